@@ -1,0 +1,201 @@
+"""What a field declaration says, as words: the source of messages, ``--explain`` and the reference page."""
+
+from __future__ import annotations
+
+import types
+import typing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Iterator, Literal
+
+from pydantic.fields import FieldInfo
+
+from .axis import FORM
+from .materials import KINDS, Materials
+from .model import Case
+from .quantity import DIMENSION, Quantity
+from .section import Section
+
+
+@dataclass(frozen=True)
+class KeyInfo:
+    """One key of the case file, described.
+
+    Attributes
+    ----------
+    key : str
+        Dotted key; ``[]`` stands for an index, ``NAME`` for a free name.
+    type, unit, allowed, description : str
+        Words for people; ``unit`` is empty for what has none.
+    default : object
+        SI default, None when there is none; ``shown`` is its text in a case file.
+    required : bool
+        Whether the key must be given.
+    """
+
+    key: str
+    type: str
+    unit: str
+    allowed: str
+    description: str
+    default: Any
+    shown: str
+    required: bool
+
+
+def quantity_of(field: FieldInfo) -> Quantity | None:
+    """The physical quantity of a scalar field, or of the elements of a list."""
+    found = next((m for m in field.metadata if isinstance(m, Quantity)), None)
+    return found or _inner_quantity(field.annotation)
+
+
+def _inner_quantity(annotation: Any) -> Quantity | None:
+    for argument in typing.get_args(annotation):
+        for meta in getattr(argument, "__metadata__", ()):
+            if isinstance(meta, Quantity):
+                return meta
+        found = _inner_quantity(argument)
+        if found:
+            return found
+    return None
+
+
+def element_model(annotation: Any) -> type[Section] | None:
+    """The section class that a field holds, directly or in a list."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return annotation
+    if typing.get_origin(annotation) is tuple:
+        return element_model(typing.get_args(annotation)[0])
+    return None
+
+
+def _limits(metadata: list[Any]) -> dict[str, Any]:
+    names = ("gt", "ge", "lt", "le", "min_length")
+    return {n: getattr(m, n) for m in metadata for n in names if getattr(m, n, None) is not None}
+
+
+def _item_limits(annotation: Any) -> dict[str, Any]:
+    meta = [m for a in typing.get_args(annotation) for m in getattr(a, "__metadata__", ())]
+    flat = [n for m in meta for n in (m.metadata if isinstance(m, FieldInfo) else [m])]
+    return _limits(flat)
+
+
+def show_value(value: Any, quantity: Quantity | None) -> str:
+    """A value as TOML text, with its unit where it has one."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if quantity is not None and isinstance(value, (int, float)):
+        value = quantity.show(value)
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, (tuple, list)):
+        return "[" + ", ".join(show_value(v, quantity) for v in value) + "]"
+    if isinstance(value, Section):
+        fields = type(value).model_fields
+        pairs = (f"{n} = {show_value(getattr(value, n), quantity_of(f))}" for n, f in fields.items())
+        return "{ " + ", ".join(pairs) + " }"
+    text = str(value).replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{text}"'
+
+
+def _bounds(limits: dict[str, Any], quantity: Quantity | None) -> str:
+    def text(value: Any) -> str:
+        if value == 0 or quantity is None:
+            return f"{value:g}"
+        shown = quantity.show(value)
+        return shown if isinstance(shown, str) else f"{shown:g}"
+
+    low, high = limits.get("ge", limits.get("gt")), limits.get("le", limits.get("lt"))
+    words = []
+    if low is not None:
+        words.append(("at least " if "ge" in limits else "greater than ") + text(low))
+    if high is not None:
+        words.append(("at most " if "le" in limits else "less than ") + text(high))
+    return " and ".join(words)
+
+
+def _type_words(field: FieldInfo) -> str:
+    annotation, quantity = field.annotation, quantity_of(field)
+    core = _strip_none(annotation)
+    if core is dict or typing.get_origin(core) is dict:
+        return "tables"
+    if element_model(annotation):
+        return "list of tables" if typing.get_origin(annotation) is tuple else "table"
+    if typing.get_origin(annotation) is tuple:
+        return f"list of {DIMENSION[quantity.si]}s" if quantity else "list"
+    if typing.get_origin(core) is Literal:
+        return "choice"
+    if quantity:
+        return DIMENSION[quantity.si]
+    return {bool: "true or false", int: "integer", str: "text", Path: "file"}.get(core, "text")
+
+
+def _strip_none(annotation: Any) -> Any:
+    if typing.get_origin(annotation) in (types.UnionType, typing.Union):
+        rest = [a for a in typing.get_args(annotation) if a is not type(None)]
+        return rest[0] if len(rest) == 1 else annotation
+    return annotation
+
+
+def allowed_words(field: FieldInfo) -> str:
+    """What a field allows, completing "it must be ..."."""
+    quantity = quantity_of(field)
+    core, kind = _strip_none(field.annotation), _type_words(field)
+    if kind == "choice":
+        options = [repr(a).replace("'", '"') for a in typing.get_args(core)]
+        return options[0] if len(options) == 1 else " or ".join(options)
+    if kind in ("table", "list of tables", "tables"):
+        return {"table": "a table", "list of tables": "a list of at least one table", "tables": "tables"}[kind]
+    if kind == "file":
+        return "the name of a file that can be read"
+    if kind.startswith("list of"):
+        words = _bounds(_item_limits(field.annotation), quantity)
+        return f"a list of at least one {DIMENSION[quantity.si]} ({quantity.si}), each {words}"
+    if kind == "true or false":
+        return "true or false"
+    bounds = _bounds(_limits(field.metadata), quantity)
+    if quantity:
+        noun = {"": "a number"}.get(quantity.si, f"{_article(DIMENSION[quantity.si])} ({quantity.si})")
+        return f"{noun} {bounds}".strip()
+    if kind == "integer":
+        return f"an integer {bounds}".strip()
+    if field.annotation is str and any(type(m).__name__ == "AfterValidator" for m in field.metadata):
+        return FORM
+    return "a text that is not empty"
+
+
+def _article(noun: str) -> str:
+    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+
+
+def describe_field(key: str, field: FieldInfo) -> KeyInfo:
+    """Describe one declared key."""
+    required = field.is_required()
+    quantity = quantity_of(field)
+    default = None if required else field.default
+    shown = "" if default is None or default == {} else show_value(default, quantity)
+    return KeyInfo(
+        key=key,
+        type=_type_words(field),
+        unit=quantity.si if quantity else "",
+        allowed=allowed_words(field),
+        description=field.description or "",
+        default=default,
+        shown=shown,
+        required=required,
+    )
+
+
+def walk(model: type[Section] = Case, prefix: str = "") -> Iterator[KeyInfo]:
+    """Every key that a case file may hold, in order; list elements and material kinds included."""
+    for name, field in model.model_fields.items():
+        key = f"{prefix}{name}"
+        if model is Materials and name == "named":
+            for kind, card in KINDS.items():
+                yield from walk(card, f"materials.NAME({kind}).")
+            continue
+        inner = element_model(field.annotation)
+        yield describe_field(key, field)
+        if inner:
+            many = "[]" if typing.get_origin(field.annotation) is tuple else ""
+            yield from walk(inner, f"{key}{many}.")

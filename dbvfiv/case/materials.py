@@ -1,0 +1,216 @@
+"""Layers and the materials they are made of.
+
+A material card is data only; what it does under strain is the business of the
+``materials`` room.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union
+
+from pydantic import Field, StrictStr, ValidationInfo, field_validator, model_validator
+
+from .quantity import Angle, Density, Length, Modulus, Number, Percent
+from .section import BrokenRule, Section, key
+
+RUBBERS = ("CR", "SBR", "EPDM")
+
+
+def _density(default: Any) -> Any:
+    return key(default, "Mass density.", gt=0, le=30000)
+
+
+def _poisson(description: str, default: Any = ...) -> Any:
+    return key(default, description, gt=-1, lt=0.5)
+
+
+class MooneyRivlin(Section):
+    """Incompressible W = c10 (I1 - 3) + c01 (I2 - 3) + c11 (I1 - 3)(I2 - 3)."""
+
+    kind: Literal["mooney-rivlin"] = key(..., "Incompressible Mooney-Rivlin rubber.")
+    c10: Modulus = key(..., "Factor of I1 - 3.", ge=-1e12, le=1e12)
+    c01: Modulus = key(..., "Factor of I2 - 3.", ge=-1e12, le=1e12)
+    c11: Modulus = key(0.0, "Factor of (I1 - 3)(I2 - 3).", ge=-1e12, le=1e12)
+    density: Density = _density(...)
+
+    @model_validator(mode="after")
+    def _stiff_at_rest(self) -> "MooneyRivlin":
+        modulus = 2 * (self.c10 + self.c01)
+        if modulus <= 0:
+            raise BrokenRule(
+                "c10",
+                f"{self.c10:g} Pa with c01 = {self.c01:g} Pa, which makes the small-strain shear modulus "
+                f"2 (c10 + c01) = {modulus:g} Pa",
+                "c10 + c01 must be greater than 0",
+            )
+        return self
+
+
+class NeoHookean(Section):
+    """Incompressible W = G/2 (I1 - 3)."""
+
+    kind: Literal["neo-hookean"] = key(..., "Incompressible neo-Hookean rubber.")
+    shear_modulus: Modulus = key(..., "Shear modulus G.", gt=0, le=1e13)
+    density: Density = _density(...)
+
+
+class Isotropic(Section):
+    """Isotropic, linear between Green-Lagrange strain and second Piola-Kirchhoff stress."""
+
+    kind: Literal["isotropic"] = key(..., "Linear elastic, isotropic.")
+    youngs_modulus: Modulus = key(..., "Young's modulus.", gt=0, le=1e13)
+    poisson_ratio: Number = _poisson("Poisson ratio.")
+    density: Density = _density(...)
+
+
+class Orthotropic(Section):
+    """Orthotropic ply in plane stress; 1 lies along the fibre, 3 through the thickness."""
+
+    kind: Literal["orthotropic"] = key(..., "Linear elastic ply, orthotropic.")
+    e1: Modulus = key(..., "Young's modulus along the fibre.", gt=0, le=1e13)
+    e2: Modulus = key(..., "Young's modulus across the fibre.", gt=0, le=1e13)
+    nu12: Number = key(..., "Poisson ratio: contraction along 2 under stress along 1.", ge=-100, le=100)
+    g12: Modulus = key(..., "Shear modulus in the plane of the ply.", gt=0, le=1e13)
+    g13: Modulus = key(..., "Transverse shear modulus along the fibre.", gt=0, le=1e13)
+    g23: Modulus = key(..., "Transverse shear modulus across the fibre.", gt=0, le=1e13)
+    density: Density = _density(...)
+
+    @model_validator(mode="after")
+    def _positive_definite(self) -> "Orthotropic":
+        limit = math.sqrt(self.e1 / self.e2)
+        if abs(self.nu12) >= limit:
+            raise BrokenRule(
+                "nu12",
+                f"{self.nu12:g}, which makes the ply's stiffness not positive definite",
+                f"it must lie strictly between -{limit:g} and {limit:g} = sqrt(e1/e2)",
+            )
+        return self
+
+
+class HalpinTsai(Section):
+    """Fibre ply from its constituents by the Halpin-Tsai equations (Th. 3.3; defaults of App. A)."""
+
+    kind: Literal["halpin-tsai"] = key("halpin-tsai", "Fibre ply from the constants of fibre and matrix.")
+    fibre_fraction: Percent = key(0.45, "Volume fraction of the fibre.", gt=0, lt=1)
+    fibre_modulus: Modulus = key(3460e6, "Young's modulus of the fibre.", gt=0, le=1e13)
+    matrix_modulus: Modulus = key(4.37e6, "Young's modulus of the matrix.", gt=0, le=1e13)
+    fibre_poisson: Number = _poisson("Poisson ratio of the fibre.", 0.21)
+    matrix_poisson: Number = _poisson("Poisson ratio of the matrix.", 0.35)
+    xi: Number = key(120000.0, "Halpin-Tsai coefficient along the fibre (twice its slenderness).", gt=0, le=1e12)
+    density: Density = _density(1270.0)
+
+
+class Fit(Section):
+    """Mooney-Rivlin constants fitted to a tension test."""
+
+    kind: Literal["fit"] = key(..., "Mooney-Rivlin rubber fitted to a tension test.")
+    path: Path = key(..., "CSV file of the tension test; relative to the case file.")
+    terms: Literal[2, 3] = key(2, "Number of constants: 2 (c10, c01) or 3 (and c11).")
+    density: Density = _density(...)
+
+    @field_validator("path", mode="after")
+    @classmethod
+    def _find(cls, path: Path, info: ValidationInfo) -> Path:
+        context = info.context or {}
+        if not context.get("check_files", True):
+            return path
+        path = Path(context.get("folder", ".")) / path
+        try:
+            found = path.is_file()
+        except (OSError, ValueError):
+            found = False
+        if not found:
+            raise ValueError("which does not exist" if not str(path).endswith("/") else "which is not a file")
+        return path.resolve()
+
+
+class ShippedRubber(Section):
+    """One of the three tested rubbers at a strain level (constants of App. A)."""
+
+    kind: Literal["shipped"] = key(..., "A rubber whose constants come with the program.")
+    rubber: Literal["CR", "SBR", "EPDM"] = key(..., "Which rubber.")
+    strain_level: Percent = key(0.10, "Strain up to which its constants were fitted.", ge=0.10, le=0.60)
+    density: Density = _density(1300.0)
+
+
+Card = Union[MooneyRivlin, NeoHookean, Isotropic, Orthotropic, HalpinTsai, Fit, ShippedRubber]
+KINDS = {c.model_fields["kind"].annotation.__args__[0]: c for c in Card.__args__}
+
+
+class Materials(Section):
+    """Materials by name; every table ``[materials.NAME]`` adds or replaces one."""
+
+    strain_level: Percent = key(
+        0.10, "Strain level of the built-in rubbers CR, SBR and EPDM; between the tested levels "
+        "10, 20, 40 and 60 % the constants are interpolated.", ge=0.10, le=0.60
+    )
+    fibre_constants: Literal["program", "table"] = key(
+        "program",
+        "Ply constants of the built-in fibre: as App. A's program uses them (xi = 2 shear modulus in "
+        "the plane) or as Table 3-5 prints them.",
+    )
+    named: dict[StrictStr, Annotated[Card, Field(discriminator="kind")]] = key(
+        {}, "The tables [materials.NAME]; in the file they stand directly under materials."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gather_named(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        known = {k: v for k, v in data.items() if k in cls.model_fields}
+        named = dict(known.get("named") or {}) if isinstance(known.get("named", {}), dict) else None
+        if named is None:
+            return data
+        for name, value in data.items():
+            if name in cls.model_fields:
+                continue
+            if isinstance(value, dict):
+                named[name] = value
+            else:
+                known[name] = value  # not a table: refused as an unknown key
+        return known | {"named": named}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every name a layer may use."""
+        return tuple(dict.fromkeys((*RUBBERS, "fibre", *self.named)))
+
+    def card(self, name: str) -> Card:
+        """Return the card of a material; tables of the case file go before the built-in ones.
+
+        Raises
+        ------
+        KeyError
+            For a name that is neither built in nor in the case file.
+        """
+        if name in self.named:
+            return self.named[name]
+        if name in RUBBERS:
+            return ShippedRubber(kind="shipped", rubber=name, strain_level=self.strain_level)
+        if name == "fibre":
+            return HalpinTsai()
+        raise KeyError(name)
+
+
+class Layer(Section):
+    """One layer of the wall."""
+
+    material: StrictStr = key(..., "Name of its material.", min_length=1)
+    thickness: Length = key(
+        ..., "Thickness before all layers are scaled to the local wall thickness.", gt=0, le=10
+    )
+    angle: Angle = key(
+        0.0, "Angle of material axis 1 from the valve's axis, in the tangent plane.", ge=-180, le=180
+    )
+
+
+DEFAULT_LAYERS = (
+    Layer(material="CR", thickness=0.00635),
+    Layer(material="SBR", thickness=0.003175),
+    Layer(material="fibre", thickness=0.0008382, angle=54.0),
+    Layer(material="fibre", thickness=0.0008382, angle=-54.0),
+    Layer(material="EPDM", thickness=0.003175),
+)

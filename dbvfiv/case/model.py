@@ -1,0 +1,102 @@
+"""The whole case: every section, and the rules between sections."""
+
+from __future__ import annotations
+
+from typing import Any, Mapping
+
+from pydantic import model_validator
+
+from . import physics, studies
+from .materials import DEFAULT_LAYERS, Layer, Materials
+from .section import BrokenRule, Section, key
+from .valve import Mesh, Valve
+
+
+class Case(Section):
+    """Everything a run depends on; ``Case()`` is the 12-inch inline valve.
+
+    All numbers are SI floats; layer angles are in degrees.
+
+    Examples
+    --------
+    >>> Case().drive.pressure
+    18000.0
+    >>> Case().replace({"drive.pressure": "36 kPa"}).drive.pressure
+    36000.0
+    """
+
+    valve: Valve = key(Valve(), "Shape and wall of the valve.")
+    mesh: Mesh = key(Mesh(), "Shell mesh of the quarter model.")
+    layers: tuple[Layer, ...] = key(
+        DEFAULT_LAYERS,
+        "Layers of the wall from inside to outside, scaled so that their sum is the local wall thickness.",
+        min_length=1,
+    )
+    materials: Materials = key(Materials(), "Materials by name.")
+    shell: physics.Shell = key(physics.Shell(), "Choices of the shell theory.")
+    damping: physics.Damping = key(physics.Damping(), "Rayleigh damping.")
+    fluid: physics.Fluid = key(physics.Fluid(), "The fluid and its conservation laws.")
+    drive: physics.Drive = key(physics.Drive(), "The load.")
+    supports: physics.Supports = key(physics.Supports(), "One-sided stops of the lips.")
+    steady: studies.Steady = key(studies.Steady(), "Equilibria over a list of pressures.")
+    modes: studies.Modes = key(studies.Modes(), "Leading eigenvalues of the coupled state.")
+    sweep: studies.Sweep = key(studies.Sweep(), "Modes tracked along one parameter.")
+    onset: studies.Onset = key(studies.Onset(), "Where a state loses stability.")
+    map: studies.StabilityMap = key(studies.StabilityMap(), "Stability over two parameters.")
+    transient: studies.Transient = key(studies.Transient(), "A time history.")
+    closure: studies.Closure = key(studies.Closure(), "Back pressure on the outside, no flow.")
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> "Case":
+        for i, layer in enumerate(self.layers):
+            if layer.material not in self.materials.names:
+                raise BrokenRule(
+                    f"layers.{i}.material",
+                    f"{layer.material!r}, which is no material of this case",
+                    f"it must be one of {', '.join(self.materials.names)} or a table [materials.NAME]",
+                )
+        if len(self.layers) * self.mesh.layer_points < 2:
+            raise BrokenRule(
+                "mesh.layer_points",
+                "1 with a single layer, which has no bending stiffness",
+                "it must be at least 2 then",
+            )
+        if self.drive.kind == "flow" and self.drive.side == "outside":
+            raise BrokenRule(
+                "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
+            )
+        if self.map.axes[0].parameter == self.map.axes[1].parameter:
+            raise BrokenRule("map.y", f"{self.map.y!r}", f"it must range over another parameter than map.x = {self.map.x!r}")
+        if self.transient.step > self.transient.duration:
+            raise BrokenRule(
+                "transient.step",
+                f"{self.transient.step:g} s",
+                f"it must be at most transient.duration = {self.transient.duration:g} s",
+            )
+        return self
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""
+        return self.model_dump(mode="json")
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Case":
+        """Rebuild a case from ``to_dict`` without looking for the files it was made from."""
+        from .load import make_case
+
+        return make_case(data, check_files=False)
+
+    def replace(self, changes: Mapping[str, Any]) -> "Case":
+        """Return a validated copy with some keys changed, ``{"drive.pressure": 36e3, ...}``.
+
+        Raises
+        ------
+        CaseError
+            As ``load_case`` does.
+        """
+        from .load import make_case, put
+
+        data = self.to_dict()
+        for dotted, value in changes.items():
+            put(data, dotted, value)
+        return make_case(data, check_files=False)

@@ -1,0 +1,69 @@
+"""Shell theory, damping, fluid, load and supports."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import StrictBool
+
+from .quantity import Density, Number, Pressure, Rate, Stiffness, Time
+from .section import Section, key
+
+
+class Shell(Section):
+    """Choices of the shell theory."""
+
+    metric: Literal["first-order", "true"] = key(
+        "first-order",
+        "Through-thickness metric: Budiansky-Sanders first order, or the true one (refused where "
+        "half the wall exceeds the radius of the mid-surface).",
+    )
+    shear_correction_plies: Number = key(5 / 6, "Transverse-shear factor of fibre plies.", gt=0, le=1.5)
+    shear_correction_rubber: Number = key(1.0, "Transverse-shear factor of all other layers.", gt=0, le=1.5)
+
+
+class Damping(Section):
+    """Rayleigh damping C = alpha M + beta K."""
+
+    alpha: Rate = key(5.0, "Factor of the mass matrix.", ge=0, le=1e6)
+    beta: Time = key(0.003, "Factor of the structure's tangent stiffness.", ge=0, le=1e3)
+
+
+class Fluid(Section):
+    """The fluid and its conservation laws."""
+
+    density: Density = key(1000.0, "Mass density.", gt=0, le=30000)
+    continuity: Literal["quasi-steady", "storage"] = key(
+        "quasi-steady",
+        "A U the same at every station (quasi-steady, the thesis), or dA/dt + d(AU)/dz = 0 (storage).",
+    )
+    unsteady: StrictBool = key(True, "Keep the unsteady term of Bernoulli's equation.")
+    area_floor: Number = key(
+        0.05, "Smallest flow area, as a fraction of the lip gap area at rest; keeps a shut passage finite.", gt=0, lt=1
+    )
+
+
+class Drive(Section):
+    """The load."""
+
+    kind: Literal["flow", "uniform"] = key(
+        "flow", "Pressure from the flow through the valve, or one uniform pressure without flow."
+    )
+    pressure: Pressure = key(18e3, "Inlet pressure (flow), or the pressure on the wall (uniform).", ge=0, le=1e8)
+    side: Literal["inside", "outside"] = key("inside", "Which side of the wall a uniform pressure acts on.")
+    unloaded_edge: Number = key(
+        3 / 28,
+        "Fraction of the columns, counted from the side edge of the duckbill, that carries no pressure.",
+        ge=0,
+        lt=1,
+    )
+
+
+class Supports(Section):
+    """One-sided stops of the lips."""
+
+    lip_stop: StrictBool = key(True, "Keep the duckbill from crossing the closing plane y = 0.")
+    lip_stop_stiffness: Stiffness = key(1e8, "Stiffness of each one-sided spring.", gt=0, le=1e15)
+    lip_stop_columns: Literal["inner-half", "all"] = key(
+        "inner-half", "Columns of duckbill nodes with a stop: those next to the centre, or all."
+    )

@@ -1,0 +1,144 @@
+"""Numbers with units: ``"36 kPa"``, ``"12 mm"``, ``"54 deg"``, ``"10 %"`` become SI floats.
+
+A bare number is taken as SI. Strings carry a unit of the right dimension; a
+fraction such as ``"3/28"`` is accepted where a plain number is asked for.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import core_schema
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*([A-Za-zµμ°%][A-Za-zµμ°%0-9/*^. ()-]{{0,40}})?\s*")
+_FRACTION = re.compile(rf"\s*({_NUMBER})\s*/\s*({_NUMBER})\s*")
+
+# SI unit -> what such a quantity is called in messages and in the reference
+DIMENSION = {
+    "m": "length",
+    "Pa": "pressure",
+    "kg/m^3": "density",
+    "s": "time",
+    "1/s": "rate",
+    "Hz": "frequency",
+    "N/m": "stiffness",
+    "m/s": "velocity",
+    "deg": "angle",
+    "": "plain number",
+}
+
+
+@cache
+def _registry():
+    import pint  # slow to import, and a case of bare numbers does without it
+
+    registry = pint.UnitRegistry()
+    # Pint allows dimensionless <-> angle; the two are kept apart in `_to_si`.
+    return registry
+
+
+@cache
+def _factor(unit_text: str, si: str) -> float | None:
+    """Factor from ``unit_text`` to ``si``; None when the dimension differs or the unit is unknown."""
+    try:
+        registry = _registry()
+        source = registry.Quantity(1.0, registry.parse_units(unit_text.replace("%", "percent")))
+        target = "degree" if si == "deg" else (si or "dimensionless")
+        return float(source.to(target).magnitude)
+    except Exception:  # pint raises a wide family, tokeniser errors included
+        return None
+
+
+def _angle_like(unit_text: str) -> bool:
+    return bool(re.fullmatch(r"(deg|degree|degrees|°|rad|radian|radians|mrad|gon|grad|arcmin|turn)", unit_text))
+
+
+def _to_si(text: str, si: str) -> float:
+    fraction = _FRACTION.fullmatch(text)
+    if fraction and si == "":
+        if float(fraction[2]) == 0.0:
+            raise ValueError("which divides by zero")
+        return float(fraction[1]) / float(fraction[2])
+    match = _QUANTITY.fullmatch(text)
+    if not match:
+        raise ValueError("which is not a number with a unit")
+    value, unit = float(match[1]), (match[2] or "").strip()
+    if not unit:
+        if si == "":
+            return value
+        raise ValueError("which has no unit")
+    if _angle_like(unit) != (si == "deg"):
+        raise ValueError(f"which is not a {DIMENSION[si]}")
+    factor = _factor(unit, si)
+    if factor is None:
+        raise ValueError(f"which is not a {DIMENSION[si]}")
+    # 15 digits: "6.19 mm" is to be the same float as 0.00619
+    return value if factor == 1.0 else float(f"{value * factor:.15g}")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Marks a float field as a physical quantity.
+
+    Parameters
+    ----------
+    si : str
+        The SI unit the validated value is in (``"deg"`` for angles).
+    shown : str
+        The unit in which case files and tables show it.
+    """
+
+    si: str
+    shown: str = ""
+
+    def parse(self, given: Any) -> float:
+        """Return the SI value of a number or a string with a unit.
+
+        Raises
+        ------
+        ValueError
+            With a clause that completes "key is given as X, ...".
+        """
+        if isinstance(given, bool):
+            raise ValueError("which is a truth value")
+        if isinstance(given, (int, float)):
+            try:
+                value = float(given)
+            except OverflowError:
+                raise ValueError("which is too large") from None
+        elif isinstance(given, str):
+            value = _to_si(given, self.si)
+        else:
+            raise ValueError("which is not a number")
+        if not math.isfinite(value):
+            raise ValueError("which is not finite")
+        return value
+
+    def show(self, value: float) -> Any:
+        """Return the value as a case file would hold it: a number, or a string with a unit."""
+        if not self.shown:
+            return value
+        factor = 1.0 if self.shown == self.si else _factor(self.shown, self.si)
+        return f"{float(f'{value / factor:.15g}'):.15g} {self.shown}"
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler):
+        return core_schema.no_info_before_validator_function(self.parse, handler(source))
+
+
+Length = Annotated[float, Quantity("m", "mm")]
+Pressure = Annotated[float, Quantity("Pa", "kPa")]
+Modulus = Annotated[float, Quantity("Pa", "MPa")]
+Density = Annotated[float, Quantity("kg/m^3", "kg/m^3")]
+Time = Annotated[float, Quantity("s", "s")]
+Rate = Annotated[float, Quantity("1/s", "1/s")]
+Frequency = Annotated[float, Quantity("Hz", "Hz")]
+Stiffness = Annotated[float, Quantity("N/m", "N/m")]
+Angle = Annotated[float, Quantity("deg", "deg")]
+Number = Annotated[float, Quantity("")]
+Percent = Annotated[float, Quantity("", "%")]

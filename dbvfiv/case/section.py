@@ -1,0 +1,39 @@
+"""What every table of a case file has in common, and the one way to declare a key."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class BrokenRule(ValueError):
+    """Two or more keys that do not go together.
+
+    Parameters
+    ----------
+    key : str
+        The key to blame, relative to the model that checks the rule.
+    given, allowed : str
+        Complete the sentence "KEY is GIVEN; ALLOWED".
+    """
+
+    def __init__(self, key: str, given: str, allowed: str):
+        super().__init__(f"{key} is {given}; {allowed}")
+        self.key, self.given, self.allowed = key, given, allowed
+
+
+class Section(BaseModel):
+    """A table of the case file: immutable, and closed to keys it does not know."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=False, allow_inf_nan=False, validate_default=True
+    )
+
+
+def key(default: Any, description: str, **limits: Any) -> Any:
+    """Declare one key: default, description and limits (``gt``, ``ge``, ``lt``, ``le``, ``min_length``).
+
+    Type and unit come from the annotation. A default of ``...`` makes the key mandatory.
+    """
+    return Field(default, description=description, **limits)

@@ -1,0 +1,89 @@
+"""One section for each study: what to compute, and how finely."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, StrictBool, StrictInt, StrictStr
+
+from .axis import Axis, parse_axis
+from .quantity import Frequency, Number, Pressure, Rate, Time
+from .section import Section, key
+
+
+def _readable(text: str) -> str:
+    parse_axis(text)
+    return text
+
+
+Range = Annotated[StrictStr, AfterValidator(_readable)]
+LoadPressure = Annotated[Pressure, Field(gt=0, le=1e8)]
+
+
+class Steady(Section):
+    """Equilibria over a list of pressures."""
+
+    pressures: tuple[LoadPressure, ...] = key(
+        (2e3, 6e3, 12e3, 18e3, 24e3, 29e3, 36e3, 50e3), "Pressures of the head-discharge curve.", min_length=1
+    )
+    tolerance: Number = key(1e-8, "Residual, relative to the load, at which Newton stops.", gt=0, le=1e-2)
+    max_iterations: StrictInt = key(30, "Newton iterations of one load step.", ge=1, le=10000)
+    min_step: Number = key(1e-4, "Smallest load step, relative to the target, before giving up.", gt=0, le=1)
+
+
+class Modes(Section):
+    """Leading eigenvalues of the coupled state."""
+
+    count: StrictInt = key(10, "How many modes.", ge=1, le=1000)
+    shift: Rate = key(50.0, "Real part of the shift; positive stands clear of the pile at -1/beta.", ge=-1e6, le=1e6)
+    shift_frequency: Frequency = key(0.0, "Frequency of the shift.", ge=0, le=1e6)
+    tolerance: Number = key(1e-8, "Largest accepted relative residual of the full pencil.", gt=0, le=1e-2)
+    in_vacuo: StrictBool = key(False, "Leave the fluid out.")
+
+
+class Sweep(Section):
+    """Modes tracked along one parameter."""
+
+    over: Range = key("density=1:1000:40:log", "Parameter and its values: PARAMETER=START:STOP:COUNT[:log].")
+
+    @property
+    def axis(self) -> Axis:
+        """The parsed range."""
+        return parse_axis(self.over)
+
+
+class Onset(Section):
+    """Where a state loses stability."""
+
+    over: Literal["pressure", "density", "alpha", "beta"] = key("density", "The parameter to move.")
+
+
+class StabilityMap(Section):
+    """Stability over two parameters."""
+
+    x: Range = key("pressure=500:50000:64", "Horizontal range: PARAMETER=START:STOP:COUNT[:log].")
+    y: Range = key("density=1:1000:64:log", "Vertical range: PARAMETER=START:STOP:COUNT[:log].")
+
+    @property
+    def axes(self) -> tuple[Axis, Axis]:
+        """The parsed ranges."""
+        return parse_axis(self.x), parse_axis(self.y)
+
+
+class Transient(Section):
+    """A time history."""
+
+    step: Time = key(1e-3, "Time step.", gt=0, le=1e3)
+    duration: Time = key(0.5, "Simulated time.", gt=0, le=1e5)
+    start: Literal["rest", "steady", "kick"] = key(
+        "rest", "From the closed valve at rest, from the steady state, or from the steady state with a push."
+    )
+    numerical_damping: Number = key(0.0, "Numerical damping of high frequencies.", ge=0, le=0.5)
+
+
+class Closure(Section):
+    """Back pressure on the outside, no flow."""
+
+    pressures: tuple[LoadPressure, ...] = key(
+        (7e3, 14e3, 21e3, 28e3), "Back pressures.", min_length=1
+    )

@@ -1,0 +1,39 @@
+"""The two kinds of failure a user can meet, each told in one sentence.
+
+``CaseError`` means the question was wrong (exit status 2), ``SolveError`` that
+the question was fine and no answer was found (exit status 1).
+"""
+
+from __future__ import annotations
+
+
+class CaseError(ValueError):
+    """A case, an override or a command-line value that cannot be used.
+
+    Parameters
+    ----------
+    sentence : str
+        One sentence: which key, what was given, what is allowed.
+    key : str, optional
+        Dotted key in the case, such as ``drive.pressure``.
+    line : int, optional
+        Line of the TOML file, counted from 1, where it is known.
+    """
+
+    def __init__(self, sentence: str, key: str | None = None, line: int | None = None):
+        super().__init__(" ".join(str(sentence).split()))
+        self.key = key
+        self.line = line
+
+
+class SolveError(RuntimeError):
+    """A solution that was not found.
+
+    Parameters
+    ----------
+    sentence : str
+        One sentence: at which pressure or time, and what was tried.
+    """
+
+    def __init__(self, sentence: str):
+        super().__init__(" ".join(str(sentence).split()))
