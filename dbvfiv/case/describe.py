@@ -100,10 +100,12 @@ def show_value(value: Any, quantity: Quantity | None) -> str:
 
 def _bounds(limits: dict[str, Any], quantity: Quantity | None) -> str:
     def text(value: Any) -> str:
-        if value == 0 or quantity is None:
+        if quantity is None or quantity.shown == "":
             return f"{value:g}"
         shown = quantity.show(value)
-        return shown if isinstance(shown, str) else f"{shown:g}"
+        if not isinstance(shown, str) or abs(float(shown.split()[0])) > 1e4:
+            return f"{value:g} {quantity.si}".strip()
+        return shown
 
     low, high = limits.get("ge", limits.get("gt")), limits.get("le", limits.get("lt"))
     words = []
@@ -150,12 +152,12 @@ def allowed_words(field: FieldInfo) -> str:
         return "the name of a file that can be read"
     if kind.startswith("list of"):
         words = _bounds(_item_limits(field.annotation), quantity)
-        return f"a list of at least one {DIMENSION[quantity.si]} ({quantity.si}), each {words}"
+        return f"a list of at least one {DIMENSION[quantity.si]}, each {words}"
     if kind == "true or false":
         return "true or false"
     bounds = _bounds(_limits(field.metadata), quantity)
     if quantity:
-        noun = {"": "a number"}.get(quantity.si, f"{_article(DIMENSION[quantity.si])} ({quantity.si})")
+        noun = _article(DIMENSION[quantity.si]) if quantity.si else "a number"
         return f"{noun} {bounds}".strip()
     if kind == "integer":
         return f"an integer {bounds}".strip()

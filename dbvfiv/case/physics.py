@@ -49,7 +49,7 @@ class Drive(Section):
     kind: Literal["flow", "uniform"] = key(
         "flow", "Pressure from the flow through the valve, or one uniform pressure without flow."
     )
-    pressure: Pressure = key(18e3, "Inlet pressure (flow), or the pressure on the wall (uniform).", ge=0, le=1e8)
+    pressure: Pressure = key(18e3, "Inlet pressure (flow), or the pressure on the wall (uniform).", ge=0, le=1e7)
     side: Literal["inside", "outside"] = key("inside", "Which side of the wall a uniform pressure acts on.")
     unloaded_edge: Number = key(
         3 / 28,

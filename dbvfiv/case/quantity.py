@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from typing import Annotated, Any
 
@@ -16,7 +17,7 @@ from pydantic import GetCoreSchemaHandler
 from pydantic_core import core_schema
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*([A-Za-zµμ°%][A-Za-zµμ°%0-9/*^. ()-]{{0,40}})?\s*")
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*((?:1?\s*/\s*)?[A-Za-zµμ°%][A-Za-zµμ°%0-9/*^. ()-]{{0,40}})?\s*")
 _FRACTION = re.compile(rf"\s*({_NUMBER})\s*/\s*({_NUMBER})\s*")
 
 # SI unit -> what such a quantity is called in messages and in the reference
@@ -48,7 +49,8 @@ def _factor(unit_text: str, si: str) -> float | None:
     """Factor from ``unit_text`` to ``si``; None when the dimension differs or the unit is unknown."""
     try:
         registry = _registry()
-        source = registry.Quantity(1.0, registry.parse_units(unit_text.replace("%", "percent")))
+        text = ("1" if unit_text.startswith("/") else "") + unit_text.replace("%", "percent")
+        source = registry.Quantity(1.0, registry.parse_units(text))
         target = "degree" if si == "deg" else (si or "dimensionless")
         return float(source.to(target).magnitude)
     except Exception:  # pint raises a wide family, tokeniser errors included
@@ -121,11 +123,18 @@ class Quantity:
         return value
 
     def show(self, value: float) -> Any:
-        """Return the value as a case file would hold it: a number, or a string with a unit."""
+        """Return the value as a case file would hold it: a number, or a string with a unit.
+
+        The result reads back as exactly the same float.
+        """
         if not self.shown:
+            fraction = Fraction(value).limit_denominator(100)
+            if len(repr(value)) > 10 and float(fraction) == value:
+                return f"{fraction.numerator}/{fraction.denominator}"
             return value
         factor = 1.0 if self.shown == self.si else _factor(self.shown, self.si)
-        return f"{float(f'{value / factor:.15g}'):.15g} {self.shown}"
+        text = f"{value / factor:.15g} {self.shown}"
+        return text if self.parse(text) == value else value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler):
         return core_schema.no_info_before_validator_function(self.parse, handler(source))

@@ -17,7 +17,7 @@ def _readable(text: str) -> str:
 
 
 Range = Annotated[StrictStr, AfterValidator(_readable)]
-LoadPressure = Annotated[Pressure, Field(gt=0, le=1e8)]
+LoadPressure = Annotated[Pressure, Field(gt=0, le=1e7)]
 
 
 class Steady(Section):

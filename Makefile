@@ -1,0 +1,26 @@
+# Two commands matter: `make demo` and `make test`; each sets up what is missing first.
+PYTHON = $(shell cat build/setup/python 2>/dev/null)
+
+.PHONY: setup test verify bench demo docs clean
+.DEFAULT_GOAL := demo
+
+setup:
+	@tools/setup
+
+test: setup
+	@$(PYTHON) -m pytest -m "not slow"
+
+verify: setup
+	@$(PYTHON) -m pytest -s tests/verification
+
+bench: setup
+	@$(PYTHON) -m benchmarks
+
+demo: setup
+	@PYTHON="$(PYTHON)" tools/demo
+
+docs: setup
+	@$(PYTHON) -m dbvfiv.case.reference > docs/case-reference.md
+
+clean:
+	rm -rf out build

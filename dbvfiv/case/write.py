@@ -1,0 +1,101 @@
+"""A case as TOML text, with or without comments; reading it back gives the same case."""
+
+from __future__ import annotations
+
+import textwrap
+import typing
+from typing import Any, Iterator
+
+from .. import __version__
+from .describe import allowed_words, element_model, quantity_of, show_value
+from .materials import Materials
+from .model import Case
+from .section import Section
+
+_WIDTH = 110
+_BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
+
+HEAD = """# A case of dbvfiv: a duckbill valve, its material, the fluid and the load.
+#
+# Quantities are SI numbers or strings with units: 18e3 or "18 kPa", 0.012 or "12 mm", "54 deg", "10 %".
+# Every key is optional and is set to its default here, which is the 12-inch inline valve; delete what you
+# do not change. `dbvfiv case FILE` checks the file, `dbvfiv case --explain KEY` explains a key.
+"""
+
+OWN_MATERIAL = """
+# Further materials, or replacements of CR, SBR, EPDM and fibre, are tables [materials.NAME], for instance
+#
+# [materials.silicone]
+# kind = "mooney-rivlin"     # also neo-hookean, isotropic, orthotropic, halpin-tsai, fit, shipped
+# c10 = "0.3 MPa"
+# c01 = "0.1 MPa"
+# density = "1150 kg/m^3"
+"""
+
+
+def case_toml(case: Case, comments: bool = True) -> str:
+    """Return the case as TOML.
+
+    Parameters
+    ----------
+    case : Case
+    comments : bool
+        Put description and allowed values above each key.
+    """
+    parts = [HEAD] if comments else [f"# dbvfiv {__version__}: every key of this case"]
+    for name, field in Case.model_fields.items():
+        value = getattr(case, name)
+        if comments:
+            parts.append(f"\n# ---- {field.description}")
+        if isinstance(value, tuple):
+            parts.extend(_tables(name, value, comments))
+            continue
+        parts.append(f"[{name}]" if comments else f"\n[{name}]")
+        parts.extend(_keys(value, comments))
+        if isinstance(value, Materials):
+            for own, card in value.named.items():
+                parts.append(f"\n[materials.{_quoted(own)}]")
+                parts.extend(_keys(card, comments))
+            if comments:
+                parts.append(OWN_MATERIAL.rstrip("\n"))
+    return "\n".join(parts) + "\n"
+
+
+def _tables(name: str, items: tuple[Section, ...], comments: bool) -> Iterator[str]:
+    """An array of tables; the keys are explained at its first element only."""
+    for i, item in enumerate(items):
+        yield f"[[{name}]]" if comments and i == 0 else f"\n[[{name}]]"
+        yield from _keys(item, comments and i == 0)
+
+
+def _keys(section: Section, comments: bool) -> Iterator[str]:
+    for name, field in type(section).model_fields.items():
+        if name == "named" and isinstance(section, Materials):
+            continue
+        value = getattr(section, name)
+        if comments:
+            yield from _comment(field)
+        if value is None:
+            if comments:
+                yield f'# {name} = "..."'
+            continue
+        yield f"{name} = {_value(value, field)}"
+
+
+def _comment(field: Any) -> Iterator[str]:
+    words = field.description or ""
+    if element_model(field.annotation) is None:
+        words = f"{words} [{allowed_words(field)}]"
+    for line in textwrap.wrap(words, _WIDTH - 2):
+        yield f"# {line}"
+
+
+def _value(value: Any, field: Any) -> str:
+    if typing.get_origin(field.annotation) is tuple and element_model(field.annotation):
+        rows = "".join(f"    {show_value(item, None)},\n" for item in value)
+        return f"[\n{rows}]"
+    return show_value(value, quantity_of(field))
+
+
+def _quoted(name: str) -> str:
+    return name if name and set(name) <= _BARE else show_value(name, None)

@@ -1,0 +1,34 @@
+"""The arguments that commands share, and how a case is taken from them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Optional
+
+import typer
+
+if TYPE_CHECKING:
+    from ..case import Case
+
+CaseFile = Annotated[Optional[Path], typer.Argument(metavar="[CASE]", help="Case file; the 12-inch valve without one.")]
+ResultFile = Annotated[Path, typer.Argument(metavar="RESULT.h5", help="Result file of an earlier command.")]
+Override = Annotated[
+    Optional[list[str]],
+    typer.Option("--set", metavar="KEY=VALUE", help='Change a key of the case: --set drive.pressure="18 kPa".'),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")]
+Output = Annotated[
+    Optional[Path], typer.Option("-o", "--output", metavar="RESULT.h5", help="Keep everything in this HDF5 file.")
+]
+
+
+def read_case(path: Path | None, overrides: list[str] | None) -> "Case":
+    """Load the case a command was given.
+
+    Raises
+    ------
+    CaseError
+    """
+    from ..case import load_case
+
+    return load_case(path, overrides or ())

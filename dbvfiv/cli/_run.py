@@ -1,0 +1,107 @@
+"""Build the command list, run one, and translate every failure into a sentence and an exit status."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pkgutil
+import sys
+import traceback
+from typing import Annotated, Sequence
+
+import typer
+
+from ..errors import CaseError, SolveError
+
+# Typer brings its own Click in newer versions and uses the separate package in older ones.
+_UsageProblem = typer.BadParameter.__mro__[2]
+
+
+def _version(show: bool) -> None:
+    if show:
+        from .. import __version__
+
+        print(f"dbvfiv {__version__}")
+        raise typer.Exit()
+
+
+def _root(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")] = False,
+) -> None:
+    """Fluid-induced vibration of duckbill valves.
+
+    A CASE is a TOML file; without one the 12-inch valve is taken.
+    Start with `dbvfiv case --new my.toml`, check the machine with `dbvfiv doctor`.
+    """
+
+
+def build() -> typer.Typer:
+    """Collect the command modules of this package."""
+    app = typer.Typer(
+        add_completion=False, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False
+    )
+    app.callback()(_root)
+    package = __package__
+    folder = importlib.import_module(package).__path__
+    names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
+    modules = [(name, importlib.import_module(f"{package}.{name}")) for name in names]
+    for name, module in sorted(modules, key=lambda pair: (getattr(pair[1], "ORDER", 100), pair[0])):
+        app.command(name.replace("_", "-"), no_args_is_help=False)(module.command)
+    return app
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Without the program's name.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, 1 no solution or a failing machine, 2 a case or
+        an argument that cannot be used, 3 an error of the program, 130 interrupted.
+    """
+    command = typer.main.get_command(build())
+    try:
+        status = command.main(list(arguments), prog_name="dbvfiv", standalone_mode=False)
+        sys.stdout.flush()
+        return status if isinstance(status, int) else 0
+    except CaseError as error:
+        return _say(str(error), 2)
+    except SolveError as error:
+        return _say(str(error), 1)
+    except (KeyboardInterrupt, typer.Abort):
+        return _say("Interrupted; what was finished before has been kept.", 130)
+    except typer.Exit as leave:
+        return leave.exit_code
+    except _UsageProblem as problem:
+        if type(problem).__name__ == "NoArgsIsHelpError":
+            print(problem.format_message())
+            return 2
+        text = " ".join(problem.format_message().split()).rstrip(".?").replace(". ", "; ")
+        return _say(f"{text}; `dbvfiv --help` lists what there is.", 2)
+    except BrokenPipeError:
+        # the reader left (`dbvfiv ... | head`); keep Python from complaining at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        name = f" {error.filename!r}" if error.filename else ""
+        return _say(f"The file{name} cannot be used ({error.strerror or error}).", 1)
+    except Exception as error:  # the last line of defence: no traceback unless asked for
+        if os.environ.get("DBVFIV_DEBUG"):
+            traceback.print_exc()
+        detail = " ".join(str(error).split())[:200].rstrip(".")
+        return _say(
+            f"The program failed unexpectedly ({type(error).__name__}: {detail}); "
+            "set DBVFIV_DEBUG=1 for the details to report.",
+            3,
+        )
+
+
+def _say(sentence: str, status: int) -> int:
+    sys.stdout.flush()
+    print(sentence, file=sys.stderr)
+    return status

@@ -1,0 +1,172 @@
+"""What this machine offers, what is missing, and the command that mends it."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+import platform
+import sys
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from . import __version__, runtime
+
+_NEEDED = ("numpy", "scipy", "jax", "numba", "h5py", "matplotlib", "pydantic", "pint", "typer", "tqdm", "pyvista")
+_FOR_TESTS = ("pytest", "hypothesis", "felupe")
+_SOLVERS = ("mumps", "superlu", "superlu_dist", "umfpack", "petsc")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something that is missing or unfit.
+
+    Attributes
+    ----------
+    what, remedy : str
+        A sentence, and a command or an action.
+    fatal : bool
+        Whether the solvers cannot work because of it.
+    """
+
+    what: str
+    remedy: str
+    fatal: bool = True
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was found."""
+
+    dbvfiv: str
+    python: str
+    executable: str
+    platform: str
+    cores: int
+    packages: dict[str, str | None]
+    petsc: dict[str, Any]
+    cache: dict[str, Any]
+    problems: list[Problem] = field(default_factory=list)
+
+    @property
+    def healthy(self) -> bool:
+        """Whether every solver can work."""
+        return not any(problem.fatal for problem in self.problems)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return asdict(self) | {"healthy": self.healthy}
+
+
+def examine() -> Report:
+    """Look at packages, PETSc and SLEPc, the cache folder and the cores."""
+    problems: list[Problem] = []
+    packages = {name: _version(name, problems) for name in _NEEDED}
+    packages |= {name: _version(name, problems, fatal=False) for name in _FOR_TESTS}
+    return Report(
+        dbvfiv=__version__,
+        python=platform.python_version(),
+        executable=sys.executable,
+        platform=platform.platform(),
+        cores=_cores(),
+        packages=packages,
+        petsc=_petsc(problems),
+        cache=_cache(problems),
+        problems=problems,
+    )
+
+
+def _version(name: str, problems: list[Problem], fatal: bool = True) -> str | None:
+    try:
+        return str(getattr(importlib.import_module(name), "__version__", "unknown"))
+    except Exception as error:  # a broken binary raises more than ImportError
+        detail = " ".join(str(error).split())[:120]
+        role = "" if fatal else " (only the tests need it)"
+        problems.append(Problem(f"{name} cannot be imported{role}: {detail}.", "make setup", fatal))
+        return None
+
+
+def _petsc(problems: list[Problem]) -> dict[str, Any]:
+    """Versions, scalar type and direct solvers of PETSc and SLEPc."""
+    found: dict[str, Any] = {"petsc": None, "slepc": None, "scalar": None, "integer_bits": None, "solvers": []}
+    if importlib.util.find_spec("petsc4py") is None or importlib.util.find_spec("slepc4py") is None:
+        problems.append(Problem("PETSc and SLEPc for Python (petsc4py, slepc4py) are missing.", petsc_remedy()))
+        return found
+    try:
+        import petsc4py
+
+        petsc4py.init(["dbvfiv"])
+        import numpy as np
+        from petsc4py import PETSc
+        from slepc4py import SLEPc
+    except Exception as error:
+        detail = " ".join(str(error).split())[:160]
+        problems.append(Problem(f"PETSc or SLEPc is installed but cannot be imported: {detail}.", petsc_remedy()))
+        return found
+    found["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
+    found["slepc"] = ".".join(map(str, SLEPc.Sys.getVersion()))
+    found["scalar"] = "complex" if np.dtype(PETSc.ScalarType).kind == "c" else "real"
+    found["integer_bits"] = np.dtype(PETSc.IntType).itemsize * 8
+    found["solvers"] = [name for name in _SOLVERS if _factors(PETSc, name)]
+    if np.dtype(PETSc.RealType).itemsize < 8:
+        problems.append(Problem("PETSc works in single precision.", petsc_remedy()))
+    if "mumps" not in found["solvers"]:
+        problems.append(
+            Problem("PETSc has no MUMPS, so factorisations are slower.", petsc_remedy(), fatal=not found["solvers"])
+        )
+    return found
+
+
+def _factors(PETSc: Any, name: str) -> bool:
+    """Whether PETSc factors a small unsymmetric matrix with this package."""
+    PETSc.Sys.pushErrorHandler("ignore")
+    try:
+        matrix = PETSc.Mat().createAIJ((2, 2), nnz=2, comm=PETSc.COMM_SELF)
+        matrix.setValues([0, 1], [0, 1], [[2.0, 1.0], [0.5, 3.0]])
+        matrix.assemble()
+        solver = PETSc.KSP().create(PETSc.COMM_SELF)
+        solver.setOperators(matrix)
+        solver.setType("preonly")
+        solver.getPC().setType("lu")
+        solver.getPC().setFactorSolverType(name)
+        solver.setUp()
+        return True
+    except PETSc.Error:
+        return False
+    finally:
+        PETSc.Sys.popErrorHandler()
+
+
+def petsc_remedy() -> str:
+    """The command that brings PETSc and SLEPc to this kind of machine."""
+    if os.environ.get("CONDA_PREFIX"):
+        return "conda install -c conda-forge petsc4py slepc4py"
+    if os.path.exists("/etc/debian_version"):
+        return "make setup (as root or with sudo: apt-get install python3-petsc4py-real python3-slepc4py-real)"
+    return "conda env create -f environment.yml, or load your cluster's petsc4py and slepc4py modules, then make setup"
+
+
+def _cache(problems: list[Problem]) -> dict[str, Any]:
+    folder = runtime.cache_directory()
+    size = 0
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".probe-{os.getpid()}"
+        probe.write_bytes(b"")
+        probe.unlink()
+        writable = True
+        size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+    except OSError:
+        writable = False
+        problems.append(
+            Problem(
+                f"The cache folder {folder} is not writable, so every run compiles anew.",
+                "export DBVFIV_CACHE=/a/folder/you/may/write",
+                fatal=False,
+            )
+        )
+    return {"folder": str(folder), "writable": writable, "bytes": size}
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)

@@ -1,0 +1,53 @@
+"""The process's surroundings: double precision, caches, threads, MPI without ``mpiexec``.
+
+Everything goes through environment variables that the libraries read when they
+are first imported, and never overwrites what the user has set.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+
+def cache_directory() -> Path:
+    """Folder of compiled code: ``$DBVFIV_CACHE``, or the platform's user cache."""
+    chosen = os.environ.get("DBVFIV_CACHE")
+    if chosen:
+        return Path(chosen).expanduser()
+    import platformdirs
+
+    return Path(platformdirs.user_cache_dir("dbvfiv"))
+
+
+def prepare() -> None:
+    """Set the surroundings; safe to call again, also after JAX was imported.
+
+    Double precision in JAX is not optional: Newton's method stops at 1e-8.
+    """
+    cache = cache_directory()
+    settings = {
+        "JAX_PLATFORMS": "cpu",
+        "JAX_COMPILATION_CACHE_DIR": str(cache / "jax"),
+        "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.2",
+        "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
+        "NUMBA_CACHE_DIR": str(cache / "numba"),
+        # element loops and the small factorisations here lose time to threads
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+        # Open MPI: one process without mpiexec, as root too, without noise
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "OMPI_MCA_plm": "isolated",
+        "OMPI_MCA_btl_base_warn_component_unused": "0",
+        "OMPI_MCA_btl_vader_single_copy_mechanism": "none",
+        "PRTE_MCA_plm_ssh_agent": "false",
+    }
+    for name, value in settings.items():
+        os.environ.setdefault(name, value)
+    os.environ["JAX_ENABLE_X64"] = "true"
+    if "jax" in sys.modules:
+        config = sys.modules["jax"].config
+        config.update("jax_enable_x64", True)
+        config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
