@@ -1,20 +1,20 @@
 """Material laws of a layered wall: rubbers, isotropic sheets and fibre plies.
 
-Each law is a strain energy in five Green-Lagrange strains with S33 = 0 (see `law`); stresses and
-tangents follow by differentiation. Energies are meant for float64: switch on ``jax_enable_x64``.
+Each law is a strain energy in five Green-Lagrange strains with S33 = 0 (see `law`);
+stresses and tangents follow by differentiation, in float64 (importing this package switches it on).
 """
 
 from dbvfiv.materials.checks import MaterialError
+from dbvfiv.materials.fit import UniaxialFit, fit_mooney_rivlin, uniaxial_stress
+from dbvfiv.materials.halpin_tsai import fibre_ply, halpin_tsai, ply_from_constituents
 from dbvfiv.materials.isotropic import IsotropicElastic
-from dbvfiv.materials.law import (
-    LINEAR_ELASTIC,
-    MOONEY_RIVLIN,
-    PARAMETER_COUNT,
-    Law,
-    energy_of,
-)
+from dbvfiv.materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, PARAMETER_COUNT, Law, energy_of
+from dbvfiv.materials.library import law_from_card, law_from_case
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
 from dbvfiv.materials.orthotropic import OrthotropicPly
+from dbvfiv.materials.rubbers import rubber, rubber_names, strain_levels
+from dbvfiv.materials.stability import StableRange, stability_margin, stability_warning, stable_range
+from dbvfiv.materials.tension_test import TensionTest, read_tension_test
 
 __all__ = [
     "IsotropicElastic",
@@ -25,5 +25,22 @@ __all__ = [
     "MooneyRivlin",
     "OrthotropicPly",
     "PARAMETER_COUNT",
+    "StableRange",
+    "TensionTest",
+    "UniaxialFit",
     "energy_of",
+    "fibre_ply",
+    "fit_mooney_rivlin",
+    "halpin_tsai",
+    "law_from_card",
+    "law_from_case",
+    "ply_from_constituents",
+    "read_tension_test",
+    "rubber",
+    "rubber_names",
+    "stability_margin",
+    "stability_warning",
+    "stable_range",
+    "strain_levels",
+    "uniaxial_stress",
 ]

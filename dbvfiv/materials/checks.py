@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from numbers import Real
 
+from dbvfiv.errors import CaseError
 
-class MaterialError(ValueError):
+
+class MaterialError(CaseError):
     """A material constant, table or test file that cannot be used; the message says why."""
 
 

@@ -14,10 +14,14 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from dbvfiv.materials.incompressible import mooney_rivlin_energy
+
+# Single precision would leave nothing of constants that cancel to a twentieth of their size.
+jax.config.update("jax_enable_x64", True)
 
 LINEAR_ELASTIC = 0
 MOONEY_RIVLIN = 1
@@ -99,7 +103,6 @@ def energy_of(kind, parameters, e):
 
     Examples
     --------
-    >>> import jax; jax.config.update("jax_enable_x64", True)
     >>> from dbvfiv.materials import MooneyRivlin, energy_of
     >>> law = MooneyRivlin(c10=4e5, c01=1e5, c11=0.0, density=1300.0)
     >>> e = [0.1, 0.0, 0.02, 0.0, 0.01]
