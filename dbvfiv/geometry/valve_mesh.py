@@ -1,0 +1,122 @@
+"""Graded mesh of the quarter valve, with its rows, symmetry planes and flow areas at rest."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case.valve import Mesh, Valve
+from .surface import Surface, surface_of
+
+
+@dataclass(frozen=True)
+class ValveMesh:
+    """Nodes on rows of constant z, from the lip (row 0) to the flange (last row).
+
+    Attributes
+    ----------
+    nodes : (nn, 3) array, m
+    quads : (ne, 4) int array
+        Oriented so that the normal points out of the valve.
+    rows : (rows, columns) int array
+        Node numbers; column 0 on x = 0, the last column on y = 0.
+    columns : (columns,) array
+        Position of the columns in the parameter of the grading, 0 at the centre, 1 at the side edge.
+    z : (rows,) array, m
+    thickness : (ne,) array, m
+    element_z : (ne,) array, m
+        Axial position of the element centres.
+    element_columns : (ne, 2) array
+        Grading parameter of the two sides of each element.
+    rest_area : (rows,) array, m2
+        Area between mid-surface and symmetry planes at rest, of the surface itself, not of the polygon through the nodes.
+    wall_deduction : (rows,) array, m2
+        Area taken by the wall (Th. 4.12-4.14), less the initial gap.
+    """
+
+    nodes: np.ndarray
+    quads: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+    z: np.ndarray
+    thickness: np.ndarray
+    element_z: np.ndarray
+    element_columns: np.ndarray
+    rest_area: np.ndarray
+    wall_deduction: np.ndarray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Elements around and along."""
+        return self.rows.shape[1] - 1, self.rows.shape[0] - 1
+
+
+def valve_mesh(valve: Valve, mesh: Mesh) -> ValveMesh:
+    """Mesh a valve.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has fewer elements along than the surface has pieces.
+    """
+    surface = surface_of(valve)
+    z = row_positions(surface, mesh.along)
+    columns = np.linspace(0.0, 1.0, mesh.around + 1)
+    s = grading(columns, mesh.grading)
+    points = np.stack([surface.section(level, s) for level in z])
+    points[:, 0, 0] = 0.0
+    points[:, -1, 1] = 0.0
+    count = mesh.around + 1
+    rows = np.arange(len(z) * count, dtype=np.int32).reshape(len(z), count)
+    quads = np.stack([rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]], axis=-1).reshape(-1, 4)
+    middle = 0.5 * (z[1:] + z[:-1])
+    element_z = np.repeat(middle, mesh.around)
+    return ValveMesh(
+        nodes=points.reshape(-1, 3),
+        quads=quads,
+        rows=rows,
+        columns=columns,
+        z=z,
+        thickness=np.array([valve.thickness_at(level) for level in element_z]),
+        element_z=element_z,
+        element_columns=np.tile(np.stack([columns[:-1], columns[1:]], axis=1), (mesh.along, 1)),
+        rest_area=np.array([surface.area(level) for level in z]),
+        wall_deduction=wall_deduction(valve, z),
+    )
+
+
+def grading(columns: np.ndarray, ratio: float) -> np.ndarray:
+    """Normalised arc length at the column parameters: element lengths fall geometrically from 1 to `ratio`.
+
+    A continuous law, so that meshes of twice the elements contain the nodes of the coarser ones.
+    """
+    if abs(ratio - 1.0) < 1e-9:
+        return np.asarray(columns, float)
+    return (1.0 - ratio ** np.asarray(columns, float)) / (1.0 - ratio)
+
+
+def row_positions(surface: Surface, along: int) -> np.ndarray:
+    """Axial positions of the rows: each piece of the surface gets elements in proportion to its length, at least one."""
+    breaks = surface.breaks
+    lengths = np.diff(breaks)
+    if along < len(lengths):
+        raise ValueError(f"mesh.along is {along}, but the surface has {len(lengths)} pieces and each needs an element.")
+    share = along * lengths / lengths.sum()
+    counts = np.maximum(1, np.floor(share + 1e-9).astype(int))
+    while counts.sum() < along:
+        counts[np.argmax(share - counts)] += 1
+    while counts.sum() > along:
+        counts[np.argmin(np.where(counts > 1, share - counts, np.inf))] -= 1
+    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks[:-1], breaks[1:], counts)]
+    return np.concatenate([*parts, breaks[-1:]])
+
+
+def wall_deduction(valve: Valve, z: np.ndarray) -> np.ndarray:
+    """Part of the section taken by the wall (Th. 4.12-4.14, App. A): constant on duckbill and flange, linear over the saddle."""
+    gap = valve.duckbill_wall_deduction - valve.initial_gap
+    duckbill = 0.25 * np.pi * valve.lip_radius**2 + valve.lip_half_width * gap
+    inner = valve.flange_radius - valve.flange_wall_deduction
+    flange = 0.25 * np.pi * (valve.flange_radius**2 - inner**2)
+    joint = valve.duckbill_length
+    share = np.clip((np.asarray(z) - joint) / valve.saddle_length, 0.0, 1.0)
+    return duckbill + share * (flange - duckbill)

@@ -1,0 +1,33 @@
+"""From a case to the shell it describes."""
+from __future__ import annotations
+
+from ..case.model import Case
+from ..geometry import ValveMesh, valve_mesh
+from ..materials.library import law_from_case
+from ..materials.orthotropic import OrthotropicPly
+from ..shell import Layer, Section, Shell, ShellMesh
+from .supports import free_unknowns
+
+
+def build_section(case: Case) -> Section:
+    """Wall of a case, inside to outside, with its shear-correction factors."""
+    layers = []
+    for layer in case.layers:
+        law = law_from_case(case, layer.material)
+        ply = isinstance(law, OrthotropicPly)
+        factor = case.shell.shear_correction_plies if ply else case.shell.shear_correction_rubber
+        layers.append(Layer(law, layer.thickness, layer.angle, factor, layer.material))
+    return Section(tuple(layers), case.mesh.layer_points)
+
+
+def build_shell(case: Case) -> tuple[ValveMesh, Shell]:
+    """Mesh and shell of a case."""
+    mesh = valve_mesh(case.valve, case.mesh)
+    surface = ShellMesh.build(
+        mesh.nodes,
+        mesh.quads,
+        mesh.thickness,
+        material_axis=(0.0, 0.0, 1.0),
+        planes=[(mesh.rows[:, 0], 0), (mesh.rows[:, -1], 1)],
+    )
+    return mesh, Shell(surface, build_section(case), free_unknowns(mesh), case.shell.metric)

@@ -1,0 +1,188 @@
+"""Equilibrium at one pressure: globalised Newton by PETSc's SNES on the coupled residual, solved directly."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from .linear import SingularMatrix
+from .valve import Tangent, ValveModel
+
+_REASONS = {
+    -1: "the residual or tangent could not be evaluated",
+    -2: "too many residuals were evaluated",
+    -3: "the tangent is singular or holds numbers that are not finite",
+    -4: "the residual became infinite",
+    -5: "the iterations ran out",
+    -6: "the line search found no acceptable step",
+    -7: "the inner solve failed",
+    -8: "the line search stalled in a local minimum of the residual",
+    -9: "the residual grew beyond bounds",
+    -11: "the tangent solves became inaccurate",
+}
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """Options of the equilibrium iteration.
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest norm of the residual over that of the pressure forces.
+    max_iterations : int
+    line_search : str
+        A SNES line search. Full steps ("basic") serve shells best: the residual rises before it falls, as membrane forces follow bending, so
+        searches on its norm crawl; load steps catch what diverges.
+    largest_step : float
+        Largest norm of one Newton step over that of the valve's length per root of the node count; guards against wild first steps.
+    """
+
+    tolerance: float = 1e-8
+    max_iterations: int = 30
+    line_search: str = "basic"
+    largest_step: float = 0.1
+
+
+@dataclass(frozen=True)
+class NewtonResult:
+    """Outcome of one equilibrium iteration.
+
+    Attributes
+    ----------
+    q : (n,) array
+    converged : bool
+    iterations : int
+    residual : float
+        Norm of the unbalanced force over that of the pressure forces.
+    rounding : float
+        Relative residual that rounding alone leaves; a residual below it counts as zero.
+    reason : str
+    """
+
+    q: np.ndarray
+    converged: bool
+    iterations: int
+    residual: float
+    rounding: float
+    reason: str
+
+
+class EquilibriumSolver:
+    """Newton iterations for one model; keeps its factorisation between calls.
+
+    Parameters
+    ----------
+    model : ValveModel
+    options : NewtonOptions
+    """
+
+    def __init__(self, model: ValveModel, options: NewtonOptions = NewtonOptions()):
+        self.model = model
+        self.options = options
+        self.factor = model.factor()
+        self.tangent: Tangent | None = None
+        self.tangents = 0
+        self.residuals = 0
+        self.last: np.ndarray | None = None
+        self._pressure = 0.0
+        self._error = ""
+        n = model.size
+        self._snes = snes = PETSc.SNES().create(PETSc.COMM_SELF)
+        self._vector = PETSc.Vec().createSeq(n)
+        self._residual = PETSc.Vec().createSeq(n)
+        jacobian = PETSc.Mat().createPython((n, n), context=_CoupledTangent(self), comm=PETSc.COMM_SELF)
+        jacobian.setUp()
+        snes.setFunction(self._evaluate, self._residual)
+        snes.setJacobian(self._linearise, jacobian, jacobian)
+        snes.setConvergenceTest(self._test)
+        snes.setMaxFunctionEvaluations(1000)
+        ksp = snes.getKSP()
+        ksp.setType("preonly")
+        pc = ksp.getPC()
+        pc.setType("python")
+        pc.setPythonContext(_DirectPC(self))
+        prefix = f"dbvfiv_equilibrium_{id(self)}_"
+        snes.setOptionsPrefix(prefix)
+        settings = PETSc.Options(prefix)
+        settings["snes_linesearch_type"] = options.line_search
+        length = float(np.ptp(model.mesh.nodes[:, 2]))
+        settings["snes_linesearch_maxstep"] = options.largest_step * length * np.sqrt(len(model.mesh.nodes))
+        snes.setFromOptions()
+        for key in ("snes_linesearch_type", "snes_linesearch_maxstep"):
+            settings.delValue(key)
+
+    def solve(self, start: np.ndarray, pressure: float) -> NewtonResult:
+        """Iterate from a state (n,) to the equilibrium at an inlet pressure, Pa."""
+        self._pressure = pressure
+        self._scale = max(self.model.force_scale(start, pressure), np.finfo(float).tiny)
+        self._rounding = 0.0
+        self._error = ""
+        self._vector.setArray(start)
+        self._snes.setTolerances(max_it=self.options.max_iterations)
+        try:
+            self._snes.solve(None, self._vector)
+        except PETSc.Error as error:
+            reason = self._error or f"PETSc stopped with error {error.ierr}"
+            return NewtonResult(start, False, self._snes.getIterationNumber(), np.inf, self._rounding, reason)
+        q = self.last = self._vector.getArray().copy()
+        code = self._snes.getConvergedReason()
+        norm = float(np.linalg.norm(self._residual.getArray())) / self._scale
+        reason = "converged" if code > 0 else self._error or _REASONS.get(code, f"SNES stopped with reason {code}")
+        return NewtonResult(q, code > 0, self._snes.getIterationNumber(), norm, self._rounding / self._scale, reason)
+
+    def sensitivity(self, q: np.ndarray, pressure: float) -> np.ndarray:
+        """Derivative (n,) of the equilibrium with respect to pressure, from the factors of the last tangent."""
+        return -self.factor.solve(self.model.pressure_derivative(q, pressure))
+
+    # -- what SNES calls ------------------------------------------------------------------------------------------------------------
+
+    def _evaluate(self, snes, x, f):
+        self.residuals += 1
+        f.setArray(self.model.residual(x.getArray(readonly=True), self._pressure))
+
+    def _linearise(self, snes, x, jacobian, preconditioner):
+        self.tangents += 1
+        q = x.getArray(readonly=True)
+        self.tangent = self.model.tangent(q, self._pressure)
+        if not self._rounding:
+            self._rounding = self.model.rounding(q, self.tangent)
+        try:
+            self.model.refactor(self.factor, self.tangent)
+        except SingularMatrix as error:
+            self._error = str(error)
+            raise
+        preconditioner.assemble()
+        if jacobian != preconditioner:
+            jacobian.assemble()
+
+    def _test(self, snes, iteration, norms):
+        norm = norms[2]
+        if not np.isfinite(norm):
+            return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
+        if norm <= self.options.tolerance * self._scale or norm <= self._rounding:
+            return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS
+        if norm > 1e6 * self._scale:
+            return PETSc.SNES.ConvergedReason.DIVERGED_DTOL
+        return PETSc.SNES.ConvergedReason.ITERATING
+
+
+class _CoupledTangent:
+    """The tangent as an operator, for the slopes that line searches ask for."""
+
+    def __init__(self, solver: EquilibriumSolver):
+        self.solver = solver
+
+    def mult(self, matrix, x, y):
+        y.setArray(self.solver.model.apply(self.solver.tangent, x.getArray(readonly=True)))
+
+
+class _DirectPC:
+    """Coupled direct solve as a preconditioner."""
+
+    def __init__(self, solver: EquilibriumSolver):
+        self.solver = solver
+
+    def apply(self, pc, x, y):
+        y.setArray(self.solver.factor.solve(x.getArray(readonly=True)))

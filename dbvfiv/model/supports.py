@@ -1,0 +1,65 @@
+"""Where the valve is held: clamped flange, symmetry planes and one-sided lip stops."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case.physics import Supports
+from ..geometry import ValveMesh
+
+
+def free_unknowns(mesh: ValveMesh) -> np.ndarray:
+    """(nn, 5) free displacements and rotations of the quarter valve (App. A).
+
+    The frames' first vector lies in each symmetry plane, so a plane of symmetry fixes the second rotation.
+    """
+    free = np.ones((len(mesh.nodes), 5), bool)
+    centre, side, flange = mesh.rows[:, 0], mesh.rows[:, -1], mesh.rows[-1]
+    free[centre, 0] = False
+    free[centre, 4] = False
+    free[side, 1] = False
+    free[side, 4] = False
+    free[flange] = False
+    return free
+
+
+@dataclass(frozen=True)
+class LipStops:
+    """One-sided springs against y displacements below zero (Th. 3.5.5).
+
+    Attributes
+    ----------
+    unknowns : (k,) int array
+        Numbers of the free unknowns that the stops act on.
+    stiffness : float, N/m
+    """
+
+    unknowns: np.ndarray
+    stiffness: float
+
+    def energy(self, q: np.ndarray) -> float:
+        return 0.5 * self.stiffness * float(np.sum(np.minimum(q[self.unknowns], 0.0) ** 2))
+
+    def force(self, q: np.ndarray) -> np.ndarray:
+        """Internal force (k,) on the unknowns with a stop."""
+        return self.stiffness * np.minimum(q[self.unknowns], 0.0)
+
+    def tangent(self, q: np.ndarray) -> np.ndarray:
+        """Diagonal stiffness (k,)."""
+        return np.where(q[self.unknowns] < 0.0, self.stiffness, 0.0)
+
+    def touching(self, q: np.ndarray) -> int:
+        """Number of stops in contact."""
+        return int(np.count_nonzero(q[self.unknowns] < 0.0))
+
+
+def lip_stops(mesh: ValveMesh, index: np.ndarray, supports: Supports, joint: float) -> LipStops:
+    """Stops on the duckbill nodes of the inner half of the columns, or of all."""
+    if not supports.lip_stop:
+        return LipStops(np.zeros(0, int), supports.lip_stop_stiffness)
+    limit = 0.5 if supports.lip_stop_columns == "inner-half" else 1.0 + 1e-9
+    rows = mesh.z <= joint * (1 + 1e-9)
+    nodes = mesh.rows[np.ix_(rows, mesh.columns < limit - 1e-9)].ravel()
+    unknowns = index[nodes, 1]
+    return LipStops(unknowns[unknowns >= 0].astype(int), supports.lip_stop_stiffness)

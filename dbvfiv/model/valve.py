@@ -1,0 +1,238 @@
+"""The coupled valve: one contract for equilibria, spectra, branches and time histories.
+
+State q (n,): free displacements (m) and rotations (rad) of the quarter model. Row areas and station pressures are functions of it, so the equilibrium is
+
+    r(q; P) = f_shell(q) + f_stops(q) - G(q) p(A(q); P) = 0
+
+with the columns of G the forces of unit station pressures. The tangent is K - G D J: K holds shell, stops and the follower stiffness of the present
+pressures, J the derivative of the areas, D that of the pressures.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..case.model import Case
+from ..flow import Channel, RowAreas, UniformLoad
+from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
+from .build import build_shell
+from .linear import CoupledFactor
+from .supports import lip_stops
+
+QUARTERS = 4
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Residual and exact linearisation of the equilibrium at one state.
+
+    Attributes
+    ----------
+    residual : (n,) N, N m
+    structure : (nnz,) values of the structure's own tangent: material, geometric, stops; symmetric
+    stiffness : (nnz,) values of K: structure less follower stiffness of the pressures
+    forces : (nnz of G,) values of G
+    areas_slope : (nnz of J,) values of J
+    pressure_slope : (m, m) D, Pa/m2
+    area, pressure : (m,) m2, Pa
+    """
+
+    residual: np.ndarray
+    structure: np.ndarray
+    stiffness: np.ndarray
+    forces: np.ndarray
+    areas_slope: np.ndarray
+    pressure_slope: np.ndarray
+    area: np.ndarray
+    pressure: np.ndarray
+
+
+class ValveModel:
+    """The coupled valve of a case.
+
+    Parameters
+    ----------
+    case : Case
+
+    Raises
+    ------
+    ValueError
+        If the case's geometry cannot be meshed or its shell metric is not valid on it.
+    """
+
+    def __init__(self, case: Case):
+        self.case = case
+        self.mesh, self.shell = build_shell(case)
+        dofs = self.shell.dofs
+        self.rows = RowAreas(self.mesh, dofs.index)
+        self.stops = lip_stops(self.mesh, dofs.index, case.supports, case.valve.duckbill_length)
+        self.station_of_node = np.empty(len(self.mesh.nodes), np.int64)
+        self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
+        self.loaded = _loaded_share(self.mesh, case)
+        gap_area = self.mesh.rest_area[0] - self.mesh.wall_deduction[0]
+        if case.drive.kind == "flow":
+            storage = 1.0 if case.fluid.continuity == "storage" else 0.0
+            self.flow = Channel(self.mesh.z, case.fluid.area_floor * gap_area, storage, case.fluid.unsteady)
+        else:
+            self.flow = UniformLoad(len(self.mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
+        self._stop_slots = dofs.diagonal_slots[self.stops.unknowns]
+
+    # -- layout ---------------------------------------------------------------------------------------------------------------------
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns n."""
+        return self.shell.size
+
+    @property
+    def stations(self) -> int:
+        """Number of flow stations m."""
+        return len(self.mesh.z)
+
+    def rest(self) -> np.ndarray:
+        return np.zeros(self.size)
+
+    def nodal(self, q: np.ndarray) -> np.ndarray:
+        """Nodal displacements and rotations (nn, 5)."""
+        return self.shell.dofs.expand(q)
+
+    # -- statics --------------------------------------------------------------------------------------------------------------------
+
+    def residual(self, q: np.ndarray, pressure: float) -> np.ndarray:
+        """Unbalanced force (n,) at an inlet pressure, Pa."""
+        nodal = self.nodal(q)
+        p = self.flow.steady_pressure(self.rows.areas(nodal), pressure)
+        force = self.shell.force(q) - self.pressure_force(nodal, p)
+        force[self.stops.unknowns] += self.stops.force(q)
+        return force
+
+    def tangent(self, q: np.ndarray, pressure: float) -> Tangent:
+        """Residual and linearisation at an inlet pressure, Pa."""
+        nodal = self.nodal(q)
+        area = self.rows.areas(nodal)
+        p, slope = self.flow.steady_operator(area, pressure)
+        force, structure = self.structure(q)
+        force -= self.pressure_force(nodal, p)
+        return Tangent(
+            residual=force,
+            structure=structure,
+            stiffness=self.follower_stiffness(nodal, p, structure),
+            forces=self.station_forces(nodal).data,
+            areas_slope=self.rows.jacobian(nodal).data,
+            pressure_slope=slope,
+            area=area,
+            pressure=p,
+        )
+
+    def structure(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Internal force (n,) of shell and stops and values (nnz,) of their tangent."""
+        force, data = self.shell.force_and_tangent(q)
+        force[self.stops.unknowns] += self.stops.force(q)
+        data[self._stop_slots] += self.stops.tangent(q)
+        return force, data
+
+    def pressure_force(self, nodal: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Force (n,) of station pressures p (m,), Pa, on the deformed wall."""
+        out = np.zeros_like(nodal)
+        surface = self.shell.mesh
+        pressure_force(surface.quads, surface.nodes, nodal, p[self.station_of_node], self.loaded, out)
+        return self.shell.dofs.restrict(out)
+
+    def follower_stiffness(self, nodal: np.ndarray, p: np.ndarray, structure: np.ndarray) -> np.ndarray:
+        """Values (nnz,) of the structure's tangent less the derivative of the pressure force at constant pressures."""
+        data = structure.copy()
+        surface = self.shell.mesh
+        pressure_stiffness(
+            surface.quads, surface.nodes, nodal, p[self.station_of_node], self.loaded, self.shell.dofs.slots, -1.0, data
+        )
+        return data
+
+    def station_forces(self, nodal: np.ndarray) -> sp.csr_matrix:
+        """G (n, m): forces of unit station pressures on the deformed wall."""
+        surface = self.shell.mesh
+        out = np.empty((surface.element_count, 4, 3, 4))
+        station_forces(surface.quads, surface.nodes, nodal, self.station_of_node, self.loaded, out)
+        slots, indices, indptr = self._force_pattern
+        keep = slots >= 0
+        data = np.bincount(slots[keep], weights=out.ravel()[keep], minlength=len(indices))
+        return sp.csr_matrix((data, indices, indptr), shape=(self.size, self.stations), copy=False)
+
+    @cached_property
+    def _force_pattern(self):
+        quads = self.shell.mesh.quads
+        rows = np.broadcast_to(self.shell.dofs.index[quads][:, :, :3, None], (len(quads), 4, 3, 4)).ravel()
+        columns = np.broadcast_to(self.station_of_node[quads][:, None, None, :], (len(quads), 4, 3, 4)).ravel()
+        carried = np.repeat(self.loaded > 0, 48)
+        keep = (rows >= 0) & carried
+        keys = rows[keep] * self.stations + columns[keep]
+        unique, inverse = np.unique(keys, return_inverse=True)
+        slots = np.full(rows.shape, -1, np.int64)
+        slots[keep] = inverse
+        indptr = np.searchsorted(unique // self.stations, np.arange(self.size + 1)).astype(np.int32)
+        return slots, (unique % self.stations).astype(np.int32), indptr
+
+    def factor(self) -> CoupledFactor:
+        """A new factorisation object for tangents of this model; see `refactor`."""
+        return CoupledFactor(
+            self.shell.dofs.matrix(np.ones(len(self.shell.dofs.pattern[1]))),
+            self.station_forces(self.nodal(self.rest())),
+            self.rows.jacobian(self.nodal(self.rest())),
+        )
+
+    @staticmethod
+    def refactor(factor: CoupledFactor, tangent: Tangent) -> None:
+        """Factor the coupled tangent of the equilibrium."""
+        factor.refactor(tangent.stiffness, tangent.forces, tangent.areas_slope, tangent.pressure_slope)
+
+    def matrices(self, tangent: Tangent) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
+        """K (n, n), G (n, m) and J (m, n) of a tangent."""
+        _, indices, indptr = self._force_pattern
+        g = sp.csr_matrix((tangent.forces, indices, indptr), shape=(self.size, self.stations), copy=False)
+        return self.shell.dofs.matrix(tangent.stiffness), g, self.rows.matrix(tangent.areas_slope)
+
+    def apply(self, tangent: Tangent, direction: np.ndarray) -> np.ndarray:
+        """Product (n,) of the coupled tangent K - G D J with a direction (n,)."""
+        k, g, j = self.matrices(tangent)
+        return k @ direction - g @ (tangent.pressure_slope @ (j @ direction))
+
+    def rounding(self, q: np.ndarray, tangent: Tangent) -> float:
+        """Norm of the residual that rounding of the positions alone can leave, N: machine epsilon times |K| |x|."""
+        position = np.abs(self.nodal(q))
+        position[:, :3] += np.abs(self.mesh.nodes)
+        stiffness = self.shell.dofs.matrix(np.abs(tangent.structure))
+        return float(np.finfo(float).eps * np.linalg.norm(stiffness @ self.shell.dofs.restrict(position)))
+
+    def pressure_derivative(self, q: np.ndarray, pressure: float) -> np.ndarray:
+        """Derivative (n,) of the residual with respect to the inlet pressure; steady pressures are proportional to it."""
+        nodal = self.nodal(q)
+        unit = self.flow.steady_pressure(self.rows.areas(nodal), 1.0)
+        return -self.pressure_force(nodal, unit)
+
+    def force_scale(self, q: np.ndarray, pressure: float) -> float:
+        """Norm of the pressure forces, N: what residuals are measured against."""
+        nodal = self.nodal(q)
+        p = self.flow.steady_pressure(self.rows.areas(nodal), pressure)
+        return float(np.linalg.norm(self.pressure_force(nodal, p)))
+
+    # -- dynamics -------------------------------------------------------------------------------------------------------------------
+
+    def mass(self, q: np.ndarray) -> np.ndarray:
+        """Values (nnz,) of the mass matrix at a state."""
+        return self.shell.mass(q)
+
+    def mass_flow(self, area: np.ndarray, pressure: float, density: float | None = None) -> float:
+        """Steady mass flow of the whole valve, kg/s."""
+        density = self.case.fluid.density if density is None else density
+        velocity = self.flow.inlet_velocity(area, pressure, density)
+        return QUARTERS * density * velocity * float(self.mesh.rest_area[-1] - self.mesh.wall_deduction[-1])
+
+
+def _loaded_share(mesh: ValveMesh, case: Case) -> np.ndarray:
+    """(ne,) share of each element that carries pressure: none beside the side edge of the duckbill (App. A)."""
+    limit = 1.0 - case.drive.unloaded_edge
+    left, right = mesh.element_columns.T
+    share = np.clip((limit - left) / (right - left), 0.0, 1.0)
+    return np.where(mesh.element_z < case.valve.duckbill_length, np.round(share, 12), 1.0)

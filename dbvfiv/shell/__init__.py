@@ -1,0 +1,7 @@
+"""Layered, thick, finite-rotation four-node shell on any quadrilateral mesh."""
+from .mesh import ShellMesh, nodal_directors, tangent_frames
+from .section import Layer, Section
+from .supports import DofMap
+from .shell import Shell
+
+__all__ = ["DofMap", "Layer", "Section", "Shell", "ShellMesh", "nodal_directors", "tangent_frames"]

@@ -1,0 +1,231 @@
+"""The element is its energy: the one definition of the shell's mechanics, differentiated automatically.
+
+Strains are covariant Green-Lagrange coefficients of a first-order (thick shell) kinematics x(t) = x + t d, with the transverse shear of Dvorkin &
+Bathe (1984). Two through-thickness treatments:
+
+``first-order``
+    Mid-surface metric and area; E(t) = c0 + t (c1 - sym(kappa c0)), Budiansky-Sanders' best first-order theory.
+``true``
+    Metric, area and quadratic strain of each parallel surface; valid while half the wall stays below the radius.
+"""
+from __future__ import annotations
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..materials import energy_of
+from .reference import SHAPE, SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE, ReferenceGeometry, strain_map
+from .rotation import director
+from .section import Section
+
+FIRST_ORDER, TRUE_METRIC = "first-order", "true"
+
+
+def section_arrays(section: Section, geometry: ReferenceGeometry, metric: str) -> dict:
+    """Layer-point data for `element_energy`; with the true metric also maps per element and point."""
+    data = {
+        "zeta": section.points[:, 0],
+        "weight": section.points[:, 1],
+        "parameters": section.parameters,
+        "direction": section.directions,
+        "shear": section.shear_scale,
+    }
+    return {key: jnp.asarray(value) for key, value in data.items()}
+
+
+def element_arrays(mesh, geometry: ReferenceGeometry, section: Section, metric: str) -> dict:
+    """Arrays with a leading element axis that `element_energy` is mapped over."""
+    data = {
+        "x": mesh.nodes[mesh.quads],
+        "director": mesh.directors[mesh.quads],
+        "frame": mesh.frames[mesh.quads],
+        "h": geometry.thickness,
+        "area": geometry.area,
+        "m0": geometry.metric0,
+        "m1": geometry.metric1,
+        "s0": geometry.shear0,
+    }
+    if metric == FIRST_ORDER:
+        data |= {"q": geometry.q, "qk": geometry.qk, "p": geometry.p}
+    else:
+        t = geometry.thickness[:, None] * section.points[:, 0]  # (ne, np)
+        shift = np.eye(2) + t[:, None, :, None, None] * geometry.curvature[:, :, None]
+        jacobian = np.linalg.det(shift)
+        if jacobian.min() <= 0:
+            element = int(np.argmin(jacobian.min(axis=(1, 2))))
+            place = ", ".join(f"{value:.4g}" for value in geometry.position[element].mean(axis=0))
+            raise ValueError(
+                f"The true metric is not valid at ({place}) m: half the wall exceeds the radius there, so the inner face folds over itself; "
+                "use the first-order metric."
+            )
+        p = np.einsum("epac,eplcd->eplad", geometry.p, np.linalg.inv(shift))
+        turn = np.einsum("pac,eai->epci", SLOPE, mesh.directors[mesh.quads])
+        second = np.einsum("epci,epdi->epcd", turn, turn)
+        data |= {
+            "q": strain_map(p),
+            "p": p,
+            "mu": jacobian,
+            "m2": np.stack([0.5 * second[..., 0, 0], 0.5 * second[..., 1, 1], second[..., 0, 1]], axis=-1),
+        }
+    return {key: jnp.asarray(value) for key, value in data.items()}
+
+
+def local_strains(unknowns, element, layers, metric):
+    """Strains (4, np, 5) at all layer points in local axes, transverse shears not yet scaled.
+
+    Parameters
+    ----------
+    unknowns : (4, 5) displacements and rotations of the nodes
+    """
+    d = jax.vmap(director)(unknowns[:, 3:], element["director"], element["frame"])
+    x = element["x"] + unknowns[:, :3]
+    basis = jnp.einsum("pac,ai->pci", SLOPE, x)
+    turn = jnp.einsum("pac,ai->pci", SLOPE, d)
+    c0 = _voigt(basis, basis, 0.5) - element["m0"]
+    c1 = _voigt(basis, turn, 1.0) - element["m1"]
+    edge = 0.25 * jnp.sum((x[SHEAR_EDGES[:, 1]] - x[SHEAR_EDGES[:, 0]]) * (d[SHEAR_EDGES[:, 1]] + d[SHEAR_EDGES[:, 0]]), axis=1)
+    shear = SHEAR_WEIGHTS * (edge - element["s0"])
+    gamma = jnp.stack([shear[:, 0] + shear[:, 1], shear[:, 2] + shear[:, 3]], axis=1)
+    t = element["h"] * layers["zeta"]
+    if metric == FIRST_ORDER:
+        membrane = jnp.einsum("pij,pj->pi", element["q"], c0)
+        bending = jnp.einsum("pij,pj->pi", element["q"], c1) - jnp.einsum("pij,pj->pi", element["qk"], c0)
+        plane = membrane[:, None] + t[None, :, None] * bending[:, None]
+        across = jnp.broadcast_to(jnp.einsum("pac,pc->pa", element["p"], gamma)[:, None], plane.shape[:2] + (2,))
+    else:
+        c2 = _voigt(turn, turn, 0.5) - element["m2"]
+        cov = c0[:, None] + t[None, :, None] * c1[:, None] + (t**2)[None, :, None] * c2[:, None]
+        plane = jnp.einsum("plij,plj->pli", element["q"], cov)
+        across = jnp.einsum("plac,pc->pla", element["p"], gamma)
+    return jnp.concatenate([plane, across], axis=-1)
+
+
+def _voigt(a, b, factor):
+    """Symmetric products of two pairs of vectors (4, 2, 3) as [11, 22, 12 + 21], scaled so that a = b gives metric strains."""
+    cross = jnp.einsum("pi,pi->p", a[:, 0], b[:, 1]) + jnp.einsum("pi,pi->p", a[:, 1], b[:, 0])
+    return factor * jnp.stack([jnp.einsum("pi,pi->p", a[:, 0], b[:, 0]), jnp.einsum("pi,pi->p", a[:, 1], b[:, 1]), cross], axis=-1)
+
+
+def material_strains(strains, layers):
+    """Turn local strains (..., np, 5) into the axes of each layer and scale the transverse shears."""
+    c, s = layers["direction"][:, 0], layers["direction"][:, 1]
+    e1, e2, e3, g1, g2 = (strains[..., i] for i in range(5))
+    k = layers["shear"]
+    return jnp.stack(
+        [
+            c * c * e1 + s * s * e2 + c * s * e3,
+            s * s * e1 + c * c * e2 - c * s * e3,
+            2 * c * s * (e2 - e1) + (c * c - s * s) * e3,
+            k * (c * g1 + s * g2),
+            k * (c * g2 - s * g1),
+        ],
+        axis=-1,
+    )
+
+
+def point_energies(kinds, parameters, strains):
+    """Energy densities (..., np) of strains (..., np, 5); `kinds` is static, so each law is traced once per run of equal points."""
+    parts, start = [], 0
+    while start < len(kinds):
+        stop = start
+        while stop < len(kinds) and kinds[stop] == kinds[start]:
+            stop += 1
+        law = partial(energy_of, kinds[start])
+        over_points = jax.vmap(law, in_axes=(0, 0))
+        over_gauss = jax.vmap(over_points, in_axes=(None, 0))
+        parts.append(over_gauss(parameters[start:stop], strains[:, start:stop]))
+        start = stop
+    return jnp.concatenate(parts, axis=1)
+
+
+def element_energy(kinds, metric, unknowns, element, layers):
+    """Strain energy of one element, J.
+
+    Parameters
+    ----------
+    kinds : tuple of int, static
+        Law of each layer point.
+    metric : str, static
+    unknowns : (4, 5)
+    element, layers : dict of arrays, see `element_arrays` and `section_arrays`
+    """
+    strains = material_strains(local_strains(unknowns, element, layers, metric), layers)
+    density = point_energies(kinds, layers["parameters"], strains)
+    weight = element["h"] * element["area"][:, None] * layers["weight"]
+    if metric == TRUE_METRIC:
+        weight = weight * element["mu"]
+    return jnp.sum(weight * density)
+
+
+class EnergyFunctions:
+    """Compiled maps of the element energy and its derivatives over all elements of one mesh.
+
+    The layer data are arguments of the compiled functions, not constants in them, so a change of material or thickness does not compile anew.
+    """
+
+    def __init__(self, mesh, geometry: ReferenceGeometry, section: Section, metric: str = FIRST_ORDER):
+        if metric not in (FIRST_ORDER, TRUE_METRIC):
+            raise ValueError(f"The shell metric is '{metric}', but only '{FIRST_ORDER}' and '{TRUE_METRIC}' exist.")
+        self.metric = metric
+        self.kinds = tuple(int(kind) for kind in section.kinds)
+        self.elements = element_arrays(mesh, geometry, section, metric)
+        self.layers = section_arrays(section, geometry, metric)
+
+    def energy(self, unknowns):
+        """(ne,) energies from unknowns (ne, 4, 5)."""
+        return _energies(self.kinds, self.metric, unknowns, self.elements, self.layers)
+
+    def force(self, unknowns):
+        """(ne, 20) gradients."""
+        return _gradients(self.kinds, self.metric, unknowns, self.elements, self.layers)
+
+    def tangent(self, unknowns):
+        """(ne, 20, 20) Hessians."""
+        return _hessians(self.kinds, self.metric, unknowns, self.elements, self.layers)
+
+    def second(self, unknowns, a, b):
+        """(ne, 20): second directional derivative of the force along a and b (ne, 4, 5)."""
+        return _second(self.kinds, self.metric, unknowns, a, b, self.elements, self.layers)
+
+    def third(self, unknowns, a, b, c):
+        """(ne, 20): third directional derivative of the force."""
+        return _third(self.kinds, self.metric, unknowns, a, b, c, self.elements, self.layers)
+
+    def strains(self, unknowns):
+        """(ne, 4, np, 5): strains in the axes of the layers, shear correction not applied."""
+        layers = self.layers | {"shear": jnp.ones_like(self.layers["shear"])}
+        return _strains(self.kinds, self.metric, unknowns, self.elements, layers)
+
+
+def _mapped(function):
+    """Compile `function(kinds, metric, *unknowns, element, layers)` mapped over elements."""
+
+    @partial(jax.jit, static_argnums=(0, 1))
+    def run(kinds, metric, *arguments):
+        *fields, elements, layers = arguments
+        one = lambda *row: function(kinds, metric, *row, layers)  # noqa: E731
+        return jax.vmap(one)(*fields, elements)
+
+    return run
+
+
+def _force(kinds, metric, unknowns, element, layers):
+    return jax.grad(element_energy, argnums=2)(kinds, metric, unknowns, element, layers)
+
+
+def _along(function, *directions):
+    """Directional derivative of function(u) along each direction in turn."""
+    for direction in directions:
+        function = partial(lambda inner, v, u: jax.jvp(inner, (u,), (v,))[1], function, direction)
+    return function
+
+
+_energies = _mapped(element_energy)
+_gradients = _mapped(lambda k, m, u, e, l: _force(k, m, u, e, l).reshape(20))
+_hessians = _mapped(lambda k, m, u, e, l: jax.jacfwd(lambda v: _force(k, m, v, e, l).reshape(20))(u).reshape(20, 20))
+_second = _mapped(lambda k, m, u, a, b, e, l: _along(lambda v: _force(k, m, v, e, l).reshape(20), a, b)(u))
+_third = _mapped(lambda k, m, u, a, b, c, e, l: _along(lambda v: _force(k, m, v, e, l).reshape(20), a, b, c)(u))
+_strains = _mapped(lambda k, m, u, e, l: material_strains(local_strains(u, e, l, m), l))

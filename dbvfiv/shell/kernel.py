@@ -1,0 +1,439 @@
+"""Compiled element loop: force and tangent of the first-order shell, the hot path of every solve.
+
+The mechanics are defined once, by the energy in `energy.py`; this loop evaluates its first and second derivative with the structure used: covariant
+strains are quadratic in positions and directors, so their first derivative is linear and the second constant, and the layers integrate to an
+8 x 8 section tangent before the strain-displacement product. It agrees with automatic differentiation to rounding.
+
+Element unknowns are node-major: three displacements and two rotations of each of the four nodes.
+"""
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from .kernel_rubber import FAST, rubber_stress, rubber_tangent
+from .reference import SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE
+
+_SLOPE = np.ascontiguousarray(SLOPE)
+_EDGES = np.ascontiguousarray(SHEAR_EDGES)
+_EDGE_WEIGHTS = np.ascontiguousarray(SHEAR_WEIGHTS)
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _gather(quad, nodes, displacement, director, x, d):
+    for a in range(4):
+        n = quad[a]
+        for i in range(3):
+            x[a, i] = nodes[n, i] + displacement[n, i]
+            d[a, i] = director[n, i]
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _bases(point, x, d, basis, turn):
+    """Covariant base vectors and director derivatives at one point, each (2, 3)."""
+    for c in range(2):
+        for i in range(3):
+            basis[c, i] = 0.0
+            turn[c, i] = 0.0
+        for a in range(4):
+            slope = _SLOPE[point, a, c]
+            for i in range(3):
+                basis[c, i] += slope * x[a, i]
+                turn[c, i] += slope * d[a, i]
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _edge_shears(x, d, edge):
+    for g in range(4):
+        a = _EDGES[g, 0]
+        b = _EDGES[g, 1]
+        total = 0.0
+        for i in range(3):
+            total += (x[b, i] - x[a, i]) * (d[b, i] + d[a, i])
+        edge[g] = 0.25 * total
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _strains(point, basis, turn, edge, shear0, metric0, metric1, q, qk, p, strain):
+    """Section strains in local axes: membrane (3), bending (3), transverse shear (2)."""
+    c00 = -metric0[0]
+    c01 = -metric0[1]
+    c02 = -metric0[2]
+    c10 = -metric1[0]
+    c11 = -metric1[1]
+    c12 = -metric1[2]
+    for i in range(3):
+        c00 += 0.5 * basis[0, i] * basis[0, i]
+        c01 += 0.5 * basis[1, i] * basis[1, i]
+        c02 += basis[0, i] * basis[1, i]
+        c10 += basis[0, i] * turn[0, i]
+        c11 += basis[1, i] * turn[1, i]
+        c12 += basis[0, i] * turn[1, i] + basis[1, i] * turn[0, i]
+    for i in range(3):
+        strain[i] = q[i, 0] * c00 + q[i, 1] * c01 + q[i, 2] * c02
+        strain[3 + i] = (
+            q[i, 0] * c10 + q[i, 1] * c11 + q[i, 2] * c12 - qk[i, 0] * c00 - qk[i, 1] * c01 - qk[i, 2] * c02
+        )
+    g0 = _EDGE_WEIGHTS[point, 0] * (edge[0] - shear0[0]) + _EDGE_WEIGHTS[point, 1] * (edge[1] - shear0[1])
+    g1 = _EDGE_WEIGHTS[point, 2] * (edge[2] - shear0[2]) + _EDGE_WEIGHTS[point, 3] * (edge[3] - shear0[3])
+    strain[6] = p[0, 0] * g0 + p[0, 1] * g1
+    strain[7] = p[1, 0] * g0 + p[1, 1] * g1
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _linear_response(stiffness, h, strain, stress):
+    h2 = h * h
+    h3 = h2 * h
+    for i in range(3):
+        n = 0.0
+        m = 0.0
+        for j in range(3):
+            n += h * stiffness[i, j] * strain[j] + h2 * stiffness[i, 3 + j] * strain[3 + j]
+            m += h2 * stiffness[3 + i, j] * strain[j] + h3 * stiffness[3 + i, 3 + j] * strain[3 + j]
+        stress[i] = n
+        stress[3 + i] = m
+    for i in range(2):
+        stress[6 + i] = h * (stiffness[6 + i, 6] * strain[6] + stiffness[6 + i, 7] * strain[7])
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _point_strain(zeta, h, scale, strain, e):
+    t = zeta * h
+    for i in range(3):
+        e[i] = strain[i] + t * strain[3 + i]
+    e[3] = scale * strain[6]
+    e[4] = scale * strain[7]
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _section_stress(stiffness, points, constants, scales, h, strain, stress, e, s):
+    _linear_response(stiffness, h, strain, stress)
+    for l in range(points.shape[0]):
+        _point_strain(points[l, 0], h, scales[l], strain, e)
+        rubber_stress(constants[l, 0], constants[l, 1], constants[l, 2], e, s)
+        w = points[l, 1] * h
+        t = points[l, 0] * h
+        for i in range(3):
+            stress[i] += w * s[i]
+            stress[3 + i] += w * t * s[i]
+        stress[6] += w * scales[l] * s[3]
+        stress[7] += w * scales[l] * s[4]
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _section_tangent(stiffness, points, constants, scales, h, strain, stress, tangent, e, s, t5):
+    _linear_response(stiffness, h, strain, stress)
+    h2 = h * h
+    h3 = h2 * h
+    for i in range(3):
+        for j in range(3):
+            tangent[i, j] = h * stiffness[i, j]
+            tangent[i, 3 + j] = h2 * stiffness[i, 3 + j]
+            tangent[3 + i, 3 + j] = h3 * stiffness[3 + i, 3 + j]
+        for j in range(2):
+            tangent[i, 6 + j] = 0.0
+            tangent[3 + i, 6 + j] = 0.0
+    for i in range(2):
+        for j in range(2):
+            tangent[6 + i, 6 + j] = h * stiffness[6 + i, 6 + j]
+    for l in range(points.shape[0]):
+        k = scales[l]
+        _point_strain(points[l, 0], h, k, strain, e)
+        rubber_tangent(constants[l, 0], constants[l, 1], constants[l, 2], e, s, t5)
+        w = points[l, 1] * h
+        t = points[l, 0] * h
+        wt = w * t
+        wtt = wt * t
+        for i in range(3):
+            stress[i] += w * s[i]
+            stress[3 + i] += wt * s[i]
+            for j in range(i, 3):
+                v = t5[i, j]
+                tangent[i, j] += w * v
+                tangent[3 + i, 3 + j] += wtt * v
+                tangent[i, 3 + j] += wt * v
+                if j > i:
+                    tangent[j, 3 + i] += wt * v
+            for j in range(2):
+                v = k * t5[i, 3 + j]
+                tangent[i, 6 + j] += w * v
+                tangent[3 + i, 6 + j] += wt * v
+        stress[6] += w * k * s[3]
+        stress[7] += w * k * s[4]
+        tangent[6, 6] += w * k * k * t5[3, 3]
+        tangent[6, 7] += w * k * k * t5[3, 4]
+        tangent[7, 7] += w * k * k * t5[4, 4]
+    for i in range(8):
+        for j in range(i):
+            tangent[i, j] = tangent[j, i]
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _covariant_stress(q, qk, p, weight, stress, n, m, g):
+    """Covariant counterparts of the section stresses: weights of the second derivatives of the covariant strains."""
+    for j in range(3):
+        total = 0.0
+        bend = 0.0
+        for i in range(3):
+            total += q[i, j] * stress[i] - qk[i, j] * stress[3 + i]
+            bend += q[i, j] * stress[3 + i]
+        n[j] = weight * total
+        m[j] = weight * bend
+    for c in range(2):
+        g[c] = weight * (p[0, c] * stress[6] + p[1, c] * stress[7])
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _add_forces(point, n, m, g, basis, turn, x, d, fx, fd):
+    """Forces on positions and directors (4, 3) from covariant stresses at one point."""
+    for a in range(4):
+        s0 = _SLOPE[point, a, 0]
+        s1 = _SLOPE[point, a, 1]
+        x0 = n[0] * s0 + n[2] * s1
+        x1 = n[1] * s1 + n[2] * s0
+        d0 = m[0] * s0 + m[2] * s1
+        d1 = m[1] * s1 + m[2] * s0
+        for i in range(3):
+            fx[a, i] += x0 * basis[0, i] + x1 * basis[1, i] + d0 * turn[0, i] + d1 * turn[1, i]
+            fd[a, i] += d0 * basis[0, i] + d1 * basis[1, i]
+    for e in range(4):
+        w = 0.25 * _EDGE_WEIGHTS[point, e] * g[e // 2]
+        a = _EDGES[e, 0]
+        b = _EDGES[e, 1]
+        for i in range(3):
+            director = w * (d[a, i] + d[b, i])
+            along = w * (x[b, i] - x[a, i])
+            fx[b, i] += director
+            fx[a, i] -= director
+            fd[a, i] += along
+            fd[b, i] += along
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def shell_force(quads, nodes, q, director, director1, shear0, metric0, metric1, mq, mqk, mp, area, thickness,
+                stiffness, points, constants, scales, out):  # fmt: skip
+    """Add the internal force to out (nn, 5); unknowns q (nn, 5)."""
+    x = np.empty((4, 3))
+    d = np.empty((4, 3))
+    fx = np.empty((4, 3))
+    fd = np.empty((4, 3))
+    basis = np.empty((2, 3))
+    turn = np.empty((2, 3))
+    edge = np.empty(4)
+    strain = np.empty(8)
+    stress = np.empty(8)
+    e = np.empty(5)
+    s = np.empty(5)
+    n = np.empty(3)
+    m = np.empty(3)
+    g = np.empty(2)
+    for el in range(quads.shape[0]):
+        quad = quads[el]
+        _gather(quad, nodes, q, director, x, d)
+        _edge_shears(x, d, edge)
+        for a in range(4):
+            for i in range(3):
+                fx[a, i] = 0.0
+                fd[a, i] = 0.0
+        for point in range(4):
+            _bases(point, x, d, basis, turn)
+            _strains(point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], mq[el, point], mqk[el, point], mp[el, point], strain)
+            _section_stress(stiffness, points, constants, scales, thickness[el], strain, stress, e, s)
+            _covariant_stress(mq[el, point], mqk[el, point], mp[el, point], area[el, point], stress, n, m, g)
+            _add_forces(point, n, m, g, basis, turn, x, d, fx, fd)
+        for a in range(4):
+            node = quad[a]
+            for i in range(3):
+                out[node, i] += fx[a, i]
+            for r in range(2):
+                total = 0.0
+                for i in range(3):
+                    total += fd[a, i] * director1[node, r, i]
+                out[node, 3 + r] += total
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def shell_tangent(quads, nodes, q, director, director1, director2, shear0, metric0, metric1, mq, mqk, mp, area, thickness,
+                  stiffness, points, constants, scales, slots, out, data):  # fmt: skip
+    """Add the internal force to out (nn, 5) and the tangent to the matrix values data (nnz,).
+
+    Parameters
+    ----------
+    slots : (ne, 400) int array
+        Where each entry of the 20 x 20 element matrix goes in `data`; negative for constrained unknowns.
+    """
+    x = np.empty((4, 3))
+    d = np.empty((4, 3))
+    fx = np.empty((4, 3))
+    fd = np.empty((4, 3))
+    basis = np.empty((2, 3))
+    turn = np.empty((2, 3))
+    edge = np.empty(4)
+    strain = np.empty(8)
+    stress = np.empty(8)
+    tangent = np.empty((8, 8))
+    e = np.empty(5)
+    s = np.empty(5)
+    t5 = np.zeros((5, 5))
+    n = np.empty(3)
+    m = np.empty(3)
+    g = np.empty(2)
+    cov = np.empty((8, 20))  # covariant strain-displacement rows: c0 (3), c1 (3), gamma (2)
+    rows = np.empty((8, 20))  # the same in local axes
+    product = np.empty((8, 20))
+    k = np.empty((20, 20))
+    shear_rows = np.empty((4, 20))
+    gxx = np.empty((4, 4))
+    gxd = np.empty((4, 4))
+    for el in range(quads.shape[0]):
+        quad = quads[el]
+        h = thickness[el]
+        _gather(quad, nodes, q, director, x, d)
+        _edge_shears(x, d, edge)
+        for a in range(4):
+            for i in range(3):
+                fx[a, i] = 0.0
+                fd[a, i] = 0.0
+            for b in range(4):
+                gxx[a, b] = 0.0
+                gxd[a, b] = 0.0
+        for i in range(20):
+            for j in range(20):
+                k[i, j] = 0.0
+        for ed in range(4):
+            for j in range(20):
+                shear_rows[ed, j] = 0.0
+            a = _EDGES[ed, 0]
+            b = _EDGES[ed, 1]
+            for i in range(3):
+                total = 0.25 * (d[a, i] + d[b, i])
+                shear_rows[ed, 5 * b + i] = total
+                shear_rows[ed, 5 * a + i] = -total
+            for r in range(2):
+                ta = 0.0
+                tb = 0.0
+                for i in range(3):
+                    along = 0.25 * (x[b, i] - x[a, i])
+                    ta += along * director1[quad[a], r, i]
+                    tb += along * director1[quad[b], r, i]
+                shear_rows[ed, 5 * a + 3 + r] = ta
+                shear_rows[ed, 5 * b + 3 + r] = tb
+        for point in range(4):
+            _bases(point, x, d, basis, turn)
+            ql = mq[el, point]
+            qkl = mqk[el, point]
+            pl = mp[el, point]
+            _strains(point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], ql, qkl, pl, strain)
+            _section_tangent(stiffness, points, constants, scales, h, strain, stress, tangent, e, s, t5)
+            weight = area[el, point]
+            _covariant_stress(ql, qkl, pl, weight, stress, n, m, g)
+            _add_forces(point, n, m, g, basis, turn, x, d, fx, fd)
+            for a in range(4):
+                s0 = _SLOPE[point, a, 0]
+                s1 = _SLOPE[point, a, 1]
+                for i in range(3):
+                    j = 5 * a + i
+                    cov[0, j] = s0 * basis[0, i]
+                    cov[1, j] = s1 * basis[1, i]
+                    cov[2, j] = s0 * basis[1, i] + s1 * basis[0, i]
+                    cov[3, j] = s0 * turn[0, i]
+                    cov[4, j] = s1 * turn[1, i]
+                    cov[5, j] = s0 * turn[1, i] + s1 * turn[0, i]
+                node = quad[a]
+                for r in range(2):
+                    b0 = 0.0
+                    b1 = 0.0
+                    for i in range(3):
+                        b0 += basis[0, i] * director1[node, r, i]
+                        b1 += basis[1, i] * director1[node, r, i]
+                    j = 5 * a + 3 + r
+                    cov[0, j] = 0.0
+                    cov[1, j] = 0.0
+                    cov[2, j] = 0.0
+                    cov[3, j] = s0 * b0
+                    cov[4, j] = s1 * b1
+                    cov[5, j] = s0 * b1 + s1 * b0
+            w0 = _EDGE_WEIGHTS[point, 0]
+            w1 = _EDGE_WEIGHTS[point, 1]
+            w2 = _EDGE_WEIGHTS[point, 2]
+            w3 = _EDGE_WEIGHTS[point, 3]
+            for j in range(20):
+                cov[6, j] = w0 * shear_rows[0, j] + w1 * shear_rows[1, j]
+                cov[7, j] = w2 * shear_rows[2, j] + w3 * shear_rows[3, j]
+            for i in range(3):
+                for j in range(20):
+                    rows[i, j] = ql[i, 0] * cov[0, j] + ql[i, 1] * cov[1, j] + ql[i, 2] * cov[2, j]
+                    rows[3 + i, j] = (
+                        ql[i, 0] * cov[3, j] + ql[i, 1] * cov[4, j] + ql[i, 2] * cov[5, j]
+                        - qkl[i, 0] * cov[0, j] - qkl[i, 1] * cov[1, j] - qkl[i, 2] * cov[2, j]
+                    )  # fmt: skip
+            for i in range(2):
+                for j in range(20):
+                    rows[6 + i, j] = pl[i, 0] * cov[6, j] + pl[i, 1] * cov[7, j]
+            for i in range(8):
+                for j in range(20):
+                    product[i, j] = 0.0
+                for l in range(8):
+                    v = weight * tangent[i, l]
+                    for j in range(20):
+                        product[i, j] += v * rows[l, j]
+            for i in range(20):
+                for l in range(8):
+                    v = rows[l, i]
+                    for j in range(20):
+                        k[i, j] += v * product[l, j]
+            # geometric stiffness: second derivatives of the covariant strains are scalars times the identity
+            for a in range(4):
+                a0 = _SLOPE[point, a, 0]
+                a1 = _SLOPE[point, a, 1]
+                for b in range(4):
+                    b0 = _SLOPE[point, b, 0]
+                    b1 = _SLOPE[point, b, 1]
+                    mixed = a0 * b1 + a1 * b0
+                    gxx[a, b] += n[0] * a0 * b0 + n[1] * a1 * b1 + n[2] * mixed
+                    gxd[a, b] += m[0] * a0 * b0 + m[1] * a1 * b1 + m[2] * mixed
+            for ed in range(4):
+                w = 0.25 * _EDGE_WEIGHTS[point, ed] * g[ed // 2]
+                a = _EDGES[ed, 0]
+                b = _EDGES[ed, 1]
+                gxd[b, a] += w
+                gxd[b, b] += w
+                gxd[a, a] -= w
+                gxd[a, b] -= w
+        for a in range(4):
+            na = quad[a]
+            for b in range(4):
+                v = gxx[a, b]
+                for i in range(3):
+                    k[5 * a + i, 5 * b + i] += v
+                v = gxd[a, b]
+                nb = quad[b]
+                for r in range(2):
+                    for i in range(3):
+                        value = v * director1[nb, r, i]
+                        k[5 * a + i, 5 * b + 3 + r] += value
+                        k[5 * b + 3 + r, 5 * a + i] += value
+            curve0 = 0.0
+            curve1 = 0.0
+            curve2 = 0.0
+            for i in range(3):
+                curve0 += fd[a, i] * director2[na, 0, i]
+                curve1 += fd[a, i] * director2[na, 1, i]
+                curve2 += fd[a, i] * director2[na, 2, i]
+            k[5 * a + 3, 5 * a + 3] += curve0
+            k[5 * a + 4, 5 * a + 4] += curve1
+            k[5 * a + 3, 5 * a + 4] += curve2
+            k[5 * a + 4, 5 * a + 3] += curve2
+            for i in range(3):
+                out[na, i] += fx[a, i]
+            for r in range(2):
+                total = 0.0
+                for i in range(3):
+                    total += fd[a, i] * director1[na, r, i]
+                out[na, 3 + r] += total
+        slot = slots[el]
+        for i in range(20):
+            for j in range(20):
+                where = slot[20 * i + j]
+                if where >= 0:
+                    data[where] += k[i, j]

@@ -1,0 +1,109 @@
+"""Stress and tangent of the incompressible Mooney-Rivlin law in plane stress, in closed form for compiled loops.
+
+The law is defined by its energy in `dbvfiv.materials`; this is its first and second derivative with respect to [E11, E22, 2E12, 2E13, 2E23],
+checked against automatic differentiation of that energy.
+"""
+from __future__ import annotations
+
+import numba
+
+FAST = {"contract", "reassoc", "arcp", "nsz"}
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def rubber_stress(c10, c01, c11, e, s):
+    """Fill the stress s (5,) for strains e (5,)."""
+    a = 1 + 2 * e[0]
+    b = 1 + 2 * e[1]
+    c = e[2]
+    g = e[3]
+    k = e[4]
+    det = a * b - c * c
+    inv = 1 / det
+    n = b * g * g - 2 * c * g * k + a * k * k
+    h = (1 + n) * inv
+    i1 = (a + b - 2) + (h - 1)
+    i2 = (det - 1) + (a + b) * h - g * g - k * k - 2
+    w1 = c10 + c11 * i2
+    w2 = c01 + c11 * i1
+    sum_ab = a + b
+    h0 = (k * k - h * b) * inv
+    h1 = (g * g - h * a) * inv
+    h2 = 2 * (h * c - g * k) * inv
+    h3 = 2 * (b * g - c * k) * inv
+    h4 = 2 * (a * k - c * g) * inv
+    s[0] = 2 * (w1 * (1 + h0) + w2 * (b + h + sum_ab * h0))
+    s[1] = 2 * (w1 * (1 + h1) + w2 * (a + h + sum_ab * h1))
+    s[2] = w1 * h2 + w2 * (sum_ab * h2 - 2 * c)
+    s[3] = w1 * h3 + w2 * (sum_ab * h3 - 2 * g)
+    s[4] = w1 * h4 + w2 * (sum_ab * h4 - 2 * k)
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def rubber_tangent(c10, c01, c11, e, s, t):
+    """Fill stress s (5,) and the upper triangle of the tangent t (5, 5) for strains e (5,)."""
+    a = 1 + 2 * e[0]
+    b = 1 + 2 * e[1]
+    c = e[2]
+    g = e[3]
+    k = e[4]
+    det = a * b - c * c
+    inv = 1 / det
+    n = b * g * g - 2 * c * g * k + a * k * k
+    h = (1 + n) * inv
+    i1 = (a + b - 2) + (h - 1)
+    i2 = (det - 1) + (a + b) * h - g * g - k * k - 2
+    w1 = c10 + c11 * i2
+    w2 = c01 + c11 * i1
+    r = a + b
+    # gradients of C33 (h), det and n with respect to C11, C22, C12, C13, C23
+    h0 = (k * k - h * b) * inv
+    h1 = (g * g - h * a) * inv
+    h2 = 2 * (h * c - g * k) * inv
+    h3 = 2 * (b * g - c * k) * inv
+    h4 = 2 * (a * k - c * g) * inv
+    d2 = -2 * c
+    p0 = 1 + h0
+    p1 = 1 + h1
+    q0 = b + h + r * h0
+    q1 = a + h + r * h1
+    q2 = d2 + r * h2
+    q3 = r * h3 - 2 * g
+    q4 = r * h4 - 2 * k
+    s[0] = 2 * (w1 * p0 + w2 * q0)
+    s[1] = 2 * (w1 * p1 + w2 * q1)
+    s[2] = w1 * h2 + w2 * q2
+    s[3] = w1 * h3 + w2 * q3
+    s[4] = w1 * h4 + w2 * q4
+    # Hessian of h
+    h00 = -2 * h0 * b * inv
+    h01 = (-h0 * a - h1 * b - h) * inv
+    h02 = -(h0 * d2 + h2 * b) * inv
+    h03 = -h3 * b * inv
+    h04 = (2 * k - h4 * b) * inv
+    h11 = -2 * h1 * a * inv
+    h12 = -(h1 * d2 + h2 * a) * inv
+    h13 = (2 * g - h3 * a) * inv
+    h14 = -h4 * a * inv
+    h22 = (2 * h - 2 * h2 * d2) * inv
+    h23 = (-2 * k - h3 * d2) * inv
+    h24 = (-2 * g - h4 * d2) * inv
+    h33 = 2 * b * inv
+    h34 = -2 * c * inv
+    h44 = 2 * a * inv
+    w = w1 + w2 * r
+    t[0, 0] = 4 * (w * h00 + w2 * 2 * h0 + 2 * c11 * p0 * q0)
+    t[0, 1] = 4 * (w * h01 + w2 * (1 + h0 + h1) + c11 * (p0 * q1 + p1 * q0))
+    t[0, 2] = 2 * (w * h02 + w2 * h2 + c11 * (p0 * q2 + h2 * q0))
+    t[0, 3] = 2 * (w * h03 + w2 * h3 + c11 * (p0 * q3 + h3 * q0))
+    t[0, 4] = 2 * (w * h04 + w2 * h4 + c11 * (p0 * q4 + h4 * q0))
+    t[1, 1] = 4 * (w * h11 + w2 * 2 * h1 + 2 * c11 * p1 * q1)
+    t[1, 2] = 2 * (w * h12 + w2 * h2 + c11 * (p1 * q2 + h2 * q1))
+    t[1, 3] = 2 * (w * h13 + w2 * h3 + c11 * (p1 * q3 + h3 * q1))
+    t[1, 4] = 2 * (w * h14 + w2 * h4 + c11 * (p1 * q4 + h4 * q1))
+    t[2, 2] = w * h22 - 2 * w2 + 2 * c11 * h2 * q2
+    t[2, 3] = w * h23 + c11 * (h2 * q3 + h3 * q2)
+    t[2, 4] = w * h24 + c11 * (h2 * q4 + h4 * q2)
+    t[3, 3] = w * h33 - 2 * w2 + 2 * c11 * h3 * q3
+    t[3, 4] = w * h34 + c11 * (h3 * q4 + h4 * q3)
+    t[4, 4] = w * h44 - 2 * w2 + 2 * c11 * h4 * q4

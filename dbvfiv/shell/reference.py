@@ -1,0 +1,136 @@
+"""Reference geometry at the in-plane integration points: metrics, curvature and the maps to local axes."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mesh import ShellMesh, shape_functions
+
+GAUSS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(3.0)
+SHAPE = np.array([shape_functions(*point)[0] for point in GAUSS])  # (4, 4): point, node
+SLOPE = np.array([shape_functions(*point)[1] for point in GAUSS])  # (4, 4, 2): point, node, direction
+
+#: Mid-edge sampling of the transverse shear (Dvorkin & Bathe 1984): first and second node of the edges along which the shears
+#: gamma_1 (first two) and gamma_2 (last two) are taken, and their weights at the integration points.
+SHEAR_EDGES = np.array([[0, 1], [3, 2], [0, 3], [1, 2]])
+SHEAR_WEIGHTS = np.stack(
+    [0.5 * (1 - GAUSS[:, 1]), 0.5 * (1 + GAUSS[:, 1]), 0.5 * (1 - GAUSS[:, 0]), 0.5 * (1 + GAUSS[:, 0])], axis=1
+)  # (4 points, 4 edges)
+
+
+@dataclass(frozen=True)
+class ReferenceGeometry:
+    """Arrays over elements and in-plane points (ne, 4, ...).
+
+    Strains are ordered [11, 22, 2 * 12]. With covariant strain coefficients c0 and c1 and mixed curvature kappa the local strain at thickness
+    coordinate t is E = q c0 + t (q c1 - qk c0), qk standing for sym(kappa c0).
+
+    Attributes
+    ----------
+    area : (ne, 4) m2
+    thickness : (ne,) m
+    q : (ne, 4, 3, 3), qk : (ne, 4, 3, 3)
+    p : (ne, 4, 2, 2)
+        Transverse shear: gamma_local[a] = p[a, alpha] gamma[alpha].
+    metric0 : (ne, 4, 3), metric1 : (ne, 4, 3), shear0 : (ne, 4)
+        Reference values that the strains are measured from; `shear0` per shear edge.
+    curvature : (ne, 4, 2, 2)
+        Mixed curvature kappa[gamma, beta]: covariant derivative beta of the director against basis vector gamma.
+    axes : (ne, 4, 3, 3)
+        Local axes (rows): material axis in the tangent plane, the direction across, the normal.
+    position : (ne, 4, 3) m
+    """
+
+    area: np.ndarray
+    thickness: np.ndarray
+    q: np.ndarray
+    qk: np.ndarray
+    p: np.ndarray
+    metric0: np.ndarray
+    metric1: np.ndarray
+    shear0: np.ndarray
+    curvature: np.ndarray
+    axes: np.ndarray
+    position: np.ndarray
+
+
+def strain_map(p: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) map of covariant strains [11, 22, 2*12] to local axes, from p[..., a, alpha] = e_a . G^alpha."""
+    a, b, c, d = p[..., 0, 0], p[..., 0, 1], p[..., 1, 0], p[..., 1, 1]
+    return np.stack(
+        [
+            np.stack([a * a, b * b, a * b], axis=-1),
+            np.stack([c * c, d * d, c * d], axis=-1),
+            np.stack([2 * a * c, 2 * b * d, a * d + b * c], axis=-1),
+        ],
+        axis=-2,
+    )
+
+
+def curvature_map(kappa: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) map of c0 to sym(kappa c0), both as [11, 22, 2*12]."""
+    k11, k12, k21, k22 = kappa[..., 0, 0], kappa[..., 0, 1], kappa[..., 1, 0], kappa[..., 1, 1]
+    zero = np.zeros_like(k11)
+    return np.stack(
+        [
+            np.stack([k11, zero, 0.5 * k21], axis=-1),
+            np.stack([zero, k22, 0.5 * k12], axis=-1),
+            np.stack([k12, k21, 0.5 * (k11 + k22)], axis=-1),
+        ],
+        axis=-2,
+    )
+
+
+def reference_geometry(mesh: ShellMesh) -> ReferenceGeometry:
+    """Evaluate the reference geometry of a mesh at the 2 x 2 points of every element.
+
+    Raises
+    ------
+    ValueError
+        If an element has no area or its material axis stands normal to the surface.
+    """
+    x = mesh.nodes[mesh.quads]
+    d = mesh.directors[mesh.quads]
+    basis = np.einsum("pac,eai->epci", SLOPE, x)  # (ne, 4, 2, 3)
+    turn = np.einsum("pac,eai->epci", SLOPE, d)
+    normal = np.cross(basis[:, :, 0], basis[:, :, 1])
+    area = np.linalg.norm(normal, axis=-1)
+    if not np.all(area > 0):
+        raise ValueError(f"Element {int(np.argmin(area.min(axis=1)))} has no area.")
+    normal /= area[..., None]
+    axis = np.broadcast_to(mesh.material_axis, (mesh.element_count, 3))[:, None, :]
+    first = axis - np.einsum("epi,epi->ep", np.broadcast_to(axis, normal.shape), normal)[..., None] * normal
+    length = np.linalg.norm(first, axis=-1, keepdims=True)
+    if np.any(length < 1e-6 * np.linalg.norm(axis, axis=-1, keepdims=True)):
+        raise ValueError(f"The material axis stands normal to element {int(np.argmin(length.min(axis=(1, 2))))}.")
+    first /= length
+    axes = np.stack([first, np.cross(normal, first), normal], axis=2)
+    metric = np.einsum("epci,epdi->epcd", basis, basis)
+    dual = np.einsum("epcd,epdi->epci", np.linalg.inv(metric), basis)
+    p = np.einsum("epai,epci->epac", axes[:, :, :2], dual)
+    kappa = np.einsum("epgi,epbi->epgb", dual, turn)
+    q = strain_map(p)
+    mixed = np.einsum("epci,epdi->epcd", basis, turn)
+    edge = 0.25 * np.einsum(
+        "egi,egi->eg", x[:, SHEAR_EDGES[:, 1]] - x[:, SHEAR_EDGES[:, 0]], d[:, SHEAR_EDGES[:, 1]] + d[:, SHEAR_EDGES[:, 0]]
+    )
+    return ReferenceGeometry(
+        area=area,
+        thickness=mesh.thickness,
+        q=q,
+        qk=q @ curvature_map(kappa),
+        p=p,
+        metric0=np.stack([0.5 * metric[..., 0, 0], 0.5 * metric[..., 1, 1], metric[..., 0, 1]], axis=-1),
+        metric1=np.stack([mixed[..., 0, 0], mixed[..., 1, 1], mixed[..., 0, 1] + mixed[..., 1, 0]], axis=-1),
+        shear0=edge,
+        curvature=kappa,
+        axes=axes,
+        position=np.einsum("pa,eai->epi", SHAPE, x),
+    )
+
+
+def thickness_over_radius(geometry: ReferenceGeometry) -> np.ndarray:
+    """(ne, 4): half the wall over the smaller radius of curvature; above one the inner face folds over itself."""
+    eigenvalues = np.linalg.eigvals(geometry.curvature)
+    return 0.5 * geometry.thickness[:, None] * np.abs(eigenvalues).max(axis=-1)

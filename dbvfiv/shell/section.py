@@ -1,0 +1,135 @@
+"""The wall: layers from inside to outside and how they are integrated through the thickness."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+LINEAR, RUBBER = 0, 1
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One layer.
+
+    Attributes
+    ----------
+    law : constitutive law of `dbvfiv.materials`
+    thickness : float
+        Nominal thickness, m; a section scales all layers so that they fill the local wall.
+    angle : float
+        Angle of the first material direction from the mesh's material axis, degrees, counter-clockwise about the outward normal.
+    shear_correction : float
+        Factor on the transverse shear energy.
+    name : str
+    """
+
+    law: object
+    thickness: float
+    angle: float = 0.0
+    shear_correction: float = 1.0
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """Layers, inside to outside, with Gauss points in each.
+
+    Through-thickness coordinate and weights are normalised: zeta in (-1/2, 1/2), weights summing to one; a wall of thickness h
+    has t = h zeta.
+    """
+
+    layers: tuple[Layer, ...]
+    points_per_layer: int = 2
+
+    def __post_init__(self):
+        if not self.layers:
+            raise ValueError("A section needs at least one layer.")
+        if min(layer.thickness for layer in self.layers) <= 0:
+            raise ValueError("Every layer of a section needs a positive thickness.")
+        if self.points_per_layer < 1:
+            raise ValueError("A layer needs at least one integration point.")
+
+    @cached_property
+    def fractions(self) -> np.ndarray:
+        """Thickness of each layer over that of the wall (nl,)."""
+        h = np.array([layer.thickness for layer in self.layers])
+        return h / h.sum()
+
+    @cached_property
+    def interfaces(self) -> np.ndarray:
+        """Normalised coordinates of the layer faces (nl + 1,), from -1/2 to 1/2."""
+        return np.concatenate([[0.0], np.cumsum(self.fractions)]) - 0.5
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """(nl * points, 2): normalised coordinate and weight of every layer point."""
+        x, w = np.polynomial.legendre.leggauss(self.points_per_layer)
+        centre = 0.5 * (self.interfaces[1:] + self.interfaces[:-1])
+        zeta = centre[:, None] + 0.5 * self.fractions[:, None] * x
+        weight = 0.5 * self.fractions[:, None] * w
+        return np.stack([zeta.ravel(), weight.ravel()], axis=1)
+
+    @cached_property
+    def kinds(self) -> np.ndarray:
+        return np.repeat([layer.law.kind for layer in self.layers], self.points_per_layer).astype(np.int64)
+
+    @cached_property
+    def parameters(self) -> np.ndarray:
+        """(np, 8) constants of the law at each layer point."""
+        return np.repeat([layer.law.parameters for layer in self.layers], self.points_per_layer, axis=0)
+
+    @cached_property
+    def directions(self) -> np.ndarray:
+        """(np, 2): cosine and sine of the layer angle at each layer point."""
+        angle = np.radians([layer.angle for layer in self.layers])
+        return np.repeat(np.stack([np.cos(angle), np.sin(angle)], axis=1), self.points_per_layer, axis=0)
+
+    @cached_property
+    def shear_scale(self) -> np.ndarray:
+        """(np,): factor on the transverse shear strains, the root of the shear correction."""
+        return np.repeat(np.sqrt([layer.shear_correction for layer in self.layers]), self.points_per_layer)
+
+    @cached_property
+    def inertia(self) -> np.ndarray:
+        """(3,): integrals of density * zeta^k over the normalised wall, k = 0, 1, 2 (kg/m3), exact."""
+        z = self.interfaces
+        density = np.array([layer.law.density for layer in self.layers])
+        return np.array([(density * (z[1:] ** (k + 1) - z[:-1] ** (k + 1))).sum() / (k + 1) for k in range(3)])
+
+    @cached_property
+    def linear_stiffness(self) -> np.ndarray:
+        """(8, 8) stiffness of the linear layers for a wall of unit thickness.
+
+        Rows: membrane (11, 22, 12), bending (11, 22, 12), transverse shear (13, 23). For a wall of thickness h the membrane and shear
+        blocks scale with h, the coupling with h^2, the bending block with h^3.
+        """
+        total = np.zeros((8, 8))
+        for (zeta, weight), kind, par, (c, s), shear in zip(
+            self.points, self.kinds, self.parameters, self.directions, self.shear_scale
+        ):
+            if kind != LINEAR:
+                continue
+            q11, q22, q12, q66, q55, q44 = par[:6]
+            plane = strain_rotation(c, s)
+            q = plane.T @ np.array([[q11, q12, 0], [q12, q22, 0], [0, 0, q66]]) @ plane
+            turn = np.array([[c, s], [-s, c]])
+            qs = shear**2 * turn.T @ np.diag([q55, q44]) @ turn
+            total[:3, :3] += weight * q
+            total[:3, 3:6] += weight * zeta * q
+            total[3:6, :3] += weight * zeta * q
+            total[3:6, 3:6] += weight * zeta**2 * q
+            total[6:, 6:] += weight * qs
+        return total
+
+    @cached_property
+    def rubber_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points (k, 2), constants (k, 3) and shear scale (k,) of the points that carry rubber."""
+        chosen = self.kinds == RUBBER
+        return self.points[chosen].copy(), self.parameters[chosen, :3].copy(), self.shear_scale[chosen].copy()
+
+
+def strain_rotation(c: float, s: float) -> np.ndarray:
+    """(3, 3) matrix that takes [E11, E22, 2E12] to axes turned by the angle with cosine c and sine s."""
+    return np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])

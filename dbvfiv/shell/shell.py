@@ -1,0 +1,140 @@
+"""The shell as a structure: internal force, tangent and mass of any mesh with any wall."""
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from .energy import FIRST_ORDER, EnergyFunctions
+from .kernel import shell_force, shell_tangent
+from .mass import assemble_mass, convective_inertia, mass_integrals
+from .mesh import ShellMesh
+from .reference import reference_geometry, thickness_over_radius
+from .rotation import director_derivatives
+from .section import Section
+from .supports import DofMap
+
+
+class Shell:
+    """A layered shell with finite rotations, total Lagrangian.
+
+    Parameters
+    ----------
+    mesh : ShellMesh
+    section : Section
+    free : (nn, 5) bool array, optional
+        Free unknowns of each node; all by default.
+    metric : "first-order" or "true"
+        Through-thickness treatment, see `dbvfiv.shell.energy`. Only the first-order treatment has a compiled element loop; the other is
+        evaluated by automatic differentiation of its energy, several times slower.
+
+    All states are vectors of the free unknowns (n,): displacements in m, rotations in rad. Forces are in N and N m.
+    """
+
+    def __init__(self, mesh: ShellMesh, section: Section, free=None, metric: str = FIRST_ORDER):
+        self.mesh = mesh
+        self.section = section
+        free = np.ones((mesh.node_count, 5), bool) if free is None else np.asarray(free, bool)
+        self.dofs = DofMap(free, mesh.quads)
+        self.metric = metric
+        self.geometry = reference_geometry(mesh)
+        points, constants, scales = section.rubber_points
+        g = self.geometry
+        self._reference = (g.shear0, g.metric0, g.metric1, g.q, g.qk, g.p, g.area, g.thickness)
+        self._wall = (section.linear_stiffness, points, constants, scales)
+        self._integrals = mass_integrals(g, section)
+        self._frames = np.ascontiguousarray(mesh.frames)
+
+    @property
+    def size(self) -> int:
+        return self.dofs.size
+
+    @cached_property
+    def energies(self) -> EnergyFunctions:
+        """The automatically differentiated definition on this mesh."""
+        return EnergyFunctions(self.mesh, self.geometry, self.section, self.metric)
+
+    def directors(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Directors (nn, 3), first (nn, 2, 3) and second (nn, 3, 3) derivatives for nodal unknowns (nn, 5)."""
+        count = self.mesh.node_count
+        d, d1, d2 = np.empty((count, 3)), np.empty((count, 2, 3)), np.empty((count, 3, 3))
+        director_derivatives(np.ascontiguousarray(nodal[:, 3:]), self.mesh.directors, self._frames, d, d1, d2)
+        return d, d1, d2
+
+    def energy(self, q: np.ndarray) -> float:
+        """Strain energy, J."""
+        return float(np.sum(self.energies.energy(self._element_unknowns(q))))
+
+    def force(self, q: np.ndarray) -> np.ndarray:
+        """Internal force (n,): the derivative of the energy."""
+        if self.metric != FIRST_ORDER:
+            return self._scatter(np.asarray(self.energies.force(self._element_unknowns(q))))
+        nodal = self.dofs.expand(q)
+        d, d1, _ = self.directors(nodal)
+        out = np.zeros_like(nodal)
+        shell_force(self.mesh.quads, self.mesh.nodes, nodal, d, d1, *self._reference, *self._wall, out)
+        return self.dofs.restrict(out)
+
+    def force_and_tangent(self, q: np.ndarray, data: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Internal force (n,) and values (nnz,) of the symmetric tangent on the pattern of `dofs`.
+
+        `data`, if given, is added to.
+        """
+        if data is None:
+            data = np.zeros(len(self.dofs.pattern[1]))
+        if self.metric != FIRST_ORDER:
+            unknowns = self._element_unknowns(q)
+            self._scatter_matrix(np.asarray(self.energies.tangent(unknowns)), data)
+            return self._scatter(np.asarray(self.energies.force(unknowns))), data
+        nodal = self.dofs.expand(q)
+        d, d1, d2 = self.directors(nodal)
+        out = np.zeros_like(nodal)
+        shell_tangent(
+            self.mesh.quads, self.mesh.nodes, nodal, d, d1, d2, *self._reference, *self._wall, self.dofs.slots, out, data
+        )
+        return self.dofs.restrict(out), data
+
+    def mass(self, q: np.ndarray | None = None) -> np.ndarray:
+        """Values (nnz,) of the consistent mass matrix at a state (at rest by default), kg and kg m2."""
+        q = np.zeros(self.size) if q is None else q
+        _, d1, _ = self.directors(self.dofs.expand(q))
+        data = np.zeros(len(self.dofs.pattern[1]))
+        assemble_mass(self.mesh.quads, self._integrals, d1, self.dofs.slots, data)
+        return data
+
+    def convective_inertia(self, q: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Inertia force (n,) quadratic in the velocities, from the turning of the directors."""
+        nodal = self.dofs.expand(q)
+        _, d1, d2 = self.directors(nodal)
+        out = np.zeros_like(nodal)
+        convective_inertia(self.mesh.quads, self._integrals, d1, d2, self.dofs.expand(rate), out)
+        return self.dofs.restrict(out)
+
+    def second(self, q, a, b) -> np.ndarray:
+        """Second directional derivative (n,) of the internal force along a and b (n,)."""
+        return self._scatter(np.asarray(self.energies.second(*map(self._element_unknowns, (q, a, b)))))
+
+    def third(self, q, a, b, c) -> np.ndarray:
+        """Third directional derivative (n,) of the internal force along a, b and c (n,)."""
+        return self._scatter(np.asarray(self.energies.third(*map(self._element_unknowns, (q, a, b, c)))))
+
+    def strains(self, q: np.ndarray) -> np.ndarray:
+        """Green-Lagrange strains (ne, 4, np, 5) in layer axes at all integration points."""
+        return np.asarray(self.energies.strains(self._element_unknowns(q)))
+
+    def folded_places(self) -> np.ndarray:
+        """Positions (k, 3) of the integration points at which half the wall exceeds the radius of the mid-surface."""
+        return self.geometry.position[thickness_over_radius(self.geometry) > 1.0]
+
+    def _element_unknowns(self, q):
+        return self.dofs.expand(np.asarray(q, float))[self.mesh.quads]
+
+    def _scatter(self, element_forces: np.ndarray) -> np.ndarray:
+        out = np.zeros((self.mesh.node_count, 5))
+        np.add.at(out, self.mesh.quads, element_forces.reshape(-1, 4, 5))
+        return self.dofs.restrict(out)
+
+    def _scatter_matrix(self, element_matrices: np.ndarray, data: np.ndarray) -> None:
+        slots = self.dofs.slots.ravel()
+        keep = slots >= 0
+        np.add.at(data, slots[keep], element_matrices.reshape(-1)[keep])

@@ -1,0 +1,105 @@
+"""One steady state of the valve and what a user reads off it."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import ValveModel
+from ..model.valve import QUARTERS
+
+
+@dataclass(frozen=True)
+class SteadyState:
+    """An equilibrium; flow and areas are those of the whole valve, station data those of a quarter.
+
+    Attributes
+    ----------
+    pressure : float, Pa
+    q : (n,) array
+        Free displacements (m) and rotations (rad).
+    mass_flow : float, kg/s
+    outlet_area : float, m2
+    outlet_velocity : float, m/s
+    max_displacement : float, m
+    max_displacement_position : (3,) tuple, m
+        Where it occurs, on the mid-surface at rest.
+    lip_opening : float, m
+        Displacement in y at x = z = 0.
+    station_area, station_velocity, station_pressure : (m,) arrays, m2 (a quarter), m/s, Pa
+    stops : int
+        Lip stops in contact.
+    converged : bool
+    iterations : int
+        Newton iterations over all load steps that led here.
+    load_steps : int
+    residual : float
+        Unbalanced force over pressure force.
+    rounding : float
+        Relative residual that rounding alone explains.
+    reason : str
+    """
+
+    pressure: float
+    q: np.ndarray
+    mass_flow: float
+    outlet_area: float
+    outlet_velocity: float
+    max_displacement: float
+    max_displacement_position: tuple[float, float, float]
+    lip_opening: float
+    station_area: np.ndarray
+    station_velocity: np.ndarray
+    station_pressure: np.ndarray
+    stops: int
+    converged: bool
+    iterations: int
+    load_steps: int
+    residual: float
+    rounding: float
+    reason: str
+
+    def summary(self) -> dict:
+        """Plain SI numbers for JSON."""
+        return {
+            "pressure": self.pressure,
+            "mass_flow": self.mass_flow,
+            "outlet_area": self.outlet_area,
+            "outlet_velocity": self.outlet_velocity,
+            "max_displacement": self.max_displacement,
+            "max_displacement_position": list(self.max_displacement_position),
+            "lip_opening": self.lip_opening,
+            "stops": self.stops,
+            "converged": self.converged,
+            "iterations": self.iterations,
+            "load_steps": self.load_steps,
+            "residual": self.residual,
+            "rounding": self.rounding,
+            "reason": self.reason,
+        }
+
+
+def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution) -> SteadyState:
+    """Steady state of a model from its unknowns; `solution` holds the fields from `converged` to `reason`."""
+    nodal = model.nodal(q)
+    area = model.rows.areas(nodal)
+    density = model.case.fluid.density
+    velocity = model.flow.inlet_velocity(area, pressure, density)
+    speeds = model.flow.velocities(area, velocity)
+    displacement = np.linalg.norm(nodal[:, :3], axis=1)
+    where = int(np.argmax(displacement))
+    return SteadyState(
+        pressure=float(pressure),
+        q=np.asarray(q),
+        mass_flow=model.mass_flow(area, pressure),
+        outlet_area=float(QUARTERS * area[0]),
+        outlet_velocity=float(speeds[0]),
+        max_displacement=float(displacement[where]),
+        max_displacement_position=tuple(float(value) for value in model.mesh.nodes[where]),
+        lip_opening=float(nodal[model.mesh.rows[0, 0], 1]),
+        station_area=area,
+        station_velocity=speeds,
+        station_pressure=model.flow.steady_pressure(area, pressure),
+        stops=model.stops.touching(q),
+        **solution,
+    )

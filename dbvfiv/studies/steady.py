@@ -1,0 +1,224 @@
+"""Equilibria over a list of pressures, by load steps from rest or from a given state."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Iterable, Iterator
+
+import numpy as np
+
+from ..errors import SolveError
+from ..model import ValveModel
+from ..model.newton import EquilibriumSolver, NewtonOptions, NewtonResult
+from .observer import Observer
+from .state import SteadyState, describe_state
+
+
+@dataclass(frozen=True)
+class SteadyOptions:
+    """Options of a list of equilibria.
+
+    Attributes
+    ----------
+    newton : NewtonOptions
+    min_step : float
+        Smallest load step over the target pressure before giving up.
+    """
+
+    newton: NewtonOptions = NewtonOptions()
+    min_step: float = 1e-4
+
+    @classmethod
+    def of(cls, case) -> "SteadyOptions":
+        """Options of a case file."""
+        steady = case.steady
+        return cls(NewtonOptions(steady.tolerance, steady.max_iterations), steady.min_step)
+
+
+@dataclass(frozen=True)
+class SteadyResult:
+    """Equilibria in the order asked for.
+
+    Attributes
+    ----------
+    model : ValveModel
+    states : tuple of SteadyState
+        Converged states only.
+    failures : tuple of str
+        One sentence for each pressure that was not reached.
+    warnings : tuple of str
+    interrupted : bool
+    """
+
+    model: ValveModel
+    states: tuple[SteadyState, ...]
+    failures: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    interrupted: bool = False
+
+    def summary(self) -> dict:
+        """Plain SI numbers for JSON."""
+        return {
+            "points": [state.summary() for state in self.states],
+            "failures": list(self.failures),
+            "warnings": list(self.warnings),
+            "interrupted": self.interrupted,
+        }
+
+
+@dataclass
+class LoadPath:
+    """Walks a model from one equilibrium to the next in pressure.
+
+    Steps are predicted along the tangent of the equilibrium path, tried whole first, halved when Newton fails and doubled when it succeeds.
+
+    Parameters
+    ----------
+    model : ValveModel
+    options : SteadyOptions
+    pressure : float, Pa
+    q : (n,) array
+        Where the walk starts; at rest by default.
+    """
+
+    model: ValveModel
+    options: SteadyOptions = SteadyOptions()
+    pressure: float = 0.0
+    q: np.ndarray | None = None
+    observer: Observer = field(default_factory=Observer)
+
+    def __post_init__(self):
+        self.q = self.model.rest() if self.q is None else np.asarray(self.q, float)
+        self.solver = EquilibriumSolver(self.model, self.options.newton)
+        self.fallback = EquilibriumSolver(self.model, replace(self.options.newton, line_search="l2"))
+        self._slope: np.ndarray | None = None
+
+    def go_to(self, target: float) -> SteadyState:
+        """Equilibrium at a pressure, Pa.
+
+        Raises
+        ------
+        SolveError
+            If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
+        """
+        smallest = self.options.min_step * max(abs(target), abs(self.pressure))
+        step = target - self.pressure
+        iterations, steps = 0, 0
+        while True:
+            remaining = target - self.pressure
+            last = abs(step) >= abs(remaining) * (1 - 1e-12)
+            aim = target if last else self.pressure + step
+            result = self._attempt(aim)
+            iterations += result.iterations
+            if result.converged:
+                steps += 1
+                self._accept(result, aim)
+                if last:
+                    break
+                step = np.copysign(min(2 * abs(step), abs(target - self.pressure)), step)
+                self.observer.progress(f"equilibrium at {aim:.6g} Pa, {result.iterations} iterations")
+                continue
+            step = (aim - self.pressure) / 2
+            self.observer.progress(f"no equilibrium at {aim:.6g} Pa ({result.reason}), step halved to {abs(step):.3g} Pa")
+            if abs(step) < smallest:
+                raise SolveError(
+                    f"No equilibrium was found between {self.pressure:.6g} Pa, the last one, and {aim:.6g} Pa on the way to {target:.6g} Pa: "
+                    f"{result.reason}; load steps down to {2 * abs(step):.3g} Pa and two line searches were tried."
+                )
+        return describe_state(
+            self.model, self.q, target, converged=True, iterations=iterations, load_steps=steps,
+            residual=result.residual, rounding=result.rounding, reason=result.reason,
+        )  # fmt: skip
+
+    def _attempt(self, aim: float) -> NewtonResult:
+        start = self.q if self._slope is None else self.q + (aim - self.pressure) * self._slope
+        result = self.solver.solve(start, aim)
+        if result.converged:
+            return result
+        first = result
+        result = self.fallback.solve(self.q, aim)
+        return replace(result, iterations=result.iterations + first.iterations)
+
+    def _accept(self, result: NewtonResult, pressure: float) -> None:
+        self.q, self.pressure = result.q, pressure
+        used = self.solver if self.solver.last is result.q else self.fallback
+        self._slope = used.sensitivity(self.q, pressure)
+
+
+def run_steady(
+    model: ValveModel,
+    pressures: Iterable[float],
+    options: SteadyOptions | None = None,
+    observer: Observer | None = None,
+    start: SteadyState | None = None,
+) -> SteadyResult:
+    """Equilibria at a list of inlet pressures, Pa, each reached from the one before.
+
+    A pressure that is not reached is reported in `failures` and the list goes on from the last equilibrium; an interrupt ends the list and
+    keeps what was found.
+    """
+    options = SteadyOptions.of(model.case) if options is None else options
+    observer = Observer() if observer is None else observer
+    pressures = [float(pressure) for pressure in pressures]
+    path = LoadPath(model, options, observer=observer)
+    if start is not None:
+        path.q, path.pressure = start.q, start.pressure
+    states: list[SteadyState] = []
+    failures: list[str] = []
+    warnings = list(model_warnings(model))
+    observer.begin("steady", len(pressures))
+    for sentence in warnings:
+        observer.warn(sentence)
+    interrupted = False
+    try:
+        for state in _states(path, pressures, failures, observer):
+            observer.item(state)
+            states.append(state)
+    except KeyboardInterrupt:
+        interrupted = True
+    for sentence in state_warnings(model, states):
+        warnings.append(sentence)
+        observer.warn(sentence)
+    observer.end(interrupted)
+    return SteadyResult(model, tuple(states), tuple(failures), tuple(warnings), interrupted)
+
+
+def _states(path: LoadPath, pressures: list[float], failures: list[str], observer: Observer) -> Iterator[SteadyState]:
+    for pressure in pressures:
+        try:
+            yield path.go_to(pressure)
+        except SolveError as error:
+            failures.append(str(error))
+            observer.warn(str(error))
+
+
+def model_warnings(model: ValveModel) -> Iterator[str]:
+    """Sentences about the model that hold whatever the load."""
+    folded = model.shell.folded_places()
+    if len(folded):
+        (xa, ya, za), (xb, yb, zb) = folded.min(axis=0), folded.max(axis=0)
+        yield (
+            f"Half the wall exceeds the radius of the mid-surface at {len(folded)} points (x {xa:.3f} to {xb:.3f} m, z {za:.3f} to {zb:.3f} m): "
+            "the inner face folds over itself there and first-order shell theory is only an approximation."
+        )
+
+
+def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str]:
+    """Sentences about the states found: strains at which a rubber law is no longer stable."""
+    from ..materials.stability import stability_margin
+
+    section = model.shell.section
+    worst: dict[str, tuple[float, float]] = {}
+    for state in states:
+        strain = model.shell.strains(state.q)
+        for i, layer in enumerate(section.layers):
+            if layer.law.kind == 0:
+                continue
+            points = slice(i * section.points_per_layer, (i + 1) * section.points_per_layer)
+            margin = float(np.min(stability_margin(layer.law, strain[:, :, points].reshape(-1, 5))))
+            if margin <= 0 and margin < worst.get(layer.name, (0.0, 0.0))[0]:
+                worst[layer.name] = (margin, state.pressure)
+    for name, (margin, pressure) in worst.items():
+        yield (
+            f"The constants of {name} lose stability within the strains that occur: at {pressure:.6g} Pa the smallest eigenvalue of its tangent falls to "
+            f"{margin:.2g} of the value at rest; choose a higher strain level or fit the constants over a wider range."
+        )
