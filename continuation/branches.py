@@ -1,0 +1,161 @@
+"""Branches of equilibria: start, resume, switch."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from continuation.branch import Branch, SpecialPoint
+from continuation.errors import NotABifurcation, NotConverged
+from continuation.monitors import BranchPointMonitor, EventMonitor, FoldMonitor
+from continuation.options import ContinuationOptions
+from continuation.problem import Problem
+from continuation.stability import SpectrumMonitor
+from continuation.tracer import Tracer
+
+
+def branch_tracer(system, mu, parameter, options, events=(), spectrum=None, observers=None):
+    """The tracer of a branch with the monitors the options ask for."""
+    problem = Problem(system, mu, (parameter,), None, options.state_scale,
+                      options.parameter_scales)
+    monitors: list = []
+    if options.folds and options.method == "arclength":
+        monitors.append(FoldMonitor())
+    if options.branch_points:
+        monitors.append(BranchPointMonitor())
+    if options.eigenvalues:
+        monitors.append(SpectrumMonitor(spectrum))
+    monitors += [EventMonitor(event) for event in events]
+    return Tracer(problem, options, monitors, observers)
+
+
+def continue_branch(
+    system,
+    u,
+    mu,
+    parameter: str,
+    options: ContinuationOptions | None = None,
+    events=(),
+    spectrum=None,
+    observers=None,
+) -> Branch:
+    """Follow equilibria in one parameter.
+
+    Parameters
+    ----------
+    system : System
+    u : ndarray, shape (n,)
+        Near an equilibrium; corrected first.
+    mu : mapping of str to float
+    parameter : str
+        The parameter to free.
+    options : ContinuationOptions
+    events : sequence of Event
+    spectrum : callable, optional
+        ``(u, mu, count, near) -> Spectrum`` in place of the system's own.
+    observers : Observer, callable or sequence of them
+
+    Returns
+    -------
+    Branch
+        With all accepted points, whatever ended the run; see its ``reason``.
+
+    Raises
+    ------
+    NotConverged
+        There is no equilibrium near the start.
+
+    Examples
+    --------
+    >>> from continuation.jax_system import JaxSystem
+    >>> system = JaxSystem(lambda u, mu: mu["r"] + u**2, size=1)
+    >>> branch = continue_branch(system, [-1.0], {"r": -1.0}, "r",
+    ...                          ContinuationOptions(max_points=30))
+    >>> abs(branch.of_kind("fold")[0].mu["r"]) < 1e-9
+    True
+    """
+    options = options or ContinuationOptions()
+    mu = {name: float(value) for name, value in dict(mu).items()}
+    tracer = branch_tracer(system, mu, parameter, options, events, spectrum, observers)
+    u = np.asarray(u, float)
+    if u.shape != (system.size,):
+        raise ValueError(f"The state has shape {u.shape}; the system needs ({system.size},).")
+    direction = np.zeros(u.size + 1)
+    direction[-1] = options.direction
+    here = tracer.start(tracer.problem.pack(u, mu), direction)
+    branch = Branch("equilibria", system.size, (parameter,), (), mu, [here.point()])
+    return tracer.run(branch, here, options.step)
+
+
+def resume(
+    system, branch: Branch, options: ContinuationOptions | None = None, events=(), spectrum=None,
+    observers=None,
+) -> Branch:
+    """Go on from the last point of a branch of equilibria, e.g. one loaded from a file.
+
+    The branch handed over stays as it is; the one returned holds its points and the new ones.
+    """
+    if branch.kind != "equilibria":
+        raise ValueError(f"This resumes branches of equilibria, not a {branch.kind}.")
+    options = options or ContinuationOptions()
+    tracer = branch_tracer(system, branch.fixed, branch.names[0], options, events, spectrum,
+                           observers)
+    last = branch.points[-1]
+    here = tracer.start(last.z, last.tangent, branch.restart.get("frame"))
+    longer = replace(branch, points=list(branch.points), special=list(branch.special),
+                     reason="running", restart=dict(branch.restart))
+    step = float(np.clip(branch.next_step or options.step, options.min_step, options.max_step))
+    return tracer.run(longer, here, step)
+
+
+def switch_branch(
+    system, special: SpecialPoint, parameter: str, options: ContinuationOptions | None = None,
+    side: int = 1, events=(), spectrum=None, observers=None,
+) -> Branch:
+    """Follow the other branch through a simple branch point, to one side.
+
+    Parameters
+    ----------
+    special : SpecialPoint
+        A located branch point.
+    side : {+1, -1}
+        Which of the two halves.
+
+    Raises
+    ------
+    NotABifurcation
+        The point is not a located branch point with a second real branch.
+    NotConverged
+        No point of the other branch was found at any step tried.
+    """
+    options = options or ContinuationOptions()
+    if special.kind != "branch point" or not special.located or "direction" not in special.vectors:
+        raise NotABifurcation(
+            f"Branches are switched at located branch points; this is a {special.kind}"
+            f" ({special.reason or 'located: ' + str(special.located)})."
+        )
+    if side not in (1, -1):
+        raise ValueError(f"The side is +1 or -1, not {side}.")
+    tracer = branch_tracer(system, special.mu, parameter, options, events, spectrum, observers)
+    direction = side * special.vectors["direction"]
+    problem = tracer.problem
+    frame = problem.frame(direction[:, None])
+    step = options.step
+    reason = ""
+    while step >= options.min_step:
+        try:
+            here = tracer.start(special.z + step * direction, direction, frame)
+        except NotConverged as error:
+            reason = error.reason
+        else:
+            gap = here.z - special.z
+            gap = gap / problem.norm(gap)
+            known = special.tangent / problem.norm(special.tangent)
+            if abs(problem.dot(gap, direction)) > abs(problem.dot(gap, known)):
+                branch = Branch("equilibria", system.size, (parameter,), (), dict(special.mu),
+                                [here.point()])
+                return tracer.run(branch, here, step)
+            reason = "the corrector fell back to the known branch"
+        step *= options.shrink
+    raise NotConverged(f"The other branch was not found: {reason}.", reason)

@@ -1,0 +1,199 @@
+"""Scalar conditions of minimally augmented systems, with exact derivatives.
+
+Each condition borders a matrix so that it becomes regular and reads off a number that
+vanishes exactly when the inner matrix is singular (Griewank & Reddien 1984; Govaerts,
+Numerical Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, ch. 4).  If
+``[[M, p], [q*, 0]] (v, g) = (0, 1)`` and ``(w*, g)`` solves the adjoint problem, then
+``dg = -w* dM v``: only directional second derivatives are needed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from continuation.bordered import Bordered, bordered
+from continuation.multilinear import Derivatives
+
+
+def unit_last(size, dtype=float):
+    e = np.zeros(size, dtype)
+    e[-1] = 1.0
+    return e
+
+
+def null_pair(solver, p, q):
+    """``g, v, w`` of the bordered matrix; ``w`` is conjugated, so that ``w* M = -g q*``."""
+    border = Bordered(solver, p, np.conj(q))
+    one = unit_last(p.size + 1)
+    right, left = border.solve(one), border.solve_transpose(one)
+    return right[-1], right[:-1], np.conj(left[:-1]), border
+
+
+class FoldCondition:
+    """``g = 0``: ``F_u`` is singular.
+
+    Parameters
+    ----------
+    p, q : ndarray, shape (n,)
+        Borders, near the left and right null vectors.
+    """
+
+    extra, count = 0, 1
+    extra_names: tuple[str, ...] = ()
+
+    def __init__(self, p, q):
+        self.p, self.q = p / np.linalg.norm(p), q / np.linalg.norm(q)
+
+    def evaluate(self, system, u, mu, names, linear, extra):
+        return FoldValue(self, Derivatives(system, u, mu), linear)
+
+    def adapt(self, value):
+        """Turn the borders to the null vectors found, so that they stay near."""
+        self.__init__(value.w, value.v)
+
+
+class FoldValue:
+    """The fold condition at a point: ``values``, ``along``, and the null vectors ``v, w``."""
+
+    d_extra = np.zeros((1, 0))
+
+    def __init__(self, condition, derivatives, linear):
+        self._derivatives = derivatives
+        self.linear = linear
+        g, self.v, self.w, self._border = null_pair(linear, condition.p, condition.q)
+        self.values = np.array([g])
+
+    def along(self, du, dmu):
+        return np.array([-self.w @ self._derivatives.jacobian_along(self.v, du, dmu)])
+
+
+class HopfCondition:
+    """Real and imaginary part of ``g``: ``F_u - i omega B`` is singular.
+
+    Parameters
+    ----------
+    p, q : ndarray, complex, shape (n,)
+        Borders, near the left and right eigenvectors.
+    """
+
+    extra, count = 1, 2
+    extra_names = ("omega",)
+
+    def __init__(self, p, q):
+        self.p, self.q = p / np.linalg.norm(p), q / np.linalg.norm(q)
+
+    def evaluate(self, system, u, mu, names, linear, extra):
+        return HopfValue(self, Derivatives(system, u, mu), linear, float(extra[0]))
+
+    def adapt(self, value):
+        self.__init__(value.w, value.v)
+
+
+class HopfValue:
+    """The Hopf condition at a point; ``v, w`` are the right and left eigenvectors at ``g = 0``."""
+
+    def __init__(self, condition, derivatives, linear, omega):
+        self._derivatives, self.omega = derivatives, omega
+        self.linear = linear
+        shifted = linear.shifted(1j * omega)
+        g, self.v, self.w, _ = null_pair(shifted, condition.p, condition.q)
+        self.values = np.array([g.real, g.imag])
+        slope = 1j * np.vdot(self.w, linear.mass_matvec(self.v))
+        self.d_extra = np.array([[slope.real], [slope.imag]])
+
+    def along(self, du, dmu):
+        change = self._derivatives.jacobian_along(self.v, du, dmu)
+        change = change - 1j * self.omega * self._derivatives.mass_along(self.v, du, dmu)
+        dg = -np.vdot(self.w, change)
+        return np.array([dg.real, dg.imag])
+
+
+class BogdanovTakensCondition(FoldCondition):
+    """``F_u v = 0`` and ``w' B v = 0``: a double zero eigenvalue with one eigenvector."""
+
+    count = 2
+
+    def evaluate(self, system, u, mu, names, linear, extra):
+        return BogdanovTakensValue(self, Derivatives(system, u, mu), linear)
+
+
+class BogdanovTakensValue(FoldValue):
+    d_extra = np.zeros((2, 0))
+
+    def __init__(self, condition, derivatives, linear):
+        super().__init__(condition, derivatives, linear)
+        self._bv, self._bw = linear.mass_matvec(self.v), linear.mass_rmatvec(self.w)
+        self.values = np.array([self.values[0], self.w @ self._bv])
+
+    def along(self, du, dmu):
+        d = self._derivatives
+        av = d.jacobian_along(self.v, du, dmu)
+        # dv solves the differentiated bordered system; w' B dv = (B'w)' dv.  dw enters
+        # through a transposed solve with B v, which needs no gradient of w' F_u.
+        zero = np.zeros(1)
+        dv = self._border.solve(np.concatenate([-av, zero]))[:-1]
+        x = self._border.solve(np.concatenate([self._bv, zero]))[:-1]
+        dw_bv = -(self.w @ d.jacobian_along(x, du, dmu))
+        second = self._bw @ dv + dw_bv + self.w @ d.mass_along(self.v, du, dmu)
+        return np.array([-self.w @ av, second])
+
+
+class BranchPointCondition:
+    """``[F_u, F_p]`` loses rank, for the system unfolded by ``F + beta * p``.
+
+    The freed parameters are the branch's and ``beta``; at the solution ``beta = 0``
+    (Moore 1980; Allgower & Schwetlick 1997).
+
+    Parameters
+    ----------
+    p : ndarray, shape (n,)
+        Border and unfolding direction, near the left null vector.
+    rows : ndarray, shape (2, n + 1)
+        Near the two null vectors of ``[F_u, F_p]``.
+    """
+
+    extra, count = 0, 2
+    extra_names: tuple[str, ...] = ()
+
+    def __init__(self, p, rows):
+        self.p, self.rows = p / np.linalg.norm(p), rows
+
+    def evaluate(self, system, u, mu, names, linear, extra):
+        return BranchPointValue(self, system, u, mu, names[0], linear)
+
+
+class BranchPointValue:
+    """``null``: two vectors of shape (n + 1,) that span the kernel at ``values = 0``."""
+
+    d_extra = np.zeros((2, 0))
+
+    def __init__(self, condition, system, u, mu, name, linear):
+        self._system, self._u, self._mu, self._name = system, u, mu, name
+        self._derivatives = Derivatives(system, u, mu)
+        n = u.size
+        columns = [system.d_parameter(u, mu, name), condition.p]
+        rows = np.hstack([condition.rows, np.zeros((2, 1))])
+        # The first border must not be singular with its row alone, so the rows are ordered
+        # by the caller: the tangent of the branch first.
+        solver = bordered(linear, columns, rows)
+        unit = np.eye(n + 2)
+        right = [solver.solve(unit[n + i]) for i in range(2)]
+        self.null = [x[: n + 1] for x in right]
+        self.w = solver.solve_transpose(unit[-1])[:n]
+        self.values = np.array([x[-1] for x in right])
+
+    def extended_along(self, x, du, dmu):
+        """``d([F_u, F_p] x)`` for a change of state and parameters."""
+        v, s = x[:-1], x[-1]
+        change = self._derivatives.jacobian_along(v, du, dmu)
+        if s != 0.0:
+            change = change + s * self._derivatives.d2_parameter(self._name, du)
+            for name, amount in dmu.items():
+                if amount != 0.0:
+                    change = change + s * amount * self._system.d_parameters2(
+                        self._u, self._mu, self._name, name
+                    )
+        return change
+
+    def along(self, du, dmu):
+        return np.array([-self.w @ self.extended_along(x, du, dmu) for x in self.null])

@@ -1,0 +1,180 @@
+"""A system whose residual is written once in JAX; every derivative follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import jax
+
+jax.config.update("jax_enable_x64", True)
+
+import jax.numpy as jnp  # noqa: E402
+import numpy as np  # noqa: E402
+import scipy.sparse as sp  # noqa: E402
+
+from continuation.colouring import ColouredJacobian  # noqa: E402
+from continuation.linear import MatrixLinearisation  # noqa: E402
+from continuation.system import SystemBase  # noqa: E402
+
+
+class JaxSystem(SystemBase):
+    """``B(u, mu) u' = F(u, mu)`` with ``F`` (and ``B``) as JAX functions.
+
+    Parameters
+    ----------
+    residual : callable
+        ``residual(u, mu)`` of a JAX array (n,) and a dict of floats; returns shape (n,).
+    size : int
+        n.
+    mass : None, array, sparse matrix or callable
+        None is the identity; a matrix is a constant ``B``; a callable ``mass(u, mu, v)``
+        returns ``B(u, mu) v`` (linear in ``v``) and is differentiated too.
+    sparsity : None or sparse matrix, shape (n, n)
+        Where ``dF/du`` may be non-zero; given, Jacobians are assembled sparse from a few
+        coloured directional derivatives.  None assembles them dense.
+    mass_sparsity : None or sparse matrix
+        The same for a callable mass; default ``sparsity``.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp, numpy as np
+    >>> fold = JaxSystem(lambda u, mu: mu["r"] + u**2, size=1)
+    >>> fold.linear(np.array([-2.0]), {"r": -4.0}).matvec(np.ones(1))
+    array([-4.])
+    """
+
+    def __init__(
+        self,
+        residual: Callable,
+        size: int,
+        mass=None,
+        sparsity: sp.spmatrix | None = None,
+        mass_sparsity: sp.spmatrix | None = None,
+    ):
+        self.size = int(size)
+        self._callable_mass = mass if callable(mass) else None
+        self._constant_mass = None if callable(mass) else mass
+        self._colouring = None if sparsity is None else ColouredJacobian(sparsity)
+        pattern = sparsity if mass_sparsity is None else mass_sparsity
+        self._mass_colouring = None
+        if self._callable_mass and pattern is not None:
+            self._mass_colouring = ColouredJacobian(pattern)
+
+        def f(u, mu):
+            return jnp.asarray(residual(u, mu), dtype=jnp.float64)
+
+        self._residual = jax.jit(f)
+        self._along = _directional_derivatives(f)
+        if self._colouring is None:
+            self._jacobian = jax.jit(jax.jacfwd(f))
+        else:
+            seeds = jnp.asarray(self._colouring.seeds)
+            self._jacobian = jax.jit(
+                lambda u, mu: jax.vmap(lambda s: jax.jvp(lambda x: f(x, mu), (u,), (s,))[1])(seeds)
+            )
+        if self._callable_mass:
+            # The direction multiplied by B rides along as part of the frozen arguments.
+            def b(u, mu, c):
+                return jnp.asarray(mass(u, mu, c), dtype=jnp.float64)
+
+            self._mass_apply = jax.jit(b)
+            self._mass_d1 = jax.jit(lambda u, mu, c, a: _jvp(lambda x: b(x, mu, c), u, a))
+            self._mass_d2 = jax.jit(
+                lambda u, mu, c, a, d: _jvp(lambda x: _jvp(lambda y: b(y, mu, c), x, a), u, d)
+            )
+            self._mass_mu = jax.jit(
+                lambda u, mu, dmu, c: jax.jvp(lambda m: b(u, m, c), (mu,), (dmu,))[1]
+            )
+            eye = jnp.eye(self.size) if self._mass_colouring is None else jnp.asarray(
+                self._mass_colouring.seeds
+            )
+            self._mass_matrix = jax.jit(lambda u, mu: jax.vmap(lambda s: b(u, mu, s))(eye))
+
+    # -- residual and first derivatives ---------------------------------------------------
+
+    def residual(self, u, mu):
+        return np.asarray(self._residual(np.asarray(u, float), _floats(mu)))
+
+    def linear(self, u, mu):
+        u, mu = np.asarray(u, float), _floats(mu)
+        jacobian = np.asarray(self._jacobian(u, mu))
+        if self._colouring is not None:
+            jacobian = self._colouring.assemble(jacobian)
+        return MatrixLinearisation(jacobian, self._mass(u, mu))
+
+    def _mass(self, u, mu):
+        if self._callable_mass is None:
+            return self._constant_mass
+        products = np.asarray(self._mass_matrix(u, mu))
+        if self._mass_colouring is None:
+            return products.T
+        return self._mass_colouring.assemble(products)
+
+    def d_parameter(self, u, mu, name):
+        return self._directional(u, mu, [(None, name)])
+
+    # -- higher derivatives ---------------------------------------------------------------
+
+    def d2(self, u, mu, a, b):
+        return self._directional(u, mu, [(a, None), (b, None)])
+
+    def d3(self, u, mu, a, b, c):
+        return self._directional(u, mu, [(a, None), (b, None), (c, None)])
+
+    def d2_parameter(self, u, mu, name, a):
+        return self._directional(u, mu, [(a, None), (None, name)])
+
+    def d_parameters2(self, u, mu, first, second):
+        return self._directional(u, mu, [(None, first), (None, second)])
+
+    def _directional(self, u, mu, directions):
+        mu = _floats(mu)
+        tangents = []
+        for vector, name in directions:
+            if name is not None and name not in mu:
+                raise KeyError(f"The parameter {name!r} is not one of: {', '.join(sorted(mu))}.")
+            step = np.zeros(self.size) if vector is None else np.asarray(vector, float)
+            tangents.append((step, {key: float(key == name) for key in mu}))
+        return np.asarray(self._along[len(tangents)](np.asarray(u, float), mu, tangents))
+
+    # -- mass -----------------------------------------------------------------------------
+
+    def mass_d(self, u, mu, c, a):
+        if self._callable_mass is None:
+            return np.zeros(self.size)
+        return np.asarray(self._mass_d1(u, _floats(mu), c, a))
+
+    def mass_d2(self, u, mu, c, a, b):
+        if self._callable_mass is None:
+            return np.zeros(self.size)
+        return np.asarray(self._mass_d2(u, _floats(mu), c, a, b))
+
+    def mass_parameter(self, u, mu, name, c):
+        if self._callable_mass is None:
+            return np.zeros(self.size)
+        mu = _floats(mu)
+        return np.asarray(self._mass_mu(u, mu, {k: float(k == name) for k in mu}, c))
+
+
+def _floats(mu) -> dict[str, float]:
+    return {name: float(value) for name, value in mu.items()}
+
+
+def _jvp(function, x, direction):
+    return jax.jvp(function, (x,), (direction,))[1]
+
+
+def _directional_derivatives(f) -> dict[int, Callable]:
+    """Jitted first to third derivatives of ``f(u, mu)`` along joint directions."""
+
+    def nest(g, direction):
+        return lambda u, mu: jax.jvp(g, (u, mu), direction)[1]
+
+    def derivative(u, mu, directions):
+        g = f
+        for direction in directions:
+            g = nest(g, direction)
+        return g(u, mu)
+
+    jitted = jax.jit(derivative)
+    return {1: jitted, 2: jitted, 3: jitted}

@@ -1,0 +1,161 @@
+"""Linearisations made of explicit matrices: dense numpy or scipy sparse (LU)."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from continuation.errors import SingularSystem
+
+#: A zero pivot is replaced by this fraction of the matrix norm.  Bordered solves with
+#: refinement against the true matrix remove the perturbation again.
+PIVOT_REPAIR = 1e-14
+
+
+class DenseSolver:
+    """LU of a dense matrix; exactly zero pivots are repaired."""
+
+    def __init__(self, matrix: np.ndarray):
+        self.matrix = matrix
+        if not np.all(np.isfinite(matrix)):
+            raise SingularSystem("The matrix holds numbers that are not finite.")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", sla.LinAlgWarning)
+            lu, self._pivots = sla.lu_factor(matrix, check_finite=False)
+        diagonal = np.abs(np.diagonal(lu))
+        floor = PIVOT_REPAIR * max(np.abs(matrix).max(initial=0.0), np.finfo(float).tiny)
+        #: True when the factors are those of a slightly different matrix.
+        self.repaired = bool(np.any(diagonal < 1e-3 * floor))
+        if self.repaired:
+            i = np.flatnonzero(diagonal < 1e-3 * floor)
+            lu = lu.copy()
+            lu[i, i] = floor
+        self._lu = lu
+
+    def matvec(self, x):
+        return self.matrix @ x
+
+    def rmatvec(self, x):
+        return self.matrix.T @ x
+
+    def solve(self, rhs):
+        return sla.lu_solve((self._lu, self._pivots), rhs, check_finite=False)
+
+    def solve_transpose(self, rhs):
+        return sla.lu_solve((self._lu, self._pivots), rhs, trans=1, check_finite=False)
+
+
+class SparseSolver:
+    """SuperLU of a sparse matrix; a singular one is shifted by a rounding-sized multiple of 1."""
+
+    def __init__(self, matrix: sp.spmatrix):
+        self.matrix = sp.csc_matrix(matrix)
+        if not np.all(np.isfinite(self.matrix.data)):
+            raise SingularSystem("The matrix holds numbers that are not finite.")
+        self.repaired = False
+        try:
+            self._lu = spla.splu(self.matrix)
+        except RuntimeError:
+            size = np.abs(self.matrix.data).max(initial=0.0)
+            if size == 0.0:
+                raise SingularSystem("The matrix is zero.") from None
+            shift = sp.identity(self.matrix.shape[0], dtype=self.matrix.dtype, format="csc")
+            try:
+                self._lu = spla.splu((self.matrix + PIVOT_REPAIR * size * shift).tocsc())
+            except RuntimeError as error:
+                raise SingularSystem(f"The sparse factorisation failed: {error}.") from error
+            self.repaired = True
+
+    def matvec(self, x):
+        return self.matrix @ x
+
+    def rmatvec(self, x):
+        return self.matrix.T @ x
+
+    def _solve(self, rhs, trans):
+        rhs = np.asarray(rhs)
+        if np.iscomplexobj(rhs) and not np.iscomplexobj(self.matrix.data):
+            return self._lu.solve(rhs.real.copy(), trans) + 1j * self._lu.solve(
+                rhs.imag.copy(), trans
+            )
+        return self._lu.solve(rhs.astype(self.matrix.dtype), trans)
+
+    def solve(self, rhs):
+        return self._solve(rhs, "N")
+
+    def solve_transpose(self, rhs):
+        return self._solve(rhs, "T")
+
+
+def solver_for(matrix):
+    """A factorised solver for a dense or sparse matrix."""
+    return SparseSolver(matrix) if sp.issparse(matrix) else DenseSolver(np.asarray(matrix))
+
+
+class MatrixLinearisation:
+    """``A`` and ``B`` given as matrices, both dense or both sparse.
+
+    Parameters
+    ----------
+    jacobian : ndarray or sparse matrix, shape (n, n)
+        ``dF/du``.
+    mass : ndarray or sparse matrix, shape (n, n), or None
+        ``B``; None is the identity.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> lin = MatrixLinearisation(np.array([[0.0, 1.0], [-4.0, 0.0]]))
+    >>> lin.solve(np.array([1.0, 0.0]))
+    array([-0.,  1.])
+    """
+
+    def __init__(self, jacobian, mass=None):
+        sparse = sp.issparse(jacobian)
+        self.size = jacobian.shape[0]
+        self.jacobian = sp.csc_matrix(jacobian) if sparse else np.asarray(jacobian, float)
+        if mass is None:
+            self.mass = sp.identity(self.size, format="csc") if sparse else np.eye(self.size)
+        else:
+            dense = mass.toarray() if sp.issparse(mass) and not sparse else mass
+            self.mass = sp.csc_matrix(dense) if sparse else np.asarray(dense, float)
+        self._solver = None
+
+    @property
+    def _factors(self):
+        if self._solver is None:
+            self._solver = solver_for(self.jacobian)
+        return self._solver
+
+    def matvec(self, x):
+        return self.jacobian @ x
+
+    def rmatvec(self, x):
+        return self.jacobian.T @ x
+
+    def solve(self, rhs):
+        return self._factors.solve(rhs)
+
+    def solve_transpose(self, rhs):
+        return self._factors.solve_transpose(rhs)
+
+    def mass_matvec(self, x):
+        return self.mass @ x
+
+    def mass_rmatvec(self, x):
+        return self.mass.T @ x
+
+    def shifted(self, shift):
+        """A solver for ``A - shift B``; real arithmetic for a real shift."""
+        shift = complex(shift)
+        return solver_for(self.jacobian - (shift.real if shift.imag == 0 else shift) * self.mass)
+
+    def to_dense(self):
+        """``(A, B)`` as dense arrays; for small problems and tests."""
+        if sp.issparse(self.jacobian):
+            return self.jacobian.toarray(), self.mass.toarray()
+        return self.jacobian, self.mass

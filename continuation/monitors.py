@@ -1,0 +1,287 @@
+"""What is watched for along a branch of equilibria without a spectrum: folds, branch points, events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from continuation.bordered import Bordered
+from continuation.conditions import BranchPointCondition, FoldCondition, null_pair
+from continuation.errors import SingularSystem
+from continuation.locate import safeguarded, special_at
+from continuation.normal_form import fold_coefficient
+from continuation.problem import Problem, correct
+from continuation.system import SystemBase
+from continuation.tracer import Here
+
+
+def companion(tracer, condition, names=None, system=None, mu=None):
+    """A problem in the same units as the tracer's, with a condition."""
+    problem, options = tracer.problem, tracer.options
+    return Problem(system or problem.system, mu or problem.fixed, names or problem.names,
+                   condition, options.state_scale, options.parameter_scales)
+
+
+class FoldMonitor:
+    """Folds: the parameter's part of the tangent changes sign."""
+
+    def measure(self, tracer, here):
+        here.tests["fold"] = float(here.tangent[tracer.problem.n])
+
+    def between(self, tracer, before, after, index, found):
+        if before.tests["fold"] * after.tests["fold"] >= 0 and after.tests["fold"] != 0:
+            return []
+        n = tracer.problem.n
+        if not tracer.options.locate:
+            return [special_at(tracer, "fold", after, index, False, "location was not asked for")]
+
+        def attempt(guess, *_):
+            point = solve_fold(tracer, guess)
+            return point if isinstance(point, str) else (point.z, point)
+
+        result, guess, reason = safeguarded(
+            tracer, before, after, lambda here: here.tangent[n], attempt
+        )
+        if result is None:
+            return [special_at(tracer, "fold", guess, index, False, reason)]
+        v, w = result.local.condition.v, result.local.condition.w
+        values = {"iterations": result.iterations}
+        values["quadratic_coefficient"] = fold_coefficient(
+            tracer.problem.system, result.local.u, result.local.mu, v, w
+        )
+        here = Here(result.z, np.append(v, 0.0), result.local)
+        here.tangent = here.tangent / tracer.problem.norm(here.tangent)
+        return [special_at(tracer, "fold", here, index, True, "", values, {"right": v, "left": w})]
+
+
+def solve_fold(tracer, guess):
+    """Newton on ``F = 0, g = 0`` from a point of the branch; a `Correction` or a sentence."""
+    problem = tracer.problem
+    q = problem.u(guess.tangent)
+    p = guess.local.columns[0]
+    for _ in range(2):
+        _, q, p, _ = null_pair(guess.local.linear, p / np.linalg.norm(p), q / np.linalg.norm(q))
+    augmented = companion(tracer, FoldCondition(p, q))
+    frame = augmented.frame(guess.tangent[:, None])
+    result = correct(augmented, guess.z, frame, tracer.options.newton, None,
+                     tracer.options.location_tolerance)
+    if not result.converged:
+        return f"Newton's method on the augmented system: {result.reason}"
+    return result
+
+
+class BranchPointMonitor:
+    """Simple branch points: the bordered scalar of ``[[F_u, F_p], [t']]`` changes sign."""
+
+    def __init__(self):
+        self._b = self._c = None
+
+    def measure(self, tracer, here):
+        n = tracer.problem.n
+        if self._b is None:
+            self._b = np.cos(np.arange(n + 1.0)) / np.sqrt(n + 1)
+            self._c = np.sin(np.arange(1.0, n + 2.0)) / np.sqrt(n + 1)
+        here.tests["branch point"] = self._scalar(tracer, here)[0]
+        here.data["borders"] = (self._b, self._c)
+
+    def _scalar(self, tracer, here, borders=None):
+        """``g`` and the null vectors with the borders in force."""
+        b, c = borders or (self._b, self._c)
+        row = tracer.problem.weights * here.tangent
+        extended = Bordered(here.local.linear, here.local.columns[0], row[:-1], row[-1])
+        try:
+            g, v, w, _ = null_pair(extended, b, c)
+        except SingularSystem:
+            return np.nan, None, None
+        return float(g), v, w
+
+    def between(self, tracer, before, after, index, found):
+        borders = after.data["borders"]
+        g0, g1 = before.tests["branch point"], after.tests["branch point"]
+        if before.data["borders"][0] is not borders[0]:
+            g0 = self._scalar(tracer, before, borders)[0]
+        special = self._examine(tracer, before, after, index, g0, g1, borders)
+        self._adapt(tracer, after)
+        return special
+
+    def _adapt(self, tracer, here):
+        """Turn the borders to the vectors just found, for a well-scaled test function."""
+        g, v, w = self._scalar(tracer, here)
+        if v is None:
+            return
+        b, c = w / np.linalg.norm(w), v / np.linalg.norm(v)
+        self._b, self._c = b, c
+        here.tests["branch point"] = self._scalar(tracer, here)[0]
+        here.data["borders"] = (b, c)
+
+    def _examine(self, tracer, before, after, index, g0, g1, borders):
+        if not np.isfinite(g0 * g1) or (g0 * g1 >= 0 and g1 != 0):
+            return []
+        if not tracer.options.locate:
+            return [special_at(tracer, "branch point", after, index, False,
+                               "location was not asked for")]
+        sizes = []
+
+        def indicator(here):
+            g = self._scalar(tracer, here, borders)[0]
+            sizes.append(abs(g))
+            return g
+
+        def attempt(guess, *_):
+            point = self._solve(tracer, guess, borders)
+            return point if isinstance(point, str) else (point.z[:-1], point)
+
+        result, guess, reason = safeguarded(tracer, before, after, indicator, attempt)
+        if result is None:
+            if sizes[-1] > max(abs(g0), abs(g1)):
+                return []  # The test function went through infinity: no branch point.
+            return [special_at(tracer, "branch point", guess, index, False, reason)]
+        return [self._describe(tracer, result, guess, index)]
+
+    def _solve(self, tracer, guess, borders):
+        problem = tracer.problem
+        _, v, w = self._scalar(tracer, guess, borders)
+        if v is None:
+            return "The bordered matrix is singular."
+        unfolded = Unfolded(problem.system, w[: problem.n])
+        rows = problem.frame(np.stack([guess.tangent, v], axis=1))
+        condition = BranchPointCondition(unfolded.direction, rows)
+        name = problem.names[0]
+        augmented = companion(tracer, condition, (name, unfolded.name), unfolded,
+                              {**problem.mu(guess.z), unfolded.name: 0.0})
+        frame = np.hstack([rows, np.zeros((2, 1))])
+        result = correct(augmented, np.append(guess.z, 0.0), frame, tracer.options.newton, None,
+                         tracer.options.location_tolerance)
+        if not result.converged:
+            return f"Newton's method on the augmented system: {result.reason}"
+        if abs(result.z[-1]) > 1e-6 * (1 + np.abs(result.z[:-1]).max()):
+            return "The point is a branch point of an unfolded system only."
+        return result
+
+    def _describe(self, tracer, result, guess, index):
+        value = result.local.condition
+        kernel = np.stack(value.null, axis=1)
+        directions = branch_directions(tracer.problem, value, guess.tangent)
+        here = Here(result.z[:-1], directions[0], result.local)
+        vectors = {"left": value.w, "kernel": kernel}
+        if len(directions) == 2:
+            vectors["direction"] = directions[1]
+        values = {"iterations": result.iterations, "unfolding": float(result.z[-1])}
+        reason = "" if len(directions) == 2 else "only one branch direction is real"
+        return special_at(tracer, "branch point", here, index, True, reason, values, vectors)
+
+
+def branch_directions(problem, value, tangent):
+    """Tangents of the branches that meet, the one nearest to ``tangent`` first.
+
+    They solve the algebraic bifurcation equation ``w' G_zz [y, y] = 0`` on the kernel of
+    ``G_z = [F_u, F_p]`` (Keller 1977).
+    """
+    name = problem.names[0]
+    kernel = np.stack(value.null, axis=1)
+    root = np.sqrt(problem.weights)
+    kernel = np.linalg.qr(root[:, None] * kernel)[0] / root[:, None]
+    form = np.empty((2, 2))
+    for j in range(2):
+        for i in range(2):
+            y = kernel[:, j]
+            form[i, j] = value.w @ value.extended_along(
+                kernel[:, i], y[:-1], {name: float(y[-1])}
+            )
+    form = 0.5 * (form + form.T)
+    eigenvalues, rotation = np.linalg.eigh(form)
+    # form = l0 x^2 + l1 y^2 = 0 has two real lines when l0 < 0 < l1 (one may be zero).
+    low, high = min(eigenvalues[0], 0.0), max(eigenvalues[1], 0.0)
+    if high - low <= 0.0 or eigenvalues[0] * eigenvalues[1] > 1e-8 * (high - low) ** 2:
+        return [tangent]
+    x, y = np.sqrt(high), np.sqrt(-low)
+    lines = [kernel @ (rotation @ np.array([x, sign * y])) for sign in (1.0, -1.0)]
+    lines = [line / problem.norm(line) for line in lines]
+    lines.sort(key=lambda line: -abs(problem.dot(line, tangent)))
+    if problem.dot(lines[0], tangent) < 0:
+        lines[0] = -lines[0]
+    return lines
+
+
+class Unfolded(SystemBase):
+    """``F + beta p``, with ``beta`` as one more parameter."""
+
+    name = "unfolding of the branch point"
+
+    def __init__(self, system, direction):
+        self.inner, self.size = system, system.size
+        self.direction = direction / np.linalg.norm(direction)
+        for optional in ("residual_norm", "state_weights"):
+            if hasattr(system, optional):
+                setattr(self, optional, getattr(system, optional))
+
+    def _rest(self, mu):
+        return {name: value for name, value in mu.items() if name != self.name}
+
+    def residual(self, u, mu):
+        return self.inner.residual(u, self._rest(mu)) + mu[self.name] * self.direction
+
+    def linear(self, u, mu):
+        return self.inner.linear(u, self._rest(mu))
+
+    def d_parameter(self, u, mu, name):
+        return self.direction if name == self.name else self.inner.d_parameter(
+            u, self._rest(mu), name)
+
+    def d2(self, u, mu, a, b):
+        return self.inner.d2(u, self._rest(mu), a, b)
+
+    def d2_parameter(self, u, mu, name, a):
+        return np.zeros(self.size) if name == self.name else self.inner.d2_parameter(
+            u, self._rest(mu), name, a)
+
+    def d_parameters2(self, u, mu, first, second):
+        if self.name in (first, second):
+            return np.zeros(self.size)
+        return self.inner.d_parameters2(u, self._rest(mu), first, second)
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something of the user's own to watch for.
+
+    Attributes
+    ----------
+    name : str
+        Becomes the kind of the special point.
+    function : callable
+        ``function(u, mu)`` -> float; its sign changes are located.
+    stop : bool
+        End the branch there.
+    """
+
+    name: str
+    function: Callable
+    stop: bool = False
+
+
+class EventMonitor:
+    """Locates sign changes of an `Event`."""
+
+    def __init__(self, event: Event):
+        self.event = event
+
+    def value(self, tracer, here):
+        return float(self.event.function(tracer.problem.u(here.z), tracer.problem.mu(here.z)))
+
+    def measure(self, tracer, here):
+        here.tests[self.event.name] = self.value(tracer, here)
+
+    def between(self, tracer, before, after, index, found):
+        f0, f1 = before.tests[self.event.name], after.tests[self.event.name]
+        if f0 * f1 > 0 or f0 == 0:
+            return []
+        values = {"stop": float(self.event.stop)} if self.event.stop else {}
+        if f1 == 0:
+            return [special_at(tracer, self.event.name, after, index, True, "", values)]
+        here = tracer.root(before, after, lambda point: self.value(tracer, point))
+        located = here is not None
+        reason = "" if located else "the curve was lost in the bracket"
+        return [special_at(tracer, self.event.name, here or after, index, located, reason, values)]

@@ -1,0 +1,271 @@
+"""Curves of equilibria under scalar conditions, and Newton's method for them.
+
+Unknowns ``z = (u, p, e)``: the state, ``k`` freed parameters and ``e`` extra numbers (a
+frequency).  Equations: ``F(u, mu(p)) = 0`` and ``m`` scalar conditions.  With
+``m + 1 = k + e`` this is a curve, with ``m = k + e`` a point.  A branch of equilibria has
+``k = 1, m = 0``; a fold curve ``k = 2, m = 1``; a Hopf curve ``k = 2, m = 2, e = 1``.
+
+The full Newton step is taken by block elimination: a bordered solve gives one particular
+correction of ``F`` and a basis of the ``k`` directions that keep ``F = 0``; the conditions
+then fix the ``k + e`` coefficients.  So conditions are needed only along ``k + 1``
+directions, and no gradient of a condition is ever formed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from continuation.bordered import bordered
+from continuation.errors import SingularSystem
+from continuation.newton import residual_norm
+
+
+class Problem:
+    """What is continued or located.
+
+    Parameters
+    ----------
+    system : System
+    mu : mapping of str to float
+        All parameters; those in ``names`` are overridden by the unknowns.
+    names : sequence of str
+        The ``k`` freed parameters.
+    condition : object, optional
+        See `continuation.conditions`.
+    state_scale, parameter_scales
+        Units of the arclength, see `ContinuationOptions`.
+    """
+
+    def __init__(self, system, mu, names, condition=None, state_scale=1.0, parameter_scales=None):
+        self.system = system
+        self.fixed = {name: float(value) for name, value in mu.items()}
+        self.names = tuple(names)
+        for name in self.names:
+            if name not in self.fixed:
+                known = ", ".join(sorted(self.fixed))
+                raise KeyError(f"The parameter {name!r} is not one of: {known}.")
+        self.condition = condition
+        self.n, self.k = system.size, len(self.names)
+        self.e = 0 if condition is None else condition.extra
+        self.m = 0 if condition is None else condition.count
+        own = getattr(system, "state_weights", None)
+        weights = np.full(self.n, 1.0 / self.n) if own is None else np.asarray(own, float)
+        scales = parameter_scales or {}
+        parameter = [scales.get(name, 1.0) ** -2 for name in self.names]
+        self.weights = np.concatenate([weights / state_scale**2, parameter, np.ones(self.e)])
+
+    def u(self, z):
+        return z[: self.n]
+
+    def p(self, z):
+        return z[self.n: self.n + self.k]
+
+    def extra(self, z):
+        return z[self.n + self.k:]
+
+    def mu(self, z) -> dict[str, float]:
+        return {**self.fixed, **dict(zip(self.names, map(float, self.p(z))))}
+
+    def changes(self, y) -> dict[str, float]:
+        """The parameter part of a direction, by name."""
+        return dict(zip(self.names, map(float, y[self.n: self.n + self.k])))
+
+    def pack(self, u, mu, extra=()):
+        return np.concatenate([u, [mu[name] for name in self.names], np.atleast_1d(extra)])
+
+    def dot(self, a, b) -> float:
+        return float(a @ (self.weights * b))
+
+    def norm(self, a) -> float:
+        return float(np.sqrt(max(self.dot(a, a), 0.0)))
+
+    def natural_frame(self) -> np.ndarray:
+        """Rows that single out the freed parameters; regular where ``F_u`` is."""
+        return np.hstack([np.zeros((self.k, self.n)), np.eye(self.k)])
+
+    def frame(self, directions) -> np.ndarray:
+        """Rows dual to some directions, shape (n + k, k), orthonormalised in the metric."""
+        root = np.sqrt(self.weights[: self.n + self.k])
+        q, _ = np.linalg.qr(root[:, None] * directions)
+        return (root[:, None] * q).T
+
+
+class Local:
+    """The problem linearised at one point ``z``.
+
+    Parameters
+    ----------
+    frame : ndarray, shape (k, n + k)
+        Rows that complete ``[F_u, F_p]`` to a regular matrix.
+    reuse : Local, optional
+        Take its factors instead of new ones (conditions are not reused).
+    """
+
+    def __init__(self, problem: Problem, z: np.ndarray, frame: np.ndarray, reuse=None):
+        self.problem, self.z, self.frame = problem, z, frame
+        system, u, mu = problem.system, problem.u(z), problem.mu(z)
+        self.u, self.mu = u, mu
+        self.residual = system.residual(u, mu)
+        self.size = residual_norm(system, self.residual)
+        self.finite = bool(np.isfinite(self.size))
+        if not self.finite:
+            return
+        n, k = problem.n, problem.k
+        if reuse is not None:
+            self.linear, self.columns = reuse.linear, reuse.columns
+            self.solver, self.basis = reuse.solver, reuse.basis
+        else:
+            self.linear = system.linear(u, mu)
+            self.columns = [system.d_parameter(u, mu, name) for name in problem.names]
+            self.solver = bordered(self.linear, self.columns, frame)
+            unit = np.eye(n + k)[n:]
+            #: Directions along which F stays zero, shape (n + k, k).
+            self.basis = np.stack([self.solver.solve(row) for row in unit], axis=1)
+        self.condition = None
+        if problem.condition is not None:
+            self.condition = problem.condition.evaluate(
+                system, u, mu, problem.names, self.linear, problem.extra(z)
+            )
+
+    @property
+    def values(self) -> np.ndarray:
+        """The scalar conditions, shape (m,)."""
+        return np.zeros(0) if self.condition is None else self.condition.values
+
+    def _rows(self):
+        """The conditions' derivatives along the basis and the extra unknowns, (m, k + e)."""
+        problem = self.problem
+        if self.condition is None:
+            return np.zeros((0, problem.k + problem.e))
+        along = [self._along(self.basis[:, i]) for i in range(problem.k)]
+        return np.hstack([np.stack(along, axis=1), self.condition.d_extra])
+
+    def _along(self, y):
+        return self.condition.along(self.problem.u(y), self.problem.changes(y))
+
+    def _assemble(self, particular, coefficients):
+        k = self.problem.k
+        y = particular + self.basis @ coefficients[:k]
+        return np.concatenate([y, coefficients[k:]])
+
+    def correction(self, normal=None, offset=0.0) -> np.ndarray:
+        """The Newton step; ``normal . dz = -offset`` closes the equations of a curve.
+
+        Raises
+        ------
+        SingularSystem
+            The conditions do not fix the remaining unknowns.
+        """
+        n, k = self.problem.n, self.problem.k
+        particular = self.solver.solve(np.concatenate([-self.residual, np.zeros(k)]))
+        rows = self._rows()
+        right = -self.values
+        if self.condition is not None:
+            right = right - self._along(particular)
+        if normal is not None:
+            last = np.concatenate([normal[: n + k] @ self.basis, normal[n + k:]])
+            rows = np.vstack([rows, last])
+            right = np.append(right, -offset - normal[: n + k] @ particular)
+        try:
+            coefficients = np.linalg.solve(rows, right)
+        except np.linalg.LinAlgError:
+            raise SingularSystem("The conditions of the augmented system are dependent.") from None
+        return self._assemble(particular, coefficients)
+
+    def tangent(self, reference) -> np.ndarray:
+        """Unit tangent of the curve, pointing to the side of ``reference``."""
+        problem = self.problem
+        rows = self._rows()
+        if rows.shape[0]:
+            # Rows are scaled so that conditions of different size count alike.
+            rows = rows / np.maximum(np.abs(rows).max(axis=1, keepdims=True), 1e-300)
+            coefficients = np.linalg.svd(rows)[2][-1]
+        else:
+            coefficients = np.ones(1)
+        zero = np.zeros(problem.n + problem.k)
+        direction = self._assemble(zero, coefficients)
+        direction = direction / problem.norm(direction)
+        return direction if problem.dot(direction, reference) >= 0 else -direction
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Outcome of Newton's method on a `Problem`.
+
+    Attributes
+    ----------
+    z : ndarray
+    local : Local or None
+        The linearisation at ``z`` when converged.
+    converged : bool
+    reason : str
+        As in `NewtonResult`.
+    iterations : int
+    residual : float
+        Norm of ``F``.
+    """
+
+    z: np.ndarray
+    local: Local | None
+    converged: bool
+    reason: str
+    iterations: int
+    residual: float
+
+
+def correct(problem, z, frame, newton, normal=None, step_tolerance=1e-8) -> Correction:
+    """Newton from ``z``; with ``normal`` in the hyperplane through ``z``, else to a point.
+
+    Converged means that ``F`` meets its tolerance and, where there are conditions, that the
+    last correction was small, relative to the point: the conditions have no natural size.
+    """
+    start = z
+    reason, size = "maximum iterations", np.inf
+    local, first, previous = None, None, np.inf
+    iterations, last = 0, np.inf
+    for iteration in range(newton.max_iterations + 1):
+        iterations = iteration
+        slow = size > newton.reuse_rate * previous
+        old = local if (problem.condition is None and local is not None and not slow) else None
+        previous = size
+        try:
+            local = Local(problem, z, frame, old)
+            size = local.size
+            if not local.finite:
+                reason = "not finite"
+                break
+            first = size if first is None else first
+            settled = problem.condition is None or last <= step_tolerance
+            if size <= newton.tolerance and settled:
+                if old is not None:
+                    local = Local(problem, z, frame)
+                return Correction(z, local, True, "converged", iteration, size)
+            if size > newton.divergence * max(first, newton.tolerance):
+                reason = "diverged"
+                break
+            if iteration == newton.max_iterations:
+                break
+            offset = 0.0 if normal is None else float(normal @ (z - start))
+            step = local.correction(normal, offset)
+        except SingularSystem:
+            reason = "singular"
+            break
+        if not np.all(np.isfinite(step)):
+            reason = "not finite"
+            break
+        # Scaled part by part: a frequency of 1e2 must not hide a parameter that moves.
+        last = max(
+            _relative(problem.u(step), problem.u(z)),
+            _relative(problem.p(step), problem.p(z)),
+            _relative(problem.extra(step), problem.extra(z)),
+        )
+        z = z + step
+    return Correction(z, None, False, reason, iterations, size)
+
+
+def _relative(step, position) -> float:
+    if step.size == 0:
+        return 0.0
+    return float(np.abs(step).max() / (1.0 + np.abs(position).max()))

@@ -1,0 +1,80 @@
+"""Ready-made eigenvalue callables: dense for small systems, shift-invert Arnoldi for others.
+
+Any callable ``(u, mu, count, near) -> Spectrum`` may take their place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.sparse.linalg as spla
+
+from continuation.system import Spectrum
+
+#: Up to this order a dense generalised eigenvalue solve is the quicker and safer way.
+DENSE_LIMIT = 300
+
+
+def dense_spectrum(linearisation, count=None, near=None) -> Spectrum:
+    """All finite eigenvalues by QZ, the first ``count`` leading or nearest to ``near``."""
+    a, b = linearisation.to_dense()
+    identity = np.array_equal(b, np.eye(b.shape[0]))
+    values, vectors = sla.eig(a) if identity else sla.eig(a, b)
+    # A singular mass gives infinite eigenvalues: algebraic constraints, not motions.
+    size = max(np.abs(a).max(), 1e-300) / max(np.abs(b).max(), 1e-300)
+    finite = np.isfinite(values) & (np.abs(values) < 1e12 * size)
+    values, vectors = values[finite], vectors[:, finite]
+    key = -values.real if near is None else np.abs(values - near)
+    order = np.argsort(key, kind="stable")[: count if count else None]
+    return Spectrum(values[order], vectors[:, order], np.ones(order.size, bool), 1)
+
+
+def shift_invert_spectrum(linearisation, count, near=0.0, tolerance=1e-10) -> Spectrum:
+    """``count`` eigenvalues nearest to ``near`` by ARPACK on ``(A - near B)^-1 B``.
+
+    Raises
+    ------
+    ValueError
+        ``count`` is too large for the iteration.
+    """
+    n = linearisation.size
+    if count > n - 2:
+        raise ValueError(f"{count} eigenvalues were asked of a system of {n}; at most {n - 2}.")
+    solver = linearisation.shifted(near)
+    applied = 0
+
+    def apply(x):
+        nonlocal applied
+        applied += 1
+        return solver.solve(linearisation.mass_matvec(np.asarray(x).ravel()))
+
+    operator = spla.LinearOperator((n, n), matvec=apply, dtype=complex)
+    start = np.cos(np.arange(1.0, n + 1.0)).astype(complex)
+    size = min(n - 1, max(2 * count + 1, 20))
+    try:
+        theta, vectors = spla.eigs(operator, k=count, which="LM", v0=start, ncv=size,
+                                   tol=tolerance)
+    except spla.ArpackNoConvergence as error:
+        theta, vectors = error.eigenvalues, error.eigenvectors
+    if theta.size == 0:
+        return Spectrum(np.empty(0, complex), np.empty((n, 0), complex), np.empty(0, bool), applied)
+    values = near + 1.0 / theta
+    converged = np.empty(values.size, bool)
+    for i, value in enumerate(values):
+        x = vectors[:, i]
+        ax, bx = linearisation.matvec(x), linearisation.mass_matvec(x)
+        size = np.linalg.norm(ax) + abs(value) * np.linalg.norm(bx)
+        converged[i] = np.linalg.norm(ax - value * bx) <= 1e-6 * max(size, 1e-300)
+    order = np.argsort(np.abs(values - near), kind="stable")
+    return Spectrum(values[order], vectors[:, order], converged[order], applied)
+
+
+def spectrum_of(linearisation, count, near=None) -> Spectrum:
+    """Dense when the matrices are small and at hand, shift-invert Arnoldi otherwise.
+
+    Without ``near`` the iteration looks around 0: right for a loss of stability at low
+    frequency, and to be replaced by a better callable when the spectrum is wide.
+    """
+    if hasattr(linearisation, "to_dense") and linearisation.size <= DENSE_LIMIT:
+        return dense_spectrum(linearisation, count, near)
+    return shift_invert_spectrum(linearisation, count, 0.0 if near is None else near)

@@ -1,0 +1,226 @@
+"""Stability along a branch from a spectrum: counts, tracked modes, Hopf points."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from continuation.conditions import HopfCondition, null_pair
+from continuation.errors import ContinuationError, DerivativeMissing
+from continuation.locate import safeguarded, special_at
+from continuation.monitors import companion
+from continuation.normal_form import hopf_normal_form
+from continuation.problem import correct
+from continuation.tracer import Here
+
+
+def count_unstable(values, tolerance=0.0) -> int:
+    """Unstable eigenvalues, given one of each conjugate pair."""
+    return int(sum((2 if value.imag > 0 else 1) for value in values if value.real > tolerance))
+
+
+def match_modes(first, second) -> list[tuple[int, int]]:
+    """Pair the modes of two nearby points by eigenvalue and shape.
+
+    Parameters
+    ----------
+    first, second : (values, vectors)
+        With one mode of each conjugate pair.
+
+    Returns
+    -------
+    list of (i, j)
+    """
+    if first[0].size == 0 or second[0].size == 0:
+        return []
+    rows, columns = linear_sum_assignment(mode_distance(first, second))
+    return list(zip(rows.tolist(), columns.tolist()))
+
+
+def mode_distance(first, second) -> np.ndarray:
+    """How unlike the modes of two points are, shape (first, second), from 0 to about 2.5."""
+    (a, x), (b, y) = first, second
+    size = max(np.abs(a).max(), np.abs(b).max(), 1e-300)
+    near = np.abs(a[:, None] - b[None, :])
+    near = near / (np.abs(a)[:, None] + np.abs(b)[None, :] + 1e-3 * size)
+    overlap = np.abs(x.conj().T @ y)
+    norms = np.linalg.norm(x, axis=0)[:, None] * np.linalg.norm(y, axis=0)[None, :]
+    likeness = overlap / np.maximum(norms, 1e-300)
+    # A complex mode cannot have become a real one without another that met it.
+    kind = 0.5 * ((a.imag == 0)[:, None] != (b.imag == 0)[None, :])
+    return near + (1.0 - likeness) + kind
+
+
+class SpectrumMonitor:
+    """Counts unstable eigenvalues and finds Hopf points by tracking each mode.
+
+    A pair that enters the right half plane while another leaves it does not change the
+    count, so the modes are matched one by one; and where matches and counts contradict each
+    other, the interval is halved.
+
+    Parameters
+    ----------
+    spectrum : callable, optional
+        ``(u, mu, count, near) -> Spectrum``; the system's own by default.
+    """
+
+    def __init__(self, spectrum=None):
+        self._spectrum = spectrum
+
+    def modes(self, tracer, here):
+        """Values and vectors at a point, computed once."""
+        if "modes" not in here.data:
+            options, problem = tracer.options, tracer.problem
+            ask = self._spectrum or problem.system.spectrum
+            result = ask(problem.u(here.z), problem.mu(here.z), options.eigenvalues, options.near)
+            here.data["modes"] = result.upper_half()
+            here.eigenvalues = here.data["modes"][0]
+            complete = bool(np.all(result.converged))
+            here.unstable = -1
+            if complete:
+                here.unstable = count_unstable(here.eigenvalues, options.stability_tolerance)
+        return here.data["modes"]
+
+    def measure(self, tracer, here):
+        self.modes(tracer, here)
+
+    def between(self, tracer, before, after, index, found):
+        special: list = []
+        self._between(tracer, before, after, index, 0, found, special)
+        # Vectors of points left behind would only fill memory.
+        before.data.pop("modes", None)
+        return special
+
+    def _between(self, tracer, before, after, index, depth, found, special):
+        a, b = self.modes(tracer, before), self.modes(tracer, after)
+        limit = tracer.options.stability_tolerance
+        pairs = match_modes(a, b)
+        crossing = [(i, j) for i, j in pairs
+                    if (a[0][i].real > limit) != (b[0][j].real > limit)]
+        oscillating = [(i, j) for i, j in crossing if a[0][i].imag > 0 and b[0][j].imag > 0]
+        real = [(i, j) for i, j in crossing if a[0][i].imag == 0 and b[0][j].imag == 0]
+        expected = sum(2 * _sign(b[0][j].real - a[0][i].real) for i, j in oscillating)
+        expected += sum(_sign(b[0][j].real - a[0][i].real) for i, j in real)
+        known = before.unstable >= 0 and after.unstable >= 0
+        mixed = len(oscillating) + len(real) < len(crossing)
+        contradictory = mixed or (known and expected != after.unstable - before.unstable)
+        if contradictory and depth < tracer.options.max_subdivisions:
+            middle = tracer.at(before, after, 0.5)
+            if middle is not None:
+                self._between(tracer, before, middle, index, depth + 1, found, special)
+                self._between(tracer, middle, after, index, depth + 1, found, special)
+                return
+        if contradictory:
+            reason = (f"the count of unstable eigenvalues went from {before.unstable} to "
+                      f"{after.unstable}, the modes that could be followed explain {expected:+d}")
+            special.append(special_at(tracer, "stability change", after, index, False, reason))
+        for i, j in oscillating:
+            special.append(self._locate(tracer, before, after, index, i, j, special))
+        zero = [s for s in found if s.kind in ("fold", "branch point")]
+        if len(real) > len(zero) and depth == 0:
+            special.append(special_at(
+                tracer, "zero eigenvalue", after, index, False,
+                "a real eigenvalue crossed zero and no fold or branch point was detected"))
+
+    def _locate(self, tracer, before, after, index, i, j, special):
+        if not tracer.options.locate:
+            return special_at(tracer, "hopf", after, index, False, "location was not asked for",
+                              {"omega": float(self.modes(tracer, after)[0][j].imag)})
+        limit = tracer.options.stability_tolerance
+        key = ("followed mode", before.z.tobytes(), i)
+        ends = []
+        for here, k in ((before, i), (after, j)):
+            values, vectors = self.modes(tracer, here)
+            ends.append((values[[k]], vectors[:, [k]]))
+            here.data[key] = ends[-1]
+
+        def mode_at(here):
+            """The crossing mode at a point of the bracket: the one most like both ends."""
+            if key not in here.data:
+                values, vectors = self.modes(tracer, here)
+                unlike = sum(mode_distance(end, (values, vectors))[0] for end in ends)
+                best = int(np.argmin(unlike))
+                here.data[key] = (values[[best]], vectors[:, [best]])
+            return here.data[key]
+
+        def attempt(guess, low, high):
+            x, y = mode_at(low), mode_at(high)
+            ra, rb = x[0][0].real - limit, y[0][0].real - limit
+            share = ra / (ra - rb) if ra != rb else 0.5
+            omega = (1 - share) * x[0][0].imag + share * y[0][0].imag
+            vector = (x if share < 0.5 else y)[1][:, 0]
+            result = solve_hopf(tracer, guess, omega, vector)
+            if isinstance(result, str):
+                return result
+            found_omega = float(result.z[-1])
+            room = max(abs(x[0][0].imag - y[0][0].imag), 0.05 * abs(omega))
+            if abs(found_omega - omega) > room:
+                return "Newton's method went to another frequency"
+            for other in special:
+                if other.kind == "hopf" and other.located:
+                    same = abs(other.values["omega"] - found_omega) <= 1e-9 * found_omega
+                    if same and np.allclose(other.u, result.local.u, rtol=1e-9, atol=1e-12):
+                        return "Newton's method found the same point again"
+            return result.z[:-1], result
+
+        result, guess, reason = safeguarded(
+            tracer, before, after, lambda here: mode_at(here)[0][0].real - limit, attempt
+        )
+        if result is None:
+            return special_at(tracer, "hopf", guess, index, False, reason,
+                              {"omega": float(mode_at(before)[0][0].imag)})
+        return describe_hopf(tracer, result, guess.tangent, index)
+
+
+def _sign(x) -> int:
+    return 1 if x > 0 else -1
+
+
+def hopf_borders(linear, omega, vector):
+    """Left and right vectors near the null vectors of ``A - i omega B``."""
+    shifted = linear.shifted(1j * omega)
+    q = np.asarray(vector, complex)
+    p = linear.mass_matvec(q)
+    if np.linalg.norm(p) <= 1e-12 * np.linalg.norm(q):
+        p = q
+    for _ in range(2):
+        _, q, p, _ = null_pair(shifted, p / np.linalg.norm(p), q / np.linalg.norm(q))
+    return p, q
+
+
+def solve_hopf(tracer, guess, omega, vector):
+    """Newton on ``F = 0, g = 0`` in state, parameter and frequency."""
+    p, q = hopf_borders(guess.local.linear, omega, vector)
+    augmented = companion(tracer, HopfCondition(p, q))
+    frame = augmented.frame(guess.tangent[:, None])
+    result = correct(augmented, np.append(guess.z, omega), frame, tracer.options.newton, None,
+                     tracer.options.location_tolerance)
+    if not result.converged:
+        return f"Newton's method on the augmented system: {result.reason}"
+    if not result.z[-1] > 0:
+        return "Newton's method went to a frequency that is not positive"
+    return result
+
+
+def describe_hopf(tracer, result, tangent, index):
+    """The special point with frequency, normal form and a check of the eigenpair."""
+    problem, value = tracer.problem, result.local.condition
+    omega = float(result.z[-1])
+    linear, q = value.linear, value.v / np.linalg.norm(value.v)
+    aq, bq = linear.matvec(q), linear.mass_matvec(q)
+    defect = np.linalg.norm(aq - 1j * omega * bq) / max(np.linalg.norm(aq), 1e-300)
+    values = {"omega": omega, "iterations": result.iterations, "eigen_residual": float(defect)}
+    vectors = {"right": q, "left": value.w}
+    try:
+        form = hopf_normal_form(problem.system, result.local.u, result.local.mu, omega,
+                                q, value.w, problem.names[0])
+        values.update(
+            first_lyapunov_coefficient=form.l1, c1_real=form.c1.real, c1_imag=form.c1.imag,
+            crossing_real=form.crossing.real, crossing_imag=form.crossing.imag,
+            criticality=form.criticality, amplitude_coefficient=form.amplitude_coefficient(),
+        )
+        vectors["left"] = form.p
+    except (DerivativeMissing, ContinuationError) as error:
+        values["normal_form"] = str(error)
+    here = Here(result.z[:-1], tangent, result.local)
+    return special_at(tracer, "hopf", here, index, True, "", values, vectors)

@@ -1,0 +1,223 @@
+"""The contract a model fulfils so that its branches and bifurcations can be computed.
+
+A system is ``B(u, mu) u' = F(u, mu)`` with a state ``u`` of ``size`` numbers and a
+mapping ``mu`` of named parameters.  Everything here asks for residuals, matrix-vector
+products, solves and directional derivatives; never for a dense matrix of the full size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from continuation.errors import DerivativeMissing
+
+Parameters = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Some eigenvalues of ``A x = lambda B x``.
+
+    Attributes
+    ----------
+    values : ndarray, complex, shape (m,)
+        Eigenvalues; of a conjugate pair both, or either one.
+    vectors : ndarray, complex, shape (n, m)
+        Right eigenvectors, in columns.
+    converged : ndarray of bool, shape (m,)
+        Which pairs met the tolerance; the others are never used.
+    iterations : int
+        Work done, for the record.
+    """
+
+    values: np.ndarray
+    vectors: np.ndarray
+    converged: np.ndarray
+    iterations: int = 0
+
+    def upper_half(self, tolerance: float = 1e-9) -> tuple[np.ndarray, np.ndarray]:
+        """Converged values with non-negative imaginary part, one of each pair, by growth rate."""
+        keep = np.asarray(self.converged, bool) & np.isfinite(self.values)
+        values = np.asarray(self.values, complex)[keep]
+        vectors = np.asarray(self.vectors, complex)[:, keep]
+        flip = values.imag < 0
+        values = np.where(flip, values.conj(), values)
+        vectors = np.where(flip, vectors.conj(), vectors)
+        # Solvers leave rounding in the imaginary part of a real eigenvalue.
+        scale = np.maximum(np.abs(values), tolerance)
+        values = np.where(np.abs(values.imag) <= tolerance * scale, values.real, values)
+        order = np.argsort(-values.real, kind="stable")
+        values, vectors, flip = values[order], vectors[:, order], flip[order]
+        chosen: list[int] = []
+        for i, value in enumerate(values):
+            # Only a value that came from the lower half can be the partner of an upper one.
+            partner = any(
+                abs(value - values[j]) <= 1e-7 * max(1.0, abs(value)) and flip[i] != flip[j]
+                for j in chosen
+            )
+            if value.imag == 0.0 or not partner:
+                chosen.append(i)
+        return values[chosen], vectors[:, chosen]
+
+
+@runtime_checkable
+class ShiftedSolver(Protocol):
+    """Solves with ``A - lambda B`` for one complex ``lambda``."""
+
+    def matvec(self, x: np.ndarray) -> np.ndarray: ...
+
+    def rmatvec(self, x: np.ndarray) -> np.ndarray:
+        """The plain transpose (no conjugate) times ``x``."""
+        ...
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray: ...
+
+    def solve_transpose(self, rhs: np.ndarray) -> np.ndarray:
+        """Solve with the plain transpose (no conjugate)."""
+        ...
+
+
+@runtime_checkable
+class Linearisation(Protocol):
+    """``A = dF/du`` and ``B`` at one state; all vectors of shape (n,), real or complex."""
+
+    size: int
+
+    def matvec(self, x: np.ndarray) -> np.ndarray: ...
+
+    def rmatvec(self, x: np.ndarray) -> np.ndarray: ...
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray: ...
+
+    def solve_transpose(self, rhs: np.ndarray) -> np.ndarray: ...
+
+    def mass_matvec(self, x: np.ndarray) -> np.ndarray: ...
+
+    def mass_rmatvec(self, x: np.ndarray) -> np.ndarray: ...
+
+    def shifted(self, shift: complex) -> ShiftedSolver: ...
+
+
+@runtime_checkable
+class System(Protocol):
+    """``B(u, mu) u' = F(u, mu)``.
+
+    Directional derivatives take real vectors and are multilinear; this package splits
+    complex arguments itself.  `SystemBase` supplies defaults for what a model lacks.
+    """
+
+    size: int
+
+    def residual(self, u: np.ndarray, mu: Parameters) -> np.ndarray:
+        """``F(u, mu)``, shape (n,)."""
+        ...
+
+    def linear(self, u: np.ndarray, mu: Parameters) -> Linearisation:
+        """``dF/du`` and ``B`` at the state."""
+        ...
+
+    def d_parameter(self, u: np.ndarray, mu: Parameters, name: str) -> np.ndarray:
+        """``dF/dmu_name``, shape (n,)."""
+        ...
+
+    def d2(self, u, mu, a, b) -> np.ndarray:
+        """``F_uu[a, b]``."""
+        ...
+
+    def d3(self, u, mu, a, b, c) -> np.ndarray:
+        """``F_uuu[a, b, c]``."""
+        ...
+
+    def d2_parameter(self, u, mu, name: str, a) -> np.ndarray:
+        """``d(F_u a)/dmu_name``."""
+        ...
+
+    def d_parameters2(self, u, mu, first: str, second: str) -> np.ndarray:
+        """``d2F/(dmu_first dmu_second)``; needed only at branch points."""
+        ...
+
+    def mass_d(self, u, mu, c, a) -> np.ndarray:
+        """``d(B(u) c)/du [a]``; zero for a constant mass."""
+        ...
+
+    def mass_d2(self, u, mu, c, a, b) -> np.ndarray:
+        """``d2(B(u) c)/du2 [a, b]``."""
+        ...
+
+    def mass_parameter(self, u, mu, name: str, c) -> np.ndarray:
+        """``d(B c)/dmu_name``."""
+        ...
+
+    def spectrum(self, u, mu, count: int, near: complex | None = None) -> Spectrum:
+        """``count`` eigenvalues of ``A x = lambda B x``: nearest to ``near``, or leading."""
+        ...
+
+
+class SystemBase:
+    """Defaults for a `System`: constant mass, spectrum from solves, differences in parameters.
+
+    Derivatives in the state are never replaced by differences behind the caller's back:
+    a missing ``d2`` or ``d3`` raises `DerivativeMissing`.
+    """
+
+    size: int = 0
+    #: Relative step for the central differences in parameters.
+    parameter_step: float = 6e-6
+
+    def residual(self, u, mu):
+        raise NotImplementedError(f"{type(self).__name__} has no residual.")
+
+    def linear(self, u, mu):
+        raise NotImplementedError(f"{type(self).__name__} has no linearisation.")
+
+    def _sides(self, mu: Parameters, name: str):
+        if name not in mu:
+            known = ", ".join(sorted(mu))
+            raise KeyError(f"The parameter {name!r} is not one of: {known}.")
+        h = self.parameter_step * max(1e-3, abs(mu[name]))
+        up, down = mu[name] + h, mu[name] - h
+        return {**mu, name: up}, {**mu, name: down}, up - down
+
+    def d_parameter(self, u, mu, name):
+        up, down, width = self._sides(mu, name)
+        return (self.residual(u, up) - self.residual(u, down)) / width
+
+    def d2(self, u, mu, a, b):
+        raise DerivativeMissing(f"{type(self).__name__} has no second derivative d2.")
+
+    def d3(self, u, mu, a, b, c):
+        raise DerivativeMissing(f"{type(self).__name__} has no third derivative d3.")
+
+    def d2_parameter(self, u, mu, name, a):
+        up, down, width = self._sides(mu, name)
+        return (self.linear(u, up).matvec(a) - self.linear(u, down).matvec(a)) / width
+
+    def d_parameters2(self, u, mu, first, second):
+        up, down, width = self._sides(mu, second)
+        return (self.d_parameter(u, up, first) - self.d_parameter(u, down, first)) / width
+
+    def mass_d(self, u, mu, c, a):
+        return np.zeros(self.size)
+
+    def mass_d2(self, u, mu, c, a, b):
+        return np.zeros(self.size)
+
+    def mass_parameter(self, u, mu, name, c):
+        return np.zeros(self.size)
+
+    def spectrum(self, u, mu, count, near=None):
+        from continuation.spectra import spectrum_of
+
+        return spectrum_of(self.linear(u, mu), count, near)
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A real or complex direction in state and parameters, for directional derivatives."""
+
+    u: np.ndarray
+    mu: dict[str, float] = field(default_factory=dict)

@@ -1,0 +1,307 @@
+"""Follows a curve: predictor, corrector, step control, limits, monitors, resumption."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from continuation.branch import Branch, CurvePoint
+from continuation.errors import NotConverged, SingularSystem
+from continuation.observers import as_observers
+from continuation.problem import Local, Problem, correct
+
+
+@dataclass
+class Here:
+    """A point on the curve with its linearisation and what the monitors made of it.
+
+    Attributes
+    ----------
+    z, tangent : ndarray
+    local : Local
+    tests : dict of str to float
+    unstable : int
+    eigenvalues : ndarray, complex
+    data : dict
+        Private to the monitors.
+    """
+
+    z: np.ndarray
+    tangent: np.ndarray
+    local: Local
+    iterations: int = 0
+    step: float = 0.0
+    tests: dict = field(default_factory=dict)
+    unstable: int = -1
+    eigenvalues: np.ndarray = field(default_factory=lambda: np.empty(0, complex))
+    data: dict = field(default_factory=dict)
+
+    def point(self) -> CurvePoint:
+        return CurvePoint(self.z, self.tangent, self.step, self.iterations,
+                           float(self.local.size), dict(self.tests), self.unstable,
+                           self.eigenvalues)
+
+
+class Tracer:
+    """One run along one curve.
+
+    Parameters
+    ----------
+    problem : Problem
+    options : ContinuationOptions
+    monitors : sequence
+        Objects with ``measure(tracer, here)`` and
+        ``between(tracer, before, after, index, found)``.
+    observers
+        See `continuation.observers`.
+    """
+
+    def __init__(self, problem: Problem, options, monitors=(), observers=None):
+        self.problem, self.options = problem, options
+        self.monitors = list(monitors)
+        self.observers = as_observers(observers)
+        self.frame = problem.natural_frame()
+
+    # -- points ---------------------------------------------------------------------------
+
+    def correct(self, z, normal):
+        return correct(self.problem, z, self.frame, self.options.newton, normal,
+                       self.options.location_tolerance)
+
+    def here(self, correction, reference, measure=True) -> Here:
+        """A corrected point with tangent (to the side of ``reference``) and tests."""
+        local = correction.local
+        result = Here(correction.z, local.tangent(reference), local, correction.iterations)
+        if measure:
+            for monitor in self.monitors:
+                monitor.measure(self, result)
+        return result
+
+    def at(self, before: Here, after: Here, fraction: float, measure=False) -> Here | None:
+        """The point of the curve over a fraction of the chord, or None if not reached."""
+        chord = after.z - before.z
+        normal = self.problem.weights * chord
+        scale = np.abs(normal).max()
+        correction = self.correct(before.z + fraction * chord, normal / scale)
+        if not correction.converged:
+            return None
+        return self.here(correction, chord, measure)
+
+    def fraction(self, before: Here, after: Here, z) -> tuple[float, float]:
+        """Where ``z`` lies along the chord, and its distance from it in chord lengths."""
+        chord = after.z - before.z
+        length2 = max(self.problem.dot(chord, chord), 1e-300)
+        s = self.problem.dot(z - before.z, chord) / length2
+        away = self.problem.norm(z - before.z - s * chord) / np.sqrt(length2)
+        return s, away
+
+    def root(self, before: Here, after: Here, function, tolerance=1e-10, steps=60) -> Here | None:
+        """Zero of a function of points between two of opposite sign (Illinois)."""
+        a, b = 0.0, 1.0
+        fa, fb = function(before), function(after)
+        best, side = None, 0
+        for _ in range(steps):
+            s = (a * fb - b * fa) / (fb - fa)
+            width = b - a
+            s = min(max(s, a + 1e-3 * width), b - 1e-3 * width)
+            here = self.at(before, after, s)
+            if here is None:
+                return best
+            f = function(here)
+            best = here
+            if abs(f) == 0.0 or width < tolerance:
+                return here
+            if (f > 0) == (fb > 0):
+                b, fb = s, f
+                fa = fa / 2 if side == 1 else fa
+                side = 1
+            else:
+                a, fa = s, f
+                fb = fb / 2 if side == -1 else fb
+                side = -1
+        return best
+
+    # -- the run --------------------------------------------------------------------------
+
+    def start(self, z, direction, frame=None) -> Here:
+        """Correct the first point and choose the side to leave it on.
+
+        Raises
+        ------
+        NotConverged
+            The first point is not on the curve and Newton's method does not reach it.
+        """
+        n, k = self.problem.n, self.problem.k
+        if frame is not None:
+            self.frame = frame
+        normal = self.problem.weights * direction
+        correction = self.correct(z, normal / np.abs(normal).max())
+        if not correction.converged and frame is None:
+            # The natural frame is singular at a fold; any generic row will do there.
+            generic = np.cos(np.arange(1.0, k * (n + k) + 1.0)).reshape(k, n + k)
+            self.frame = generic
+            correction = self.correct(z, normal / np.abs(normal).max())
+        if not correction.converged:
+            raise NotConverged(
+                f"The first point was not found: {correction.reason} after "
+                f"{correction.iterations} iterations, residual {correction.residual:.3g}.",
+                correction.reason, correction,
+            )
+        here = self.here(correction, direction, measure=False)
+        self.frame = self.problem.frame(here.local.basis)
+        here.local = Local(self.problem, here.z, self.frame)
+        here.tangent = here.local.tangent(here.tangent)
+        for monitor in self.monitors:
+            monitor.measure(self, here)
+        return here
+
+    def run(self, branch: Branch, here: Here, step: float) -> Branch:
+        """Add points to ``branch`` from ``here`` on until something ends it."""
+        self._tell("started", branch)
+        try:
+            branch.reason = self._steps(branch, here, step)
+        except KeyboardInterrupt:
+            branch.reason = "interrupted"
+        self._tell("ended", branch)
+        return branch
+
+    def _steps(self, branch, here, step) -> str:
+        options = self.options
+        self._branch = branch
+        first = branch.points[0]
+        for _ in range(options.max_points):
+            self._remember(branch, step)
+            outcome = self._advance(branch, here, step)
+            if isinstance(outcome, str):
+                return outcome
+            after, step, ending = outcome
+            found: list = []
+            for monitor in self.monitors:
+                found += monitor.between(self, here, after, len(branch) - 1, found)
+            branch.points.append(after.point())
+            branch.special += found
+            self.frame = self.problem.frame(after.local.basis)
+            if self.problem.condition is not None:
+                self.problem.condition.adapt(after.local.condition)
+            closed = options.detect_closed and self._closed(branch, first, here, after)
+            here = after
+            self._remember(branch, step)
+            self._tell("accepted", branch)
+            for special in found:
+                self._tell("found", branch, special)
+            stopping = [s.kind for s in found if s.kind in options.stop_at or s.values.get("stop")]
+            if stopping:
+                return f"stopped at: {stopping[0]}"
+            if ending:
+                return ending
+            if closed:
+                return "closed: the curve came back to its first point"
+        return "largest number of points reached"
+
+    def _remember(self, branch, step):
+        branch.next_step = float(step)
+        branch.restart = {"frame": self.frame}
+        condition = self.problem.condition
+        if condition is not None:
+            branch.restart.update(p=condition.p, q=condition.q)
+
+    def _advance(self, branch, here, step):
+        """One accepted step: the point, the next step, and why the branch ends, if it does."""
+        problem, options = self.problem, self.options
+        while True:
+            z, used, normal, ending = self._predict(here, step)
+            if ending and used == 0.0:
+                return ending
+            correction = self.correct(z, normal)
+            trouble = None
+            if not correction.converged:
+                trouble = correction.reason
+            else:
+                try:
+                    after = self.here(correction, here.tangent, measure=False)
+                except SingularSystem:
+                    trouble = "singular"
+            if trouble is None:
+                cosine = np.clip(problem.dot(after.tangent, here.tangent), -1.0, 1.0)
+                angle = float(np.arccos(cosine))
+                travelled = problem.norm(after.z - here.z)
+                if options.method == "arclength" and angle > options.max_angle:
+                    trouble = "the tangent turns too far"
+                elif options.method == "arclength" and travelled > 3.0 * used:
+                    trouble = "the corrector went far from the prediction"
+                elif options.method == "natural" and angle > 1.0:
+                    trouble = "the tangent turns too far"
+            if trouble is None:
+                break
+            self._tell("refused", branch, trouble, used)
+            if used <= options.min_step * (1 + 1e-9):
+                return f"step below its minimum: {trouble}"
+            step = max(used * options.shrink, options.min_step)
+        after.step = used
+        crossed = None if ending else self._beyond(after.z)
+        if crossed:
+            landed = self._land(here, after, *crossed)
+            if landed is not None:
+                after, ending = landed, f"limit of {crossed[0]} reached"
+        for monitor in self.monitors:
+            monitor.measure(self, after)
+        factor = (options.target_iterations + 1) / (after.iterations + 1)
+        if angle > 0 and options.method == "arclength":
+            factor = min(factor, 0.7 * options.max_angle / angle)
+        factor = float(np.clip(factor, options.shrink, options.growth))
+        if ending is None:
+            step = float(np.clip(used * factor, options.min_step, options.max_step))
+        return after, step, ending
+
+    def _predict(self, here, step):
+        problem, options = self.problem, self.options
+        n = problem.n
+        direction, used, ending = here.tangent, step, None
+        normal = problem.weights * here.tangent
+        normal = normal / np.abs(normal).max()
+        if options.method == "natural":
+            # The step counts in the parameter, in its own unit.
+            rate = abs(here.tangent[n]) * np.sqrt(problem.weights[n])
+            direction = here.tangent / max(rate, 1e-12)
+            used = step
+            normal = np.zeros(problem.n + problem.k + problem.e)
+            normal[n] = 1.0
+        for i, name in enumerate(problem.names):
+            if name not in options.limits or direction[n + i] == 0.0:
+                continue
+            low, high = options.limits[name]
+            limit = high if direction[n + i] > 0 else low
+            reach = (limit - here.z[n + i]) / direction[n + i]
+            if 0.0 <= reach <= used * (1 + 1e-9):
+                used, ending = reach, f"limit of {name} reached"
+                normal = np.zeros(problem.n + problem.k + problem.e)
+                normal[n + i] = 1.0
+        z = here.z + used * direction
+        return z, used, normal, ending
+
+    def _beyond(self, z):
+        for i, name in enumerate(self.problem.names):
+            if name in self.options.limits:
+                low, high = self.options.limits[name]
+                value = z[self.problem.n + i]
+                if value < low or value > high:
+                    return name, self.problem.n + i, low if value < low else high
+        return None
+
+    def _land(self, here, after, name, index, limit):
+        landed = self.root(here, after, lambda point: point.z[index] - limit)
+        if landed is not None:
+            landed.step = self.problem.norm(landed.z - here.z)
+        return landed
+
+    def _closed(self, branch, first, here, after) -> bool:
+        if len(branch) < 6:
+            return False
+        s, away = self.fraction(here, after, first.z)
+        same_way = self.problem.dot(first.tangent, after.tangent) > 0.9
+        return 0.0 < s <= 1.0 and away < 0.1 and same_way
+
+    def _tell(self, hook, *arguments):
+        for observer in self.observers:
+            getattr(observer, hook)(*arguments)

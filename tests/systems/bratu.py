@@ -1,0 +1,37 @@
+"""Bratu's problem, laplacian u + lambda exp(u) = 0, u = 0 on the edge of the unit interval or square."""
+
+import jax.numpy as jnp
+import scipy.sparse as sp
+
+from continuation.jax_system import JaxSystem
+
+
+def bratu_1d(points: int) -> JaxSystem:
+    """Fourth-order compact (Numerov) differences, so that few points suffice."""
+    h = 1.0 / (points + 1)
+
+    def residual(u, mu):
+        full = jnp.concatenate([jnp.zeros(1), u, jnp.zeros(1)])
+        source = mu["lambda"] * jnp.exp(full)
+        second = (full[2:] - 2 * full[1:-1] + full[:-2]) / h**2
+        return second + (source[2:] + 10 * source[1:-1] + source[:-2]) / 12
+
+    pattern = sp.diags([1.0, 1.0, 1.0], [-1, 0, 1], shape=(points, points))
+    return JaxSystem(residual, points, sparsity=pattern)
+
+
+def bratu_2d(points: int) -> JaxSystem:
+    """Five-point differences on ``points`` x ``points`` interior nodes."""
+    h = 1.0 / (points + 1)
+
+    def residual(u, mu):
+        full = jnp.pad(u.reshape(points, points), 1)
+        laplacian = (
+            full[2:, 1:-1] + full[:-2, 1:-1] + full[1:-1, 2:] + full[1:-1, :-2]
+            - 4 * full[1:-1, 1:-1]
+        ) / h**2
+        return laplacian.ravel() + mu["lambda"] * jnp.exp(u)
+
+    line = sp.diags([1.0, 1.0, 1.0], [-1, 0, 1], shape=(points, points))
+    one = sp.identity(points)
+    return JaxSystem(residual, points**2, sparsity=sp.kron(line, one) + sp.kron(one, line))
