@@ -14,7 +14,8 @@ from . import __version__, runtime
 
 _NEEDED = ("numpy", "scipy", "jax", "numba", "h5py", "matplotlib", "pydantic", "pint", "typer", "tqdm", "pyvista")
 _FOR_TESTS = ("pytest", "hypothesis", "felupe")
-_SOLVERS = ("mumps", "superlu", "superlu_dist", "umfpack", "petsc")
+# SuperLU_DIST is left out: used a few times in one process, Debian's 8.1 corrupts the heap
+_SOLVERS = ("mumps", "superlu", "umfpack", "petsc")
 
 
 @dataclass(frozen=True)

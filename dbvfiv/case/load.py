@@ -117,6 +117,8 @@ def parse_toml(text: str, name: str = "") -> dict[str, Any]:
         place = re.search(r"\(at line (\d+), column \d+\)", str(error))
         reason = re.sub(r"\s*\(at [^)]*\)\s*$", "", str(error)).rstrip(".") or "nested too deeply"
         line = int(place[1]) if place else None
+        if "at end of document" in str(error):
+            line = max(1, len(text.splitlines()))
         where = f"{name}, line {line}" if line else (name or "The text")
         raise CaseError(f"{where} is not valid TOML: {reason}.", line=line) from None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import typing
 from typing import Any
 
@@ -16,6 +17,7 @@ from .model import Case
 from .section import BrokenRule, Section
 
 Path = tuple[str, ...]
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,60}")
 
 
 def sentence(error: ValidationError, source: str, lines: dict[Path, int], overridden: tuple[Path, ...]) -> CaseError:
@@ -76,7 +78,8 @@ def _resolve(loc: tuple[Any, ...]) -> tuple[Path, type[Section] | None, Any]:
 
 
 def _dotted(path: Path) -> str:
-    return ".".join(_clean(part) for part in path)
+    """The key as TOML would write it; what is no bare key is quoted."""
+    return ".".join(p if _BARE_KEY.fullmatch(p) else f'"{_clean(p, quoted=True)}"' for p in path)
 
 
 def _unknown(path: Path, owner: type[Section] | None) -> str:
@@ -90,7 +93,7 @@ def _unknown(path: Path, owner: type[Section] | None) -> str:
     if nearest:
         hint = f"the nearest valid key is {nearest}"
     else:
-        hint = f"{place or 'a case'} may hold {', '.join(names)}"
+        hint = f"{_dotted(path[:-1]) or 'a case'} may hold {', '.join(names)}"
     return f"{_dotted(path)} is not a key of the case file; {hint}."
 
 

@@ -68,6 +68,8 @@ def run(arguments: Sequence[str]) -> int:
     try:
         status = command.main(list(arguments), prog_name="dbvfiv", standalone_mode=False)
         sys.stdout.flush()
+        if status == 130:  # newer Typer swallows Ctrl-C
+            raise KeyboardInterrupt
         return status if isinstance(status, int) else 0
     except CaseError as error:
         return _say(str(error), 2)

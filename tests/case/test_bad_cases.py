@@ -1,0 +1,168 @@
+"""Malformed and impossible cases: status 2, one sentence that names the key, no traceback."""
+
+import pytest
+
+# TOML text of a case file, and words that the sentence must hold
+BAD = {
+    "not TOML": ("[valve", "line 1"),
+    "unclosed text": ('[drive]\npressure = "18 kPa', "line 2"),
+    "key given twice": ("[mesh]\naround = 28\naround = 30", "line 3"),
+    "bare word as value": ("[drive]\nkind = flow", "line 2"),
+    "unknown section": ("[valv]\nsaddle = 'ruled'", "line 1: valv.*nearest valid key is valve"),
+    "unknown key": ("[drive]\n\npresure = 3.0", "line 3: drive.presure.*nearest valid key is drive.pressure"),
+    "key in the wrong section": ("[drive]\nalpha = 3", "line 2: drive.alpha.*damping.alpha"),
+    "key without a section": ("density = 3", "line 1: density.*density"),
+    "unknown key in a layer": (
+        "[[layers]]\nmaterial = 'CR'\nthickness = 0.006\n[[layers]]\nmaterial = 'CR'\nthicknes = 0.006",
+        r"line 6: layers\.1\.thicknes is.*layers\.1\.thickness",
+    ),
+    "unknown key in a material": (
+        "[materials.A]\nkind='neo-hookean'\nshear_modulus=1e6\ndensity=1300\nyoungs=3",
+        r"line 5: materials\.A\.youngs",
+    ),
+    "section that is a number": ("drive = 3", "drive is given as 3.*table"),
+    "section that is a list": ("mesh = [1, 2]", "mesh is given as a list of 2"),
+    "wrong dimension": ("[drive]\npressure = '18 mm'", 'line 2: drive.pressure is given as "18 mm".*pressure'),
+    "text without a unit": ("[drive]\npressure = '18'", "has no unit.*pressure"),
+    "unit that does not exist": ("[drive]\npressure = '18 kilopuscals'", "not a pressure"),
+    "text without a number": ("[valve]\nlip_radius = 'small'", "not a number"),
+    "angle as a plain number in a text": (
+        "[[layers]]\nmaterial='CR'\nthickness=0.006\nangle='10 %'", r"layers\.0\.angle.*not a angle|not an angle"
+    ),
+    "percent where a length is due": ("[valve]\nlip_radius = '10 %'", "valve.lip_radius"),
+    "truth value for a number": ("[drive]\npressure = true", "truth value"),
+    "truth value for an integer": ("[mesh]\naround = true", "mesh.around is given as true; it must be an integer"),
+    "number for a truth value": ("[fluid]\nunsteady = 1", "fluid.unsteady.*true or false"),
+    "text for a truth value": ("[supports]\nlip_stop = 'yes'", "supports.lip_stop"),
+    "number that is not finite": ("[damping]\nbeta = inf", "not finite"),
+    "not a number": ("[damping]\nalpha = nan", "not finite"),
+    "date for a number": ("[damping]\nalpha = 2020-01-01", "damping.alpha"),
+    "integer too large for a float": (f"[damping]\nalpha = 1{'0' * 400}", "too large"),
+    "integer with thousands of digits": (f"[damping]\nalpha = 1{'0' * 5000}", "not valid TOML"),
+    "thickness zero": ("[valve]\nwall = 'uniform'\nwall_thickness = 0", "line 3.*greater than 0"),
+    "thickness negative": (
+        "[valve]\nwall_map = [{ to = 0.6, thickness = '-3 mm' }]", r"valve\.wall_map\.0\.thickness.*greater than 0"
+    ),
+    "layer of no thickness": ("[[layers]]\nmaterial='CR'\nthickness=0", r"layers\.0\.thickness"),
+    "layer without a material": ("[[layers]]\nthickness=0.01", r"layers\.0\.material is missing"),
+    "layer without a thickness": ("[[layers]]\nmaterial='CR'", r"layers\.0\.thickness is missing"),
+    "layer of an unknown material": ("[[layers]]\nmaterial='teflon'\nthickness=0.01", "'teflon'.*CR, SBR, EPDM"),
+    "no layers": ("layers = []", "layers is given as an empty list"),
+    "one layer with one Gauss point": (
+        "[mesh]\nlayer_points=1\n[[layers]]\nmaterial='CR'\nthickness=0.01", "mesh.layer_points.*at least 2"
+    ),
+    "angle beyond the full turn": ("[[layers]]\nmaterial='CR'\nthickness=0.01\nangle=270", r"layers\.0\.angle"),
+    "density zero": ("[fluid]\ndensity = 0", "fluid.density.*greater than 0"),
+    "density negative": ("[fluid]\ndensity = '-1 kg/m^3'", "fluid.density"),
+    "pressure negative": ("[drive]\npressure = '-2 kPa'", "drive.pressure.*at least 0"),
+    "unknown choice": ("[fluid]\ncontinuity = 'steady'", '"quasi-steady" or "storage"'),
+    "choice given as a number": ("[drive]\nkind = 1", '"flow" or "uniform"'),
+    "outside flow": ("[drive]\nside = 'outside'", "drive.side.*uniform"),
+    "lips wider than the pipe": ("[valve]\nlip_half_width = 0.2", "lip_half_width.*wider than the pipe"),
+    "no flow area at the lips": ("[valve]\nduckbill_wall_deduction = 0.02", "no flow area between the lips"),
+    "no flow area at the flange": ("[valve]\nflange_wall_deduction = 0.2", "no flow area at the flange"),
+    "wall thicker than the pipe": ("[valve]\nwall='uniform'\nwall_thickness=0.3", "fills the pipe"),
+    "wall map too short": ("[valve]\nwall_map = [{ to = 0.3, thickness = 0.01 }]", "must reach.*0.56 m"),
+    "wall map not increasing": (
+        "[valve]\nwall_map = [{to=0.4, thickness=0.01}, {to=0.3, thickness=0.01}, {to=0.6, thickness=0.01}]",
+        "must increase",
+    ),
+    "wall map empty": ("[valve]\nwall_map = []", "valve.wall_map is given as an empty list"),
+    "wall map of numbers": ("[valve]\nwall_map = [0.01, 0.02]", "wall_map"),
+    "length zero": ("[valve]\nsaddle_length = 0", "valve.saddle_length"),
+    "too few elements": ("[mesh]\naround = 1", "mesh.around.*at least 4"),
+    "elements that are no integer": ("[mesh]\nalong = 48.5", "mesh.along.*integer"),
+    "far too many elements": ("[mesh]\nalong = 1000000", "mesh.along.*at most"),
+    "grading zero": ("[mesh]\ngrading = 0", "mesh.grading"),
+    "key points that do not exist": ("[valve]\nkey_points = 'nowhere.txt'", "nowhere.txt.*does not exist"),
+    "key points that are a folder": ("[valve]\nkey_points = '.'", "valve.key_points"),
+    "tension test that does not exist": (
+        "[materials.A]\nkind='fit'\npath='test.csv'\ndensity=1300", r"materials\.A\.path.*does not exist"
+    ),
+    "fit of four terms": ("[materials.A]\nkind='fit'\npath='x'\nterms=4\ndensity=1", r"materials\.A\."),
+    "strain level out of range": ("[materials]\nstrain_level = '80 %'", "strain_level.*60 %"),
+    "strain level as percent number": ("[materials]\nstrain_level = 10", "strain_level.*60 %"),
+    "material that is a number": ("[materials]\nCR = 3", "materials.CR"),
+    "material without a kind": ("[materials.A]\nc10 = 1e6", r"materials\.A\.kind is missing"),
+    "material of an unknown kind": ("[materials.A]\nkind = 'ogden'", r'materials\.A\.kind is given as "ogden".*neo-hookean'),
+    "material kind that is a list": ("[materials.A]\nkind = [1]", r"materials\.A\.kind"),
+    "Mooney-Rivlin without stiffness": (
+        "[materials.A]\nkind='mooney-rivlin'\nc10='1 MPa'\nc01='-1 MPa'\ndensity=1300", r"materials\.A\.c10.*greater than 0"
+    ),
+    "Mooney-Rivlin without c01": ("[materials.A]\nkind='mooney-rivlin'\nc10='1 MPa'\ndensity=1300", "c01 is missing"),
+    "neo-Hookean without stiffness": ("[materials.A]\nkind='neo-hookean'\nshear_modulus=0\ndensity=1", "shear_modulus"),
+    "Poisson ratio one half": (
+        "[materials.A]\nkind='isotropic'\nyoungs_modulus=1e6\npoisson_ratio=0.5\ndensity=1", "poisson_ratio.*less than 0.5"
+    ),
+    "ply that is not positive definite": (
+        "[materials.A]\nkind='orthotropic'\ne1=1e6\ne2=4e6\nnu12=0.6\ng12=1e6\ng13=1e6\ng23=1e6\ndensity=1",
+        "nu12.*sqrt",
+    ),
+    "fibre fraction above one": ("[materials.fibre]\nkind='halpin-tsai'\nfibre_fraction='120 %'", "fibre_fraction"),
+    "material density negative": ("[materials.A]\nkind='neo-hookean'\nshear_modulus=1e6\ndensity=-1", "density"),
+    "no pressures": ("[steady]\npressures = []", "steady.pressures is given as an empty list"),
+    "pressure list with a length": ("[steady]\npressures = [1000, '3 m']", r"steady\.pressures\.1.*not a pressure"),
+    "tolerance too large": ("[steady]\ntolerance = 1", "steady.tolerance"),
+    "no modes": ("[modes]\ncount = 0", "modes.count"),
+    "sweep over nothing": ("[sweep]\nover = 'density'", "sweep.over.*START:STOP:COUNT"),
+    "sweep backwards": ("[sweep]\nover = 'density=10:1:5'", "start is not below"),
+    "sweep over an unknown parameter": ("[sweep]\nover = 'mass=1:10:5'", "none of pressure, density, alpha, beta"),
+    "map of one parameter": ("[map]\ny = 'pressure=1:10:5'", "map.y.*another parameter"),
+    "step longer than the history": ("[transient]\nstep = '2 s'", "transient.step.*at most"),
+    "numerical damping too large": ("[transient]\nnumerical_damping = 0.6", "numerical_damping"),
+    "no edge columns left": ("[drive]\nunloaded_edge = '28/28'", "unloaded_edge.*less than 1"),
+    "division by zero": ("[drive]\nunloaded_edge = '3/0'", "divides by zero"),
+    "nested too deeply": ("a = " + "[" * 3000 + "]" * 3000, "."),
+}
+
+
+@pytest.mark.parametrize("text, words", BAD.values(), ids=BAD.keys())
+def test_a_bad_case_is_refused_in_one_sentence(tmp_path, monkeypatch, command_line, one_sentence, text, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.toml").write_text(text)
+    outcome = command_line("case", "bad.toml")
+    assert outcome.status == 2
+    assert outcome.out == ""
+    assert one_sentence(outcome.err), outcome.err
+    assert matches(words, outcome.err), outcome.err
+
+
+OVERRIDES = {
+    "no equals sign": ("drive.pressure", "KEY=VALUE"),
+    "no key": ("=3", "KEY=VALUE"),
+    "unknown key": ("drive.presure=3", "drive.pressure"),
+    "wrong unit": ("drive.pressure=3 kg", "In an override, drive.pressure"),
+    "no such layer": ("layers.7.angle=3", "between 0 and 4"),
+    "a layer by name": ("layers.CR.angle=3", "between 0 and 4"),
+    "below a number": ("drive.pressure.x=3", "drive.pressure"),
+    "empty value": ("drive.pressure=", "drive.pressure"),
+    "a table in a value": ("drive.pressure=3\nx=4", "drive.pressure"),
+}
+
+
+@pytest.mark.parametrize("override, words", OVERRIDES.values(), ids=OVERRIDES.keys())
+def test_a_bad_override_is_refused_in_one_sentence(command_line, one_sentence, override, words):
+    outcome = command_line("case", "--set", override)
+    assert outcome.status == 2
+    assert one_sentence(outcome.err), outcome.err
+    assert matches(words, outcome.err), outcome.err
+
+
+@pytest.mark.parametrize("name", ["missing.toml", ".", "a\0b.toml"])
+def test_a_file_that_is_no_case(tmp_path, monkeypatch, command_line, one_sentence, name):
+    monkeypatch.chdir(tmp_path)
+    outcome = command_line("case", name)
+    assert outcome.status == 2
+    assert one_sentence(outcome.err), outcome.err
+
+
+def test_a_binary_file_is_no_case(tmp_path, command_line, one_sentence):
+    (tmp_path / "x.toml").write_bytes(b"\xff\xfe\x00[valve]")
+    outcome = command_line("case", tmp_path / "x.toml")
+    assert outcome.status == 2 and one_sentence(outcome.err), outcome.err
+
+
+def matches(pattern: str, text: str) -> bool:
+    import re
+
+    return re.search(pattern, text) is not None

@@ -1,0 +1,169 @@
+"""The case model: defaults, units, overrides, copies, and the texts made from the declarations."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from dbvfiv.case import Case, CaseError, load_case, parse_axis
+from dbvfiv.case.describe import walk
+from dbvfiv.case.reference import explain, page
+from dbvfiv.case.write import case_toml
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_the_reference_case_spells_out_the_defaults():
+    assert load_case(ROOT / "cases/dbv12.toml") == Case()
+
+
+def test_the_reference_case_names_every_key():
+    text = (ROOT / "cases/dbv12.toml").read_text()
+    names = {info.key.split(".")[-1] for info in walk() if not info.key.startswith("materials.NAME")}
+    assert not [name for name in names if name not in text]
+
+
+def test_the_defaults_are_the_12_inch_valve():
+    case = Case()
+    assert case.valve.length == pytest.approx(0.56)
+    assert [case.valve.thickness_at(z) for z in (0.0, 0.2099, 0.25, 0.4, 0.56)] == [0.012, 0.012, 0.015, 0.019, 0.016]
+    assert [layer.material for layer in case.layers] == ["CR", "SBR", "fibre", "fibre", "EPDM"]
+    assert [layer.angle for layer in case.layers] == [0, 0, 54, -54, 0]
+    assert math.fsum(layer.thickness for layer in case.layers) == pytest.approx(0.0143764)
+    assert (case.mesh.around, case.mesh.along) == (28, 48)
+
+
+@pytest.mark.parametrize(
+    "override, key, value",
+    [
+        ("drive.pressure=36 kPa", "drive.pressure", 36000.0),
+        ('drive.pressure="0.36 bar"', "drive.pressure", 36000.0),
+        ("drive.pressure=29e3", "drive.pressure", 29000.0),
+        ("valve.lip_radius=6.19 mm", "valve.lip_radius", 0.00619),
+        ("valve.flange_radius = 139.19 mm", "valve.flange_radius", 0.13919),
+        ("materials.strain_level=15 %", "materials.strain_level", 0.15),
+        ("materials.strain_level=0.2", "materials.strain_level", 0.2),
+        ("layers.2.angle=45 deg", "layers.2.angle", 45.0),
+        ("layers.2.angle=0.5 rad", "layers.2.angle", math.degrees(0.5)),
+        ("drive.unloaded_edge=1/28", "drive.unloaded_edge", 1 / 28),
+        ("fluid.density=1.2 g/l", "fluid.density", 1.2),
+        ("damping.alpha=5 1/s", "damping.alpha", 5.0),
+        ("damping.alpha=5/s", "damping.alpha", 5.0),
+        ("damping.beta=3 ms", "damping.beta", 0.003),
+        ("supports.lip_stop_stiffness=1e5 kN/m", "supports.lip_stop_stiffness", 1e8),
+        ("fluid.continuity=storage", "fluid.continuity", "storage"),
+        ("fluid.unsteady=false", "fluid.unsteady", False),
+        ("mesh.around=14", "mesh.around", 14),
+        ("steady.pressures=['1 kPa', 2000]", "steady.pressures", (1000.0, 2000.0)),
+        ("valve.wall_map.0.thickness=13 mm", "valve.wall_map.0.thickness", 0.013),
+    ],
+)
+def test_overrides_become_si(override, key, value):
+    found = load_case(None, [override])
+    for part in key.split("."):
+        found = found[int(part)] if part.isdigit() else getattr(found, part)
+    assert found == pytest.approx(value, rel=1e-14) if isinstance(value, float) else found == value
+
+
+def test_a_quantity_in_its_usual_unit_is_the_same_float():
+    # otherwise a case file in mm and kPa would not equal the defaults
+    for number in range(1, 2000):
+        case = load_case(None, [f"drive.pressure={number / 100} kPa"])
+        assert case.drive.pressure == number * 10.0
+
+
+def test_overrides_win_over_the_file_and_each_other(tmp_path):
+    file = tmp_path / "a.toml"
+    file.write_text("[drive]\npressure = '2 kPa'\n[fluid]\ndensity = 10")
+    case = load_case(file, ["drive.pressure=3 kPa", "drive.pressure=4 kPa"])
+    assert (case.drive.pressure, case.fluid.density) == (4000.0, 10.0)
+
+
+def test_replace_leaves_the_original_alone_and_checks_again():
+    case = Case()
+    changed = case.replace({"drive.pressure": "36 kPa", "layers.2.angle": 45, "layers.3.angle": -45})
+    assert changed.drive.pressure == 36e3 and [c.angle for c in changed.layers] == [0, 0, 45, -45, 0]
+    assert case == Case()
+    with pytest.raises(CaseError, match="fluid.density"):
+        case.replace({"fluid.density": -1})
+
+
+def test_a_case_cannot_be_changed_in_place():
+    with pytest.raises(ValueError):
+        Case().drive.pressure = 3.0
+
+
+def test_own_and_built_in_materials():
+    case = load_case(
+        None,
+        [
+            "materials.CR={kind='neo-hookean', shear_modulus='1 MPa', density=1100}",
+            "materials.skin={kind='shipped', rubber='SBR', strain_level='20 %'}",
+            "layers.0.material=skin",
+        ],
+    )
+    materials = case.materials
+    assert materials.card("CR").shear_modulus == 1e6
+    assert (materials.card("SBR").kind, materials.card("SBR").strain_level) == ("shipped", 0.1)
+    assert materials.card("skin").strain_level == 0.2
+    assert materials.card("fibre").fibre_modulus == 3460e6 and materials.card("fibre").density == 1270
+    with pytest.raises(KeyError):
+        materials.card("teflon")
+
+
+def test_key_points_are_found_beside_the_case_file(tmp_path):
+    points = [(0.1 * j, 0.01, 0.07 * i) for i in range(9) for j in range(15)]
+    (tmp_path / "points.txt").write_text("# x y z\n" + "\n".join("%g %g %g" % p for p in points))
+    (tmp_path / "a.toml").write_text("[valve]\nkey_points = 'points.txt'")
+    case = load_case(tmp_path / "a.toml")
+    assert case.valve.key_points == (tmp_path / "points.txt").resolve()
+    (tmp_path / "points.txt").write_text("1 2 3\n" * 134)
+    with pytest.raises(CaseError, match="134 points"):
+        load_case(tmp_path / "a.toml")
+    (tmp_path / "points.txt").write_text("1 2 3\n" * 5 + "1 2\n")
+    with pytest.raises(CaseError, match="line 6"):
+        load_case(tmp_path / "a.toml")
+    # a stored case can be rebuilt where the file is gone
+    assert Case.from_dict(case.to_dict()) == case
+
+
+def test_errors_know_key_and_line(tmp_path):
+    (tmp_path / "a.toml").write_text('# a\n[valve]\nsaddle = "ruled"\n\nlip_radius = "6 kPa"\n')
+    with pytest.raises(CaseError) as info:
+        load_case(tmp_path / "a.toml")
+    assert (info.value.key, info.value.line) == ("valve.lip_radius", 5)
+
+
+@pytest.mark.parametrize("comments", [True, False])
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        [],
+        ["drive.pressure=12345.678901234567", "valve.lip_radius=0.0061999999999999999", "layers.1.angle=-0.1"],
+        ["materials.A={kind='orthotropic',e1=3e6,e2=1e6,nu12=0.4,g12=1e6,g13=1e6,g23=1e6,density=1}"],
+        ["materials.'a b'={kind='mooney-rivlin',c10='-1.5 MPa',c01='2.1 MPa',c11=7,density=1}"],
+    ],
+)
+def test_written_text_reads_back_as_the_same_case(tmp_path, overrides, comments):
+    case = load_case(None, overrides)
+    (tmp_path / "b.toml").write_text(case_toml(case, comments=comments))
+    assert load_case(tmp_path / "b.toml") == case
+    assert Case.from_dict(case.to_dict()) == case
+
+
+def test_the_reference_page_is_up_to_date():
+    assert (ROOT / "docs/case-reference.md").read_text() == page(), "run `make docs`"
+
+
+def test_every_key_is_described():
+    for info in walk():
+        assert info.description.endswith("."), info.key
+        assert info.allowed, info.key
+        assert explain(info.key)[0].description
+
+
+def test_parameter_ranges():
+    axis = parse_axis("density=1:1000:4:log")
+    assert axis.key == "fluid.density" and axis.values == pytest.approx((1, 10, 100, 1000))
+    assert parse_axis("pressure=0.5 kPa:50 kPa:3").values == (500.0, 25250.0, 50000.0)
+    assert parse_axis("alpha=0:5:2").values == (0.0, 5.0)

@@ -1,0 +1,164 @@
+"""Exit statuses, one-sentence failures, and JSON that is alone on standard output."""
+
+import json
+import subprocess
+import sys
+import time
+import types
+
+import pytest
+import typer
+
+from dbvfiv.case import Case
+from dbvfiv.cli import _run
+from dbvfiv.cli._output import print_json
+from dbvfiv.errors import CaseError, SolveError
+
+
+def test_help_lists_every_command(command_line):
+    outcome = command_line("--help")
+    assert outcome.status == 0
+    for name in ("case", "doctor"):
+        assert f"\n  {name} " in outcome.out
+
+
+def test_every_command_has_help_and_loads_nothing_heavy():
+    code = (
+        "import sys; from dbvfiv.cli._run import build; app = build();"
+        "print([c.callback.__module__ for c in app.registered_commands if not c.callback.__doc__]);"
+        "print([m for m in ('jax', 'numpy', 'scipy', 'petsc4py', 'numba', 'pint', 'matplotlib') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.split("\n")[:2] == ["[]", "[]"], done.stdout + done.stderr
+
+
+def test_help_is_quick():
+    best = min(_time_of_help() for _ in range(3))
+    assert best < 1.5  # 0.15 s on an idle machine; loading JAX alone would take longer than this
+
+
+def _time_of_help() -> float:
+    start = time.perf_counter()
+    subprocess.run([sys.executable, "-m", "dbvfiv", "--help"], check=True, capture_output=True)
+    return time.perf_counter() - start
+
+
+def test_version(command_line):
+    outcome = command_line("--version")
+    assert (outcome.status, outcome.out.split()[0]) == (0, "dbvfiv")
+
+
+@pytest.mark.parametrize("arguments", [["cas"], ["case", "--nonsense"], ["case", "a", "b"], ["case", "--set"], ["doctor", "x"]])
+def test_a_wrong_command_line_is_one_sentence(command_line, one_sentence, arguments):
+    outcome = command_line(*arguments)
+    assert outcome.status == 2 and outcome.out == ""
+    assert one_sentence(outcome.err), outcome.err
+
+
+@pytest.mark.parametrize(
+    "failure, status",
+    [
+        (CaseError("drive.pressure is wrong."), 2),
+        (SolveError("No equilibrium was found at 3 kPa after 12 halvings of the load step."), 1),
+        (KeyboardInterrupt(), 130),
+        (FileNotFoundError(2, "No such file or directory", "x.h5"), 1),
+        (ZeroDivisionError("division\nby zero"), 3),
+    ],
+)
+def test_failures_become_exit_statuses(monkeypatch, command_line, one_sentence, failure, status):
+    def command() -> None:
+        raise failure
+
+    def build() -> typer.Typer:
+        app = typer.Typer(add_completion=False)
+        app.callback()(lambda: None)
+        app.command("work")(command)
+        return app
+
+    monkeypatch.setattr(_run, "build", build)
+    outcome = command_line("work")
+    assert outcome.status == status
+    assert outcome.out == ""
+    assert one_sentence(outcome.err), outcome.err
+
+
+def test_case_as_json(command_line, tmp_path):
+    (tmp_path / "a.toml").write_text("[drive]\npressure = '36 kPa'")
+    outcome = command_line("case", tmp_path / "a.toml", "--json", "--set", "fluid.density=10")
+    document = json.loads(outcome.out)
+    assert document["drive"]["pressure"] == 36e3 and document["fluid"]["density"] == 10
+    assert Case.from_dict(document).drive.pressure == 36e3
+    assert outcome.err == ""
+
+
+def test_case_printed_can_be_used_again(command_line, tmp_path):
+    first = command_line("case", "--set", "drive.pressure=36 kPa")
+    (tmp_path / "a.toml").write_text(first.out)
+    assert command_line("case", tmp_path / "a.toml").out == first.out
+
+
+def test_a_new_case_is_commented_valid_and_never_overwrites(command_line, one_sentence, tmp_path):
+    file = tmp_path / "new.toml"
+    assert command_line("case", "--new", file, "--set", "fluid.density=1.2").status == 0
+    text = file.read_text()
+    assert "# Inlet pressure" in text and 'density = "1.2 kg/m^3"' in text
+    assert command_line("case", file).status == 0
+    again = command_line("case", "--new", file)
+    assert again.status == 2 and one_sentence(again.err) and file.read_text() == text
+    nowhere = command_line("case", "--new", tmp_path / "no" / "folder.toml")
+    assert nowhere.status == 2 and one_sentence(nowhere.err)
+    assert command_line("case", "--new").status == 2
+
+
+@pytest.mark.parametrize(
+    "key, words",
+    [
+        ("drive.pressure", ["drive.pressure", "18 kPa", "pressure"]),
+        ("drive", ["drive.kind", "drive.side"]),
+        ("layers.2.angle", ["layers[].angle", "54"][:1]),
+        ("materials", ["materials.strain_level", "materials.NAME(fit).path"]),
+        ("continuity", ["fluid.continuity", "quasi-steady"]),
+    ],
+)
+def test_explain(command_line, key, words):
+    outcome = command_line("case", "--explain", key)
+    assert outcome.status == 0
+    assert all(word in outcome.out for word in words), outcome.out
+
+
+def test_explain_names_the_nearest_key(command_line, one_sentence):
+    outcome = command_line("case", "--explain", "drive.presure")
+    assert outcome.status == 2 and one_sentence(outcome.err) and "drive.pressure" in outcome.err
+
+
+def test_explain_everything_as_json(command_line):
+    keys = {entry["key"]: entry for entry in json.loads(command_line("case", "--explain", "--json").out)["keys"]}
+    assert keys["drive.pressure"]["default"] == 18e3 and keys["drive.pressure"]["unit"] == "Pa"
+    assert len(keys) > 80
+
+
+def test_doctor(command_line):
+    outcome = command_line("doctor", "--json")
+    report = json.loads(outcome.out)
+    assert outcome.status == 0 and report["healthy"]
+    assert report["petsc"]["scalar"] in ("real", "complex")
+    assert "petsc" in report["petsc"]["solvers"]
+    assert "PETSc" in command_line("doctor").out
+
+
+def test_doctor_names_the_remedy(monkeypatch, command_line):
+    from dbvfiv import doctor
+
+    real = doctor.importlib.util.find_spec
+    hidden = types.SimpleNamespace(find_spec=lambda name: None if name == "petsc4py" else real(name))
+    monkeypatch.setattr(doctor.importlib, "util", hidden)
+    outcome = command_line("doctor")
+    assert outcome.status == 1
+    assert "petsc4py" in outcome.out and "make setup" in outcome.out or "conda" in outcome.out
+
+
+def test_json_of_arrays_and_of_what_is_not_finite(capsys):
+    import numpy as np
+
+    print_json({"a": np.array([1.0, np.nan]), "b": np.float64(2), "c": (1, None), "d": 1 + 2j})
+    assert json.loads(capsys.readouterr().out) == {"a": [1.0, None], "b": 2.0, "c": [1, None], "d": {"re": 1.0, "im": 2.0}}

@@ -1,0 +1,34 @@
+"""The surroundings that importing the package sets."""
+
+import subprocess
+import sys
+
+CODE = """
+import os
+{before}
+import dbvfiv, jax, jax.numpy as jnp
+print(jnp.zeros(1).dtype, jax.config.jax_compilation_cache_dir, os.environ["NUMBA_CACHE_DIR"], os.environ["OMP_NUM_THREADS"])
+"""
+
+
+def run(before: str = "", **environment: str) -> list[str]:
+    import os
+
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("JAX_", "NUMBA_", "OMP_", "DBVFIV"))}
+    done = subprocess.run(
+        [sys.executable, "-c", CODE.format(before=before)],
+        capture_output=True, text=True, env=clean | environment, check=True,
+    )
+    return done.stdout.split()
+
+
+def test_double_precision_and_caches(tmp_path):
+    assert run(DBVFIV_CACHE=str(tmp_path)) == ["float64", str(tmp_path / "jax"), str(tmp_path / "numba"), "1"]
+
+
+def test_also_when_jax_was_there_first(tmp_path):
+    assert run("import jax", DBVFIV_CACHE=str(tmp_path))[:2] == ["float64", str(tmp_path / "jax")]
+
+
+def test_what_the_user_set_stays(tmp_path):
+    assert run(DBVFIV_CACHE=str(tmp_path), OMP_NUM_THREADS="3")[3] == "3"

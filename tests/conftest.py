@@ -1,0 +1,49 @@
+"""Double precision, one thread and the compilation caches for every test; helpers for the command line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import dbvfiv  # noqa: F401  sets the surroundings before anything imports JAX
+import pytest
+from hypothesis import HealthCheck, settings
+
+settings.register_profile(
+    "dbvfiv", deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+settings.load_profile("dbvfiv")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one command line did."""
+
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def command_line(capsys):
+    """Run ``dbvfiv`` in this process and return an ``Outcome``."""
+    from dbvfiv.cli import run
+
+    def call(*arguments: object) -> Outcome:
+        capsys.readouterr()
+        status = run([str(a) for a in arguments])
+        out, err = capsys.readouterr()
+        return Outcome(status, out, err)
+
+    return call
+
+
+def is_one_sentence(text: str) -> bool:
+    """One line, a full stop at its end and none with a blank behind it before that; no traceback."""
+    body = text.strip()
+    return bool(body) and "\n" not in body and body.endswith(".") and ". " not in body and "Traceback" not in body
+
+
+@pytest.fixture
+def one_sentence():
+    """The check that an error message is one sentence."""
+    return is_one_sentence
