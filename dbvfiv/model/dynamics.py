@@ -1,0 +1,145 @@
+"""The valve in motion: the time-dependent residual of the coupled system and its exact linearisation about a steady state.
+
+    M(q) a + h(q, v) + alpha M v + beta K_s(q) v + f(q) - G(q) p = 0,     p_outlet = 0
+
+with h the inertia quadratic in the velocities (turning directors), K_s the structure's own tangent, and p the station pressures of the unsteady flow
+through the areas A(q) with rates A' = J v and A'' = J a + d2A[v, v]. The unknowns are q and the inlet velocity U.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eigen import CoupledPencil
+
+from ..flow import Channel
+from .valve import ValveModel
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What surrounds the structure.
+
+    Attributes
+    ----------
+    density : float
+        Of the fluid, kg/m3.
+    alpha : float
+        Rayleigh mass damping, 1/s.
+    beta : float
+        Rayleigh stiffness damping, s.
+    """
+
+    density: float
+    alpha: float
+    beta: float
+
+    @classmethod
+    def of(cls, case) -> "Conditions":
+        return cls(case.fluid.density, case.damping.alpha, case.damping.beta)
+
+
+def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q, v, a, velocity: float, velocity_rate: float):
+    """Residual of the coupled equations of motion.
+
+    Parameters
+    ----------
+    inlet : float
+        Inlet pressure, Pa.
+    q, v, a : (n,) arrays
+        Unknowns, their velocities and accelerations.
+    velocity, velocity_rate : float
+        Inlet velocity, m/s, and its rate, m/s2.
+
+    Returns
+    -------
+    force : (n,) array, N and N m
+    outlet : float, Pa
+        Pressure at the outlet, to vanish.
+    """
+    matrix = model.shell.dofs.matrix
+    nodal, nodal_rate = model.nodal(q), model.nodal(v)
+    force, structure = model.structure(q)
+    mass = matrix(model.mass(q))
+    force += mass @ (a + conditions.alpha * v) + conditions.beta * (matrix(structure) @ v) + model.shell.convective_inertia(q, v)
+    slope = model.rows.jacobian(nodal)
+    area = model.rows.areas(nodal)
+    if isinstance(model.flow, Channel):
+        p = model.flow.pressure(
+            area, slope @ v, slope @ a + model.rows.second(nodal_rate, nodal_rate), velocity, velocity_rate, inlet, conditions.density
+        )
+        outlet = float(p[0])
+        p = p.copy()
+        p[0] = 0.0
+    else:
+        p, outlet = model.flow.steady_pressure(area, inlet), velocity
+    return force - model.pressure_force(nodal, p), outlet
+
+
+@dataclass(frozen=True)
+class LinearisedState:
+    """Matrices of a steady state that do not depend on fluid density, damping or continuity law.
+
+    Attributes
+    ----------
+    model : ValveModel
+    q : (n,) array
+    inlet : float
+        Inlet pressure, Pa.
+    mass, structure, stiffness : (n, n) sparse matrices
+        M, the structure's own tangent K_s, and K = K_s less the follower stiffness of the pressures.
+    forces : (n, m) sparse matrix G
+    slope : (m, n) sparse matrix J
+    area : (m,) array, m2
+    """
+
+    model: ValveModel
+    q: np.ndarray
+    inlet: float
+    mass: object
+    structure: object
+    stiffness: object
+    forces: object
+    slope: object
+    area: np.ndarray
+
+    def pencil(self, conditions: Conditions, fluid: bool = True, storage: float | None = None) -> CoupledPencil:
+        """Quadratic pencil of small motions.
+
+        Parameters
+        ----------
+        conditions : Conditions
+        fluid : bool
+            False leaves the fluid out altogether: motions in vacuo of the stressed structure, the steady pressures kept as follower loads.
+        storage : float, optional
+            Blend of the continuity laws, 0 quasi-steady to 1 storage; the model's own by default.
+        """
+        damping = conditions.alpha * self.mass + conditions.beta * self.structure
+        flow = self.model.flow
+        if not fluid or not isinstance(flow, Channel):
+            return CoupledPencil(self.mass, damping, self.stiffness)
+        if not flow.unsteady:
+            _, slope = flow.steady_operator(self.area, self.inlet)
+            return CoupledPencil(self.mass, damping, self.stiffness, self.forces, self.slope, A0=slope)
+        if storage is not None and storage != flow.storage:
+            flow = Channel(flow.z, flow.floor, storage, flow.unsteady)
+        parts = flow.operators(self.area, self.inlet, conditions.density)
+        inner = {"A0": parts.area0, "A1": parts.area1, "A2": parts.area2, "B0": parts.velocity0[:, None], "B1": parts.velocity1[:, None]}
+        kept = {}
+        for name, value in inner.items():
+            kept[name] = value.copy()
+            kept[name][0] = 0.0  # the outlet pressure vanishes
+        return CoupledPencil(
+            self.mass, damping, self.stiffness, self.forces, self.slope, **kept,
+            R0=parts.area0[:1], R1=parts.area1[:1], R2=parts.area2[:1],
+            S0=parts.velocity0[None, :1], S1=parts.velocity1[None, :1],
+        )  # fmt: skip
+
+
+def linearise(model: ValveModel, q: np.ndarray, inlet: float) -> LinearisedState:
+    """Linearise a steady state at an inlet pressure, Pa."""
+    tangent = model.tangent(q, inlet)
+    stiffness, forces, slope = model.matrices(tangent)
+    matrix = model.shell.dofs.matrix
+    return LinearisedState(model, q, inlet, matrix(model.mass(q)), matrix(tangent.structure), stiffness, forces, slope, tangent.area)
