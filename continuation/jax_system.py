@@ -54,6 +54,7 @@ class JaxSystem(SystemBase):
         self.size = int(size)
         self._callable_mass = mass if callable(mass) else None
         self._constant_mass = None if callable(mass) else mass
+        self.constant_mass, self.identity_mass = not callable(mass), mass is None
         self._colouring = None if sparsity is None else ColouredJacobian(sparsity)
         pattern = sparsity if mass_sparsity is None else mass_sparsity
         self._mass_colouring = None

@@ -27,7 +27,8 @@ class DenseSolver:
             warnings.simplefilter("ignore", sla.LinAlgWarning)
             lu, self._pivots = sla.lu_factor(matrix, check_finite=False)
         diagonal = np.abs(np.diagonal(lu))
-        floor = PIVOT_REPAIR * max(np.abs(matrix).max(initial=0.0), np.finfo(float).tiny)
+        # A zero matrix has no size of its own; any moderate pivot will do for it.
+        floor = PIVOT_REPAIR * (np.abs(matrix).max(initial=0.0) or 1.0)
         #: True when the factors are those of a slightly different matrix.
         self.repaired = bool(np.any(diagonal < 1e-3 * floor))
         if self.repaired:
@@ -60,9 +61,7 @@ class SparseSolver:
         try:
             self._lu = spla.splu(self.matrix)
         except RuntimeError:
-            size = np.abs(self.matrix.data).max(initial=0.0)
-            if size == 0.0:
-                raise SingularSystem("The matrix is zero.") from None
+            size = np.abs(self.matrix.data).max(initial=0.0) or 1.0
             shift = sp.identity(self.matrix.shape[0], dtype=self.matrix.dtype, format="csc")
             try:
                 self._lu = spla.splu((self.matrix + PIVOT_REPAIR * size * shift).tocsc())

@@ -165,6 +165,9 @@ class SystemBase:
     """
 
     size: int = 0
+    #: Whether ``mass_d`` vanishes, and whether ``B`` is the identity; spares some work.
+    constant_mass: bool = True
+    identity_mass: bool = False
     #: Relative step for the central differences in parameters.
     parameter_step: float = 6e-6
 

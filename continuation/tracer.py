@@ -202,6 +202,9 @@ class Tracer:
     def _remember(self, branch, step):
         branch.next_step = float(step)
         branch.restart = {"frame": self.frame}
+        own = getattr(self.problem.system, "restart_data", None)
+        if own is not None:
+            branch.restart.update(own())
         condition = self.problem.condition
         if condition is not None:
             branch.restart.update(p=condition.p, q=condition.q)
