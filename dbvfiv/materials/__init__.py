@@ -1,7 +1,7 @@
 """Material laws of a layered wall: rubbers, isotropic sheets and fibre plies.
 
 Each law is a strain energy in five Green-Lagrange strains with S33 = 0 (see `law`);
-stresses and tangents follow by differentiation, in float64 (importing this package switches it on).
+stresses and tangents follow by differentiation, in float64.
 """
 
 from dbvfiv.materials.checks import MaterialError

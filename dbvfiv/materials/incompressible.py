@@ -41,7 +41,7 @@ class PlaneStressInvariants(NamedTuple):
 def plane_stress_invariants(e) -> PlaneStressInvariants:
     """Invariants from five Green-Lagrange strains.
 
-    Plain arithmetic: works with floats, numpy arrays, complex steps and traced jax values. An
+    Plain arithmetic: works with floats, fractions, numpy arrays, complex steps and traced values. An
     array of shape (5, ...) gives fields of shape (...).
 
     Parameters
@@ -50,19 +50,19 @@ def plane_stress_invariants(e) -> PlaneStressInvariants:
         ``[E11, E22, 2 E12, 2 E13, 2 E23]``.
     """
     e11, e22, g12, c1, c2 = (e[i] for i in range(5))
-    trace = 2.0 * (e11 + e22)
-    det = 4.0 * e11 * e22 - g12 * g12
-    area = 1.0 + trace + det
-    quadratic = 4.0 * (e11 * e11 + e11 * e22 + e22 * e22) + g12 * g12
+    trace = 2 * (e11 + e22)
+    det = 4 * e11 * e22 - g12 * g12
+    area = 1 + trace + det
+    quadratic = 4 * (e11 * e11 + e11 * e22 + e22 * e22) + g12 * g12
 
     # (A - I) c and A c
-    b1 = 2.0 * e22 * c1 - g12 * c2
-    b2 = 2.0 * e11 * c2 - g12 * c1
+    b1 = 2 * e22 * c1 - g12 * c2
+    b2 = 2 * e11 * c2 - g12 * c1
     a1 = c1 + b1
     a2 = c2 + b2
 
     i1 = (quadratic + trace * det + c1 * a1 + c2 * a2) / area
-    i2 = (quadratic + det * (2.0 * trace + det) + a1 * a1 + a2 * a2) / area
+    i2 = (quadratic + det * (2 * trace + det) + a1 * a1 + a2 * a2) / area
     gap = (det * (trace + det) + a1 * b1 + a2 * b2) / area
     return PlaneStressInvariants(i1, i2, gap, area)
 

@@ -14,14 +14,10 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from dbvfiv.materials.incompressible import mooney_rivlin_energy
-
-# Single precision would leave nothing of constants that cancel to a twentieth of their size.
-jax.config.update("jax_enable_x64", True)
 
 LINEAR_ELASTIC = 0
 MOONEY_RIVLIN = 1

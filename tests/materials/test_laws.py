@@ -1,0 +1,192 @@
+"""The energies: identities, derivatives, objectivity, and one function for every law."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from dbvfiv.materials import (
+    IsotropicElastic,
+    Law,
+    MaterialError,
+    MooneyRivlin,
+    OrthotropicPly,
+    energy_of,
+    fibre_ply,
+    rubber,
+)
+from dbvfiv.materials.incompressible import mooney_rivlin_energy, plane_stress_invariants
+
+LAWS = {
+    "SBR 10 %": rubber("SBR", 0.10),
+    "CR 60 %": rubber("CR", 0.60),
+    "neo-Hookean": MooneyRivlin.neo_hookean(1.1e6, 1300.0),
+    "isotropic": IsotropicElastic(6e6, 0.49, 1300.0),
+    "ply": fibre_ply(),
+}
+ISOTROPIC = [name for name in LAWS if name != "ply"]
+STRAINS = np.random.default_rng(4).uniform(-0.15, 0.3, (20, 5))
+
+
+@pytest.fixture(params=LAWS)
+def law(request):
+    return LAWS[request.param]
+
+
+def _textbook_invariants(e):
+    """I1 - 3 and I2 - 3 as the definitions read, det C = 1 giving C33."""
+    c11, c22, c12, c13, c23 = 1 + 2 * e[0], 1 + 2 * e[1], e[2], e[3], e[4]
+    det = c11 * c22 - c12 * c12
+    c33 = 1 / det + (c22 * c13 * c13 - 2 * c12 * c13 * c23 + c11 * c23 * c23) / det
+    i1 = c11 + c22 + c33
+    square = c11**2 + c22**2 + c33**2 + 2 * (c12**2 + c13**2 + c23**2)
+    return i1 - 3, (i1 * i1 - square) / 2 - 3
+
+
+@pytest.mark.parametrize("size", [Fraction(1), Fraction(1, 10**6)])
+def test_invariants_equal_their_definitions_exactly(size):
+    rng = np.random.default_rng(1)
+    for row in rng.integers(-150, 300, (50, 5)):
+        e = [size * Fraction(int(v), 1000) for v in row]
+        i1, i2 = _textbook_invariants(e)
+        got = plane_stress_invariants(e)
+        assert (got.i1_minus_3, got.i2_minus_3, got.i2_minus_i1) == (i1, i2, i2 - i1)
+
+
+@pytest.mark.parametrize("size", [1e-2, 1e-5, 1e-8])
+def test_small_strains_lose_no_digits(size):
+    parameters = rubber("SBR", 0.10).parameters
+    exact_parameters = [Fraction(p) for p in parameters]
+    for e in size * STRAINS:
+        exact = float(mooney_rivlin_energy(exact_parameters, [Fraction(v) for v in e]))
+        assert mooney_rivlin_energy(parameters, e) == pytest.approx(exact, rel=1e-13)
+
+
+def test_kirchhoff_energy_is_the_laminate_formula():
+    ply = OrthotropicPly(150e9, 9e9, 0.3, 5e9, 4e9, 3e9, 1600.0)
+    compliance = np.array(
+        [[1 / 150e9, -0.3 / 150e9, 0], [-0.3 / 150e9, 1 / 9e9, 0], [0, 0, 1 / 5e9]]
+    )
+    e = np.array([1e-3, -2e-3, 3e-3, 4e-3, 5e-3])
+    expected = 0.5 * (e[:3] @ np.linalg.solve(compliance, e[:3]) + 4e9 * e[3] ** 2 + 3e9 * e[4] ** 2)
+    assert float(ply.energy(e)) == pytest.approx(expected, rel=1e-14)
+
+
+def test_isotropic_is_the_equal_ply():
+    same = OrthotropicPly(6e6, 6e6, 0.3, 6e6 / 2.6, 6e6 / 2.6, 6e6 / 2.6, 1.0)
+    np.testing.assert_allclose(same.parameters, IsotropicElastic(6e6, 0.3, 1.0).parameters, rtol=1e-15)
+
+
+def test_parameters_are_eight_doubles(law):
+    assert isinstance(law, Law)
+    assert law.parameters.shape == (8,) and law.parameters.dtype == np.float64
+
+
+def test_one_function_serves_all(law):
+    together = jax.jit(jax.value_and_grad(energy_of, argnums=2))
+    for e in STRAINS:
+        value, stress = together(law.kind, law.parameters, e)
+        assert float(value) == pytest.approx(float(law.energy(e)), rel=1e-14)
+        np.testing.assert_allclose(stress, jax.grad(law.energy)(jnp.asarray(e)), rtol=1e-12, atol=1e-6)
+
+
+def test_unused_branch_cannot_spoil_the_used_one():
+    ply = fibre_ply()
+    no_area = jnp.array([-0.5, 0.0, 0.0, 0.2, 0.0])  # det C2 = 0: the rubber's energy is infinite
+    assert not np.isfinite(energy_of(1, rubber("CR").parameters, no_area))
+    for derivative in (jax.grad, jax.hessian):
+        assert np.all(np.isfinite(derivative(energy_of, argnums=2)(0, ply.parameters, no_area)))
+    assert np.all(np.isfinite(jax.grad(energy_of, argnums=1)(0, ply.parameters, no_area)))
+
+
+def test_kinds_may_vary_along_a_batch():
+    kinds = jnp.array([law.kind for law in LAWS.values()])
+    parameters = jnp.array([law.parameters for law in LAWS.values()])
+    e = STRAINS[: len(LAWS)]
+    values = jax.vmap(energy_of)(kinds, parameters, e)
+    np.testing.assert_allclose(values, [float(m.energy(x)) for m, x in zip(LAWS.values(), e)], rtol=1e-14)
+
+
+def test_reference_state_is_free_and_has_the_small_strain_stiffness(law):
+    zero = jnp.zeros(5)
+    assert float(law.energy(zero)) == 0.0
+    np.testing.assert_array_equal(jax.grad(law.energy)(zero), 0.0)
+    tangent = np.asarray(jax.hessian(law.energy)(zero))
+    assert tangent[2, 2] == pytest.approx(law.small_strain_shear_modulus, rel=1e-14)
+    assert np.linalg.eigvalsh(tangent)[0] > 0.0
+
+
+def test_rubber_at_rest_is_incompressible_plane_stress():
+    law = rubber("EPDM", 0.2)
+    mu = law.small_strain_shear_modulus
+    expected = mu * np.array(
+        [[4, 2, 0, 0, 0], [2, 4, 0, 0, 0], [0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1]]
+    )
+    np.testing.assert_allclose(jax.hessian(law.energy)(jnp.zeros(5)), expected, rtol=1e-13, atol=1e-6)
+
+
+def test_stress_by_complex_step(law):
+    """Plain arithmetic throughout, so the step goes through without jax."""
+    for e in STRAINS:
+        by_jax = np.asarray(jax.grad(law.energy)(jnp.asarray(e)))
+        by_step = [
+            np.imag(complex(law.energy(e + 1e-30j * np.eye(5)[i]))) / 1e-30 for i in range(5)
+        ]
+        np.testing.assert_allclose(by_jax, by_step, rtol=1e-11, atol=1e-12 * np.abs(by_jax).max())
+
+
+def test_tangent_is_symmetric_and_the_derivative_of_the_stress(law):
+    stress, tangent = jax.jit(jax.grad(law.energy)), jax.jit(jax.hessian(law.energy))
+    step = 1e-5
+    for e in STRAINS:
+        t = np.asarray(tangent(e))
+        scale = np.abs(t).max()
+        np.testing.assert_allclose(t, t.T, rtol=0, atol=1e-13 * scale)
+        numeric = np.array([(stress(e + d) - stress(e - d)) / (2 * step) for d in step * np.eye(5)])
+        np.testing.assert_allclose(t, numeric, rtol=0, atol=1e-7 * scale)
+
+
+def _turned(e, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, s], [-s, c]])
+    plane = turn @ np.array([[e[0], e[2] / 2], [e[2] / 2, e[1]]]) @ turn.T
+    shear = turn @ e[3:]
+    return np.array([plane[0, 0], plane[1, 1], 2 * plane[0, 1], *shear])
+
+
+@pytest.mark.parametrize("name", ISOTROPIC)
+def test_isotropic_laws_have_no_preferred_direction(name):
+    law = LAWS[name]
+    for e in STRAINS:
+        for angle in (0.3, 1.2, 2.9):
+            assert float(law.energy(_turned(e, angle))) == pytest.approx(float(law.energy(e)), rel=1e-11)
+
+
+def test_ply_has_one():
+    ply, e = LAWS["ply"], STRAINS[0]
+    assert float(ply.energy(_turned(e, np.pi))) == pytest.approx(float(ply.energy(e)), rel=1e-12)
+    assert float(ply.energy(_turned(e, 0.5))) != pytest.approx(float(ply.energy(e)), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "make, words",
+    [
+        (lambda: MooneyRivlin(-2e6, 1e6, 0.0, 1300.0), "shear modulus"),
+        (lambda: MooneyRivlin(float("nan"), 1e6, 0.0, 1300.0), "c10 must be a finite number"),
+        (lambda: MooneyRivlin(1e6, "1e6", 0.0, 1300.0), "c01 must be a finite number"),
+        (lambda: MooneyRivlin(1e6, 1e6, 0.0, 0.0), "density must be greater than zero"),
+        (lambda: MooneyRivlin.neo_hookean(-1.0, 1300.0), "shear_modulus"),
+        (lambda: IsotropicElastic(-1.0, 0.3, 1.0), "youngs_modulus"),
+        (lambda: IsotropicElastic(1.0, 0.51, 1.0), "poisson_ratio"),
+        (lambda: IsotropicElastic(1.0, -1.0, 1.0), "poisson_ratio"),
+        (lambda: OrthotropicPly(1e6, 1e6, 1.0, 1e6, 1e6, 1e6, 1.0), "nu12"),
+        (lambda: OrthotropicPly(1e6, 1e6, 0.1, 0.0, 1e6, 1e6, 1.0), "g12"),
+    ],
+)
+def test_impossible_constants_are_refused(make, words):
+    with pytest.raises(MaterialError, match=words):
+        make()

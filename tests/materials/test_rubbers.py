@@ -1,0 +1,76 @@
+"""The shipped constants against the printed table, and what lies between the levels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbvfiv.materials import MaterialError, rubber, rubber_names, strain_levels
+
+# Th. Table 3-3, MPa: for each level the three-constant set, then the two-constant set.
+TABLE_3_3 = {
+    "SBR": [
+        (-36.10, 38.22, 53.52, -10.57, 12.28),
+        (-12.01, 13.53, 9.25, -3.21, 4.44),
+        (-6.55, 7.92, 2.82, -1.14, 2.14),
+        (-2.92, 3.91, 0.97, -0.30, 1.04),
+    ],
+    "CR": [
+        (-6.09, 6.80, 8.10, -1.87, 2.51),
+        (-3.11, 3.78, 2.23, -0.77, 1.36),
+        (-1.50, 2.11, 0.66, -0.18, 0.70),
+        (-0.95, 1.51, 0.34, -0.03, 0.51),
+    ],
+    "EPDM": [
+        (-16.24, 17.39, 23.35, -5.33, 6.31),
+        (-8.94, 9.99, 7.25, -1.80, 2.62),
+        (-2.91, 3.66, 1.47, -0.15, 0.72),
+        (-1.83, 2.48, 0.74, 0.18, 0.30),
+    ],
+}
+
+
+@pytest.mark.parametrize("name", TABLE_3_3)
+def test_shipped_constants_round_to_the_printed_table(name):
+    for level, (c10, c01, c11, two_c10, two_c01) in zip(strain_levels(), TABLE_3_3[name]):
+        three, two = rubber(name, level), rubber(name, level, terms=2)
+        # half a unit of the last printed digit, and a hair for decimal fractions
+        np.testing.assert_allclose(
+            np.array([three.c10, three.c01, three.c11]) / 1e6, [c10, c01, c11], rtol=0, atol=0.005001
+        )
+        np.testing.assert_allclose([two.c10, two.c01, two.c11], [two_c10 * 1e6, two_c01 * 1e6, 0], rtol=1e-15)
+        assert three.density == two.density == 1300.0
+
+
+def test_names_and_levels():
+    assert rubber_names() == ("CR", "EPDM", "SBR")
+    assert strain_levels() == (0.10, 0.20, 0.40, 0.60)
+
+
+@pytest.mark.parametrize("level, weight", [(0.15, 0.5), (0.12, 0.2), (0.5, 0.5)])
+def test_energy_is_interpolated_linearly_between_levels(level, weight):
+    low = max(v for v in strain_levels() if v <= level)
+    high = min(v for v in strain_levels() if v >= level)
+    e = np.array([0.04, -0.02, 0.03, 0.05, -0.01])
+    between = rubber("SBR", level)
+    ends = [rubber("SBR", v).energy(e) for v in (low, high)]
+    assert between.energy(e) == pytest.approx((1 - weight) * ends[0] + weight * ends[1], rel=1e-10)
+    moduli = [rubber("SBR", v).small_strain_shear_modulus for v in (low, high)]
+    assert min(moduli) < between.small_strain_shear_modulus < max(moduli)
+
+
+def test_density_can_be_replaced():
+    assert rubber("CR", 0.2, density=1100.0).density == 1100.0
+
+
+@pytest.mark.parametrize("level", [0.09, 0.61, float("nan"), 10])
+def test_levels_outside_the_tests_are_refused(level):
+    with pytest.raises(MaterialError, match="strain_level"):
+        rubber("CR", level)
+
+
+def test_unknown_names_and_terms_are_refused():
+    with pytest.raises(MaterialError, match="CR, EPDM, SBR.*'NBR'"):
+        rubber("NBR")
+    with pytest.raises(MaterialError, match="2 or 3 constants"):
+        rubber("CR", terms=4)
