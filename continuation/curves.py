@@ -12,23 +12,26 @@ from continuation.curve_monitors import FoldCurveMonitor, HopfCurveMonitor
 from continuation.errors import NotABifurcation
 from continuation.options import ContinuationOptions
 from continuation.problem import Problem
+from continuation.stability import CountMonitor
 from continuation.tracer import Tracer
 
 _KINDS = {"fold curve": FoldCondition, "hopf curve": HopfCondition}
 
 
-def _tracer(kind, system, mu, parameters, condition, options, observers, lyapunov=True):
+def _tracer(kind, system, mu, parameters, condition, options, observers, lyapunov=True,
+            spectrum=None):
     if len(set(parameters)) != 2:
         raise ValueError(f"A {kind} needs two different parameters, not {parameters}.")
     problem = Problem(system, mu, parameters, condition, options.state_scale,
                       options.parameter_scales)
     monitor = FoldCurveMonitor() if kind == "fold curve" else HopfCurveMonitor(lyapunov)
-    return Tracer(problem, options, [monitor], observers)
+    monitors = [monitor, CountMonitor(spectrum)] if options.eigenvalues else [monitor]
+    return Tracer(problem, options, monitors, observers)
 
 
 def continue_fold(
     system, special: SpecialPoint, parameters: tuple[str, str],
-    options: ContinuationOptions | None = None, observers=None,
+    options: ContinuationOptions | None = None, observers=None, spectrum=None,
 ) -> Branch:
     """Follow a fold in two parameters; cusps and Bogdanov-Takens points are noted.
 
@@ -38,6 +41,9 @@ def continue_fold(
         A fold, or a Bogdanov-Takens point.
     parameters : (str, str)
         ``options.direction`` is the sign of the first step in the second one.
+    spectrum : callable, optional
+        In place of the system's own.  With ``options.eigenvalues`` the count of unstable
+        eigenvalues besides the critical one is recorded: 0 on the edge of stability.
 
     Returns
     -------
@@ -45,12 +51,13 @@ def continue_fold(
         Of kind ``"fold curve"``.
     """
     return _continue("fold curve", ("fold", "bogdanov-takens", "cusp"), system, special,
-                     parameters, options, observers)
+                     parameters, options, observers, spectrum=spectrum)
 
 
 def continue_hopf(
     system, special: SpecialPoint, parameters: tuple[str, str],
     options: ContinuationOptions | None = None, observers=None, lyapunov: bool = True,
+    spectrum=None,
 ) -> Branch:
     """Follow a Hopf point in two parameters.
 
@@ -61,6 +68,8 @@ def continue_hopf(
     ----------
     lyapunov : bool
         Compute the first Lyapunov coefficient at every point (third derivatives).
+    spectrum : callable, optional
+        As in `continue_fold`.
 
     Returns
     -------
@@ -69,10 +78,11 @@ def continue_hopf(
         ``values("l1")`` the first Lyapunov coefficient.
     """
     return _continue("hopf curve", ("hopf", "generalised hopf", "zero-hopf"), system, special,
-                     parameters, options, observers, lyapunov)
+                     parameters, options, observers, lyapunov, spectrum)
 
 
-def _continue(kind, accepted, system, special, parameters, options, observers, lyapunov=True):
+def _continue(kind, accepted, system, special, parameters, options, observers, lyapunov=True,
+              spectrum=None):
     options = options or ContinuationOptions()
     if special.kind not in accepted or "right" not in special.vectors:
         raise NotABifurcation(
@@ -81,7 +91,7 @@ def _continue(kind, accepted, system, special, parameters, options, observers, l
         )
     condition = _KINDS[kind](special.vectors["left"], special.vectors["right"])
     tracer = _tracer(kind, system, special.mu, parameters, condition, options, observers,
-                     lyapunov)
+                     lyapunov, spectrum)
     problem = tracer.problem
     extra = [special.values["omega"]] if problem.e else []
     n = problem.n
@@ -103,14 +113,14 @@ def _continue(kind, accepted, system, special, parameters, options, observers, l
 
 
 def resume_curve(system, branch: Branch, options: ContinuationOptions | None = None,
-                 observers=None, lyapunov: bool = True) -> Branch:
+                 observers=None, lyapunov: bool = True, spectrum=None) -> Branch:
     """Go on from the last point of a fold or Hopf curve, e.g. one loaded from a file."""
     if branch.kind not in _KINDS:
         raise ValueError(f"This resumes fold and Hopf curves, not {branch.kind}.")
     options = options or ContinuationOptions()
     condition = _KINDS[branch.kind](branch.restart["p"], branch.restart["q"])
     tracer = _tracer(branch.kind, system, branch.fixed, branch.names, condition, options,
-                     observers, lyapunov)
+                     observers, lyapunov, spectrum)
     last = branch.points[-1]
     here = tracer.start(last.z, last.tangent, branch.restart["frame"])
     longer = replace(branch, points=list(branch.points), special=list(branch.special),

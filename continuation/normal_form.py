@@ -40,6 +40,8 @@ class HopfNormalForm:
         The equilibrium.
     crossing : complex or None
         ``d lambda / d mu`` along the branch, for the parameter asked for.
+    cancellation : float
+        ``|Re c1|`` over the sum of the sizes of its terms: digits lost to cancellation.
     """
 
     omega: float
@@ -51,16 +53,24 @@ class HopfNormalForm:
     h11: np.ndarray
     u: np.ndarray
     crossing: complex | None = None
+    cancellation: float = 1.0
 
     @property
     def criticality(self) -> str:
-        """``"super"``: a stable cycle grows from the point; ``"sub"``: an unstable one."""
+        """``"super"``: cycles are attracting within the centre manifold; ``"sub"``: repelling.
+
+        ``"degenerate"`` when the cubic terms cancel to rounding, or there are none.
+        """
+        if self.cancellation <= 1e-10:
+            return "degenerate"
         return "super" if self.l1 < 0 else "sub"
 
     def radius(self, change: float) -> float:
         """``|z|`` of the cycle at ``mu_c + change``; nan on the side without a cycle."""
         if self.crossing is None:
             raise ValueError("The crossing speed is unknown: name a parameter.")
+        if self.criticality == "degenerate":
+            return float("nan")
         square = -self.crossing.real * change / self.c1.real
         return float(np.sqrt(square)) if square >= 0 else float("nan")
 
@@ -76,11 +86,13 @@ class HopfNormalForm:
         if self.crossing is None:
             raise ValueError("The crossing speed is unknown: name a parameter.")
         gain = 2.0 if functional is None else 2.0 * abs(functional @ self.q)
+        if self.criticality == "degenerate":
+            return float("inf")
         return float(gain * np.sqrt(abs(self.crossing.real / self.c1.real)))
 
     def side(self) -> int:
         """+1 if the cycles exist above the critical parameter, -1 below."""
-        return int(np.sign(-self.crossing.real / self.c1.real))
+        return int(np.sign(-self.crossing.real * self.c1.real))
 
     def frequency(self, change: float) -> float:
         """Angular frequency of the cycle at ``mu_c + change`` to first order."""
@@ -142,12 +154,15 @@ def hopf_normal_form(system, u, mu, omega, q, p, parameter: str | None = None) -
     conj = q.conj()
     h20 = -linear.shifted(2 * s).solve(second(q, s, q, s))
     h11 = -linear.solve(second(q, s, conj, -s).real)
-    cubic = (
-        second(q, s, h11.astype(complex), 0.0)
-        + 0.5 * second(conj, -s, h20, 2 * s)
-        + 0.5 * third(q, s, q, s, conj, -s)
+    terms = (
+        second(q, s, h11.astype(complex), 0.0),
+        0.5 * second(conj, -s, h20, 2 * s),
+        0.5 * third(q, s, q, s, conj, -s),
     )
-    c1 = complex(np.vdot(p, cubic))
+    parts = [complex(np.vdot(p, term)) for term in terms]
+    c1 = sum(parts)
+    size = sum(map(abs, parts))
+    cancellation = abs(c1.real) / size if size > 0 else 0.0
     crossing = None
     if parameter is not None:
         du = -linear.solve(system.d_parameter(u, mu, parameter))
@@ -155,7 +170,8 @@ def hopf_normal_form(system, u, mu, omega, q, p, parameter: str | None = None) -
         change = d.jacobian_along(q, du, dmu) - s * d.mass_along(q, du, dmu)
         crossing = complex(np.vdot(p, change))
     return HopfNormalForm(
-        float(omega), q, p, c1, c1.real / omega, h20, h11, np.array(u), crossing
+        float(omega), q, p, c1, c1.real / omega, h20, h11, np.array(u), crossing,
+        cancellation,
     )
 
 

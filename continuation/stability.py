@@ -224,3 +224,24 @@ def describe_hopf(tracer, result, tangent, index):
         values["normal_form"] = str(error)
     here = Here(result.z[:-1], tangent, result.local)
     return special_at(tracer, "hopf", here, index, True, "", values, vectors)
+
+
+class CountMonitor(SpectrumMonitor):
+    """Counts unstable eigenvalues along a fold or Hopf curve, without the critical ones.
+
+    The count tells whether the bifurcation is the first loss of stability: 0 on the
+    boundary of the stable region.
+    """
+
+    def measure(self, tracer, here):
+        values, _ = self.modes(tracer, here)
+        extra = tracer.problem.extra(here.z)
+        critical = 1j * abs(float(extra[0])) if extra.size else 0.0
+        if here.unstable < 0 or values.size == 0:
+            return
+        rest = np.delete(values, np.argmin(np.abs(values - critical)))
+        here.unstable = count_unstable(rest, tracer.options.stability_tolerance)
+
+    def between(self, tracer, before, after, index, found):
+        before.data.pop("modes", None)
+        return []
