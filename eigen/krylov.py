@@ -1,0 +1,233 @@
+"""Eigenvalues of a pencil near one shift, by SLEPc's Krylov-Schur method."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .condensation import ShiftedPencil
+from .pencil import real_apply
+
+
+@dataclass(frozen=True)
+class KrylovPairs:
+    """Pairs that converged at one shift.
+
+    Attributes
+    ----------
+    vectors_q : ndarray, shape (n, k), complex
+        Structural part; for left pairs the conjugated left vector w of w^H T = 0.
+    vectors_u : ndarray, shape (b, k), complex
+    eigenvalues : ndarray, shape (k,)
+    reach : float
+        Size of the region around the shift in which every eigenvalue was found, as
+        |lambda - shift| |lambda - reference| < reach**2, see `SearchedRegion`.
+    iterations, applications : int
+        Restarts, and applications of the shift-and-invert operator.
+    exhausted : bool
+        True if every eigenvalue of the pencil was found.
+    """
+
+    eigenvalues: np.ndarray
+    vectors_q: np.ndarray
+    vectors_u: np.ndarray
+    reach: float
+    iterations: int
+    applications: int
+    exhausted: bool
+
+
+class _ShiftAndInvert:
+    """Operator (F - sigma E)^-1 E on x = (q, v / scale, U), or its transpose.
+
+    Real arithmetic with a complex shift uses the imaginary part over Im sigma, which is
+    (F - sigma E)^-1 E (F - conj(sigma) E)^-1: the same eigenvectors, the transformed
+    eigenvalue 1 / ((lambda - sigma)(lambda - conj sigma)).
+    """
+
+    def __init__(self, shifted: ShiftedPencil, dtype, transposed: bool):
+        pencil = shifted.pencil
+        self.shifted, self.transposed = shifted, transposed
+        self.n, self.b = pencil.n, pencil.b
+        self.paired = np.dtype(dtype).kind == "f" and isinstance(shifted.shift, complex)
+        self.scale = abs(shifted.shift) or 1.0
+        p, s = pencil, shifted.shift
+        self._A12 = p.A1 + s * p.A2
+        self._R12 = p.R1 + s * p.R2
+        self._MT = p.M.T.tocsr() if transposed else None
+        self._CT = shifted.damping_shifted.T.tocsr() if transposed else None
+        self._GT = p.G.T.tocsr()
+        self._JT = p.J.T.tocsr()
+        self.applications = 0
+
+    def mult(self, _matrix, x, y):
+        self.applications += 1
+        out = (self._left if self.transposed else self._right)(x.getArray(readonly=True))
+        y.setArray(out.imag / self.shifted.shift.imag if self.paired else out)
+
+    def _right(self, x):
+        """y = (F - sigma E)^-1 E x by T(sigma) (q, U) = -(f, g), v = q_in + sigma q."""
+        p, s, n = self.shifted.pencil, self.shifted.shift, self.n
+        q_in, v_in, u_in = x[:n], x[n:2 * n] * self.scale, x[2 * n:]
+        f = real_apply(p.M, v_in) + _apply(self.shifted.damping_shifted, q_in)
+        g = np.zeros(self.b, dtype=np.result_type(x, s))
+        if p.m:
+            yv, yq = p.J @ v_in, p.J @ q_in
+            f -= real_apply(p.G, p.A2 @ yv + self._A12 @ yq + p.B1 @ u_in)
+            g = p.R2 @ yv + self._R12 @ yq
+        g = g + p.S1 @ u_in
+        q, u = self.shifted.solve(-f, -g)
+        return np.concatenate([q, (q_in + s * q) / self.scale, u])
+
+    def _left(self, z):
+        """y = E^T (F - sigma E)^-T z; the left vector of T is part of (F - sigma E)^-T z."""
+        p, s, n = self.shifted.pencil, self.shifted.shift, self.n
+        z1, z2, z3 = z[:n], z[n:2 * n] / self.scale, z[2 * n:]
+        w, W = self.shifted.solve_transposed(-(z1 + s * z2), -z3)
+        # a is the multiplier of dq/dt = v, from the second block column
+        a = z2 + _apply(self._CT, w)
+        e2 = real_apply(self._MT, w)
+        e3 = p.S1.T @ W
+        if p.m:
+            t = self._GT @ w
+            a = a + real_apply(self._JT, self._R12.T @ W - self._A12.T @ t)
+            e2 = e2 + real_apply(self._JT, p.R2.T @ W - p.A2.T @ t)
+            e3 = e3 - p.B1.T @ t
+        return np.concatenate([a, e2 * self.scale, e3])
+
+    def left_vector(self, z):
+        """Left vector of the polynomial from an eigenvector of the transposed operator."""
+        w, W = self.shifted.solve_transposed(-(z[:self.n] + self.shifted.shift
+                                               * z[self.n:2 * self.n] / self.scale), -z[2 * self.n:])
+        return w, W
+
+
+def near_shift(shifted: ShiftedPencil, wanted: int, *, tolerance: float = 1e-10,
+               subspace: int | None = None,
+               max_restarts: int = 60, patience: int = 3,
+               transposed: bool = False) -> KrylovPairs:
+    """The eigenvalues nearest to the shift of a factored pencil.
+
+    Parameters
+    ----------
+    shifted : ShiftedPencil
+    wanted : int
+        Number of eigenvalues, conjugates counted apart.
+    tolerance : float
+        Relative, on the transformed eigenvalue.
+    subspace : int, optional
+        Largest Krylov basis; default twice the number wanted.
+    max_restarts, patience : int
+        Give up after so many restarts, or after `patience` of them without a further pair:
+        next to a limit point of eigenvalues no number of restarts helps.
+    transposed : bool
+        Left vectors (conjugated) instead of right ones, from the same factor.
+
+    Returns
+    -------
+    KrylovPairs
+        Nearest first; what did not converge is left out.
+    """
+    from petsc4py import PETSc
+    from slepc4py import SLEPc
+
+    size = shifted.pencil.order
+    wanted = min(wanted, size)
+    operator = _ShiftAndInvert(shifted, PETSc.ScalarType, transposed)
+    shell = PETSc.Mat().createPython((size, size), operator, comm=PETSc.COMM_SELF)
+    shell.setUp()
+    solver = SLEPc.EPS().create(comm=PETSc.COMM_SELF)
+    solver.setOperators(shell)
+    solver.setProblemType(SLEPc.EPS.ProblemType.NHEP)
+    solver.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
+    solver.setTolerances(tolerance, max_restarts)
+    solver.setStoppingTest(_Patience(patience, SLEPc.EPS.ConvergedReason))
+    solver.setDimensions(wanted, min(size, subspace or max(2 * wanted, wanted + 24)))
+    start = shell.createVecRight()
+    start.setArray(np.random.default_rng(7).standard_normal(size))
+    solver.setInitialSpace(start)
+    solver.solve()
+    pairs = _collect(solver, shell, operator, size)
+    for item in (solver, shell, start):
+        item.destroy()
+    return pairs
+
+
+class _Patience:
+    """Stopping test: enough pairs, too many restarts, or no progress."""
+
+    def __init__(self, patience, reasons):
+        self.patience, self.reasons = patience, reasons
+        self.best, self.since = 0, 0
+
+    def __call__(self, _solver, restart, max_restarts, converged, wanted):
+        if converged >= wanted:
+            return self.reasons.CONVERGED_TOL
+        if converged > self.best:
+            self.best, self.since = converged, restart
+        if restart >= max_restarts or restart - self.since >= self.patience:
+            return self.reasons.DIVERGED_ITS
+        return self.reasons.CONVERGED_ITERATING
+
+
+def _collect(solver, shell, operator, size) -> KrylovPairs:
+    shift, n = operator.shifted.shift, operator.n
+    found = solver.getConverged()
+    real = shell.createVecRight()
+    imag = shell.createVecRight()
+    values, q, u, theta_size = [], [], [], []
+    for i in range(found):
+        theta = solver.getEigenpair(i, real, imag)
+        if theta == 0 or abs(theta) < 1e-14 / operator.scale:
+            continue  # an infinite eigenvalue: E is singular
+        x = real.getArray() + (0 if np.iscomplexobj(real.getArray()) else 1j * imag.getArray())
+        theta_size.append(abs(theta))
+        if operator.paired:
+            values.append(_from_pair(theta, shift, x, n, operator))
+        else:
+            values.append(shift + 1.0 / theta)
+        if operator.transposed:
+            w, W = operator.left_vector(x)
+            q.append(w)
+            u.append(W)
+        else:
+            q.append(x[:n])
+            u.append(x[2 * n:])
+    k = len(values)
+    far = min(theta_size) if k else np.inf
+    reach = (far ** -0.5 if operator.paired else 1.0 / far) if k else 0.0
+    return KrylovPairs(
+        eigenvalues=np.array(values, complex),
+        vectors_q=np.array(q, complex).reshape(k, n).T,
+        vectors_u=np.array(u, complex).reshape(k, operator.b).T,
+        reach=reach, iterations=solver.getIterationNumber(),
+        applications=operator.applications, exhausted=found >= size)
+
+
+def _from_pair(theta, shift, x, n, operator):
+    """lambda from 1/theta = (lambda - shift)(lambda - conj shift); the vector picks the root."""
+    root = np.sqrt(complex(1.0 / theta - shift.imag**2))
+    candidates = np.array([shift.real + root, shift.real - root])
+    if operator.transposed:
+        w, W = operator.left_vector(x)
+        pencil = operator.shifted.pencil
+        estimate = [_left_residual(pencil, c, w, W) for c in candidates]
+        return candidates[int(np.argmin(estimate))]
+    rate = x[n:2 * n] * operator.scale
+    distance = [np.linalg.norm(rate - c * x[:n]) for c in candidates]
+    return candidates[int(np.argmin(distance))]
+
+
+def _left_residual(pencil, s, w, W):
+    A, B, R, S = pencil.fluid_at(s)
+    t = real_apply(pencil.G.T.tocsr(), w)
+    first = (s * s * real_apply(pencil.M.T, w) + s * real_apply(pencil.C.T, w)
+             + real_apply(pencil.K.T, w)
+             + real_apply(pencil.J.T.tocsr(), R.T @ W - A.T @ t))
+    return np.linalg.norm(first)
+
+
+def _apply(matrix, x):
+    """Sparse product that keeps a real matrix real."""
+    return real_apply(matrix, x) if matrix.dtype.kind == "f" else matrix @ x

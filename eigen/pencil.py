@@ -1,0 +1,209 @@
+"""A quadratic pencil with a low-rank coupling that depends on the eigenvalue."""
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+FLUID_PARTS = ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledPencil:
+    r"""Structure and fluid of a linearised coupled state.
+
+    .. math::
+        (\lambda^2 M + \lambda C + K) q &= G p, \qquad y = J q \\
+        p &= (A_0 + \lambda A_1 + \lambda^2 A_2) y + (B_0 + \lambda B_1) U \\
+        0 &= (R_0 + \lambda R_1 + \lambda^2 R_2) y + (S_0 + \lambda S_1) U
+
+    With q the n structural unknowns (constrained ones already eliminated), p and y the m
+    coupling forces and motions, U the b inner unknowns of the fluid.
+
+    Parameters
+    ----------
+    M, C, K : sparse or dense, shape (n, n)
+        Real. K, C need not be symmetric; C need not be proportional.
+    G : sparse or dense, shape (n, m), optional
+    J : sparse or dense, shape (m, n), optional
+        Both absent: no coupling (m = 0).
+    A0, A1, A2 : array, shape (m, m), optional
+        A missing part is zero.
+    B0, B1 : array, shape (m, b), optional
+    R0, R1, R2 : array, shape (b, m), optional
+    S0, S1 : array, shape (b, b), optional
+        The number b is read from any of the parts given.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit or a part holds a number that is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> pencil = CoupledPencil(M=np.eye(1), C=[[0.1]], K=[[1.0]])
+    >>> pencil.n, pencil.m, pencil.b
+    (1, 0, 0)
+    """
+
+    M: sp.csr_matrix
+    C: sp.csr_matrix
+    K: sp.csr_matrix
+    G: sp.csr_matrix | None = None
+    J: sp.csr_matrix | None = None
+    A0: np.ndarray | None = None
+    A1: np.ndarray | None = None
+    A2: np.ndarray | None = None
+    B0: np.ndarray | None = None
+    B1: np.ndarray | None = None
+    R0: np.ndarray | None = None
+    R1: np.ndarray | None = None
+    R2: np.ndarray | None = None
+    S0: np.ndarray | None = None
+    S1: np.ndarray | None = None
+
+    def __post_init__(self):
+        def put(name, value):
+            object.__setattr__(self, name, value)
+
+        for name in ("M", "C", "K"):
+            put(name, _real_csr(name, getattr(self, name)))
+        n = self.M.shape[0]
+        if (self.G is None) != (self.J is None):
+            raise ValueError("G and J belong together: give both or neither.")
+        for name, empty in (("G", (n, 0)), ("J", (0, n))):
+            value = getattr(self, name)
+            put(name, _real_csr(name, sp.csr_matrix(empty) if value is None else value))
+        m = self.G.shape[1]
+        b = 0
+        for name, axis in (("S0", 0), ("S1", 0), ("R0", 0), ("R1", 0), ("R2", 0),
+                           ("B0", 1), ("B1", 1)):
+            if getattr(self, name) is not None:
+                b = np.atleast_2d(np.asarray(getattr(self, name))).shape[axis]
+                break
+        shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "G": (n, m), "J": (m, n)}
+        for name in FLUID_PARTS:
+            shapes[name] = {"A": (m, m), "B": (m, b), "R": (b, m), "S": (b, b)}[name[0]]
+            value = getattr(self, name)
+            value = np.zeros(shapes[name]) if value is None else np.array(value, float, ndmin=2)
+            value.setflags(write=False)
+            put(name, value)
+        for name, shape in shapes.items():
+            value = getattr(self, name)
+            if value.shape != shape:
+                raise ValueError(f"The part {name} of the pencil has shape {value.shape}; "
+                                 f"{shape} is needed.")
+            data = value.data if sp.issparse(value) else value
+            if not np.isfinite(data).all():
+                raise ValueError(f"The part {name} of the pencil holds a number that is not finite.")
+
+    @property
+    def n(self) -> int:
+        """Number of structural unknowns."""
+        return self.M.shape[0]
+
+    @property
+    def m(self) -> int:
+        """Number of coupling forces."""
+        return self.G.shape[1]
+
+    @property
+    def b(self) -> int:
+        """Number of inner unknowns of the fluid."""
+        return self.S0.shape[0]
+
+    @property
+    def order(self) -> int:
+        """Size of the first-order form in (q, dq/dt, U)."""
+        return 2 * self.n + self.b
+
+    def replace(self, **parts) -> CoupledPencil:
+        """The same pencil with some parts exchanged."""
+        return replace(self, **parts)
+
+    def fluid_at(self, s: complex):
+        """Values A(s), B(s), R(s), S(s) of the fluid polynomials."""
+        return (self.A0 + s * (self.A1 + s * self.A2), self.B0 + s * self.B1,
+                self.R0 + s * (self.R1 + s * self.R2), self.S0 + s * self.S1)
+
+    def terms(self, s: complex, q: np.ndarray, U: np.ndarray):
+        """Vectors whose sums are the two block rows of T(s) x.
+
+        Parameters
+        ----------
+        s : complex or array, shape (k,)
+        q : array, shape (n,) or (n, k)
+        U : array, shape (b,) or (b, k)
+
+        Returns
+        -------
+        structure : list of arrays, shape (n,) or (n, k)
+            Inertia, damping, stiffness, minus the coupling through y, minus that through U.
+        fluid : list of arrays, shape (b,) or (b, k)
+        """
+        y = real_apply(self.J, q)
+        motion = self.A0 @ y + s * (self.A1 @ y) + s**2 * (self.A2 @ y)
+        inner = self.B0 @ U + s * (self.B1 @ U)
+        structure = [s**2 * real_apply(self.M, q), s * real_apply(self.C, q),
+                     real_apply(self.K, q), -real_apply(self.G, motion),
+                     -real_apply(self.G, inner)]
+        fluid = [self.R0 @ y, s * (self.R1 @ y), s**2 * (self.R2 @ y),
+                 self.S0 @ U, s * (self.S1 @ U)]
+        return structure, fluid
+
+    def first_order(self) -> tuple[np.ndarray, np.ndarray]:
+        """Dense F, E with F x = lambda E x, x = (q, lambda q, U); for small pencils.
+
+        Returns
+        -------
+        F, E : ndarray, shape (2n + b, 2n + b)
+        """
+        n, b = self.n, self.b
+        G, J = self.G.toarray(), self.J.toarray()
+        F, E = np.zeros((self.order, self.order)), np.zeros((self.order, self.order))
+        q, v, u = slice(0, n), slice(n, 2 * n), slice(2 * n, 2 * n + b)
+        E[q, q] = np.eye(n)
+        F[q, v] = np.eye(n)
+        E[v, v] = self.M.toarray() - G @ self.A2 @ J
+        E[v, u] = -G @ self.B1
+        F[v, q] = -(self.K.toarray() - G @ self.A0 @ J)
+        F[v, v] = -(self.C.toarray() - G @ self.A1 @ J)
+        F[v, u] = G @ self.B0
+        E[u, v] = self.R2 @ J
+        E[u, u] = self.S1
+        F[u, q] = -self.R0 @ J
+        F[u, v] = -self.R1 @ J
+        F[u, u] = -self.S0
+        return F, E
+
+
+def real_apply(matrix, x: np.ndarray) -> np.ndarray:
+    """Real sparse matrix times a complex array without making the matrix complex."""
+    if not np.iscomplexobj(x):
+        return matrix @ x
+    if x.size == 0 or matrix.shape[0] == 0:
+        return np.zeros((matrix.shape[0],) + x.shape[1:], complex)
+    flat = np.ascontiguousarray(x).reshape(x.shape[0], -1)
+    out = matrix @ flat.view(float).reshape(flat.shape[0], -1)
+    return np.ascontiguousarray(out).view(complex).reshape((matrix.shape[0],) + x.shape[1:])
+
+
+def part_names() -> tuple[str, ...]:
+    """Names of all parts of a pencil."""
+    return tuple(f.name for f in fields(CoupledPencil))
+
+
+def _real_csr(name: str, value) -> sp.csr_matrix:
+    dtype = value.dtype if hasattr(value, "dtype") else np.asarray(value).dtype
+    if np.issubdtype(dtype, np.complexfloating):
+        raise ValueError(f"The part {name} of the pencil must be real.")
+    if sp.issparse(value) and value.format == "csr" and value.dtype == float:
+        matrix = value
+    else:
+        matrix = sp.csr_matrix(value, dtype=float)
+    if not matrix.has_canonical_format:
+        matrix = matrix.copy()
+        matrix.sum_duplicates()
+    return matrix

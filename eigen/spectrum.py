@@ -1,0 +1,137 @@
+"""The result of an eigenvalue search."""
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .region import SearchedRegion
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Leading eigenpairs of a pencil, sorted by growth rate; a conjugate pair is given once.
+
+    Every pair listed has passed the residual test. Right vectors have a structural part of
+    unit 2-norm whose largest component is real and positive. Left vectors w satisfy
+    w^H T(lambda) = 0 and are scaled so that w^H T'(lambda) x = 1.
+
+    Attributes
+    ----------
+    eigenvalues : ndarray, shape (k,)
+        Complex, 1/s, imaginary part >= 0.
+    q, u : ndarray, shapes (n, k) and (b, k)
+        Right vectors: structural part, inner unknowns of the fluid.
+    residual : ndarray, shape (k,)
+        ||T(lambda) x|| over the sum of the norms of its terms (inertia, damping, stiffness,
+        coupling through y, through U); the rows of the fluid are measured apart, by
+        (sum |lambda|^k ||R_k J||) ||q|| + (||S_0|| + |lambda| ||S_1||) ||U||, and the larger
+        ratio counts. U is kept as an unknown.
+    backward_error : ndarray, shape (k,)
+        The same with the terms replaced by matrix norms (geometric mean of the 1- and
+        infinity-norm) times ||q||: smaller, and the right measure where all terms vanish.
+    left_q, left_u : ndarray or None
+    biorthogonality : float or None
+        Largest off-diagonal |w_i^H (T(l_i) - T(l_j))/(l_i - l_j) x_j| with ones on the diagonal.
+    asked : int
+        Number of modes asked for.
+    status : {"complete", "incomplete"}
+        "complete": as many as asked for (or all there are), and none missed in the region.
+    complete_above : float
+        Growth rate down to which, within `band`, every eigenvalue is listed or was found.
+    complete_below : float
+        Upper end of the strip searched; beyond it only the independent count can tell.
+    band : float
+        Frequency, Hz, up to which `complete_above` holds.
+    region : SearchedRegion
+    shifts : tuple of complex
+    applications : int
+        Applications of the shift-and-invert operator.
+    refined, rejected : int
+        Pairs that needed Newton steps on the full pencil; pairs thrown away.
+    notes : tuple of str
+        What the caller ought to know, in full sentences.
+    """
+
+    eigenvalues: np.ndarray
+    q: np.ndarray
+    u: np.ndarray
+    residual: np.ndarray
+    backward_error: np.ndarray
+    asked: int
+    status: str
+    complete_above: float
+    complete_below: float
+    band: float
+    region: SearchedRegion
+    shifts: tuple[complex, ...] = ()
+    applications: int = 0
+    refined: int = 0
+    rejected: int = 0
+    left_q: np.ndarray | None = None
+    left_u: np.ndarray | None = None
+    biorthogonality: float | None = None
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return self.eigenvalues.size
+
+    @property
+    def growth_rate(self) -> np.ndarray:
+        """Real parts, 1/s."""
+        return self.eigenvalues.real
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Damped frequencies, Hz."""
+        return self.eigenvalues.imag / (2 * np.pi)
+
+    @property
+    def damping_ratio(self) -> np.ndarray:
+        """-Re / |lambda|; +1 or -1 for real eigenvalues, zero for a zero eigenvalue."""
+        size = np.abs(self.eigenvalues)
+        return -self.eigenvalues.real / np.where(size > 0, size, 1.0)
+
+    @property
+    def unstable_count(self) -> int:
+        """Number of eigenvalues listed with positive growth rate, conjugates counted apart."""
+        return self.count_right_of(0.0)
+
+    def count_right_of(self, line: float) -> int:
+        """Number of eigenvalues listed right of a line, conjugates counted apart."""
+        right = self.eigenvalues.real > line
+        return int(np.where(self.eigenvalues.imag > 0, 2, 1)[right].sum())
+
+    def mode(self, index: int) -> Mode:
+        """One pair."""
+        left = self.left_q is not None
+        return Mode(complex(self.eigenvalues[index]), self.q[:, index], self.u[:, index],
+                    self.left_q[:, index] if left else None,
+                    self.left_u[:, index] if left else None)
+
+    def select(self, chosen) -> Spectrum:
+        """The same result with some of the pairs."""
+        def cut(array):
+            return None if array is None else array[..., chosen]
+
+        return replace(self, **{name: cut(getattr(self, name)) for name in (
+            "eigenvalues", "q", "u", "residual", "backward_error", "left_q", "left_u")})
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One eigenpair.
+
+    Attributes
+    ----------
+    eigenvalue : complex
+    q, u : ndarray, shapes (n,) and (b,)
+    left_q, left_u : ndarray or None
+        w with w^H T(lambda) = 0, scaled so that w^H T'(lambda) x = 1.
+    """
+
+    eigenvalue: complex
+    q: np.ndarray
+    u: np.ndarray
+    left_q: np.ndarray | None = None
+    left_u: np.ndarray | None = None
