@@ -27,7 +27,7 @@ BAD = {
     "unit that does not exist": ("[drive]\npressure = '18 kilopuscals'", "not a pressure"),
     "text without a number": ("[valve]\nlip_radius = 'small'", "not a number"),
     "angle as a plain number in a text": (
-        "[[layers]]\nmaterial='CR'\nthickness=0.006\nangle='10 %'", r"layers\.0\.angle.*not a angle|not an angle"
+        "[[layers]]\nmaterial='CR'\nthickness=0.006\nangle='10 %'", r"layers\.0\.angle.*not an angle"
     ),
     "percent where a length is due": ("[valve]\nlip_radius = '10 %'", "valve.lip_radius"),
     "truth value for a number": ("[drive]\npressure = true", "truth value"),
