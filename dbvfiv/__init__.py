@@ -12,3 +12,16 @@ from . import runtime
 runtime.prepare()
 
 __version__ = "0.1.0"
+__all__ = ["load", "load_result"]
+
+
+def __getattr__(name: str):
+    """Load the Python interface when it is first asked for: the command line's help does without numpy."""
+    if name == "load":
+        from .api import load as found
+    elif name == "load_result":
+        from .results import load_result as found
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = found
+    return found

@@ -47,6 +47,10 @@ def prepare() -> None:
     for name, value in settings.items():
         os.environ.setdefault(name, value)
     os.environ["JAX_ENABLE_X64"] = "true"
+    # PETSc's handlers turn Ctrl-C's neighbours and a closed pipe into an abort of MPI; Python's own are wanted
+    petsc = os.environ.get("PETSC_OPTIONS", "")
+    if "-no_signal_handler" not in petsc.split():
+        os.environ["PETSC_OPTIONS"] = f"{petsc} -no_signal_handler".strip()
     if "jax" in sys.modules:
         config = sys.modules["jax"].config
         config.update("jax_enable_x64", True)

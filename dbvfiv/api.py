@@ -1,0 +1,175 @@
+"""The valve from Python: load a case, ask for states, read results."""
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Iterable, Mapping, Sequence, overload
+
+from .case import load_case
+from .case.model import Case
+from .case.quantity import Quantity
+from .errors import CaseError, SolveError
+
+if TYPE_CHECKING:
+    from .model import ValveModel
+    from .results.state import State
+    from .results.steady import SteadyResults
+    from .studies.observer import Observer
+
+_PRESSURE = Quantity("Pa", "kPa")
+_HIGHEST = 1e7
+
+
+class Valve:
+    """A valve to ask questions of.
+
+    Parameters
+    ----------
+    case : Case
+    name : str
+        For titles and file names.
+
+    Attributes
+    ----------
+    model : ValveModel
+        The coupled model, built on first use.
+
+    Examples
+    --------
+    >>> valve = dbvfiv.load("cases/dbv12.toml")                  # doctest: +SKIP
+    >>> state = valve.steady(pressure="36 kPa")                  # doctest: +SKIP
+    >>> curve = valve.steady(pressure=[6e3, 18e3, 36e3])         # doctest: +SKIP
+    >>> [state.mass_flow for state in curve.states]              # doctest: +SKIP
+    """
+
+    def __init__(self, case: Case, name: str = "case"):
+        self.case = case
+        self.name = name
+
+    def __repr__(self) -> str:
+        return f"Valve({self.name!r})"
+
+    @cached_property
+    def model(self) -> "ValveModel":
+        from .model import ValveModel
+
+        try:
+            return ValveModel(self.case)
+        except CaseError:
+            raise
+        except ValueError as error:  # what geometry, mesh and shell refuse
+            raise CaseError(str(error)) from error
+
+    def replace(self, changes: Mapping[str, Any]) -> "Valve":
+        """A valve with some keys of its case changed, such as ``{"fluid.density": 10}``."""
+        return Valve(self.case.replace(changes), self.name)
+
+    @overload
+    def steady(self, pressure: float | str) -> "State": ...
+
+    @overload
+    def steady(self, pressure: Iterable[float | str] | None = None) -> "SteadyResults": ...
+
+    def steady(self, pressure=None, *, output: str | Path | None = None, observer: "Observer | None" = None):
+        """Equilibria.
+
+        Parameters
+        ----------
+        pressure : number (Pa), text with a unit, or several of them
+            One pressure gives one state; several, or None for those of the case, give a result with all states.
+        output : path, optional
+            Result file, written state by state.
+        observer : Observer, optional
+            Is told of progress and warnings.
+
+        Returns
+        -------
+        State or SteadyResults
+
+        Raises
+        ------
+        CaseError
+            For a pressure that cannot be used or a case that gives no model.
+        SolveError
+            If one pressure was asked for and not reached. Of several, `failures` of the result names those that were not.
+        """
+        single = isinstance(pressure, (int, float, str)) or hasattr(pressure, "__float__")
+        asked = self.case.steady.pressures if pressure is None else [pressure] if single else pressure
+        result = self._run(read_pressures(asked, "pressure"), output, observer)
+        if not single:
+            return result
+        if result.failures:
+            raise SolveError(result.failures[0])
+        if not result.states:
+            raise KeyboardInterrupt
+        return result.states[0]
+
+    def _run(self, pressures: Sequence[float], output: str | Path | None, observer: "Observer | None") -> "SteadyResults":
+        from .results.header import Header
+        from .results.steady import SteadyResults
+        from .results.steady_file import SteadyFile
+        from .studies.observer import Observer, Observers
+        from .studies.steady import run_steady
+
+        observer = observer or Observer()
+        if output is None:
+            return SteadyResults.of(run_steady(self.model, pressures, observer=observer), self.name)
+        case = self.case.replace({"steady.pressures": list(pressures)})
+        with SteadyFile(output, self.model, Header.of("steady", case, self.name)) as file:
+            result = run_steady(self.model, pressures, observer=Observers(observer, file))
+            file.conclude(result.failures, not result.interrupted)
+        return SteadyResults.of(result, self.name)
+
+
+def load(case: str | Path | Case | None = None, changes: Mapping[str, Any] | None = None) -> Valve:
+    """A valve from a case file; the 12-inch valve without one.
+
+    Parameters
+    ----------
+    case : path or Case, optional
+    changes : mapping, optional
+        Keys to change, such as ``{"fluid.density": "10 kg/m^3"}``.
+
+    Raises
+    ------
+    CaseError
+        One sentence: which key, what was given, what is allowed.
+    """
+    name = "dbv12" if case is None else "case" if isinstance(case, Case) else Path(case).stem
+    made = case if isinstance(case, Case) else load_case(case)
+    return Valve(made.replace(changes) if changes else made, name)
+
+
+def read_pressures(given: Iterable[Any], name: str) -> tuple[float, ...]:
+    """Pressures in Pa from numbers and texts with units.
+
+    Raises
+    ------
+    CaseError
+        For anything that is not a pressure above zero and up to 10 MPa; `name` says in the sentence where it was given.
+    """
+    found = []
+    for value in given:
+        try:
+            pressure = _PRESSURE.parse(_number(value))
+        except ValueError as error:
+            raise CaseError(f"{name} is given as {value!r}, {error}; {_ALLOWED}.") from None
+        if not 0 < pressure <= _HIGHEST:
+            raise CaseError(f"{name} is given as {value!r}; {_ALLOWED}.")
+        found.append(pressure)
+    if not found:
+        raise CaseError(f"{name} is an empty list; it needs at least one pressure.")
+    return tuple(found)
+
+
+_ALLOWED = f"it must be a pressure greater than 0 kPa and at most {_HIGHEST / 1e3:g} kPa, such as '36 kPa' or 36e3 (Pa)"
+
+
+def _number(value: Any) -> Any:
+    """A number where the value is one, numpy's and text such as "36e3" included."""
+    if isinstance(value, (bool, int)):
+        return value
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return value

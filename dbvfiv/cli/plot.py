@@ -1,0 +1,46 @@
+"""``dbvfiv plot``: figures of a result."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from ._options import AsJson, ResultFile
+from ._output import print_json
+
+ORDER = 50
+
+
+class Format(str, Enum):
+    """Kinds of figure files."""
+
+    png = "png"
+    svg = "svg"
+
+
+def command(
+    file: ResultFile,
+    folder: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the figures.")] = Path("."),
+    format: Annotated[Format, typer.Option("--format", help="File format.")] = Format.png,
+    only: Annotated[Optional[list[str]], typer.Option("--only", metavar="NAME", help="Draw this figure; may be repeated.")] = None,
+    pressure: Annotated[
+        Optional[str], typer.Option("--pressure", "-p", metavar="P", help="Draw 3D view and layer stresses for the state nearest to this pressure.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Draw the figures of a result file; those of one state show the highest pressure unless --pressure is given."""
+    from ..results import load_result
+
+    choices = {}
+    if pressure is not None:
+        from ..api import read_pressures
+
+        choices["pressure"] = read_pressures([pressure], "--pressure")[0]
+    written = load_result(file).plot(folder, format.value, only=only or (), **choices)
+    if as_json:
+        print_json({"written": [str(path) for path in written]})
+    else:
+        print("\n".join(f"Wrote {path}." for path in written))

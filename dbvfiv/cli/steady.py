@@ -1,0 +1,103 @@
+"""``dbvfiv steady``: equilibria over a list of pressures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from ._options import AsJson, CaseFile, Output, Override, read_case
+from ._output import print_json
+from ._progress import Progress
+
+ORDER = 20
+
+Pressures = Annotated[
+    Optional[list[str]],
+    typer.Option(
+        "--pressure", "-p", metavar="P", help="Inlet pressure, 36e3 (Pa) or '36 kPa', or a range '2 kPa:50 kPa:12'; may be repeated."
+    ),
+]
+PlotFolder = Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")]
+
+
+def command(
+    case_file: CaseFile = None,
+    pressures: Pressures = None,
+    output: Output = None,
+    plots: PlotFolder = None,
+    overrides: Override = None,
+    as_json: AsJson = False,
+) -> None:
+    """Equilibria of the coupled valve: flow, lip area, jet velocity, deflections, layer stresses.
+
+    The pressures are those of --pressure; else a drive.pressure given with --set; else steady.pressures of the case, or its drive.pressure where
+    only that is given. Each state is found from the one before.
+
+    Nothing is written unless asked for: -o keeps states, stations and layer stresses in a result file (an earlier result of that name is
+    replaced), state by state, so that Ctrl-C keeps what is done. `dbvfiv plot`, `export` and `info` read it.
+
+    dbvfiv steady cases/dbv12.toml -p "18 kPa" -p "36 kPa" -o dbv12.h5
+    """
+    from ..api import Valve
+    from ..errors import SolveError
+    from ..results.steady_table import HEAD, row_of
+
+    case = read_case(case_file, overrides)
+    wanted = _pressures(case, pressures, overrides)
+    if plots is not None:
+        _check_folder(plots)
+    valve = Valve(case, case_file.stem if case_file else "dbv12")
+    valve.model  # a case that gives no model is told before the table begins
+    if not as_json:
+        print("\n".join(HEAD), flush=True)
+    progress = Progress(quiet=as_json, row=None if as_json else row_of)
+    result = valve.steady(wanted, output=output, observer=progress)
+    figures = result.plot(plots) if plots is not None and result.states else []
+    if as_json:
+        document = result.summary()
+        document["output"] = str(output) if output else None
+        document["figures"] = [str(figure) for figure in figures]
+        print_json(document)
+    else:
+        for text in (f"Kept in {output}." if output else "", f"{len(figures)} figures in {plots}." if figures else ""):
+            if text:
+                print(text)
+    if not result.complete:
+        raise KeyboardInterrupt
+    if result.failures:
+        reached = f"{len(result.states)} of {len(wanted)} pressures were reached" if result.states else "No pressure was reached"
+        kept = f"; those states are kept in {output}" if output and result.states else ""
+        said = "" if not as_json else f"; {result.failures[0].rstrip('.')}"
+        raise SolveError(f"{reached}{kept}{said}.")
+
+
+def _pressures(case, given: list[str] | None, overrides: list[str] | None) -> tuple[float, ...]:
+    from ..api import read_pressures
+
+    if given:
+        return tuple(p for text in given for p in (_range(text) if ":" in text else read_pressures([text], "--pressure")))
+    changed = {override.partition("=")[0].strip() for override in overrides or ()}
+    set_here = "drive.pressure" in changed and "steady.pressures" not in changed
+    in_case = "pressure" in case.drive.model_fields_set and "pressures" not in case.steady.model_fields_set
+    if set_here or in_case:
+        return read_pressures([case.drive.pressure], "drive.pressure")
+    return case.steady.pressures
+
+
+def _range(text: str) -> tuple[float, ...]:
+    from ..case.axis import parse_axis
+    from ..errors import CaseError
+
+    try:
+        return parse_axis(f"pressure={text}").values
+    except ValueError as error:
+        raise CaseError(f"--pressure is given as {text!r}, {error}; a range is START:STOP:COUNT, with ':log' behind it for logarithmic steps.") from None
+
+
+def _check_folder(folder: Path) -> None:
+    from ..errors import CaseError
+
+    if folder.exists() and not folder.is_dir():
+        raise CaseError(f"--plots {str(folder)!r} is a file and not a folder.")

@@ -1,0 +1,77 @@
+"""The deformed valve in space."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Callable, Iterator
+
+import matplotlib
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from ..results.whole_valve import WholeValve
+from .style import kilopascals, new_figure
+
+if TYPE_CHECKING:
+    from ..results.state import State
+    from ..results.steady import SteadyResults
+
+_COLOURS = "turbo"
+_LIGHT = np.array([-0.35, -0.45, 0.82])
+
+
+def draw(result: "SteadyResults", pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
+    state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
+    yield "deformed", lambda: deformed(state)
+
+
+def deformed(state: "State") -> Figure:
+    """Whole valve, true to scale, coloured by displacement (compare Fig. 7-11 of Wang 2014)."""
+    valve = WholeValve.of(state.results.mesh)
+    shift = valve.vectors(state.nodal[:, :3])
+    size = np.linalg.norm(shift, axis=1) * 1e3
+    points = (valve.points + shift)[:, [2, 0, 1]] * 1e3  # axis of the valve, width, opening
+    figure = new_figure(8.2, 5.6)
+    axes = figure.add_subplot(projection="3d", computed_zorder=False)
+    scale = Normalize(0.0, size.max() or 1.0)
+    corners = points[valve.quads]
+    colours = _shaded(corners, matplotlib.colormaps[_COLOURS](scale(size[valve.quads].mean(axis=1))))
+    axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.3))
+    _frame(axes, points)
+    bar = figure.colorbar(ScalarMappable(scale, _COLOURS), ax=axes, shrink=0.62, pad=0.02, aspect=22)
+    bar.set_label("Displacement, mm")
+    bar.outline.set_visible(False)
+    x, y, z = (1e3 * value for value in state.max_displacement_position)
+    axes.set_title(
+        f"Deformed valve at {kilopascals(state.pressure)}: largest displacement {state.max_displacement * 1e3:.1f} mm at "
+        f"(x, y, z) = ({x:.0f}, ±{abs(y):.0f}, {z:.0f}) mm",
+        fontsize=10, loc="left",
+    )  # fmt: skip
+    return figure
+
+
+def _shaded(corners: np.ndarray, colours: np.ndarray) -> np.ndarray:
+    """Colours (n, 4) darkened where the faces turn from the light; inner and outer side alike."""
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    light = 0.62 + 0.38 * np.abs(normal @ (_LIGHT / np.linalg.norm(_LIGHT)))
+    return np.concatenate([colours[:, :3] * light[:, None], colours[:, 3:]], axis=1)
+
+
+def _frame(axes, points: np.ndarray) -> None:
+    low, high = points.min(axis=0), points.max(axis=0)
+    for set_limits, a, b in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high):
+        set_limits(a, b)
+    axes.set_box_aspect(high - low, zoom=1.15)
+    axes.set_proj_type("persp", focal_length=0.6)
+    axes.view_init(elev=24, azim=-142)
+    axes.set_xlabel("z, mm", labelpad=12)
+    axes.set_ylabel("x, mm", labelpad=8)
+    axes.set_zlabel("y, mm", labelpad=2)
+    axes.locator_params(nbins=5)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.pane.set_facecolor((1, 1, 1, 0))
+        axis.pane.set_edgecolor("0.8")
+        axis._axinfo["grid"].update(color="0.9", linewidth=0.6)

@@ -1,0 +1,62 @@
+"""Stresses of the layers on the unrolled wall."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Callable, Iterator
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from .style import MAGNITUDE, kilopascals, new_figure
+
+if TYPE_CHECKING:
+    from ..results.mesh import MeshData
+    from ..results.state import State
+    from ..results.steady import SteadyResults
+
+
+def draw(result: "SteadyResults", pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
+    state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
+    yield "layer-stress", lambda: layer_stress(state)
+
+
+def layer_stress(state: "State") -> Figure:
+    """Von Mises stress of each layer over the quarter, unrolled: arc length from the centre against the axis (compare Fig. 7-12 of Wang 2014)."""
+    mesh = state.results.mesh
+    arc, z = unrolled(mesh)
+    values = state.layers.von_mises.T / 1e6
+    columns = min(3, len(values))
+    rows = -(-len(values) // columns)
+    figure = new_figure(3.3 * columns, 4.6 * rows + 0.4)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for number, (axes, title, stress) in enumerate(zip(panels, mesh.layer_titles(), values)):
+        shape = (mesh.shape[1], mesh.shape[0])
+        image = axes.pcolormesh(arc * 1e3, z * 1e3, stress.reshape(shape), cmap=MAGNITUDE, vmin=0.0, rasterized=True)
+        bar = figure.colorbar(image, ax=axes, pad=0.03, aspect=28)
+        bar.outline.set_visible(False)
+        side = ", inside" if number == 0 else ", outside" if number == len(values) - 1 else ""
+        axes.set_title(f"{number + 1}  {title}{side}", loc="left", fontsize=10)
+        axes.grid(False)
+        peak = int(np.argmax(stress))
+        middle = [0.25 * (f[:-1, :-1] + f[1:, :-1] + f[:-1, 1:] + f[1:, 1:]).ravel()[peak] * 1e3 for f in (arc, z)]
+        axes.plot(*middle, "+", color="#d62728", ms=9, mew=1.6)
+        axes.text(0.97, 0.98, f"max {stress[peak]:.3g} MPa", transform=axes.transAxes, ha="right", va="top", fontsize=8.5)
+        axes.set_xlim(0, arc.max() * 1e3)
+    for axes in panels[len(values):]:
+        axes.set_visible(False)
+    for number, axes in enumerate(panels[: len(values)]):
+        axes.tick_params(labelbottom=number + columns >= len(values))
+        if number % columns == 0:
+            axes.set_ylabel("Distance from the lip z, mm")
+        if number + columns >= len(values):
+            axes.set_xlabel("Arc from the centre, mm")
+    figure.suptitle(f"Von Mises stress in the layers at {kilopascals(state.pressure)}, MPa (largest in each element)", fontsize=11, fontweight="bold")
+    return figure
+
+
+def unrolled(mesh: "MeshData") -> tuple[np.ndarray, np.ndarray]:
+    """Arc length from x = 0 and axial position of the nodes, both (rows, columns) in m, at rest."""
+    points = mesh.nodes[mesh.rows]
+    steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    arc = np.concatenate([np.zeros((len(points), 1)), np.cumsum(steps, axis=1)], axis=1)
+    return arc, points[:, :, 2]

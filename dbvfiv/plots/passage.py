@@ -1,0 +1,45 @@
+"""Pressure, velocity and area along the passage."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Callable, Iterator
+
+from matplotlib.figure import Figure
+
+from .discharge import ordered
+from .shapes import _mark_pieces
+from .style import kilopascals, new_figure, pressure_colours, some_of
+
+if TYPE_CHECKING:
+    from ..results.steady import SteadyResults
+
+_QUARTERS = 4
+_PANELS = (
+    ("Pressure, kPa", lambda state: state.station_pressure / 1e3),
+    ("Velocity, m/s", lambda state: state.station_velocity),
+    ("Flow area, cm²", lambda state: _QUARTERS * state.station_area * 1e4),
+)
+
+
+def draw(result: "SteadyResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of a steady result, each with its name."""
+    if result.case.drive.kind == "flow":
+        yield "passage", lambda: passage(result)
+
+
+def passage(result: "SteadyResults") -> Figure:
+    """Pressure, velocity and flow area over the distance from the lip; the fluid flows from right to left."""
+    figure = new_figure(7.2, 7.4)
+    panels = figure.subplots(3, 1, sharex=True)
+    states = some_of(ordered(result))
+    z = result.mesh.z * 1e3
+    for axes, (label, value) in zip(panels, _PANELS):
+        for state, colour in zip(states, pressure_colours([s.pressure for s in states])):
+            axes.plot(z, value(state), color=colour, label=kilopascals(state.pressure))
+        axes.set_ylabel(label)
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+        axes.set_xlim(0, z[-1])
+    _mark_pieces(result, *panels)
+    panels[0].set_title("Along the passage (lip left, inlet right)", loc="left", fontweight="bold")
+    panels[-1].set_xlabel("Distance from the lip z, mm")
+    panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="inlet pressure")
+    return figure

@@ -1,0 +1,40 @@
+"""Published numbers that figures of the reference valve show beside the computed ones."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..case.model import Case
+from ..case.valve import Valve
+
+_WATER = 1000.0
+
+
+@dataclass(frozen=True)
+class Published:
+    """Points of a published curve of the 12-inch valve.
+
+    Attributes
+    ----------
+    label : str
+    pressure : tuple, Pa
+    mass_flow : tuple, kg/s
+        Whole valve.
+    source : str
+    """
+
+    label: str
+    pressure: tuple[float, ...]
+    mass_flow: tuple[float, ...]
+    source: str
+
+
+#: Mass flows of the coupled model of Wang 2014, Th. 4.3.3: handed to the viscous flow model at the pressures of Fig. 4-4.
+HEAD_DISCHARGE = Published(
+    "Wang 2014, coupled model", (18e3, 29e3, 36e3), (47.88, 75.52, 90.82), "Wang 2014 thesis, 4.3.3, Fig. 4-4 and chapter 7"
+)
+
+
+def applies(case: Case) -> bool:
+    """Whether a case is the 12-inch valve with water flowing through it: layers and materials may differ, shape and wall may not."""
+    same_shape = case.valve.model_copy(update={"saddle": "ruled"}) == Valve()
+    return same_shape and case.drive.kind == "flow" and case.fluid.density == _WATER

@@ -1,0 +1,114 @@
+"""Results as fields on the valve for ParaView."""
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Iterator, Sequence
+
+import numpy as np
+
+from ..errors import CaseError
+from .mesh import MeshData
+from .vtkhdf import Step, write_vtkhdf
+from .whole_valve import WholeValve
+
+if TYPE_CHECKING:
+    from .result import Result
+    from .steady import SteadyResults
+
+_UNITS = {"displacement": "m", "rotation": "rad", "thickness": "m", "pressure": "Pa", "velocity": "m/s"}
+
+
+def export_result(result: "Result", path: str | Path, quarter: bool = False, deformed: bool = False) -> Path:
+    """Write a result as one VTKHDF file with a step for each state.
+
+    Parameters
+    ----------
+    path : path
+        Name of the file, or a folder in which it gets the name of the case.
+    quarter : bool
+        Only the quarter that was computed.
+    deformed : bool
+        Points move with the states; otherwise they stay at rest, for ParaView's "Warp By Vector" along ``displacement``.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    CaseError
+        If the result has nothing to show in space or the file cannot be written.
+    """
+    valve = WholeValve.of(result.mesh, quarter)
+    steps = result.steps(valve)
+    if not len(steps):
+        raise CaseError(f"The {result.kind} result of {result.header.name!r} holds no state that could be exported.")
+    path = Path(path)
+    if path.suffix.lower() not in (".vtkhdf", ".hdf"):
+        path = path / f"{result.header.name}-{result.kind}.vtkhdf"
+    units = _UNITS | {name: "Pa" for name in steps[0].cell_data if name.startswith("von_mises")}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_vtkhdf(path, valve.points, valve.quads, _moved(steps, valve, deformed), units)
+    except OSError as error:
+        raise CaseError(f"{str(path)!r} cannot be written ({error.strerror or 'the folder may not be written'}).") from error
+    return path
+
+
+def _moved(steps: Sequence[Step], valve: WholeValve, deformed: bool) -> Iterator[Step]:
+    for step in steps:
+        yield replace(step, points=valve.points + step.point_data["displacement"]) if deformed else step
+
+
+@dataclass(frozen=True)
+class _SteadySteps(Sequence):
+    """States as steps, made one at a time; "time" is the pressure in Pa."""
+
+    result: "SteadyResults"
+    valve: WholeValve
+
+    def __len__(self) -> int:
+        return len(self.result.states)
+
+    def __getitem__(self, number):
+        state, valve, mesh = self.result.states[number], self.valve, self.result.mesh
+        layers = state.layers
+        rows = mesh.element_rows()
+        cell_data = {
+            "thickness": mesh.thickness,
+            "pressure": 0.5 * (state.station_pressure[rows] + state.station_pressure[rows + 1]),
+            "velocity": 0.5 * (state.station_velocity[rows] + state.station_velocity[rows + 1]),
+        }
+        for name, values in zip(layer_field_names(mesh, "von_mises"), layers.von_mises.T):
+            cell_data[name] = values
+        for name, values in zip(layer_field_names(mesh, "largest_stretch"), layers.stretch[:, :, 1].T):
+            cell_data[name] = values
+        return Step(
+            state.pressure,
+            motion(mesh, valve, state.nodal),
+            {name: valve.cells(values) for name, values in cell_data.items()},
+        )
+
+
+def steady_steps(result: "SteadyResults", valve: WholeValve) -> Sequence[Step]:
+    """States of a steady result in the order of their pressures, as ParaView wants its times."""
+    ordered = sorted({state.pressure: state for state in result.states}.values(), key=lambda state: state.pressure)
+    return _SteadySteps(result.only(*ordered), valve)
+
+
+def motion(mesh: MeshData, valve: WholeValve, nodal: np.ndarray) -> dict[str, np.ndarray]:
+    """Displacement, rotation vector and director at the points from nodal unknowns (nn, 5)."""
+    directors, towards = valve.vectors(mesh.directors), valve.vectors(np.einsum("na,nai->ni", nodal[:, 3:], mesh.frames))
+    angle = np.linalg.norm(towards, axis=1, keepdims=True)
+    return {
+        "displacement": valve.vectors(nodal[:, :3]),
+        "rotation": np.cross(directors, towards),
+        "director": np.cos(angle) * directors + np.sinc(angle / np.pi) * towards,
+    }
+
+
+def layer_field_names(mesh: MeshData, quantity: str) -> list[str]:
+    """Names of a field in each layer, inside to outside: von_mises_1_CR, von_mises_3_fibre, ..."""
+    return [f"{quantity}_{i + 1}_{re.sub(r'[^A-Za-z0-9_-]+', '_', name)}" for i, name in enumerate(mesh.layer_names)]

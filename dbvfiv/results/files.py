@@ -1,0 +1,103 @@
+"""Opening result files, for writing and for reading; whatever is wrong with one is told in a sentence."""
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Iterator
+
+import h5py
+
+from ..errors import CaseError
+from .layout import LAYOUT
+
+#: What broken or foreign HDF5 files make h5py and the readers raise.
+_BROKEN = (OSError, KeyError, RuntimeError, ValueError, TypeError, IndexError, AttributeError, MemoryError)
+
+
+@contextmanager
+def reading(path: str | Path) -> Iterator[h5py.File]:
+    """An open result file; also one that another process is still writing.
+
+    Raises
+    ------
+    CaseError
+        If there is no such file, it is no result of this program, comes from a newer version, or is damaged.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise CaseError(f"{str(path)!r} is a folder and not a result file.")
+    if not path.exists():
+        raise CaseError(f"The result file {str(path)!r} does not exist.")
+    try:
+        file = h5py.File(path, "r", locking=False)
+    except PermissionError:
+        raise CaseError(f"The result file {str(path)!r} may not be read by this user.") from None
+    except _BROKEN as error:
+        if "truncated" in str(error):
+            raise CaseError(f"{str(path)!r} is cut short, so nothing can be read from it.") from error
+        raise CaseError(f"{str(path)!r} is not a result file, because it is not HDF5.") from error
+    with file:
+        try:
+            kind, layout = str(file.attrs["dbvfiv_kind"]), int(file.attrs["layout"])
+        except _BROKEN as error:
+            raise CaseError(f"{str(path)!r} is an HDF5 file but not a result of dbvfiv.") from error
+        if layout > LAYOUT:
+            raise CaseError(
+                f"{str(path)!r} has file layout {layout} and this version reads up to {LAYOUT}; "
+                f"it was written by {file.attrs.get('program', 'a newer program')}."
+            )
+        try:
+            yield file
+        except CaseError:
+            raise
+        except _BROKEN as error:
+            detail = " ".join(str(error).split())[:120].rstrip(".")
+            raise CaseError(f"The {kind} result {str(path)!r} is damaged or cut short ({type(error).__name__}: {detail}).") from error
+
+
+def create(path: str | Path) -> h5py.File:
+    """A new result file; an earlier result of the same name is replaced, any other file is left alone.
+
+    Raises
+    ------
+    CaseError
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise CaseError(f"{str(path)!r} is a folder; the result needs the name of a file.")
+    if path.exists() and path.stat().st_size and not _replaceable(path):
+        raise CaseError(f"{str(path)!r} exists and is not a result of dbvfiv, so it is not overwritten; choose another name.")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = h5py.File(path, "w")
+    except OSError as error:
+        if "lock" in str(error):
+            raise CaseError(f"{str(path)!r} is being written by another process; choose another name.") from None
+        reason = (getattr(error, "strerror", None) or "the folder may not be written").split(" (", 1)[-1].strip("()")
+        raise CaseError(f"The result file {str(path)!r} cannot be written ({_short(reason)}).") from None
+    _hold_back_metadata(file)
+    return file
+
+
+def _replaceable(path: Path) -> bool:
+    if not h5py.is_hdf5(path):
+        return False
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            return "dbvfiv_kind" in file.attrs
+    except _BROKEN:
+        return path.suffix in (".h5", ".hdf5")  # HDF5 cut short
+
+
+def _short(reason: str) -> str:
+    if "errno" in reason:
+        return reason.split("error message = ")[-1].split(",")[0].strip("'\" ")
+    return " ".join(reason.split())[:120].rstrip(".")
+
+
+def _hold_back_metadata(file: h5py.File) -> None:
+    """Let the file's structure reach the disk at flushes only, so that being killed between them does no harm."""
+    settings = file.id.get_mdc_config()
+    settings.evictions_enabled = False
+    settings.incr_mode = settings.flash_incr_mode = settings.decr_mode = 0
+    file.id.set_mdc_config(settings)

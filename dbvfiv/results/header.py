@@ -1,0 +1,123 @@
+"""What every result file begins with: kind, case, versions and whether the run went to its end."""
+from __future__ import annotations
+
+import json
+import platform
+import shlex
+import sys
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from importlib import metadata
+
+import h5py
+import numpy as np
+
+from .. import __version__
+from ..case.model import Case
+from ..case.write import case_toml
+from .attachments import Attachment, attachments_of, placed
+from .layout import LAYOUT
+
+_PACKAGES = ("numpy", "scipy", "jax", "jaxlib", "numba", "h5py")
+
+
+@dataclass(frozen=True)
+class Header:
+    """Where a result comes from.
+
+    Attributes
+    ----------
+    kind : str
+        "steady", "modes", ...; see `dbvfiv.results.registry`.
+    case : Case
+        Complete, its defaults included.
+    name : str
+        Of the case file, without folder and ending.
+    program : str
+        Name and version of what wrote it.
+    created : str
+        ISO 8601, UTC.
+    command : str
+        Command line.
+    versions : dict of str
+    attachments : tuple of Attachment
+        Files that the case names.
+    complete : bool
+        Whether the run went to its end.
+    layout : int
+    """
+
+    kind: str
+    case: Case
+    name: str = "case"
+    program: str = f"dbvfiv {__version__}"
+    created: str = field(default_factory=lambda: datetime.now(timezone.utc).isoformat(timespec="seconds"))
+    command: str = field(default_factory=lambda: shlex.join(["dbvfiv", *sys.argv[1:]]))
+    versions: dict[str, str] = field(default_factory=lambda: versions())
+    attachments: tuple[Attachment, ...] = ()
+    complete: bool = False
+    layout: int = LAYOUT
+
+    @classmethod
+    def of(cls, kind: str, case: Case, name: str = "case", complete: bool = False) -> "Header":
+        """Header of a run that happens now."""
+        return cls(kind, case, name, attachments=attachments_of(case), complete=complete)
+
+    def rebuildable_case(self) -> Case:
+        """The case, with files that have gone or changed since put back from the attachments."""
+        if not self.attachments:
+            return self.case
+        return Case.from_dict(placed(self.case.to_dict(), self.attachments))
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything numbers depend on."""
+    found = {"dbvfiv": __version__, "python": platform.python_version(), "platform": platform.platform()}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    try:
+        from petsc4py import PETSc
+    except ImportError:
+        return found
+    found["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
+    found["petsc scalar type"] = "complex" if np.dtype(PETSc.ScalarType).kind == "c" else "real"
+    return found
+
+
+def write_header(file: h5py.File, header: Header) -> None:
+    """Write a header into an empty file."""
+    attributes = file.attrs
+    attributes["dbvfiv_kind"] = header.kind
+    attributes["layout"] = header.layout
+    attributes["complete"] = header.complete
+    for name in ("name", "program", "created", "command"):
+        attributes[name] = getattr(header, name)
+    case = file.create_group("case")
+    case["toml"] = case_toml(header.case, comments=False)
+    case["json"] = json.dumps(header.case.to_dict())
+    files = case.create_group("files")
+    for number, attachment in enumerate(header.attachments):
+        dataset = files.create_dataset(str(number), data=attachment.text, dtype=h5py.string_dtype())
+        dataset.attrs["path"] = attachment.path
+    group = file.create_group("versions")
+    for name, version in header.versions.items():
+        group.attrs[name] = version
+
+
+def read_header(file: h5py.File) -> Header:
+    """Read what `write_header` wrote."""
+    attributes = file.attrs
+    files = file["case/files"]
+    attached = [files[name] for name in sorted(files, key=int)]
+    return Header(
+        kind=str(attributes["dbvfiv_kind"]),
+        case=Case.from_dict(json.loads(file["case/json"].asstr()[()])),
+        versions={name: str(version) for name, version in file["versions"].attrs.items()},
+        attachments=tuple(Attachment(str(d.attrs["path"]), d.asstr()[()]) for d in attached),
+        complete=bool(attributes["complete"]),
+        layout=int(attributes["layout"]),
+        **{name: str(attributes[name]) for name in ("name", "program", "created", "command")},
+    )

@@ -1,0 +1,95 @@
+"""The quarter valve's mesh as results keep it."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import h5py
+import numpy as np
+
+from .layout import TEXT, Column, read_array, write_array
+
+if TYPE_CHECKING:
+    from ..model import ValveModel
+
+_COLUMNS = (
+    Column("nodes", "m", "Mid-surface at rest, x y z of each node"),
+    Column("quads", "", "Four nodes of each element, counter-clockwise seen from outside", "i4"),
+    Column("rows", "", "Node numbers: rows from lip to flange, columns from x = 0 to y = 0", "i4"),
+    Column("z", "m", "Axial position of the rows (flow stations), from the lip"),
+    Column("directors", "", "Unit vectors through the wall at rest"),
+    Column("frames", "", "Two unit vectors at each node that the rotation unknowns turn the director towards"),
+    Column("thickness", "m", "Wall thickness of each element"),
+    Column("layer_names", "", "Materials of the layers, inside to outside", TEXT),
+    Column("layer_angles", "deg", "Angle of material axis 1 from the valve's axis"),
+    Column("layer_fractions", "", "Share of each layer in the wall"),
+)
+
+
+@dataclass(frozen=True)
+class MeshData:
+    """Mesh of the quarter valve.
+
+    Attributes
+    ----------
+    nodes : (nn, 3) m
+    quads : (ne, 4) int
+    rows : (m, columns) int
+        Node numbers, the lip first; column 0 on x = 0, the last on y = 0.
+    z : (m,) m
+    directors : (nn, 3)
+    frames : (nn, 2, 3)
+    thickness : (ne,) m
+    layer_names : (nl,) tuple of str, inside to outside
+    layer_angles : (nl,) degrees
+    layer_fractions : (nl,)
+    """
+
+    nodes: np.ndarray
+    quads: np.ndarray
+    rows: np.ndarray
+    z: np.ndarray
+    directors: np.ndarray
+    frames: np.ndarray
+    thickness: np.ndarray
+    layer_names: tuple[str, ...]
+    layer_angles: np.ndarray
+    layer_fractions: np.ndarray
+
+    @classmethod
+    def of(cls, model: ValveModel) -> "MeshData":
+        """Mesh of a model."""
+        surface, section = model.shell.mesh, model.shell.section
+        return cls(
+            nodes=model.mesh.nodes, quads=model.mesh.quads, rows=model.mesh.rows, z=model.mesh.z,
+            directors=surface.directors, frames=surface.frames, thickness=surface.thickness,
+            layer_names=tuple(layer.name or f"layer {i + 1}" for i, layer in enumerate(section.layers)),
+            layer_angles=np.array([layer.angle for layer in section.layers], float),
+            layer_fractions=np.asarray(section.fractions),
+        )  # fmt: skip
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Elements around and along."""
+        return self.rows.shape[1] - 1, self.rows.shape[0] - 1
+
+    def layer_titles(self) -> tuple[str, ...]:
+        """Names of the layers that tell equal materials apart by their angle: "CR", "fibre +54°"."""
+        repeated = {name for name in self.layer_names if self.layer_names.count(name) > 1}
+        return tuple(
+            f"{name} {angle:+g}°" if name in repeated or angle else name for name, angle in zip(self.layer_names, self.layer_angles)
+        )
+
+    def element_rows(self) -> np.ndarray:
+        """(ne,) row between lip and flange that each element begins at; elements are numbered row by row."""
+        return np.repeat(np.arange(self.shape[1]), self.shape[0])
+
+
+def write_mesh(file: h5py.File, mesh: MeshData) -> None:
+    group = file.create_group("mesh")
+    for column in _COLUMNS:
+        write_array(group, column, getattr(mesh, column.name))
+
+
+def read_mesh(file: h5py.File) -> MeshData:
+    return MeshData(**{column.name: read_array(file["mesh"], column) for column in _COLUMNS})
