@@ -1,31 +1,22 @@
 """Equilibria over a list of pressures, by load steps from rest or from a given state."""
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Iterable, Iterator
 
 import numpy as np
 
 from ..errors import SolveError
 from ..model import ValveModel
-from ..model.newton import EquilibriumSolver, NewtonOptions, NewtonResult
+from ..model.newton import NewtonOptions
+from .load_steps import LoadStepOptions, LoadSteps
 from .observer import Observer
 from .state import SteadyState, describe_state
 
 
 @dataclass(frozen=True)
-class SteadyOptions:
-    """Options of a list of equilibria.
-
-    Attributes
-    ----------
-    newton : NewtonOptions
-    min_step : float
-        Smallest load step over the target pressure before giving up.
-    """
-
-    newton: NewtonOptions = NewtonOptions()
-    min_step: float = 1e-4
+class SteadyOptions(LoadStepOptions):
+    """Options of a list of equilibria."""
 
     @classmethod
     def of(cls, case) -> "SteadyOptions":
@@ -66,31 +57,8 @@ class SteadyResult:
 
 
 @dataclass
-class LoadPath:
-    """Walks a model from one equilibrium to the next in pressure.
-
-    Steps are predicted along the tangent of the equilibrium path, tried whole first, halved when Newton fails and doubled when it succeeds.
-
-    Parameters
-    ----------
-    model : ValveModel
-    options : SteadyOptions
-    pressure : float, Pa
-    q : (n,) array
-        Where the walk starts; at rest by default.
-    """
-
-    model: ValveModel
-    options: SteadyOptions = SteadyOptions()
-    pressure: float = 0.0
-    q: np.ndarray | None = None
-    observer: Observer = field(default_factory=Observer)
-
-    def __post_init__(self):
-        self.q = self.model.rest() if self.q is None else np.asarray(self.q, float)
-        self.solver = EquilibriumSolver(self.model, self.options.newton)
-        self.fallback = EquilibriumSolver(self.model, replace(self.options.newton, line_search="l2"))
-        self._slope: np.ndarray | None = None
+class LoadPath(LoadSteps):
+    """Walks a valve from one steady state to the next in pressure."""
 
     def go_to(self, target: float) -> SteadyState:
         """Equilibrium at a pressure, Pa.
@@ -100,48 +68,12 @@ class LoadPath:
         SolveError
             If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
         """
-        smallest = self.options.min_step * max(abs(target), abs(self.pressure))
-        step = target - self.pressure
-        iterations, steps = 0, 0
-        while True:
-            remaining = target - self.pressure
-            last = abs(step) >= abs(remaining) * (1 - 1e-12)
-            aim = target if last else self.pressure + step
-            result = self._attempt(aim)
-            iterations += result.iterations
-            if result.converged:
-                steps += 1
-                self._accept(result, aim)
-                if last:
-                    break
-                step = np.copysign(min(2 * abs(step), abs(target - self.pressure)), step)
-                self.observer.progress(f"equilibrium at {aim:.6g} Pa, {result.iterations} iterations")
-                continue
-            step = (aim - self.pressure) / 2
-            self.observer.progress(f"no equilibrium at {aim:.6g} Pa ({result.reason}), step halved to {abs(step):.3g} Pa")
-            if abs(step) < smallest:
-                raise SolveError(
-                    f"No equilibrium was found between {self.pressure:.6g} Pa, the last one, and {aim:.6g} Pa on the way to {target:.6g} Pa: "
-                    f"{result.reason}; load steps down to {2 * abs(step):.3g} Pa and two line searches were tried."
-                )
+        way = self.reach(target)
+        last = way.result
         return describe_state(
-            self.model, self.q, target, converged=True, iterations=iterations, load_steps=steps,
-            residual=result.residual, rounding=result.rounding, reason=result.reason,
+            self.model, self.q, target, converged=True, iterations=way.iterations, load_steps=way.steps,
+            residual=last.residual, rounding=last.rounding, reason=last.reason,
         )  # fmt: skip
-
-    def _attempt(self, aim: float) -> NewtonResult:
-        start = self.q if self._slope is None else self.q + (aim - self.pressure) * self._slope
-        result = self.solver.solve(start, aim)
-        if result.converged:
-            return result
-        first = result
-        result = self.fallback.solve(self.q, aim)
-        return replace(result, iterations=result.iterations + first.iterations)
-
-    def _accept(self, result: NewtonResult, pressure: float) -> None:
-        self.q, self.pressure = result.q, pressure
-        used = self.solver if self.solver.last is result.q else self.fallback
-        self._slope = used.sensitivity(self.q, pressure)
 
 
 def run_steady(

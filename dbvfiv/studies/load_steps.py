@@ -1,0 +1,141 @@
+"""Load steps: from one equilibrium to the next in pressure, for any model that an equilibrium solver takes."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, Callable
+
+import numpy as np
+
+from ..errors import SolveError
+from ..model.newton import EquilibriumSolver, NewtonOptions, NewtonResult
+from .observer import Observer
+
+
+@dataclass(frozen=True)
+class LoadStepOptions:
+    """Options of load steps.
+
+    Attributes
+    ----------
+    newton : NewtonOptions
+    min_step : float
+        Smallest load step over the target pressure before giving up.
+    first_step, max_step : float, Pa
+        Load step from the start, and the largest; without bounds the whole way is tried at once.
+    """
+
+    newton: NewtonOptions = NewtonOptions()
+    min_step: float = 1e-4
+    first_step: float = np.inf
+    max_step: float = np.inf
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a pressure was reached: Newton iterations over all load steps, load steps, and the last equilibrium iteration."""
+
+    iterations: int
+    steps: int
+    result: NewtonResult
+
+
+@dataclass
+class LoadSteps:
+    """Walks a model from one equilibrium to the next in pressure.
+
+    Steps are predicted along the tangent of the equilibrium path, tried whole first, halved when Newton fails and doubled when it succeeds.
+
+    Parameters
+    ----------
+    model : ValveModel, PressedShell or alike
+    options : LoadStepOptions
+    pressure : float, Pa
+    q : (n,) array
+        Where the walk starts; at rest by default.
+    observer : Observer
+    accepted : callable, optional
+        Called as accepted(pressure, q) at every equilibrium on the way, the last included.
+    """
+
+    model: Any
+    options: LoadStepOptions = LoadStepOptions()
+    pressure: float = 0.0
+    q: np.ndarray | None = None
+    observer: Observer = field(default_factory=Observer)
+    accepted: Callable[[float, np.ndarray], None] | None = None
+
+    def __post_init__(self):
+        self.q = self.model.rest() if self.q is None else np.asarray(self.q, float)
+        self.solver = EquilibriumSolver(self.model, self.options.newton)
+        self.fallback = EquilibriumSolver(self.model, replace(self.options.newton, line_search="l2"))
+        self.slope: np.ndarray | None = None
+        self._step = self.options.first_step
+
+    def reach(self, target: float) -> Way:
+        """Walk to a pressure, Pa; `self.pressure` and `self.q` hold the equilibrium.
+
+        Raises
+        ------
+        SolveError
+            If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
+        """
+        smallest = self.options.min_step * max(abs(target), abs(self.pressure))
+        step = np.copysign(min(abs(target - self.pressure), self._step, self.options.max_step), target - self.pressure)
+        iterations, steps = 0, 0
+        while True:
+            remaining = target - self.pressure
+            last = abs(step) >= abs(remaining) * (1 - 1e-12)
+            aim = target if last else self.pressure + step
+            result = self._attempt(aim)
+            iterations += result.iterations
+            if result.converged:
+                steps += 1
+                self._accept(result, aim)
+                self._step = max(2 * abs(step), self.options.first_step)
+                if last:
+                    return Way(iterations, steps, result)
+                step = np.copysign(min(2 * abs(step), abs(target - self.pressure), self.options.max_step), step)
+                self.observer.progress(f"equilibrium at {aim:.6g} Pa, {result.iterations} iterations")
+                continue
+            step = (aim - self.pressure) / 2
+            self.observer.progress(f"no equilibrium at {aim:.6g} Pa ({result.reason}), step halved to {abs(step):.3g} Pa")
+            if abs(step) < smallest:
+                raise SolveError(
+                    f"No equilibrium was found between {self.pressure:.6g} Pa, the last one, and {aim:.6g} Pa on the way to {target:.6g} Pa: "
+                    f"{result.reason}; load steps down to {2 * abs(step):.3g} Pa and two line searches were tried."
+                )
+
+    def settle(self) -> NewtonResult:
+        """Solve again at the present pressure, after something else of the model has changed.
+
+        Raises
+        ------
+        SolveError
+        """
+        result = self.solver.solve(self.q, self.pressure)
+        if not result.converged:
+            result = self.fallback.solve(self.q, self.pressure)
+        if not result.converged:
+            raise SolveError(f"The equilibrium at {self.pressure:.6g} Pa was lost: {result.reason}.")
+        self._take(result, self.pressure)
+        return result
+
+    def _attempt(self, aim: float) -> NewtonResult:
+        start = self.q if self.slope is None else self.q + (aim - self.pressure) * self.slope
+        result = self.solver.solve(start, aim)
+        if result.converged:
+            return result
+        first = result
+        result = self.fallback.solve(self.q, aim)
+        return replace(result, iterations=result.iterations + first.iterations)
+
+    def _accept(self, result: NewtonResult, pressure: float) -> None:
+        self._take(result, pressure)
+        if self.accepted is not None:
+            self.accepted(pressure, self.q)
+
+    def _take(self, result: NewtonResult, pressure: float) -> None:
+        self.q, self.pressure = result.q, pressure
+        used = self.solver if self.solver.last is result.q else self.fallback
+        if used.tangent is not None:
+            self.slope = used.sensitivity(self.q, pressure)
