@@ -71,7 +71,7 @@ class ValveModel:
         self.stops = lip_stops(self.mesh, dofs.index, case.supports, case.valve.duckbill_length)
         self.station_of_node = np.empty(len(self.mesh.nodes), np.int64)
         self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
-        self.loaded = _loaded_share(self.mesh, case)
+        self.loaded = loaded_share(self.mesh, case)
         gap_area = self.mesh.rest_area[0] - self.mesh.wall_deduction[0]
         if case.drive.kind == "flow":
             storage = 1.0 if case.fluid.continuity == "storage" else 0.0
@@ -230,7 +230,7 @@ class ValveModel:
         return QUARTERS * density * velocity * float(self.mesh.rest_area[-1] - self.mesh.wall_deduction[-1])
 
 
-def _loaded_share(mesh: ValveMesh, case: Case) -> np.ndarray:
+def loaded_share(mesh: ValveMesh, case: Case) -> np.ndarray:
     """(ne,) share of each element that carries pressure: none beside the side edge of the duckbill (App. A)."""
     limit = 1.0 - case.drive.unloaded_edge
     left, right = mesh.element_columns.T
