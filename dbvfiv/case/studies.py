@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, StrictBool, StrictInt, StrictStr
 
 from .axis import Axis, parse_axis
-from .quantity import Frequency, Number, Pressure, Rate, Time
+from .quantity import Frequency, Length, Number, Pressure, Rate, Time
 from .section import Section, key
 
 
@@ -87,3 +87,23 @@ class Closure(Section):
     pressures: tuple[LoadPressure, ...] = key(
         (7e3, 14e3, 21e3, 28e3), "Back pressures.", min_length=1
     )
+    supports: Literal["contact", "held-lips"] = key(
+        "contact",
+        "Inner faces touching the closing plane, or the simplification of Th. 3.6: duckbill held shut, mid-surface of the "
+        "saddle kept from crossing the plane.",
+    )
+    start: Literal["rest", "open"] = key("rest", "From the valve at rest, or from the steady flow at open_pressure turned back.")
+    open_pressure: LoadPressure = key(10e3, "Inlet pressure of the open start.")
+    max_step: LoadPressure = key(1e3, "Largest load step; the stiffness is watched for buckling at each.")
+    contact_depth: Length = key(
+        3e-6,
+        "Depth to which the largest back pressure alone would press the faces into each other, before multipliers push them apart.",
+        gt=0,
+        le=1e-3,
+    )
+    penetration: Length = key(1e-6, "Largest penetration that is left.", gt=0, le=1e-3)
+    shut_fraction: Number = key(
+        0.1, "A section counts as shut when less than this fraction of the lip's opening at rest is left.", ge=0, lt=1
+    )
+    eigenvalues: StrictInt = key(4, "Lowest eigenvalues of the tangent stiffness to follow.", ge=1, le=100)
+    arclength: StrictBool = key(True, "Go on along the equilibrium path by arclength when load steps end at a limit point.")

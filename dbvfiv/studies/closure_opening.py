@@ -1,0 +1,95 @@
+"""What stays open between the inner faces, row by row, and over which length the valve is shut."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .closure_model import ClosureModel
+
+#: The quarter model meets the closing plane once; the whole valve's walls meet each other over two such quarters.
+FACES = 2
+
+
+@dataclass(frozen=True)
+class Opening:
+    """Passage between the inner faces of one state, a quarter of it, by mesh row from the lip.
+
+    Attributes
+    ----------
+    z : (rows,) array, m
+    area : (rows,) array, m2
+        Between inner face and closing plane; overlapping faces count as shut.
+    reference : float, m2
+        The same at the lip at rest.
+    gap : (rows, columns) array, m
+        Height of the inner face above the plane, measured as the contact measures it; zero on the side edge.
+    width : (rows,) array, m
+        Width of the inner face.
+    """
+
+    z: np.ndarray
+    area: np.ndarray
+    reference: float
+    gap: np.ndarray
+    width: np.ndarray
+
+    @property
+    def narrowest(self) -> int:
+        """Row with the least opening."""
+        return int(np.argmin(self.area))
+
+    def shut_length(self, fraction: float) -> float:
+        """Length along the axis, m, on which the opening is below a fraction of that of the lip at rest; areas are linear between rows."""
+        return float(sum(b - a for a, b in self.shut_intervals(fraction)))
+
+    def shut_intervals(self, fraction: float) -> list[tuple[float, float]]:
+        """Intervals of z, m, on which the valve is shut in that sense."""
+        excess = self.area - fraction * self.reference
+        cuts: list[tuple[float, float]] = []
+        for i in range(len(self.z) - 1):
+            a, b, fa, fb = self.z[i], self.z[i + 1], excess[i], excess[i + 1]
+            if fa > 0 and fb > 0:
+                continue
+            start = a if fa <= 0 else a + (b - a) * fa / (fa - fb)
+            stop = b if fb <= 0 else a + (b - a) * fa / (fa - fb)
+            if cuts and abs(cuts[-1][1] - start) < 1e-12:
+                cuts[-1] = (cuts[-1][0], stop)
+            elif stop > start:
+                cuts.append((start, stop))
+        return [(float(a), float(b)) for a, b in cuts]
+
+
+def opening(model: ClosureModel, q: np.ndarray) -> Opening:
+    """Opening of a state (n,)."""
+    nodal = model.pressed.nodal(q)
+    shell, face, rows = model.pressed.shell, model.face, model.mesh.rows
+    gap, reach = _gaps(model, nodal, shell.directors(nodal)[0])
+    at_rest, rest_reach = _gaps(model, np.zeros_like(nodal), shell.mesh.directors)
+    area = _area(gap[rows], reach[rows])
+    area[model.held] = 0.0
+    return Opening(
+        z=model.mesh.z,
+        area=area,
+        reference=float(_area(at_rest[rows[:1]], rest_reach[rows[:1]])[0]),
+        gap=gap[rows],
+        width=np.sum(np.maximum(np.diff(reach[rows], axis=1), 0.0), axis=1),
+    )
+
+
+def _gaps(model, nodal, directors) -> tuple[np.ndarray, np.ndarray]:
+    """Gap (nn,) and x position (nn,) of the inner face at all nodes; the clamped flange is no contact node but has a face all the same."""
+    from ..contact import nodal_thickness
+
+    depth = 0.5 * nodal_thickness(model.pressed.shell)
+    point = model.pressed.mesh.nodes + nodal[:, :3] - depth[:, None] * directors
+    lift = np.zeros(len(depth))
+    lift[model.face.nodes] = model.face.lift
+    return point[:, 1] + lift, point[:, 0]
+
+
+def _area(gap: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Area (rows,) under the gap of rows of points; where the face folds back on itself no width is counted."""
+    height = np.maximum(gap, 0.0)
+    step = np.maximum(np.diff(x, axis=1), 0.0)
+    return np.sum(0.5 * (height[:, 1:] + height[:, :-1]) * step, axis=1)
