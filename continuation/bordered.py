@@ -52,6 +52,11 @@ class Bordered:
                 "The bordered matrix is singular: the border does not lift the rank loss."
             )
 
+    @property
+    def complement_sign(self) -> float:
+        """Sign of ``d - c' A^-1 b``: of the determinant, over that of ``A`` (real matrices)."""
+        return float(np.sign(self._delta))
+
     def matvec(self, z):
         x, y = z[:-1], z[-1]
         return np.append(self.inner.matvec(x) + self.b * y, self.c @ x + self.d * y)

@@ -21,13 +21,14 @@ def lagrange(nodes, points) -> tuple[np.ndarray, np.ndarray]:
     """Lagrange basis and its derivative at ``points``, both of shape (points, nodes)."""
     nodes, points = np.asarray(nodes, float), np.asarray(points, float)
     value = np.empty((points.size, nodes.size))
-    slope = np.empty_like(value)
+    slope = np.zeros_like(value)
+    # Products of differences; expanded coefficients would lose digits at degree 6.
     for i, node in enumerate(nodes):
         others = np.delete(nodes, i)
-        # Roots give coefficients without loss at the low degrees used here.
-        polynomial = np.poly1d(others, r=True) / np.prod(node - others)
-        value[:, i] = polynomial(points)
-        slope[:, i] = polynomial.deriv()(points)
+        factors = (points[:, None] - others) / (node - others)
+        value[:, i] = factors.prod(axis=1)
+        for k, other in enumerate(others):
+            slope[:, i] += np.delete(factors, k, axis=1).prod(axis=1) / (node - other)
     return value, slope
 
 

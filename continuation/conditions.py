@@ -29,6 +29,12 @@ def null_pair(solver, p, q):
     return right[-1], right[:-1], np.conj(left[:-1]), border
 
 
+def generic_borders(size):
+    """Two fixed vectors without any symmetry a model might have."""
+    i = np.arange(1.0, size + 1.0)
+    return np.cos(i * i) / np.sqrt(size), np.sin(i * i) / np.sqrt(size)
+
+
 class FoldCondition:
     """``g = 0``: ``F_u`` is singular.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from continuation.conditions import BogdanovTakensCondition, null_pair
+from continuation.conditions import BogdanovTakensCondition, generic_borders, null_pair
 from continuation.errors import ContinuationError, DerivativeMissing, SingularSystem
 from continuation.locate import special_at
 from continuation.normal_form import fold_coefficient, hopf_normal_form
@@ -88,7 +88,6 @@ class HopfCurveMonitor:
 
     def __init__(self, lyapunov=True):
         self.lyapunov = lyapunov
-        self._borders = None
 
     def measure(self, tracer, here):
         value, problem = here.local.condition, tracer.problem
@@ -105,14 +104,17 @@ class HopfCurveMonitor:
         here.tests["zero-hopf"] = self._zero(here)
 
     def _zero(self, here):
-        """Bordered scalar of ``F_u``: zero with a real eigenvalue at zero."""
-        n = here.local.u.size
-        if self._borders is None:
-            self._borders = (np.cos(np.arange(n)), np.sin(np.arange(1.0, n + 1.0)))
+        """Changes sign with a real eigenvalue at zero: by the determinant where there is one.
+
+        The bordered scalar in its place has poles as well, which can hide a zero.
+        """
+        linear = here.local.linear
         try:
-            return float(null_pair(here.local.linear, *self._borders)[0])
+            g = float(null_pair(linear, *generic_borders(linear.size))[0])
         except SingularSystem:
             return np.nan
+        sign = getattr(linear, "determinant_sign", None)
+        return g if sign is None else abs(g) * sign()
 
     def between(self, tracer, before, after, index, found):
         special = []

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg as sla
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from scipy.sparse.csgraph import connected_components
 
 from continuation.errors import SingularSystem
 
@@ -50,6 +51,12 @@ class DenseSolver:
         return sla.lu_solve((self._lu, self._pivots), rhs, trans=1, check_finite=False)
 
 
+    def determinant_sign(self):
+        """Sign of the determinant of the (real) matrix factorised."""
+        swaps = np.count_nonzero(self._pivots != np.arange(self._pivots.size))
+        return float(np.prod(np.sign(np.diagonal(self._lu)))) * (-1.0) ** swaps
+
+
 class SparseSolver:
     """SuperLU of a sparse matrix; a singular one is shifted by a rounding-sized multiple of 1."""
 
@@ -75,6 +82,11 @@ class SparseSolver:
     def rmatvec(self, x):
         return self.matrix.T @ x
 
+    def determinant_sign(self):
+        """Sign of the determinant of the (real) matrix factorised."""
+        sign = np.prod(np.sign(self._lu.U.diagonal()))
+        return float(sign * _parity(self._lu.perm_r) * _parity(self._lu.perm_c))
+
     def _solve(self, rhs, trans):
         rhs = np.asarray(rhs)
         if np.iscomplexobj(rhs) and not np.iscomplexobj(self.matrix.data):
@@ -88,6 +100,15 @@ class SparseSolver:
 
     def solve_transpose(self, rhs):
         return self._solve(rhs, "T")
+
+
+def _parity(permutation) -> int:
+    """+1 for an even permutation, -1 for an odd one."""
+    count, _ = connected_components(
+        sp.csr_matrix((np.ones(permutation.size), (np.arange(permutation.size), permutation))),
+        directed=False,
+    )
+    return -1 if (permutation.size - count) % 2 else 1
 
 
 def solver_for(matrix):
@@ -141,6 +162,10 @@ class MatrixLinearisation:
 
     def solve_transpose(self, rhs):
         return self._factors.solve_transpose(rhs)
+
+    def determinant_sign(self) -> float:
+        """Sign of ``det A``; optional in the contract, it makes branch points easy to see."""
+        return self._factors.determinant_sign()
 
     def mass_matvec(self, x):
         return self.mass @ x

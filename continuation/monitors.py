@@ -8,7 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from continuation.bordered import Bordered
-from continuation.conditions import BranchPointCondition, FoldCondition, null_pair
+from continuation.conditions import (
+    BranchPointCondition,
+    FoldCondition,
+    generic_borders,
+    null_pair,
+)
 from continuation.errors import SingularSystem
 from continuation.locate import safeguarded, special_at
 from continuation.normal_form import fold_coefficient
@@ -73,26 +78,40 @@ def solve_fold(tracer, guess):
 
 
 class BranchPointMonitor:
-    """Simple branch points: the bordered scalar of ``[[F_u, F_p], [t']]`` changes sign."""
+    """Simple branch points: ``[[F_u, F_p], [t']]`` becomes singular.
+
+    Where the linearisation offers ``determinant_sign`` the sign of that determinant is
+    watched, which cannot fail.  Otherwise a bordered scalar is; it has poles too, and a pole
+    and a zero within one step hide each other: then only a spectrum tells.
+    """
 
     def __init__(self):
         self._b = self._c = None
 
     def measure(self, tracer, here):
-        n = tracer.problem.n
         if self._b is None:
-            self._b = np.cos(np.arange(n + 1.0)) / np.sqrt(n + 1)
-            self._c = np.sin(np.arange(1.0, n + 2.0)) / np.sqrt(n + 1)
-        here.tests["branch point"] = self._scalar(tracer, here)[0]
+            self._b, self._c = generic_borders(tracer.problem.n + 1)
         here.data["borders"] = (self._b, self._c)
+        here.tests["branch point"] = self._test(tracer, here)
+
+    def _test(self, tracer, here, borders=None):
+        g = self._scalar(tracer, here, borders)[0]
+        sign = self._sign(tracer, here)
+        return g if sign is None else sign * abs(g)
+
+    def _extended(self, tracer, here):
+        row = tracer.problem.weights * here.tangent
+        return Bordered(here.local.linear, here.local.columns[0], row[:-1], row[-1])
+
+    def _sign(self, tracer, here):
+        own = getattr(here.local.linear, "determinant_sign", None)
+        return None if own is None else own() * self._extended(tracer, here).complement_sign
 
     def _scalar(self, tracer, here, borders=None):
-        """``g`` and the null vectors with the borders in force."""
+        """``g`` and the null vectors with the borders given or in force."""
         b, c = borders or (self._b, self._c)
-        row = tracer.problem.weights * here.tangent
-        extended = Bordered(here.local.linear, here.local.columns[0], row[:-1], row[-1])
         try:
-            g, v, w, _ = null_pair(extended, b, c)
+            g, v, w, _ = null_pair(self._extended(tracer, here), b, c)
         except SingularSystem:
             return np.nan, None, None
         return float(g), v, w
@@ -101,20 +120,24 @@ class BranchPointMonitor:
         borders = after.data["borders"]
         g0, g1 = before.tests["branch point"], after.tests["branch point"]
         if before.data["borders"][0] is not borders[0]:
-            g0 = self._scalar(tracer, before, borders)[0]
+            g0 = self._test(tracer, before, borders)
         special = self._examine(tracer, before, after, index, g0, g1, borders)
         self._adapt(tracer, after)
         return special
 
     def _adapt(self, tracer, here):
-        """Turn the borders to the vectors just found, for a well-scaled test function."""
-        g, v, w = self._scalar(tracer, here)
+        """Turn the borders towards the vectors just found, for a well-scaled test function.
+
+        A generic part stays, so that no other vector ever is out of their sight.
+        """
+        _, v, w = self._scalar(tracer, here)
         if v is None:
             return
-        b, c = w / np.linalg.norm(w), v / np.linalg.norm(v)
-        self._b, self._c = b, c
-        here.tests["branch point"] = self._scalar(tracer, here)[0]
-        here.data["borders"] = (b, c)
+        b, c = generic_borders(v.size)
+        self._b = w / np.linalg.norm(w) + 0.3 * b
+        self._c = v / np.linalg.norm(v) + 0.3 * c
+        here.data["borders"] = (self._b, self._c)
+        here.tests["branch point"] = self._test(tracer, here)
 
     def _examine(self, tracer, before, after, index, g0, g1, borders):
         if not np.isfinite(g0 * g1) or (g0 * g1 >= 0 and g1 != 0):
@@ -125,12 +148,12 @@ class BranchPointMonitor:
         sizes = []
 
         def indicator(here):
-            g = self._scalar(tracer, here, borders)[0]
+            g = self._test(tracer, here, borders)
             sizes.append(abs(g))
             return g
 
         def attempt(guess, *_):
-            point = self._solve(tracer, guess, borders)
+            point = self.solve(tracer, guess, borders)
             return point if isinstance(point, str) else (point.z[:-1], point)
 
         result, guess, reason = safeguarded(tracer, before, after, indicator, attempt)
@@ -138,13 +161,16 @@ class BranchPointMonitor:
             if sizes[-1] > max(abs(g0), abs(g1)):
                 return []  # The test function went through infinity: no branch point.
             return [special_at(tracer, "branch point", guess, index, False, reason)]
-        return [self._describe(tracer, result, guess, index)]
+        return [self.describe(tracer, result, guess, index)]
 
-    def _solve(self, tracer, guess, borders):
+    def solve(self, tracer, guess, borders):
+        """Newton on the augmented system; a `Correction` or a sentence that says why not."""
         problem = tracer.problem
-        _, v, w = self._scalar(tracer, guess, borders)
-        if v is None:
-            return "The bordered matrix is singular."
+        for _ in range(3):
+            _, v, w = self._scalar(tracer, guess, borders)
+            if v is None:
+                return "The bordered matrix is singular."
+            borders = w / np.linalg.norm(w), v / np.linalg.norm(v)
         unfolded = Unfolded(problem.system, w[: problem.n])
         rows = problem.frame(np.stack([guess.tangent, v], axis=1))
         condition = BranchPointCondition(unfolded.direction, rows)
@@ -160,7 +186,8 @@ class BranchPointMonitor:
             return "The point is a branch point of an unfolded system only."
         return result
 
-    def _describe(self, tracer, result, guess, index):
+    def describe(self, tracer, result, guess, index):
+        """The special point, with the directions of both branches."""
         value = result.local.condition
         kernel = np.stack(value.null, axis=1)
         directions = branch_directions(tracer.problem, value, guess.tangent)

@@ -35,7 +35,7 @@ class OrbitOptions:
     intervals: int = 40
     degree: int = 4
     adaptations: int = 2
-    newton: NewtonOptions = NewtonOptions(tolerance=1e-9, max_iterations=20)
+    newton: NewtonOptions = NewtonOptions(tolerance=1e-9, max_iterations=30, line_search=True)
 
     def __post_init__(self):
         require(self.intervals >= 3, "An orbit needs at least 3 mesh intervals.")

@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 from continuation.conditions import HopfCondition, null_pair
 from continuation.errors import ContinuationError, DerivativeMissing
 from continuation.locate import safeguarded, special_at
-from continuation.monitors import companion
+from continuation.monitors import BranchPointMonitor, companion
 from continuation.normal_form import hopf_normal_form
 from continuation.problem import correct
 from continuation.tracer import Here
@@ -116,17 +116,40 @@ class SpectrumMonitor:
             special.append(special_at(tracer, "stability change", after, index, False, reason))
         for i, j in oscillating:
             special.append(self._locate(tracer, before, after, index, i, j, special))
-        zero = [s for s in found if s.kind in ("fold", "branch point")]
-        if len(real) > len(zero) and depth == 0:
-            special.append(special_at(
-                tracer, "zero eigenvalue", after, index, False,
-                "a real eigenvalue crossed zero and no fold or branch point was detected"))
+        explained = [s for s in found if s.kind in ("fold", "branch point")]
+        if len(real) > len(explained):
+            for i, j in real:
+                special += self._real(tracer, before, after, index, i, j, explained + special)
 
-    def _locate(self, tracer, before, after, index, i, j, special):
-        if not tracer.options.locate:
-            return special_at(tracer, "hopf", after, index, False, "location was not asked for",
-                              {"omega": float(self.modes(tracer, after)[0][j].imag)})
+    def _real(self, tracer, before, after, index, i, j, known):
+        """A real eigenvalue through zero that nobody else explains: a branch point, most likely."""
+        if not (tracer.options.branch_points and tracer.options.locate):
+            reason = "a real eigenvalue crossed zero; branch points were not to be located"
+            return [special_at(tracer, "zero eigenvalue", after, index, False, reason)]
         limit = tracer.options.stability_tolerance
+        mode_at = self._follow(tracer, before, after, i, j)
+        search = BranchPointMonitor()
+
+        def attempt(guess, *_):
+            vector = np.append(mode_at(guess)[1][:, 0].real, 0.0)
+            point = search.solve(tracer, guess, (vector, vector))
+            if isinstance(point, str):
+                return point
+            return point.z[:-1], point
+
+        result, guess, reason = safeguarded(
+            tracer, before, after, lambda here: mode_at(here)[0][0].real - limit, attempt
+        )
+        if result is None:
+            reason = f"a real eigenvalue crossed zero; {reason}"
+            return [special_at(tracer, "zero eigenvalue", guess, index, False, reason)]
+        if any(other.located and np.allclose(other.z, result.z[:-1], rtol=1e-7, atol=1e-9)
+               for other in known):
+            return []
+        return [search.describe(tracer, result, guess, index)]
+
+    def _follow(self, tracer, before, after, i, j):
+        """A function that gives one crossing mode at any point of the bracket."""
         key = ("followed mode", before.z.tobytes(), i)
         ends = []
         for here, k in ((before, i), (after, j)):
@@ -143,6 +166,15 @@ class SpectrumMonitor:
                 here.data[key] = (values[[best]], vectors[:, [best]])
             return here.data[key]
 
+        return mode_at
+
+    def _locate(self, tracer, before, after, index, i, j, special):
+        if not tracer.options.locate:
+            return special_at(tracer, "hopf", after, index, False, "location was not asked for",
+                              {"omega": float(self.modes(tracer, after)[0][j].imag)})
+        limit = tracer.options.stability_tolerance
+        mode_at = self._follow(tracer, before, after, i, j)
+
         def attempt(guess, low, high):
             x, y = mode_at(low), mode_at(high)
             ra, rb = x[0][0].real - limit, y[0][0].real - limit
@@ -157,10 +189,10 @@ class SpectrumMonitor:
             if abs(found_omega - omega) > room:
                 return "Newton's method went to another frequency"
             for other in special:
-                if other.kind == "hopf" and other.located:
-                    same = abs(other.values["omega"] - found_omega) <= 1e-9 * found_omega
-                    if same and np.allclose(other.u, result.local.u, rtol=1e-9, atol=1e-12):
-                        return "Newton's method found the same point again"
+                if other.kind == "hopf" and other.located and np.allclose(
+                    np.append(other.z, other.values["omega"]), result.z, rtol=1e-9, atol=1e-12
+                ):
+                    return "Newton's method found the same point again"
             return result.z[:-1], result
 
         result, guess, reason = safeguarded(

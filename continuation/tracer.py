@@ -228,13 +228,12 @@ class Tracer:
             if trouble is None:
                 cosine = np.clip(problem.dot(after.tangent, here.tangent), -1.0, 1.0)
                 angle = float(np.arccos(cosine))
-                travelled = problem.norm(after.z - here.z)
                 if options.method == "arclength" and angle > options.max_angle:
                     trouble = "the tangent turns too far"
-                elif options.method == "arclength" and travelled > 3.0 * used:
-                    trouble = "the corrector went far from the prediction"
                 elif options.method == "natural" and angle > 1.0:
                     trouble = "the tangent turns too far"
+                elif self._jumped(here, after, z):
+                    trouble = "the corrector went far from the prediction"
             if trouble is None:
                 break
             self._tell("refused", branch, trouble, used)
@@ -256,6 +255,12 @@ class Tracer:
         if ending is None:
             step = float(np.clip(used * factor, options.min_step, options.max_step))
         return after, step, ending
+
+    def _jumped(self, here, after, prediction) -> bool:
+        """Whether the correction is too long for the step: likely another branch."""
+        share = max(0.5, np.tan(self.options.max_angle))
+        correction = self.problem.norm(after.z - prediction)
+        return correction > share * self.problem.norm(prediction - here.z)
 
     def _predict(self, here, step):
         problem, options = self.problem, self.options

@@ -86,3 +86,12 @@ def test_upper_half_keeps_true_multiples():
     kept, _ = Spectrum(values, np.eye(6), np.ones(6, bool)).upper_half()
     assert np.sum(kept.imag > 0) == 2
     assert np.sum(kept.imag == 0) == 2
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_determinant_sign(seed):
+    rng = np.random.default_rng(seed)
+    a = rng.standard_normal((9, 9)) * (rng.random((9, 9)) < 0.6) + 0.1 * np.eye(9)
+    sign = np.sign(np.linalg.det(a))
+    assert MatrixLinearisation(a).determinant_sign() == sign
+    assert MatrixLinearisation(sp.csc_matrix(a)).determinant_sign() == sign

@@ -1,0 +1,245 @@
+"""Following a branch: steps, limits, endings, events, files, resumption."""
+
+import json
+
+import h5py
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from continuation import (
+    Branch,
+    Checkpoint,
+    ContinuationOptions,
+    Event,
+    NewtonOptions,
+    NotConverged,
+    Observer,
+    continue_branch,
+    resume,
+)
+from continuation.jax_system import JaxSystem
+from tests.systems.normal_forms import cusp, stuart_landau
+
+MU = {"a": -2.0, "b": 1.0}
+LIMITS = {"a": (-2.0, 2.0)}
+
+
+def circle():
+    """u^2 + p^2 = 1: a closed curve with two folds."""
+    return JaxSystem(lambda u, mu: u**2 + mu["p"] ** 2 - 1.0, 1)
+
+
+def s_curve(**options):
+    return continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS, **options))
+
+
+def test_every_point_is_an_equilibrium_and_the_end_is_the_limit():
+    branch = s_curve()
+    assert branch.reason == "limit of a reached"
+    assert branch.values()[-1] == 2.0
+    assert np.all(branch.values() <= 2.0)
+    x, a = branch.states[:, 0], branch.values()
+    assert np.abs(a + x - x**3).max() < 1e-9
+    # All three states at a = 0 were passed: one root each of x - x^3 near a sign change.
+    assert np.sum(np.diff(np.sign(a)) != 0) == 3
+
+
+def test_tangents_are_unit_vectors_along_the_curve():
+    branch = s_curve(max_step=0.1)
+    for before, after in zip(branch.points, branch.points[1:]):
+        chord = after.z - before.z
+        assert np.isclose(np.linalg.norm(before.tangent), 1.0)
+        assert before.tangent @ chord > 0.9 * np.linalg.norm(chord)
+
+
+def test_angle_between_tangents_is_limited():
+    branch = s_curve(max_angle=0.1)
+    angles = [np.arccos(min(1.0, p.tangent @ q.tangent))
+              for p, q in zip(branch.points, branch.points[1:])]
+    assert max(angles) <= 0.1 + 1e-12
+    assert len(branch) > len(s_curve(max_angle=0.5))
+
+
+def test_natural_continuation_stops_before_the_fold_and_says_why():
+    branch = s_curve(method="natural", step=0.1, max_step=0.1)
+    assert branch.reason.startswith("step below its minimum")
+    fold = 2.0 / np.sqrt(27.0)
+    assert fold - 0.05 < branch.values()[-1] <= fold + 1e-9
+    assert np.allclose(np.diff(branch.values())[:10], 0.1)
+
+
+def test_direction_backwards():
+    branch = continue_branch(cusp(), [1.5], {"a": 2.0, "b": 1.0}, "a",
+                             ContinuationOptions(limits=LIMITS, direction=-1))
+    assert branch.values()[-1] == -2.0
+    assert len(branch.of_kind("fold")) == 2
+
+
+def test_starting_on_a_limit_and_leaving_it_ends_at_once():
+    branch = continue_branch(cusp(), [1.5], {"a": 2.0, "b": 1.0}, "a",
+                             ContinuationOptions(limits=LIMITS))
+    assert len(branch) == 1 and branch.reason == "limit of a reached"
+
+
+def test_a_closed_curve_is_recognised():
+    branch = continue_branch(circle(), [1.0], {"p": 0.0}, "p", ContinuationOptions(max_step=0.2))
+    assert branch.reason.startswith("closed")
+    folds = sorted(s.mu["p"] for s in branch.of_kind("fold"))
+    assert np.allclose(folds, [-1.0, 1.0], rtol=0, atol=1e-10)
+    u, p = branch.states[:, 0], branch.values()
+    total = np.abs(np.diff(np.unwrap(np.arctan2(p, u)))).sum()
+    assert 2 * np.pi * 0.95 < total < 2 * np.pi * 1.15
+
+
+def test_start_exactly_at_a_fold():
+    """F_u = 0 at the first point; the natural frame is singular there."""
+    branch = continue_branch(circle(), [0.0], {"p": 1.0}, "p", ContinuationOptions(max_step=0.2))
+    assert np.abs(branch.states[:, 0] ** 2 + branch.values() ** 2 - 1).max() < 1e-9
+    assert len(branch) > 10
+
+
+def test_events_are_located_and_can_end_the_branch():
+    crossing = Event("x is one half", lambda u, mu: u[0] - 0.5)
+    branch = continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS), [crossing])
+    (point,) = branch.of_kind("x is one half")
+    assert abs(point.u[0] - 0.5) < 1e-9 and abs(point.mu["a"] + 0.5 - 0.125) < 1e-9
+    stopping = Event("x is one half", lambda u, mu: u[0] - 0.5, stop=True)
+    short = continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS), [stopping])
+    assert short.reason == "stopped at: x is one half" and len(short) < len(branch)
+
+
+def test_stop_at_a_kind():
+    branch = s_curve(stop_at=frozenset({"fold"}))
+    assert branch.reason == "stopped at: fold" and len(branch.of_kind("fold")) == 1
+
+
+def test_no_equilibrium_at_the_start_is_an_error():
+    with pytest.raises(NotConverged, match="first point was not found"):
+        continue_branch(circle(), [0.1], {"p": 5.0}, "p",
+                        ContinuationOptions(newton=NewtonOptions(max_iterations=3)))
+
+
+def test_wrong_shape_and_unknown_parameter():
+    with pytest.raises(ValueError, match="needs"):
+        continue_branch(circle(), [0.0, 1.0], {"p": 0.0}, "p")
+    with pytest.raises(KeyError, match="'q' is not one of: p"):
+        continue_branch(circle(), [1.0], {"p": 0.0}, "q")
+
+
+def test_a_domain_that_ends_keeps_the_points_up_to_there():
+    """log(1 - p) leaves the reals at p = 1, with nothing to find beyond."""
+    system = JaxSystem(lambda u, mu: u - jnp.log(1.0 - mu["p"]), 1)
+    branch = continue_branch(system, [0.0], {"p": 0.0}, "p",
+                             ContinuationOptions(max_points=50, max_step=2.0, step=0.5))
+    assert np.all(np.isfinite(branch.states))
+    assert np.all(branch.values() < 1.0)
+
+
+class Stop(Observer):
+    def __init__(self, after):
+        self.after, self.refusals, self.finds, self.end = after, [], [], 0
+
+    def accepted(self, branch):
+        if len(branch) == self.after:
+            raise KeyboardInterrupt
+
+    def refused(self, branch, reason, step):
+        self.refusals.append((reason, step))
+
+    def found(self, branch, special):
+        self.finds.append(special.kind)
+
+    def ended(self, branch):
+        self.end += 1
+
+
+def test_interruption_keeps_points_and_resuming_gives_the_same_branch(tmp_path):
+    path = tmp_path / "branch.h5"
+    options = ContinuationOptions(limits=LIMITS, eigenvalues=1)
+    whole = continue_branch(cusp(), [-1.5], MU, "a", options)
+    stop = Stop(after=8)
+    part = continue_branch(cusp(), [-1.5], MU, "a", options, observers=[stop, Checkpoint(path, 3)])
+    assert part.reason == "interrupted" and len(part) == 8 and stop.end == 1
+    loaded = Branch.load(path)
+    assert loaded.reason == "interrupted" and len(loaded) == 8
+    longer = resume(cusp(), loaded, options)
+    assert len(loaded) == 8  # the one handed over stays as it is
+    assert longer.reason == whole.reason and len(longer) == len(whole)
+    assert np.allclose(longer.values(), whole.values(), rtol=0, atol=1e-9)
+    assert [s.kind for s in longer.special] == [s.kind for s in whole.special]
+
+
+def test_observers_hear_of_refusals_and_finds():
+    stop = Stop(after=-1)
+    continue_branch(cusp(), [-1.5], MU, "a",
+                    ContinuationOptions(limits=LIMITS, step=0.5, max_angle=0.15), observers=stop)
+    assert stop.finds == ["fold", "fold"]
+    assert stop.refusals and all(step > 0 for _, step in stop.refusals)
+
+
+def test_a_plain_function_is_an_observer():
+    lengths = []
+    branch = continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS),
+                             observers=lambda b: lengths.append(len(b)))
+    assert lengths == list(range(2, len(branch) + 1))
+
+
+def test_file_holds_everything(tmp_path):
+    path = tmp_path / "b.h5"
+    system = stuart_landau()
+    branch = continue_branch(system, [0, 0], {"mu": -0.5, "w": 2.0, "c": 0.7}, "mu",
+                             ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)}))
+    branch.save(path)
+    again = Branch.load(path)
+    assert not path.with_name("b.h5.partial").exists()
+    assert again.to_dict() == branch.to_dict()
+    assert np.array_equal(again.states, branch.states)
+    assert np.array_equal(again.values("fold"), branch.values("fold"))
+    one, two = branch.of_kind("hopf")[0], again.of_kind("hopf")[0]
+    assert np.array_equal(one.vectors["right"], two.vectors["right"])
+    assert one.values == two.values
+
+
+def test_a_foreign_file_is_refused(tmp_path):
+    path = tmp_path / "x.h5"
+    with h5py.File(path, "w") as file:
+        file["y"] = 1
+    with pytest.raises(ValueError, match="not a branch file"):
+        Branch.load(path)
+
+
+def test_json_is_valid_and_complete():
+    branch = s_curve(eigenvalues=1)
+    data = json.loads(branch.to_json())
+    assert data["points"][-1]["a"] == 2.0
+    assert data["points"][0]["unstable_count"] == 0
+    assert [s["kind"] for s in data["special"]] == ["fold", "fold"]
+    assert data["fixed"] == {"b": 1.0}
+
+
+def test_plot_draws_stability_and_special_points():
+    import matplotlib
+
+    matplotlib.use("Agg")
+    branch = s_curve(eigenvalues=1)
+    ax = branch.plot(0)
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert labels == ["fold"]
+    drawn = [np.isfinite(line.get_ydata()).sum() for line in ax.lines if line.get_linestyle() == "--"]
+    assert drawn == [np.sum(branch.unstable > 0)]
+
+
+def test_scales_make_a_branch_in_other_units_the_same():
+    """The same curve with the state in millis and the parameter in kilos."""
+    def other(u, mu):
+        x, a = u * 1e-3, mu["a"] * 1e3
+        return a + x - x**3
+
+    branch = continue_branch(
+        JaxSystem(other, 1), [-1500.0], {"a": -2e-3}, "a",
+        ContinuationOptions(limits={"a": (-2e-3, 2e-3)}, state_scale=1e3,
+                            parameter_scales={"a": 1e-3}))
+    plain = s_curve()
+    assert len(branch) == len(plain)
+    assert np.allclose(branch.values() * 1e3, plain.values(), atol=1e-8)

@@ -1,0 +1,130 @@
+"""The first Lyapunov coefficient: known values, and what it must not depend on."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from continuation import ContinuationOptions, NotABifurcation, continue_branch, hopf_normal_form
+from continuation.jax_system import JaxSystem
+from tests.systems.brusselator import brusselator
+from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
+
+MU = {"mu": -0.5, "w": 2.0, "c": 0.7}
+
+
+def hopf_of(system, u, mu, parameter, low, high):
+    branch = continue_branch(system, u, mu, parameter,
+                             ContinuationOptions(eigenvalues=3, limits={parameter: (low, high)}))
+    (point,) = branch.of_kind("hopf")
+    form = hopf_normal_form(system, point.u, point.mu, point.values["omega"],
+                            point.vectors["right"], point.vectors["left"], parameter)
+    return point, form
+
+
+@pytest.mark.parametrize("make", [stuart_landau, warped_stuart_landau])
+def test_stuart_landau_also_behind_a_mass_that_depends_on_state_and_parameter(make):
+    """z' = (mu + i w) z - (1 + i c) z |z|^2 has c1 = -(1 + i c) per |z|^2; q* q = 1 doubles it."""
+    _, form = hopf_of(make(), [0, 0], MU, "mu", -1, 1)
+    assert np.isclose(form.omega, 2.0, rtol=1e-12)
+    assert np.isclose(form.c1, -2.0 * (1 + 0.7j), rtol=1e-10)
+    assert np.isclose(form.crossing, 1.0, rtol=1e-10)
+    assert form.criticality == "super" and form.side() == 1
+    # The cycle is exactly |z| = sqrt(mu), and turns at w - c mu.
+    assert np.isclose(form.amplitude_coefficient(np.array([1.0, 0.0])), 1.0, rtol=1e-10)
+    assert np.isclose(form.frequency(0.3), 2.0 - 0.7 * 0.3, rtol=1e-10)
+    assert np.isnan(form.radius(-0.1))
+
+
+def test_criticality_of_the_mirror_image():
+    """Backwards in time a supercritical point is subcritical."""
+    plain = stuart_landau()
+    system = JaxSystem(lambda u, mu: -plain._residual(u, {**mu, "mu": mu["mu"]}), 2)
+    _, form = hopf_of(system, [0, 0], MU, "mu", -1, 1)
+    assert form.criticality == "sub" and np.isclose(form.l1, 1.0)
+    assert form.side() == 1  # the same cycles, on the same side
+
+
+def brusselator_numbers(system, u, extra=()):
+    _, form = hopf_of(system, u, {"A": 1.0, "B": 1.5}, "B", 0.5, 3.0)
+    first = np.eye(len(u))[0]
+    return np.array([form.omega, form.amplitude_coefficient(first), form.crossing.real,
+                     form.crossing.imag, form.c1.imag / form.c1.real, form.side(),
+                     form.frequency(0.1)])
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return brusselator_numbers(brusselator(), [1.0, 1.5])
+
+
+def test_constant_mass_changes_nothing_of_substance(reference):
+    b = np.array([[2.0, 0.5], [-0.3, 1.0]])
+    plain = brusselator()
+    system = JaxSystem(lambda u, mu: jnp.asarray(b) @ plain._residual(u, mu), 2, mass=b)
+    assert np.allclose(brusselator_numbers(system, [1.0, 1.5]), reference, rtol=1e-9, atol=1e-12)
+
+
+def test_algebraic_constraint_with_singular_mass(reference):
+    """The reaction rate x^2 y as an unknown with 0 = x^2 y - s."""
+    def residual(u, mu):
+        x, y, s = u
+        return jnp.stack([mu["A"] - (mu["B"] + 1) * x + s, mu["B"] * x - s, x**2 * y - s])
+
+    system = JaxSystem(residual, 3, mass=np.diag([1.0, 1.0, 0.0]))
+    assert np.allclose(brusselator_numbers(system, [1.0, 1.5, 1.5]), reference, rtol=1e-9, atol=1e-12)
+
+
+def test_other_coordinates(reference):
+    """A nonlinear change y = s - x^2/3 moves every derivative and no invariant."""
+    plain = brusselator()
+
+    def residual(u, mu):
+        x, s = u
+        f = plain._residual(jnp.stack([x, s - x**2 / 3]), mu)
+        return jnp.stack([f[0], f[1] + 2 * x / 3 * f[0]])
+
+    numbers = brusselator_numbers(JaxSystem(residual, 2), [1.0, 1.5 + 1 / 3])
+    assert np.allclose(numbers, reference, rtol=1e-9, atol=1e-12)
+
+
+def test_phase_and_size_of_the_vectors_do_not_matter():
+    system = brusselator()
+    point, form = hopf_of(system, [1.0, 1.5], {"A": 1.0, "B": 1.5}, "B", 0.5, 3.0)
+    again = hopf_normal_form(system, point.u, point.mu, form.omega, 7j * form.q, (2 - 1j) * form.p)
+    assert np.isclose(again.l1, form.l1, rtol=1e-11)
+    assert np.isclose(np.vdot(again.q, again.q), 1.0)
+    assert np.isclose(np.vdot(again.p, again.q), 1.0)
+    with pytest.raises(ValueError, match="name a parameter"):
+        again.amplitude_coefficient()
+
+
+def test_second_order_motion_satisfies_the_equation_to_third_order():
+    """u(t) from q, h20, h11 leaves a defect of order radius^3."""
+    system = brusselator()
+    point, form = hopf_of(system, [1.0, 1.5], {"A": 1.0, "B": 1.5}, "B", 0.5, 3.0)
+    defects = []
+    for radius in (2e-2, 1e-2):
+        t = np.linspace(0, 2 * np.pi, 33)
+        h = 1e-4
+        rate = (form.orbit(radius, t + h) - form.orbit(radius, t - h)) / (2 * h) * form.omega
+        force = np.array([system.residual(u, point.mu) for u in form.orbit(radius, t)])
+        defects.append(np.abs(rate - force).max())
+    assert 2.7 < np.log2(defects[0] / defects[1]) < 3.3
+
+
+def test_linear_system_is_degenerate():
+    system = JaxSystem(lambda u, mu: jnp.stack([mu["mu"] * u[0] - u[1], u[0] + mu["mu"] * u[1]]), 2)
+    _, form = hopf_of(system, [0, 0], {"mu": -0.5}, "mu", -1, 1)
+    assert form.criticality == "degenerate"
+    assert form.amplitude_coefficient() == np.inf
+
+
+def test_what_is_no_hopf_point_is_refused():
+    system = bautin()
+    with pytest.raises(NotABifurcation, match="positive frequency"):
+        hopf_normal_form(system, [0, 0], {"mu": 0.0, "nu": 0.0}, 0.0, np.ones(2), np.ones(2))
+    nilpotent = JaxSystem(lambda u, mu: jnp.stack([-u[1] + u[2], u[0] + u[3], -u[3], u[2]]), 4)
+    with pytest.raises(NotABifurcation, match="not simple"):
+        q = np.array([1, -1j, 0, 0])
+        p = np.array([0, 0, 1, -1j])
+        hopf_normal_form(nilpotent, np.zeros(4), {}, 1.0, q, p)
