@@ -2,11 +2,12 @@
 
 The pressures couple every row of the mesh to the rows upstream, so K - G D J would be full. Keeping row areas y and station pressures p as unknowns
 
-    [ K   0  -G ] [q]   [r]
-    [-J   I   0 ] [y] = [0]
-    [ 0  -D   I ] [p]   [0]
+    [ K   0  -G   0 ] [q]   [r]
+    [-J   I   0   0 ] [y] = [0]
+    [ 0  -D   I  -B ] [p]   [0]
+    [ 0   R   0   S ] [u]   [s]
 
-gives the same q with a sparse matrix hardly larger than K.
+gives the same q with a sparse matrix hardly larger than K. The last row and column are there if the fluid has unknowns of its own.
 """
 from __future__ import annotations
 
@@ -104,32 +105,40 @@ class SingularMatrix(ArithmeticError):
 
 
 class CoupledFactor:
-    """Factors of K - G D J.
+    """Factors of K - G D J, bordered by the fluid's own unknowns if there are any.
 
     Parameters
     ----------
     k, g, j : sparse matrices
         Patterns of K (n, n), G (n, m) and J (m, n); their values are ignored. A case without flow has m = 0 columns.
+    inner : int
+        Number l of the fluid's own unknowns u.
     """
 
-    def __init__(self, k: sp.csr_matrix, g: sp.csr_matrix, j: sp.csr_matrix):
+    def __init__(self, k: sp.csr_matrix, g: sp.csr_matrix, j: sp.csr_matrix, inner: int = 0):
         n, m = g.shape
-        self.size, self.stations = n, m
-        counts = np.array([k.nnz, g.nnz, j.nnz, m, m * m, m])
+        inner = inner if m else 0
+        self.size, self.stations, self.inner = n, m, inner
+        counts = np.array([k.nnz, g.nnz, j.nnz, m, m * m, m, m * inner, inner * m, inner * inner])
         offsets = np.concatenate([[0], np.cumsum(counts)])
         number = [np.arange(a + 1, b + 1, dtype=float) for a, b in zip(offsets[:-1], offsets[1:])]
 
         def numbered(pattern, values):
             return sp.csr_matrix((values, pattern.indices, pattern.indptr), shape=pattern.shape)
 
-        eye = sp.diags(number[3]) if m else None
-        last = sp.diags(number[5]) if m else None
+        def dense(values, rows, columns):
+            return sp.csr_matrix(values.reshape(rows, columns))
+
         if m:
-            dense = sp.csr_matrix(number[4].reshape(m, m))
-            whole = sp.bmat(
-                [[numbered(k, number[0]), None, numbered(g, number[1])], [numbered(j, number[2]), eye, None], [None, dense, last]],
-                format="csr",
-            )
+            blocks = [
+                [numbered(k, number[0]), None, numbered(g, number[1])],
+                [numbered(j, number[2]), sp.diags(number[3]), None],
+                [None, dense(number[4], m, m), sp.diags(number[5])],
+            ]
+            if inner:
+                blocks = [row + [None] for row in blocks] + [[None, dense(number[7], inner, m), None, dense(number[8], inner, inner)]]
+                blocks[2][3] = dense(number[6], m, inner)
+            whole = sp.bmat(blocks, format="csr")
         else:
             whole = numbered(k, number[0])
         whole.sort_indices()
@@ -137,25 +146,37 @@ class CoupledFactor:
         self._values = np.ones(offsets[-1])
         self._parts = [slice(a, b) for a, b in zip(offsets[:-1], offsets[1:])]
         self._factor = DirectFactor(whole.indptr, whole.indices)
-        self._padded = np.zeros(n + 2 * m)
+        self._padded = np.zeros(n + 2 * m + inner)
 
     @property
     def factorisations(self) -> int:
         return self._factor.factorisations
 
-    def refactor(self, k: np.ndarray, g: np.ndarray, j: np.ndarray, d: np.ndarray) -> None:
-        """Factor for values of K, G and J on their patterns and the dense D (m, m)."""
-        kk, gg, jj, one, dd, last = self._parts
+    def refactor(self, k: np.ndarray, g: np.ndarray, j: np.ndarray, d: np.ndarray, b=None, r=None, s=None) -> None:
+        """Factor for values of K, G and J on their patterns and the dense D (m, m), B (m, l), R (l, m) and S (l, l)."""
+        kk, gg, jj, one, dd, last, bb, rr, ss = self._parts
         values = self._values
         values[kk], values[gg], values[jj], values[dd] = k, -g, -j, -d.ravel()
+        if self.inner:
+            values[bb], values[rr], values[ss] = -np.ravel(b), np.ravel(r), np.ravel(s)
         np.take(values, self._source, out=self._factor.values)
         self._factor.refactor()
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solution (n,) for a right-hand side (n,)."""
+        """Solution (n,) for a right-hand side (n,), nothing on the fluid's own equations."""
+        self._padded[:] = 0.0
         self._padded[: self.size] = rhs
         return self._factor.solve(self._padded)[: self.size]
 
+    def solve_with_inner(self, rhs: np.ndarray, inner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Solution (n,) and fluid unknowns (l,) for right-hand sides r (n,) and s (l,)."""
+        self._padded[:] = 0.0
+        self._padded[: self.size] = rhs
+        self._padded[len(self._padded) - self.inner :] = inner
+        solution = self._factor.solve(self._padded)
+        return solution[: self.size], solution[len(solution) - self.inner :]
+
     def solve_transpose(self, rhs: np.ndarray) -> np.ndarray:
+        self._padded[:] = 0.0
         self._padded[: self.size] = rhs
         return self._factor.solve_transpose(self._padded)[: self.size]

@@ -1,0 +1,130 @@
+"""Length of the steps: a fixed grid with halvings where the iteration fails, or by the estimated local error."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .state import MotionState
+from .stepper import Stepper, StepFailure, StepResult
+
+
+@dataclass(frozen=True)
+class ControlOptions:
+    """Options of the step control.
+
+    Attributes
+    ----------
+    step : float
+        Nominal step, s; with `adaptive` the first and the largest one.
+    adaptive : bool
+        Follow the local error.
+    error : float
+        Local error of the displacements, m, that adaptive steps aim at.
+    smallest : float
+        Smallest step over the nominal one.
+    """
+
+    step: float
+    adaptive: bool = False
+    error: float = 1e-6
+    smallest: float = 1.0 / 4096.0
+
+
+class FixedSteps:
+    """Nominal steps on a grid; one that fails is halved, and steps grow back as soon as they fit the grid.
+
+    Attributes
+    ----------
+    level : int
+        The present step is the nominal one over 2^level.
+    offset : int
+        Steps of the present length since the last point of the nominal grid.
+    """
+
+    def __init__(self, stepper: Stepper, options: ControlOptions):
+        self.stepper, self.options = stepper, options
+        self.level = self.offset = self.successes = self.halvings = 0
+
+    def advance(self, state: MotionState, end: float) -> StepResult:
+        """One accepted step.
+
+        Raises
+        ------
+        StepFailure
+            If the smallest step failed too.
+        """
+        while True:
+            h = self.options.step / 2**self.level
+            try:
+                result = self.stepper.step(state, h)
+            except StepFailure:
+                if self.options.step / 2 ** (self.level + 1) < self.options.smallest * self.options.step:
+                    raise
+                self.level, self.offset, self.successes = self.level + 1, 2 * self.offset, 0
+                self.halvings += 1
+                self.stepper.forget()
+                continue
+            self._grow()
+            return result
+
+    def _grow(self) -> None:
+        self.offset += 1
+        self.successes += 1
+        # two steps in a row before trying twice the length, which must end on the coarser grid
+        while self.level and self.offset % 2 == 0 and self.successes >= 2:
+            self.level, self.offset, self.successes = self.level - 1, self.offset // 2, 0
+        if self.level == 0:
+            self.offset = 0
+
+    def pack(self) -> list[float]:
+        """Numbers that continue the control elsewhere."""
+        return [self.level, self.offset, self.successes, self.options.step]
+
+    def unpack(self, numbers) -> None:
+        self.level, self.offset, self.successes = (int(value) for value in numbers[:3])
+
+
+class AdaptiveSteps:
+    """Steps that keep the local error near a target; a step is changed only where it pays for a new factorisation."""
+
+    def __init__(self, stepper: Stepper, options: ControlOptions):
+        self.stepper, self.options = stepper, options
+        self.h = options.step
+        self.halvings = 0
+
+    def advance(self, state: MotionState, end: float) -> StepResult:
+        """One accepted step, not beyond `end`.
+
+        Raises
+        ------
+        StepFailure
+            If the smallest step failed too.
+        """
+        smallest = self.options.smallest * self.options.step
+        while True:
+            h = min(self.h, end - state.time) if end - state.time > 1e-9 * self.options.step else self.h
+            try:
+                result = self.stepper.step(state, h)
+            except StepFailure:
+                if 0.5 * h < smallest:
+                    raise
+                self.h, self.halvings = 0.5 * h, self.halvings + 1
+                self.stepper.forget()
+                continue
+            ratio = (self.options.error / max(result.error, 1e-30)) ** (1.0 / 3.0)
+            if ratio < 0.7 and 0.5 * h >= smallest:
+                self.h = h * max(0.3, 0.9 * ratio)
+                continue
+            if h == self.h and not 0.8 < ratio < 1.6:
+                self.h = min(self.options.step, self.h * min(2.0, 0.9 * ratio))
+            return result
+
+    def pack(self) -> list[float]:
+        return [self.h, 0.0, 0.0, self.options.step]
+
+    def unpack(self, numbers) -> None:
+        self.h = float(numbers[0])
+
+
+def step_control(stepper: Stepper, options: ControlOptions):
+    """The control that the options ask for."""
+    return AdaptiveSteps(stepper, options) if options.adaptive else FixedSteps(stepper, options)

@@ -1,0 +1,117 @@
+"""Compiled element loops of a time step: inertia, kinetic and strain energy without assembling a matrix."""
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from ..shell.kernel import _bases, _edge_shears, _gather, _linear_response, _point_strain, _strains
+from ..shell.kernel_rubber import FAST
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def inertia_force(quads, integrals, director1, director2, rate, acceleration, out):
+    """Add M a + h to out (nn, 5): inertia at nodal velocities and accelerations (nn, 5), h the part quadratic in the velocities."""
+    count = director1.shape[0]
+    turn = np.empty((count, 3))
+    for n in range(count):
+        r0 = rate[n, 3]
+        r1 = rate[n, 4]
+        a0 = acceleration[n, 3]
+        a1 = acceleration[n, 4]
+        for i in range(3):
+            turn[n, i] = (
+                director1[n, 0, i] * a0
+                + director1[n, 1, i] * a1
+                + director2[n, 0, i] * r0 * r0
+                + director2[n, 1, i] * r1 * r1
+                + 2 * director2[n, 2, i] * r0 * r1
+            )
+    moment = np.empty(3)
+    for el in range(quads.shape[0]):
+        for a in range(4):
+            na = quads[el, a]
+            for i in range(3):
+                push = 0.0
+                twist = 0.0
+                for b in range(4):
+                    nb = quads[el, b]
+                    m1 = integrals[el, 1, a, b]
+                    push += integrals[el, 0, a, b] * acceleration[nb, i] + m1 * turn[nb, i]
+                    twist += m1 * acceleration[nb, i] + integrals[el, 2, a, b] * turn[nb, i]
+                out[na, i] += push
+                moment[i] = twist
+            for r in range(2):
+                out[na, 3 + r] += director1[na, r, 0] * moment[0] + director1[na, r, 1] * moment[1] + director1[na, r, 2] * moment[2]
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def kinetic_energy(quads, integrals, director1, rate):
+    """Kinetic energy, J, at nodal velocities (nn, 5)."""
+    count = director1.shape[0]
+    turn = np.empty((count, 3))
+    for n in range(count):
+        for i in range(3):
+            turn[n, i] = director1[n, 0, i] * rate[n, 3] + director1[n, 1, i] * rate[n, 4]
+    total = 0.0
+    for el in range(quads.shape[0]):
+        for a in range(4):
+            na = quads[el, a]
+            for b in range(4):
+                nb = quads[el, b]
+                uu = 0.0
+                ut = 0.0
+                tt = 0.0
+                for i in range(3):
+                    uu += rate[na, i] * rate[nb, i]
+                    ut += rate[na, i] * turn[nb, i]
+                    tt += turn[na, i] * turn[nb, i]
+                total += integrals[el, 0, a, b] * uu + 2 * integrals[el, 1, a, b] * ut + integrals[el, 2, a, b] * tt
+    return 0.5 * total
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _rubber_energy(c10, c01, c11, e):
+    a = 1 + 2 * e[0]
+    b = 1 + 2 * e[1]
+    c = e[2]
+    g = e[3]
+    k = e[4]
+    det = a * b - c * c
+    h = (1 + (b * g * g - 2 * c * g * k + a * k * k)) / det
+    i1 = (a + b - 2) + (h - 1)
+    i2 = (det - 1) + (a + b) * h - g * g - k * k - 2
+    return c10 * i1 + c01 * i2 + c11 * i1 * i2
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def strain_energy(
+    quads, nodes, displacement, director, shear0, metric0, metric1, mq, mqk, mp, area, thickness, stiffness, points, constants, scales
+):
+    """Strain energy, J; arguments as `dbvfiv.shell.kernel.shell_force` has them."""
+    x = np.empty((4, 3))
+    d = np.empty((4, 3))
+    basis = np.empty((2, 3))
+    turn = np.empty((2, 3))
+    edge = np.empty(4)
+    strain = np.empty(8)
+    stress = np.empty(8)
+    e = np.empty(5)
+    total = 0.0
+    for el in range(quads.shape[0]):
+        _gather(quads[el], nodes, displacement, director, x, d)
+        _edge_shears(x, d, edge)
+        h = thickness[el]
+        for point in range(4):
+            _bases(point, x, d, basis, turn)
+            _strains(
+                point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], mq[el, point], mqk[el, point], mp[el, point], strain
+            )
+            _linear_response(stiffness, h, strain, stress)
+            density = 0.0
+            for i in range(8):
+                density += 0.5 * stress[i] * strain[i]
+            for l in range(points.shape[0]):
+                _point_strain(points[l, 0], h, scales[l], strain, e)
+                density += points[l, 1] * h * _rubber_energy(constants[l, 0], constants[l, 1], constants[l, 2], e)
+            total += area[el, point] * density
+    return total

@@ -1,0 +1,311 @@
+"""One implicit step: prediction, simplified Newton iterations with a kept factorisation, and a natural line search.
+
+PETSc factors and solves; the iteration is our own. TSALPHA2 knows neither a weighted internal force with its rate nor an inlet velocity of first order,
+and the convergence test wanted here, on the size of the next correction rather than on a residual that stiff membrane modes dominate, with
+factors kept over many steps, would leave nothing of SNES but the loop.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Callable
+
+import numpy as np
+
+from ..model.linear import SingularMatrix
+from .equations import Weighted, Weights
+from .scheme import Scheme
+from .state import MotionState
+
+
+@dataclass(frozen=True)
+class StepOptions:
+    """Options of the iteration within a step.
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest correction left, relative to what the accelerations move the wall in a step.
+    floor : float
+        Largest correction left relative to the deflection, where nothing moves.
+    max_iterations : int
+        Corrections of one attempt.
+    refactor_at : float
+        Contraction of the corrections above which the matrix is factored anew.
+    diverged : float
+        Growth of the corrections that ends an attempt.
+    smallest_fraction : float
+        Of a Newton correction in the line search.
+    """
+
+    tolerance: float = 1e-5
+    floor: float = 1e-10
+    max_iterations: int = 20
+    refactor_at: float = 0.3
+    diverged: float = 100.0
+    smallest_fraction: float = 1.0 / 16.0
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """A finished step.
+
+    Attributes
+    ----------
+    state : MotionState
+    weighted : Weighted
+        Forces at the instant where the equations were met.
+    inlet : float
+        Inlet pressure at that instant, Pa.
+    residuals, solves, factorisations : int
+        Work done.
+    error : float
+        Estimated local error of the displacements, m.
+    """
+
+    state: MotionState
+    weighted: Weighted
+    inlet: float
+    residuals: int
+    solves: int
+    factorisations: int
+    error: float
+
+
+class StepFailure(ArithmeticError):
+    """The iteration of a step did not converge."""
+
+
+class Stepper:
+    """Steps a motion.
+
+    Parameters
+    ----------
+    motion : ValveMotion or anything with its methods
+    scheme : Scheme
+    pressure : callable
+        Inlet pressure, Pa, from time, s.
+    options : StepOptions
+    """
+
+    def __init__(self, motion, scheme: Scheme, pressure: Callable[[float], float], options: StepOptions = StepOptions()):
+        self.motion, self.scheme, self.pressure, self.options = motion, scheme, pressure, options
+        self.residuals = self.solves = self.factorisations = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop the factors and the memory of the predictor, so that the next step depends on the state alone."""
+        self._factored: float | None = None
+        self._history: list[tuple[float, np.ndarray, float]] = []
+
+    # -- the step -------------------------------------------------------------------------------------------------------------------
+
+    def step(self, state: MotionState, h: float) -> StepResult:
+        """Advance a state by h, s.
+
+        Raises
+        ------
+        StepFailure
+        """
+        before = (self.residuals, self.solves, self.factorisations)
+        trial = _Trial(self.motion, self.scheme, state, h, self.pressure(state.time + self.scheme.now * h))
+        try:
+            self._iterate(trial)
+        except SingularMatrix as error:
+            raise StepFailure(str(error)) from error
+        new = trial.state()
+        past = self._history[-1] if self._history else None
+        here = (state.time + (1.0 - self.scheme.alpha_m) * h, trial.at[2], trial.speed_rate)
+        self._history = [*self._history[-2:], here]
+        work = [now - then for now, then in zip((self.residuals, self.solves, self.factorisations), before)]
+        jump = 0.0 if past is None else self.motion.length(here[1] - past[1]) * h / (here[0] - past[0])
+        return StepResult(new, trial.weighted, trial.inlet, *work, self.scheme.error_constant * h * h * jump)
+
+    # -- the iteration --------------------------------------------------------------------------------------------------------------
+
+    def _iterate(self, trial: "_Trial") -> None:
+        """Correct a trial until the next correction would be below what is allowed.
+
+        Three attempts, each for what defeats the one before: kept factors as long as they contract; full corrections with factors renewed, which
+        serve shells best, as membrane forces that follow bending make residuals rise before they fall; and from the prediction again, a line search.
+        """
+        norm = self._start(trial)
+        if self._factored == trial.h and self._full(trial, norm, renew=False):
+            return
+        if self._full(trial, self._residual(trial), renew=True):
+            return
+        if self._searched(trial, self._start(trial)):
+            return
+        raise StepFailure("Newton's corrections did not converge, neither whole nor with a line search.")
+
+    def _full(self, trial: "_Trial", norm: float, renew: bool) -> bool:
+        """Whole corrections. Factors that contract too slowly are renewed, or end the attempt."""
+        options = self.options
+        if renew:
+            self._factor(trial)
+        correction = self._solve(trial)
+        size = first = self.motion.length(correction[0])
+        for _ in range(options.max_iterations):
+            allowed = trial.allowed(options)
+            if size <= 1e-2 * allowed:
+                return True
+            trial.move(1.0, correction)
+            norm, norm_old = self._residual(trial), norm
+            if norm < norm_old and size * norm / norm_old <= allowed:
+                return True
+            if not np.isfinite(norm):
+                trial.move(-1.0, correction)
+                return False
+            correction = self._solve(trial)
+            size, size_old = self.motion.length(correction[0]), size
+            if size <= allowed:
+                return True
+            if not size <= options.diverged * first:
+                return False
+            if size > options.refactor_at * size_old:
+                if not renew:
+                    return False
+                self._factor(trial)
+                correction = self._solve(trial)
+                size = self.motion.length(correction[0])
+        return False
+
+    def _searched(self, trial: "_Trial", norm: float) -> bool:
+        """Parts of corrections such that the next one by the same factors is smaller: the natural monotonicity test (Deuflhard 2011)."""
+        options = self.options
+        for _ in range(options.max_iterations):
+            self._factor(trial)
+            correction = self._solve(trial)
+            size, fraction = self.motion.length(correction[0]), 1.0
+            if size <= 1e-2 * trial.allowed(options):
+                return True
+            while True:
+                trial.move(fraction, correction)
+                finite = np.isfinite(self._residual(trial))
+                left = self.motion.length(self._solve(trial)[0]) if finite else np.inf
+                if left <= (1.0 - 0.25 * fraction) * size:
+                    break
+                trial.move(-fraction, correction)
+                fraction *= 0.5
+                if not fraction >= options.smallest_fraction:
+                    return False
+            if left <= trial.allowed(options):
+                return True
+        return False
+
+    def _start(self, trial: "_Trial") -> float:
+        """Predict the accelerations at the instant where they are taken, by a parabola through the last three.
+
+        Those at the ends of steps would not do: without numerical damping they alternate about the true ones. From a state without a past, the step
+        goes on at its velocities.
+        """
+        state, s, h = trial.old, self.scheme, trial.h
+        if self._history:
+            a, rate = self._extrapolated(state.time + (1.0 - s.alpha_m) * h)
+            trial.set((a - s.alpha_m * state.a) / (1.0 - s.alpha_m), rate)
+            norm = self._residual(trial)
+            if np.isfinite(norm):
+                return norm
+        trial.set((1.0 - 0.5 / s.beta) * state.a, state.speed_rate)
+        norm = self._residual(trial)
+        if not np.isfinite(norm):
+            raise StepFailure("The equations cannot be evaluated at the start of the step.")
+        return norm
+
+    def _extrapolated(self, time: float) -> tuple[np.ndarray, float]:
+        points = self._history
+        a, rate = np.zeros_like(points[0][1]), 0.0
+        for i, (here, value, value_rate) in enumerate(points):
+            weight = 1.0
+            for j, (there, *_) in enumerate(points):
+                if i != j:
+                    weight *= (time - there) / (here - there)
+            a += weight * value
+            rate += weight * value_rate
+        return a, rate
+
+    def _residual(self, trial: "_Trial") -> float:
+        self.residuals += 1
+        return trial.evaluate()
+
+    def _factor(self, trial: "_Trial") -> None:
+        self.factorisations += 1
+        self._factored = None
+        trial.linearise()
+        self._factored = trial.h
+
+    def _solve(self, trial: "_Trial") -> tuple[np.ndarray, float]:
+        self.solves += 1
+        return self.motion.solve(-trial.residual, -trial.weighted.outlet)
+
+
+class _Trial:
+    """A candidate for the new state; its unknowns are the accelerations and the rate of the inlet velocity."""
+
+    def __init__(self, motion, scheme: Scheme, old: MotionState, h: float, inlet: float):
+        self.motion, self.scheme, self.old, self.h, self.inlet = motion, scheme, old, h, inlet
+        s, now = scheme, scheme.now
+        self.weights = Weights(
+            position=now,
+            velocity=now * s.gamma / (s.beta * h),
+            acceleration=(1.0 - s.alpha_m) / (s.beta * h * h),
+            force=now + motion.conditions.beta * s.rate / h,
+            speed=now,
+            speed_rate=s.rate / h,
+        )
+
+    def set(self, a: np.ndarray, speed_rate: float) -> None:
+        """Start from new accelerations."""
+        s, h, old = self.scheme, self.h, self.old
+        self.a = np.array(a)
+        self.speed_rate = float(speed_rate)
+        self.v = old.v + h * ((1.0 - s.gamma) * old.a + s.gamma * self.a)
+        self.q = old.q + h * old.v + h * h * ((0.5 - s.beta) * old.a + s.beta * self.a)
+        self.speed = old.speed + h * self.speed_rate
+
+    def move(self, fraction: float, correction: tuple[np.ndarray, float]) -> None:
+        """Add a fraction of a correction of q and U."""
+        s, h = self.scheme, self.h
+        dq, du = correction
+        self.q = self.q + fraction * dq
+        self.v = self.v + (fraction * s.gamma / (s.beta * h)) * dq
+        self.a = self.a + (fraction / (s.beta * h * h)) * dq
+        self.speed += fraction * du
+        self.speed_rate += fraction * du / h
+
+    def evaluate(self) -> float:
+        """Set residual and weighted forces; return the norm of the former."""
+        s, now, old = self.scheme, self.scheme.now, self.old
+        self.force = self.motion.internal_force(self.q)
+        self.force_rate = (self.force - old.force) / self.h
+        self.at = (
+            old.q + now * (self.q - old.q),
+            old.v + now * (self.v - old.v),
+            old.a + (1.0 - s.alpha_m) * (self.a - old.a),
+            old.speed + now * (self.speed - old.speed),
+            old.speed_rate + s.rate * (self.speed_rate - old.speed_rate),
+        )
+        self.weighted = w = self.motion.weighted(*self.at, self.inlet)
+        residual = old.force + now * (self.force - old.force)
+        beta = self.motion.conditions.beta
+        if beta:
+            residual = residual + beta * (old.force_rate + s.rate * (self.force_rate - old.force_rate))
+        residual += w.inertia
+        residual += w.damping
+        residual -= w.load
+        self.residual = residual
+        return float(np.linalg.norm(residual))
+
+    def linearise(self) -> None:
+        self.motion.linearise(self.q, *self.at, self.inlet, self.weights)
+
+    def allowed(self, options: StepOptions) -> float:
+        """Largest correction that may be left, m."""
+        motion = self.motion
+        moved = self.h**2 * self.scheme.beta * motion.length(self.at[2])
+        return options.tolerance * moved + options.floor * motion.length(self.q) + np.finfo(float).tiny
+
+    def state(self) -> MotionState:
+        speed = self.speed if self.motion.moving_fluid else self.weighted.speed
+        return MotionState(
+            self.old.time + self.h, self.q, self.v, self.a, self.force, self.force_rate, speed, self.speed_rate
+        )  # fmt: skip
