@@ -54,7 +54,9 @@ class Valve:
         from .model import ValveModel
 
         try:
-            return ValveModel(self.case)
+            model = ValveModel(self.case)
+            model.shell.energies  # built on first use otherwise, and it is here that an invalid metric shows
+            return model
         except CaseError:
             raise
         except ValueError as error:  # what geometry, mesh and shell refuse
@@ -112,13 +114,14 @@ class Valve:
         from .studies.steady import run_steady
 
         observer = observer or Observer()
+        # what a result keeps is the case that gives it again
+        header = Header.of("steady", self.case.replace({"steady.pressures": list(pressures)}), self.name)
         if output is None:
-            return SteadyResults.of(run_steady(self.model, pressures, observer=observer), self.name)
-        case = self.case.replace({"steady.pressures": list(pressures)})
-        with SteadyFile(output, self.model, Header.of("steady", case, self.name)) as file:
-            result = run_steady(self.model, pressures, observer=Observers(observer, file))
+            return SteadyResults.of(run_steady(self.model, pressures, observer=observer), header)
+        with SteadyFile(output, self.model, header) as file:
+            result = run_steady(self.model, pressures, observer=Observers(file, observer))  # kept first, then shown
             file.conclude(result.failures, not result.interrupted)
-        return SteadyResults.of(result, self.name)
+        return SteadyResults.of(result, header)
 
 
 def load(case: str | Path | Case | None = None, changes: Mapping[str, Any] | None = None) -> Valve:

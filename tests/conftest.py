@@ -47,3 +47,21 @@ def is_one_sentence(text: str) -> bool:
 def one_sentence():
     """The check that an error message is one sentence."""
     return is_one_sentence
+
+
+COARSE = {"mesh.around": 8, "mesh.along": 16}
+
+
+@pytest.fixture(scope="session")
+def coarse_valve():
+    """The 12-inch valve on a mesh on which a state takes a fraction of a second."""
+    return dbvfiv.load(changes=COARSE)
+
+
+@pytest.fixture(scope="session")
+def coarse_run(coarse_valve, tmp_path_factory):
+    """Three states of the coarse valve in memory; ``path`` is their result file."""
+    path = tmp_path_factory.mktemp("coarse") / "coarse.h5"
+    result = coarse_valve.steady(pressure=[6e3, 18e3, 36e3], output=path)
+    result.path = path
+    return result

@@ -69,8 +69,7 @@ def command(
     if result.failures:
         reached = f"{len(result.states)} of {len(wanted)} pressures were reached" if result.states else "No pressure was reached"
         kept = f"; those states are kept in {output}" if output and result.states else ""
-        said = "" if not as_json else f"; {result.failures[0].rstrip('.')}"
-        raise SolveError(f"{reached}{kept}{said}.")
+        raise SolveError(f"{reached}{kept}.")  # why was said when it happened
 
 
 def _pressures(case, given: list[str] | None, overrides: list[str] | None) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Callable, Iterator
 import matplotlib
 import numpy as np
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from ..results.state import State
     from ..results.steady import SteadyResults
 
-_COLOURS = "turbo"
+#: Turbo without its nearly black ends.
+_COLOURS = ListedColormap(matplotlib.colormaps["turbo"](np.linspace(0.08, 0.95, 256)))
 _LIGHT = np.array([-0.35, -0.45, 0.82])
 
 
@@ -33,21 +34,21 @@ def deformed(state: "State") -> Figure:
     shift = valve.vectors(state.nodal[:, :3])
     size = np.linalg.norm(shift, axis=1) * 1e3
     points = (valve.points + shift)[:, [2, 0, 1]] * 1e3  # axis of the valve, width, opening
-    figure = new_figure(8.2, 5.6)
+    figure = new_figure(8.2, 4.9)
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
     scale = Normalize(0.0, size.max() or 1.0)
     corners = points[valve.quads]
-    colours = _shaded(corners, matplotlib.colormaps[_COLOURS](scale(size[valve.quads].mean(axis=1))))
-    axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.3))
+    colours = _shaded(corners, _COLOURS(scale(size[valve.quads].mean(axis=1))))
+    axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.3, clip_on=False))
     _frame(axes, points)
-    bar = figure.colorbar(ScalarMappable(scale, _COLOURS), ax=axes, shrink=0.62, pad=0.02, aspect=22)
+    bar = figure.colorbar(ScalarMappable(scale, _COLOURS), ax=axes, shrink=0.62, pad=0.06, aspect=22)
     bar.set_label("Displacement, mm")
     bar.outline.set_visible(False)
     x, y, z = (1e3 * value for value in state.max_displacement_position)
-    axes.set_title(
+    figure.suptitle(
         f"Deformed valve at {kilopascals(state.pressure)}: largest displacement {state.max_displacement * 1e3:.1f} mm at "
         f"(x, y, z) = ({x:.0f}, ±{abs(y):.0f}, {z:.0f}) mm",
-        fontsize=10, loc="left",
+        fontsize=10,
     )  # fmt: skip
     return figure
 
@@ -64,9 +65,9 @@ def _frame(axes, points: np.ndarray) -> None:
     low, high = points.min(axis=0), points.max(axis=0)
     for set_limits, a, b in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high):
         set_limits(a, b)
-    axes.set_box_aspect(high - low, zoom=1.15)
+    axes.set_box_aspect(high - low, zoom=1.12)
     axes.set_proj_type("persp", focal_length=0.6)
-    axes.view_init(elev=24, azim=-142)
+    axes.view_init(elev=26, azim=-140)
     axes.set_xlabel("z, mm", labelpad=12)
     axes.set_ylabel("x, mm", labelpad=8)
     axes.set_zlabel("y, mm", labelpad=2)

@@ -27,7 +27,7 @@ def layer_stress(state: "State") -> Figure:
     values = state.layers.von_mises.T / 1e6
     columns = min(3, len(values))
     rows = -(-len(values) // columns)
-    figure = new_figure(3.3 * columns, 4.6 * rows + 0.4)
+    figure = new_figure(3.2 * columns, 4.1 * rows + 0.4)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for number, (axes, title, stress) in enumerate(zip(panels, mesh.layer_titles(), values)):
         shape = (mesh.shape[1], mesh.shape[0])
@@ -40,7 +40,7 @@ def layer_stress(state: "State") -> Figure:
         peak = int(np.argmax(stress))
         middle = [0.25 * (f[:-1, :-1] + f[1:, :-1] + f[:-1, 1:] + f[1:, 1:]).ravel()[peak] * 1e3 for f in (arc, z)]
         axes.plot(*middle, "+", color="#d62728", ms=9, mew=1.6)
-        axes.text(0.97, 0.98, f"max {stress[peak]:.3g} MPa", transform=axes.transAxes, ha="right", va="top", fontsize=8.5)
+        axes.set_title(f"max {stress[peak]:.3g}", loc="right", fontsize=9, color="#d62728")
         axes.set_xlim(0, arc.max() * 1e3)
     for axes in panels[len(values):]:
         axes.set_visible(False)

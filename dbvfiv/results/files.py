@@ -35,6 +35,8 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
     except _BROKEN as error:
         if "truncated" in str(error):
             raise CaseError(f"{str(path)!r} is cut short, so nothing can be read from it.") from error
+        if h5py.is_hdf5(path):
+            raise CaseError(f"The result file {str(path)!r} cannot be opened; it is damaged or open for writing in this process.") from error
         raise CaseError(f"{str(path)!r} is not a result file, because it is not HDF5.") from error
     with file:
         try:

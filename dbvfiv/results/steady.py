@@ -47,18 +47,19 @@ class SteadyResults(Result):
         )
 
     @classmethod
-    def of(cls, result: "SteadyResult", name: str = "case") -> "SteadyResults":
+    def of(cls, result: "SteadyResult", header: Header | None = None) -> "SteadyResults":
         """From a run that has just ended.
 
         Parameters
         ----------
         result : dbvfiv.studies.steady.SteadyResult
-        name : str
-            Of the case, for titles and file names.
+        header : Header, optional
+            Where it comes from; made from the model's case without one.
         """
         model = result.model
+        header = header or Header.of("steady", model.case)
         return cls(
-            Header.of("steady", model.case, name, complete=not result.interrupted),
+            replace(header, complete=not result.interrupted),
             MeshData.of(model),
             [row_from(model, state) for state in result.states],
             lambda i: layers_of(model, result.states[i].q),

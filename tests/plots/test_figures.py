@@ -1,0 +1,93 @@
+"""Figures: they exist, show the numbers of the result, and carry units."""
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.case import Case
+from dbvfiv.errors import CaseError
+from dbvfiv.plots import figures_of, published
+from dbvfiv.plots.layers import unrolled
+
+NAMES = {
+    "head-discharge", "area-discharge", "jet-velocity", "deflection", "lip-shapes", "centre-line", "passage", "deformed", "layer-stress",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def figures(coarse_run):
+    return figures_of(coarse_run)
+
+
+def test_every_figure_is_there_and_labelled_with_units(figures):
+    assert set(figures) == NAMES
+    for name, figure in figures.items():
+        labels = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
+        assert labels, name
+        assert all(any(unit in label for unit in ("mm", "kPa", "kg/s", "m/s", "cm²")) for label in labels), labels
+
+
+def test_curves_hold_the_numbers(figures, coarse_run):
+    line = figures["head-discharge"].axes[0].lines[0]
+    assert np.allclose(line.get_xdata(), [s.mass_flow for s in coarse_run.states])
+    assert np.allclose(line.get_ydata(), [6, 18, 36])
+    jet = figures["jet-velocity"].axes[0].lines[0]
+    assert np.allclose(jet.get_ydata(), [s.outlet_velocity for s in coarse_run.states])
+
+
+def test_lips_are_closed_symmetric_curves(figures, coarse_run):
+    rest, *moved = figures["lip-shapes"].axes[0].lines
+    for line in (rest, *moved):
+        x, y = line.get_data()
+        assert x[0] == pytest.approx(x[-1]) and y[0] == pytest.approx(y[-1])
+        assert x.max() == pytest.approx(-x.min()) and y.max() == pytest.approx(-y.min())
+    opening = max(moved[-1].get_ydata()) - max(rest.get_ydata())
+    assert opening == pytest.approx(coarse_run.states[-1].lip_opening * 1e3)
+
+
+def test_one_panel_for_each_layer(figures, coarse_run):
+    titles = [axes.get_title("left") for axes in figures["layer-stress"].axes if axes.get_title("left")]
+    assert titles == ["1  CR, inside", "2  SBR", "3  fibre +54°", "4  fibre -54°", "5  EPDM, outside"]
+    arc, z = unrolled(coarse_run.mesh)
+    # the flange is a quarter circle of radius 0.13919 m (App. A), its polygon a little shorter
+    assert arc[-1, -1] == pytest.approx(0.5 * np.pi * 0.13919, rel=5e-3) and z[-1, 0] == pytest.approx(0.56)
+
+
+def test_published_points_only_on_the_reference_valve(figures, coarse_run):
+    lines = figures["head-discharge"].axes[0].lines
+    assert len(lines) == 2 and np.allclose(lines[1].get_xdata(), [47.88, 75.52, 90.82])
+    assert published.applies(Case()) and published.applies(Case().replace({"materials.strain_level": "20 %"}))
+    for changes in ({"valve.lip_half_width": 0.1}, {"fluid.density": 10}, {"drive.kind": "uniform"}, {"valve.thickness_factor": 1.1}):
+        assert not published.applies(Case().replace(changes)), changes
+
+
+def test_a_single_state_and_a_chosen_pressure(tmp_path, coarse_run):
+    alone = figures_of(coarse_run.only(coarse_run.states[0]))
+    assert set(alone) == NAMES
+    chosen = figures_of(coarse_run, only=["deformed"], pressure=17e3)
+    assert "18 kPa" in chosen["deformed"].get_suptitle()
+
+
+def test_no_flow_no_curves_of_the_flow(coarse_valve):
+    shut = coarse_valve.replace({"drive.kind": "uniform"}).steady(pressure=[500.0])
+    assert set(figures_of(shut)) == NAMES - {"head-discharge", "area-discharge", "jet-velocity", "passage"}
+
+
+@pytest.mark.parametrize("format, head", [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_files(tmp_path, coarse_run, format, head):
+    written = dbvfiv.load_result(coarse_run.path).plot(tmp_path / "new" / "folder", format, only=["head-discharge", "passage"])
+    assert [path.name for path in written] == [f"head-discharge.{format}", f"passage.{format}"]
+    assert all(path.read_bytes().startswith(head) for path in written)
+
+
+def test_refusals_are_sentences(tmp_path, coarse_run, one_sentence):
+    (tmp_path / "file").write_text("")
+    for call in (
+        lambda: coarse_run.plot(tmp_path, "gif"),
+        lambda: coarse_run.plot(tmp_path, only=["portrait"]),
+        lambda: coarse_run.plot(tmp_path / "file"),
+        lambda: coarse_run.only().plot(tmp_path),
+    ):
+        with pytest.raises(CaseError) as caught:
+            call()
+        assert one_sentence(str(caught.value)), str(caught.value)

@@ -1,0 +1,201 @@
+"""Result files: what is written is read back, a stopped run keeps its states, broken files are told in a sentence."""
+
+import shutil
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.errors import CaseError
+from dbvfiv.materials.rubbers import rubber
+from dbvfiv.results.header import Header, read_header, write_header
+from dbvfiv.results.state import layers_of
+from dbvfiv.results.steady_file import SteadyFile
+from dbvfiv.studies.observer import Observer, Observers
+from dbvfiv.studies.steady import run_steady
+
+
+@pytest.fixture(scope="module")
+def stored(coarse_run):
+    return dbvfiv.load_result(coarse_run.path)
+
+
+def test_everything_comes_back(coarse_run, stored):
+    assert stored.summary() == coarse_run.summary()
+    assert stored.complete and stored.kind == "steady"
+    for ours, theirs in zip(stored.states, coarse_run.states, strict=True):
+        for name in ("nodal", "station_area", "station_velocity", "station_pressure"):
+            assert np.array_equal(getattr(ours, name), getattr(theirs, name)), name
+        assert ours.layers.names == theirs.layers.names == ("CR", "SBR", "fibre", "fibre", "EPDM")
+        for name in ("strain", "stress", "von_mises", "stretch"):
+            assert np.array_equal(getattr(ours.layers, name), getattr(theirs.layers, name)), name
+
+
+def test_layers_are_those_of_the_shell(coarse_run, stored):
+    state = stored.states[-1]
+    again = layers_of(coarse_run.model, state.q)
+    assert np.array_equal(again.von_mises, state.layers.von_mises)
+    # the plies carry the load: their stress is several times that of the rubber (Th. ch. 7)
+    ply, rubber = state.layers.von_mises[:, 2:4].max(), state.layers.von_mises[:, [0, 1, 4]].max()
+    assert ply > 3 * rubber
+
+
+def test_station_data_belong_together(stored):
+    density = stored.case.fluid.density
+    for state in stored.states:
+        flow = 4 * density * state.station_area * state.station_velocity
+        assert np.allclose(flow, state.mass_flow, rtol=1e-6)
+        head = state.station_pressure + 0.5 * density * state.station_velocity**2
+        assert np.allclose(head, head[0], rtol=1e-6)
+        assert state.station_pressure[0] == pytest.approx(0, abs=1e-9) and state.station_pressure[-1] == pytest.approx(state.pressure)
+
+
+def test_the_model_can_be_rebuilt_and_the_state_is_an_equilibrium(stored):
+    state = stored.states[1]
+    model = stored.model
+    unbalanced = np.linalg.norm(model.residual(state.q, state.pressure)) / model.force_scale(state.q, state.pressure)
+    assert unbalanced < 1e-7
+    restarted = run_steady(model, [state.pressure * 1.01], start=state.solution())
+    assert restarted.states[0].iterations <= 4
+    assert restarted.states[0].mass_flow > state.mass_flow
+
+
+def test_numbers_carry_units_case_and_versions(coarse_run):
+    with h5py.File(coarse_run.path) as file:
+        assert file["states/mass_flow"].attrs["units"] == "kg/s" and file["states/mass_flow"].attrs["description"]
+        assert file["states/layers/von_mises"].attrs["units"] == "Pa"
+        assert file["mesh/nodes"].attrs["units"] == "m"
+        assert "[drive]" in file["case/toml"].asstr()[()]
+        assert {"numpy", "jax", "petsc", "petsc scalar type", "dbvfiv"} <= set(file["versions"].attrs)
+
+
+def test_files_of_the_case_travel_with_the_result(tmp_path, coarse_run, monkeypatch):
+    law = rubber("CR", 0.1)
+    stretch = np.linspace(1.01, 1.3, 20)
+    stress = 2 * (stretch - stretch**-2) * (law.parameters[0] + law.parameters[1] / stretch)
+    data = tmp_path / "tension.csv"
+    data.write_text("strain,stress\n" + "".join(f"{s - 1:.6f},{p:.6e}\n" for s, p in zip(stretch, stress)))
+    case = dbvfiv.load(changes={
+        "mesh.around": 8, "mesh.along": 16,
+        "materials.own": {"kind": "fit", "path": str(data), "density": 1300},
+        "layers.0.material": "own",
+    }).case  # fmt: skip
+    monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "cache"))
+    with h5py.File(tmp_path / "h.h5", "w") as file:
+        write_header(file, Header.of("steady", case))
+        data.unlink()
+        again = read_header(file).rebuildable_case()
+    path = again.materials.named["own"].path
+    assert path != data and path.read_text().startswith("strain,stress")
+
+
+class _StopAfter(Observer):
+    def __init__(self, count):
+        self.count = count
+
+    def item(self, result):
+        self.count -= 1
+        if self.count == 0:
+            raise KeyboardInterrupt
+
+
+def test_a_stopped_run_keeps_what_it_found(tmp_path, coarse_valve):
+    path = tmp_path / "stopped.h5"
+    with SteadyFile(path, coarse_valve.model) as file:
+        result = run_steady(coarse_valve.model, [2e3, 6e3, 18e3], observer=Observers(file, _StopAfter(2)))
+        # another program may look at a run that goes on
+        code = f"import dbvfiv; r = dbvfiv.load_result({str(path)!r}); print([s.pressure for s in r.states], r.complete)"
+        seen = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        assert seen.stdout.strip() == "[2000.0, 6000.0] False", seen.stderr
+        file.conclude(result.failures, not result.interrupted)
+    kept = dbvfiv.load_result(path)
+    assert not kept.complete and kept.summary()["interrupted"]
+    assert [state.pressure for state in kept.states] == [2e3, 6e3]
+    assert kept.states[1].layers.von_mises.shape == (128, 5)
+
+
+def test_a_killed_run_leaves_a_readable_file(tmp_path, coarse_run):
+    """What lies on the disk after each flush, without the file ever being closed."""
+    path, copy = tmp_path / "running.h5", tmp_path / "killed.h5"
+    file = SteadyFile(path, coarse_run.model)
+    for number, state in enumerate(coarse_run.states, 1):
+        file.item(state.solution())
+        shutil.copy(path, copy)
+        left = dbvfiv.load_result(copy)
+        assert len(left.states) == number and not left.complete
+        assert np.array_equal(left.states[-1].layers.stress, state.layers.stress)
+    file.close()
+
+
+def test_failures_are_kept_apart_from_warnings(tmp_path, coarse_valve):
+    valve = coarse_valve.replace({"steady.max_iterations": 2, "steady.min_step": 0.3})
+    result = valve.steady(pressure=[100.0], output=tmp_path / "failed.h5")
+    kept = dbvfiv.load_result(tmp_path / "failed.h5")
+    assert kept.failures == result.failures and len(kept.failures) == 1 and "No equilibrium" in kept.failures[0]
+    assert not set(kept.failures) & set(kept.warnings) and kept.states == ()
+
+
+def test_saving_gives_the_same_file(tmp_path, stored):
+    stored.save(tmp_path / "copy.h5")
+    copy = dbvfiv.load_result(tmp_path / "copy.h5")
+    assert copy.summary() == stored.summary() and copy.header.created == stored.header.created
+    stored.states[0].save(tmp_path / "one.h5")
+    assert [s.pressure for s in dbvfiv.load_result(tmp_path / "one.h5").states] == [6e3]
+
+
+def _damage(path, kind):
+    whole = path.read_bytes()
+    if kind == "text":
+        path.write_text("[drive]\npressure = 3\n")
+    elif kind == "empty":
+        path.write_bytes(b"")
+    elif kind == "cut":
+        path.write_bytes(whole[: len(whole) // 2])
+    elif kind == "foreign":
+        with h5py.File(path, "w") as file:
+            file["x"] = 1
+    else:
+        with h5py.File(path, "r+") as file:
+            if kind == "newer":
+                file.attrs["layout"] = 99
+            elif kind == "unknown":
+                file.attrs["dbvfiv_kind"] = "horoscope"
+            elif kind == "no states":
+                del file["states"]
+            elif kind == "no case":
+                del file["case/json"]
+            elif kind == "bad case":
+                del file["case/json"]
+                file["case/json"] = "{"
+
+
+@pytest.mark.parametrize("kind", ["text", "empty", "cut", "foreign", "newer", "unknown", "no states", "no case", "bad case"])
+def test_broken_files_are_one_sentence(tmp_path, coarse_run, one_sentence, kind):
+    path = tmp_path / "r.h5"
+    path.write_bytes(coarse_run.path.read_bytes())
+    _damage(path, kind)
+    with pytest.raises(CaseError) as caught:
+        dbvfiv.load_result(path)
+    assert one_sentence(str(caught.value)), str(caught.value)
+
+
+def test_missing_files_and_folders(tmp_path, one_sentence):
+    for path in (tmp_path, tmp_path / "none.h5"):
+        with pytest.raises(CaseError) as caught:
+            dbvfiv.load_result(path)
+        assert one_sentence(str(caught.value))
+
+
+def test_only_results_are_overwritten(tmp_path, coarse_run, one_sentence):
+    precious = tmp_path / "precious.toml"
+    precious.write_text("[drive]\n")
+    for path in (precious, tmp_path):
+        with pytest.raises(CaseError) as caught:
+            SteadyFile(path, coarse_run.model)
+        assert one_sentence(str(caught.value))
+    assert precious.read_text() == "[drive]\n"
+    for _ in range(2):
+        SteadyFile(tmp_path / "r.h5", coarse_run.model).close()
