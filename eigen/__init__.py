@@ -1,11 +1,20 @@
 """Spectra of large sparse quadratic pencils with a low-rank, frequency-dependent coupling."""
+from .certificate import CertifiedSpectrum, certified_spectrum
 from .condensation import Workspace
+from .derivative import PencilDerivative, difference, eigenvalue_derivative
 from .factorization import SingularShiftError
 from .options import SearchOptions
 from .pencil import CoupledPencil
 from .region import Oval, SearchedRegion
 from .search import leading_modes
 from .spectrum import Mode, Spectrum
+from .sweep import Sweep, sweep
+from .tracking import Branches, TrackOptions, track
+from .transfer import TransferBasis
+from .winding import Count, unstable_count
 
-__all__ = ["CoupledPencil", "Mode", "Oval", "SearchOptions", "SearchedRegion",
-           "SingularShiftError", "Spectrum", "Workspace", "leading_modes"]
+__all__ = ["Branches", "CertifiedSpectrum", "Count", "CoupledPencil", "Mode", "Oval",
+           "PencilDerivative", "SearchOptions", "SearchedRegion", "SingularShiftError", "Spectrum",
+           "Sweep", "TrackOptions", "TransferBasis", "Workspace", "certified_spectrum",
+           "difference", "eigenvalue_derivative", "leading_modes", "sweep", "track",
+           "unstable_count"]

@@ -1,30 +1,50 @@
-"""Products of left and right vectors of a quadratic pencil."""
+"""Left vectors: found with the factor at hand, scaled against the right ones."""
 from __future__ import annotations
 
 import numpy as np
 
-from .pencil import CoupledPencil, real_apply
+from .condensation import ShiftedPencil, Workspace
+from .factorization import SingularShiftError
+from .krylov import near_shift
+from .pairs import SAME
+from .pencil import CoupledPencil
+from .products import coupling_of_modes
+from .residual import factored_beside
 
 
-def coupling_of_modes(pencil: CoupledPencil, left_values, left_q, left_u,
-                      right_values, right_q, right_u) -> np.ndarray:
-    r"""w_i^H [T(l_i) - T(l_j)] / (l_i - l_j) x_j, the product in which modes are orthogonal.
+def attach_left(pencil, shifted: ShiftedPencil, batch, wanted, tolerance, found) -> None:
+    """Left vectors from the same factor, matched by eigenvalue; strays by inverse iteration."""
+    k = batch.values.size
+    batch.left_q = np.zeros((pencil.n, k), complex)
+    batch.left_u = np.zeros((pencil.b, k), complex)
+    pairs = near_shift(shifted, wanted, tolerance=tolerance, transposed=True)
+    found.applications += pairs.applications
+    free = np.ones(pairs.eigenvalues.size, bool)
+    workspace = Workspace()
+    for i, value in enumerate(batch.values):
+        distance = np.where(free, np.abs(pairs.eigenvalues - value), np.inf)
+        j = int(np.argmin(distance)) if distance.size else -1
+        if j >= 0 and distance[j] <= SAME * abs(value):
+            free[j] = False
+            w, W = pairs.vectors_q[:, j], pairs.vectors_u[:, j]
+        else:
+            w, W = left_by_inverse_iteration(pencil, value, workspace)
+        # the transposed problem gives w^T T = 0
+        batch.left_q[:, i], batch.left_u[:, i] = w.conj(), W.conj()
 
-    For a quadratic pencil this is w^H [(l_i + l_j) M' + C'] x with M', C' the coefficients of
-    lambda^2 and lambda of the full pencil; on the diagonal it is w^H T'(l) x.
 
-    Returns
-    -------
-    ndarray, shape (k_left, k_right)
-    """
-    p = pencil
-    y = real_apply(p.J, right_q)
-    wg = real_apply(p.G.T.tocsr(), left_q).conj().T          # w^H G
-    wh, Wh = left_q.conj().T, left_u.conj().T
-    inertia = wh @ real_apply(p.M, right_q) - wg @ (p.A2 @ y) + Wh @ (p.R2 @ y)
-    damping = (wh @ real_apply(p.C, right_q) - wg @ (p.A1 @ y + p.B1 @ right_u)
-               + Wh @ (p.R1 @ y + p.S1 @ right_u))
-    return (np.asarray(left_values)[:, None] + np.asarray(right_values)) * inertia + damping
+def left_by_inverse_iteration(pencil, value, workspace):
+    """Solution w of w^T T(value) = 0 by two solves with the transpose at the eigenvalue."""
+    shifted = factored_beside(pencil, value if value.imag else value.real, workspace)
+    if shifted is None:
+        raise SingularShiftError(f"The pencil cannot be factored next to {value:.6g}.")
+    rng = np.random.default_rng(11)
+    w, W = rng.standard_normal(pencil.n) + 0j, rng.standard_normal(pencil.b) + 0j
+    for _ in range(3):
+        w, W = shifted.solve_transposed(w, W)
+        size = np.linalg.norm(w) or np.linalg.norm(W)
+        w, W = w / size, W / size
+    return w, W
 
 
 def biorthogonalise(pencil: CoupledPencil, eigenvalues, q, u, w, W, cluster: float = 1e-7):

@@ -39,7 +39,7 @@ class SearchOptions:
     max_frequency: float | None = None
     shifts: tuple[complex, ...] | None = None
     tolerance: float = 1e-8
-    krylov_tolerance: float = 1e-11
+    krylov_tolerance: float = 1e-12
     left: bool = False
     method: str = "auto"
     dense_below: int = 240

@@ -1,46 +1,22 @@
 """Leading eigenpairs of a pencil: shifts, merging, verification, completeness."""
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
-import scipy.linalg as la
 
-from .condensation import ShiftedPencil, Workspace
+from .condensation import Workspace
+from .dense import all_pairs
 from .factorization import SingularShiftError, petsc_is_complex
-from .krylov import KrylovPairs, near_shift
-from .left import biorthogonalise
+from .krylov import near_shift
+from .left import attach_left, biorthogonalise
 from .options import SearchOptions
+from .pairs import Found, empty, merge, polish, refine, upper_half, verified
 from .pencil import CoupledPencil
 from .region import Oval, SearchedRegion
-from .residual import Residuals, acceptable, derivative_times, factored_beside, newton
 from .spectrum import Spectrum
 
-SAME = 1e-6  # relative distance below which two shifts are taken to have found one eigenvalue
-
-
 DEPTH = 0.4  # growth rate over angular frequency, down to which a band is searched at most
-
-
-@dataclass
-class _Found:
-    """Pairs collected so far, upper half-plane."""
-
-    values: np.ndarray
-    q: np.ndarray
-    u: np.ndarray
-    residual: np.ndarray
-    backward: np.ndarray
-    left_q: np.ndarray | None = None
-    left_u: np.ndarray | None = None
-    ovals: dict[complex, Oval] = field(default_factory=dict)
-    everything: bool = False
-    shifts: list[complex] = field(default_factory=list)
-    applications: int = 0
-    refined: int = 0
-    rejected: int = 0
-    stalled: bool = False
-    notes: list[str] = field(default_factory=list)
 
 
 def leading_modes(pencil: CoupledPencil, count: int, options: SearchOptions | None = None,
@@ -89,8 +65,8 @@ def leading_modes(pencil: CoupledPencil, count: int, options: SearchOptions | No
     return _result(pencil, found, count, options)
 
 
-def _search(pencil, count, options, workspace) -> _Found:
-    found = _empty(pencil, options)
+def _search(pencil, count, options, workspace) -> Found:
+    found = empty(pencil, options.left)
     aim = max(count, options.least)
     pairs = min(2 * aim + 4, options.max_pairs)
     given = options.shifts is not None
@@ -116,9 +92,13 @@ def _search(pencil, count, options, workspace) -> _Found:
     return found
 
 
+def _band(options) -> float:
+    """Upper end of the band sought, rad/s."""
+    return np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
+
+
 def _in_band(found, options) -> int:
-    band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
-    return int(np.sum(found.values.imag <= band))
+    return int(np.sum(found.values.imag <= _band(options)))
 
 
 def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
@@ -126,12 +106,12 @@ def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
     shift, shifted, pairs = _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found)
     found.shifts.append(shift)
     found.applications += pairs.applications
-    batch = _batch(pencil, *_upper(pairs.eigenvalues, pairs.vectors_q, pairs.vectors_u))
-    _polish(pencil, shifted, batch, options)
-    dropped = _refine(pencil, batch, aim, options, found)
+    batch = verified(pencil, *upper_half(pairs.eigenvalues, pairs.vectors_q, pairs.vectors_u))
+    polish(pencil, shifted, batch, options.tolerance)
+    dropped = refine(pencil, batch, aim, _band(options), options.tolerance, found)
     if options.left:
-        _attach_left(pencil, shifted, batch, wanted, options, found)
-    _merge(found, batch)
+        attach_left(pencil, shifted, batch, wanted, options.krylov_tolerance, found)
+    merge(found, batch)
     paired = isinstance(shift, complex) and not petsc_is_complex()
     mirror = np.conj(shift) if paired else shift
     reach = min([pairs.reach * (1 + 1e-9)]
@@ -230,228 +210,23 @@ def _is_covered(found, aim, options) -> bool:
     return low <= growth and high > 0
 
 
-def _upper(values, q, u):
-    """One of each conjugate pair, the imaginary part positive; real ones made real."""
-    scale = np.abs(values)
-    flat = np.abs(values.imag) <= 1e-11 * scale
-    values = np.where(flat, values.real + 0j, values)
-    upper = list(np.flatnonzero(values.imag >= 0))
-    for i in np.flatnonzero(values.imag < 0):  # a partner that did not converge with it
-        mirror = [j for j in upper if abs(values[j] - values[i].conj()) <= SAME * scale[i]
-                  and values[j].imag > 0]
-        partner_count = np.sum(np.abs(values - values[i]) <= SAME * scale[i])
-        if len(mirror) < partner_count:
-            values[i] = values[i].conj()
-            q[:, i], u[:, i] = q[:, i].conj(), u[:, i].conj()
-            upper.append(i)
-    return values[upper], q[:, upper], u[:, upper]
-
-
-def _batch(pencil, values, q, u) -> _Found:
-    q, u = _normalised(q, u)
-    residual, backward = Residuals(pencil).measure(values, q, u)
-    return _Found(values, q, u, residual, backward)
-
-
-def _normalised(q, u):
-    """Unit 2-norm of the structural part, its largest component real and positive."""
-    q, u = np.array(q, complex), np.array(u, complex)
-    for j in range(q.shape[1]):
-        part = q[:, j] if np.linalg.norm(q[:, j]) > 0 else u[:, j]
-        largest = part[np.argmax(np.abs(part))] if part.size else 0.0
-        if largest == 0:
-            continue
-        factor = np.abs(largest) / largest / np.linalg.norm(part)
-        q[:, j] *= factor
-        u[:, j] *= factor
-    return q, u
-
-
-def _polish(pencil, shifted, batch, options) -> None:
-    """Residual inverse iteration with the factor at hand for pairs that miss the tolerance.
-
-    x - T(sigma)^-1 T(l) x with l corrected along the way (Neumaier 1985): wipes out what the
-    far modes have left in the vector, for the price of two block solves.
-    """
-    for _ in range(3):
-        bad = np.flatnonzero(batch.residual > 0.3 * options.tolerance)
-        if not bad.size:
-            return
-        values, q, u = batch.values[bad], batch.q[:, bad], batch.u[:, bad]
-        structure, fluid = pencil.terms(values, q, u)
-        dq, du = shifted.solve(sum(structure), sum(fluid))
-        eq, eu = shifted.solve(*derivative_times(pencil, values, q, u))
-        along = np.sum(q.conj() * eq, axis=0) + np.sum(u.conj() * eu, axis=0)
-        step = (np.sum(q.conj() * dq, axis=0) + np.sum(u.conj() * du, axis=0)) / along
-        step = np.where(values.imag == 0, step.real, step)
-        new = values - step
-        q, u = _normalised(q - dq + step * eq, u - du + step * eu)
-        residual, backward = Residuals(pencil).measure(new, q, u)
-        better = (residual < batch.residual[bad]) & (np.abs(step) < 1e-4 * np.abs(values))
-        if not better.any():
-            return
-        chosen = bad[better]
-        batch.values[chosen], batch.residual[chosen] = new[better], residual[better]
-        batch.backward[chosen] = backward[better]
-        batch.q[:, chosen], batch.u[:, chosen] = q[:, better], u[:, better]
-
-
-def _refine(pencil, batch, aim, options, found) -> np.ndarray:
-    """Newton steps on leading pairs that miss the tolerance; those that still do are dropped.
-
-    Returns
-    -------
-    ndarray
-        Eigenvalues dropped: the search does not vouch for their surroundings.
-    """
-    good = acceptable(batch.residual, batch.backward, options.tolerance)
-    if good.all():
-        return np.zeros(0, complex)
-    ranked = np.sort(batch.values.real[good])[::-1]
-    matters = ranked[aim - 1] if ranked.size >= aim else -np.inf
-    workspace = Workspace()
-    for i in np.flatnonzero(~good):
-        if batch.values[i].real < matters:
-            continue
-        value, q, u, residual, backward = newton(
-            pencil, batch.values[i], batch.q[:, i], batch.u[:, i],
-            workspace=workspace, tolerance=options.tolerance)
-        moved = abs(value - batch.values[i]) > 1e-3 * abs(batch.values[i])
-        if moved or not acceptable(residual, backward, options.tolerance):
-            found.rejected += 1
-            found.notes.append(f"A pair near {batch.values[i]:.6g} was rejected: its residual "
-                               f"{residual:.2g} exceeds the tolerance.")
-            continue
-        good[i] = True
-        batch.values[i], batch.residual[i], batch.backward[i] = value, residual, backward
-        batch.q[:, [i]], batch.u[:, [i]] = _normalised(q[:, None], u[:, None])
-        found.refined += 1
-    dropped = batch.values[~good]
-    for name in ("values", "q", "u", "residual", "backward"):
-        setattr(batch, name, getattr(batch, name)[..., good])
-    return dropped
-
-
-def _attach_left(pencil, shifted: ShiftedPencil, batch, wanted, options, found) -> None:
-    """Left vectors from the same factor, matched by eigenvalue; strays by inverse iteration."""
-    k = batch.values.size
-    batch.left_q = np.zeros((pencil.n, k), complex)
-    batch.left_u = np.zeros((pencil.b, k), complex)
-    pairs = near_shift(shifted, wanted, tolerance=options.krylov_tolerance, transposed=True)
-    found.applications += pairs.applications
-    free = np.ones(pairs.eigenvalues.size, bool)
-    workspace = Workspace()
-    for i, value in enumerate(batch.values):
-        distance = np.where(free, np.abs(pairs.eigenvalues - value), np.inf)
-        j = int(np.argmin(distance)) if distance.size else -1
-        if j >= 0 and distance[j] <= SAME * abs(value):
-            free[j] = False
-            w, W = pairs.vectors_q[:, j], pairs.vectors_u[:, j]
-        else:
-            w, W = left_by_inverse_iteration(pencil, value, workspace)
-        # the transposed problem gives w^T T = 0
-        batch.left_q[:, i], batch.left_u[:, i] = w.conj(), W.conj()
-
-
-def left_by_inverse_iteration(pencil, value, workspace):
-    """Solution w of w^T T(value) = 0 by two solves with the transpose at the eigenvalue."""
-    shifted = factored_beside(pencil, value if value.imag else value.real, workspace)
-    if shifted is None:
-        raise SingularShiftError(f"The pencil cannot be factored next to {value:.6g}.")
-    rng = np.random.default_rng(11)
-    w, W = rng.standard_normal(pencil.n) + 0j, rng.standard_normal(pencil.b) + 0j
-    for _ in range(3):
-        w, W = shifted.solve_transposed(w, W)
-        size = np.linalg.norm(w) or np.linalg.norm(W)
-        w, W = w / size, W / size
-    return w, W
-
-
-def _merge(found: _Found, batch: _Found) -> None:
-    """Add what is new; of an eigenvalue found twice keep the pair of smaller residual."""
-    partner = np.full(batch.values.size, -1)
-    taken = np.zeros(found.values.size, bool)
-    for i in np.argsort(batch.residual):
-        distance = np.where(taken, np.inf, np.abs(found.values - batch.values[i]))
-        if distance.size and distance.min() <= SAME * abs(batch.values[i]):
-            partner[i] = int(np.argmin(distance))
-            taken[partner[i]] = True
-    names = ["values", "q", "u", "residual", "backward"]
-    names += ["left_q", "left_u"] if found.left_q is not None else []
-    for i in np.flatnonzero(partner >= 0):
-        if batch.residual[i] < found.residual[partner[i]]:
-            for name in names:
-                getattr(found, name)[..., partner[i]] = getattr(batch, name)[..., i]
-    new = partner < 0
-    for name in names:
-        old = getattr(found, name)
-        setattr(found, name, np.concatenate([old, getattr(batch, name)[..., new]], axis=-1))
-
-
-def _empty(pencil, options) -> _Found:
-    def none(rows):
-        return np.zeros((rows, 0), complex)
-
-    found = _Found(np.zeros(0, complex), none(pencil.n), none(pencil.b), np.zeros(0), np.zeros(0))
+def _dense(pencil, count, options, workspace) -> Found:
+    """Every eigenvalue at once, verified and refined like any other."""
+    values, q, u, w, W = all_pairs(pencil, left=options.left)
+    found = empty(pencil, options.left)
+    batch = verified(pencil, values, q, u)
     if options.left:
-        found.left_q, found.left_u = none(pencil.n), none(pencil.b)
+        batch.left_q, batch.left_u = w, W
+    # only pairs that may be asked for are worth a Newton step
+    dropped = refine(pencil, batch, max(count, options.least), _band(options), options.tolerance, found)
+    merge(found, batch)
+    found.everything = not dropped.size
+    if dropped.size:
+        found.ovals[0.0] = Oval(0.0, float(np.abs(dropped).min()), False)
     return found
 
 
-def _dense(pencil, count, options, workspace) -> _Found:
-    """All finite eigenvalues by the QZ method."""
-    found = _empty(pencil, options)
-    F, E = pencil.first_order()
-    # frequencies in units of their typical size, else infinite eigenvalues are hard to tell
-    unit = np.sqrt(_size(pencil.K) / _size(pencil.M)) or 1.0
-    n = pencil.n
-    row, col = np.ones(pencil.order), np.ones(pencil.order)
-    col[n:2 * n] = unit
-    F, E = F * col, E * col * unit
-    for matrix_row in range(pencil.order):
-        size = max(np.abs(F[matrix_row]).max(), np.abs(E[matrix_row]).max())
-        row[matrix_row] = 1.0 / size if size > 0 else 1.0
-    (alpha, beta), left, right = la.eig(F * row[:, None], E * row[:, None], left=True, right=True,
-                                        homogeneous_eigvals=True)
-    finite = np.abs(beta) > 1e-13 * np.hypot(np.abs(alpha), np.abs(beta))
-    values = alpha[finite] / beta[finite] * unit
-    x, z = right[:, finite] * col[:, None], left[:, finite] * row[:, None]
-    keep = values.imag >= 0
-    values, x, z = values[keep], x[:, keep], z[:, keep]
-    batch = _batch(pencil, values, x[:n], x[2 * n:])
-    if options.left:
-        batch.left_q, batch.left_u = z[n:2 * n], z[2 * n:]
-    bad = ~acceptable(batch.residual, batch.backward, options.tolerance)
-    if bad.any():  # QZ is backward stable in the norm of F, E, not term by term
-        workspace = Workspace()
-        for i in np.flatnonzero(bad):
-            value, q, u, residual, backward = newton(
-                pencil, batch.values[i], batch.q[:, i], batch.u[:, i],
-                workspace=workspace, tolerance=options.tolerance)
-            if abs(value - batch.values[i]) <= 1e-3 * abs(batch.values[i]):
-                batch.values[i], batch.residual[i], batch.backward[i] = value, residual, backward
-                batch.q[:, [i]], batch.u[:, [i]] = _normalised(q[:, None], u[:, None])
-                found.refined += 1
-        good = acceptable(batch.residual, batch.backward, options.tolerance)
-        found.rejected = int((~good).sum())
-        for name in ("values", "q", "u", "residual", "backward") + (
-                ("left_q", "left_u") if options.left else ()):
-            setattr(batch, name, getattr(batch, name)[..., good])
-    _merge(found, batch)
-    found.everything = found.rejected == 0
-    if found.rejected:
-        found.notes.append(f"{found.rejected} pairs of the dense solution missed the tolerance.")
-        growth = np.abs(values[bad].real)
-        found.ovals[0.0] = Oval(0.0, float(growth.min(initial=np.inf)), False)
-    return found
-
-
-def _size(matrix):
-    data = np.abs(matrix.data)
-    return float(data.max(initial=0.0))
-
-
-def _result(pencil, found: _Found, count, options) -> Spectrum:
+def _result(pencil, found: Found, count, options) -> Spectrum:
     """Sort, cut to the number asked for, and say what is certified."""
     region = SearchedRegion(tuple(found.ovals.values()), found.everything)
     _, band = _leading(found, max(count, options.least), options)

@@ -1,6 +1,7 @@
 """Bratu's problem, laplacian u + lambda exp(u) = 0, u = 0 on the edge of the unit interval or square."""
 
 import jax.numpy as jnp
+import numpy as np
 import scipy.sparse as sp
 
 from continuation.jax_system import JaxSystem
@@ -35,3 +36,22 @@ def bratu_2d(points: int) -> JaxSystem:
     line = sp.diags([1.0, 1.0, 1.0], [-1, 0, 1], shape=(points, points))
     one = sp.identity(points)
     return JaxSystem(residual, points**2, sparsity=sp.kron(line, one) + sp.kron(one, line))
+
+
+def bratu_chebyshev(order: int) -> JaxSystem:
+    """On the square by Chebyshev collocation, (order - 1)^2 interior points, dense."""
+    i = np.arange(order + 1)
+    x = np.cos(np.pi * i / order)
+    c = np.where((i == 0) | (i == order), 2.0, 1.0) * (-1.0) ** i
+    gap = x[:, None] - x[None, :] + np.eye(order + 1)
+    d = np.outer(c, 1 / c) / gap
+    d -= np.diag(d.sum(axis=1))
+    # On [0, 1] derivatives are twice those on [-1, 1].
+    second = 4.0 * (d @ d)[1:-1, 1:-1]
+    second = jnp.asarray(second)
+
+    def residual(u, mu):
+        v = u.reshape(order - 1, order - 1)
+        return (second @ v + v @ second.T).ravel() + mu["lambda"] * jnp.exp(u)
+
+    return JaxSystem(residual, (order - 1) ** 2)

@@ -53,7 +53,8 @@ def cumulative_trapezoid(stations: np.ndarray) -> np.ndarray:
 
 
 def linearised_flow(stations, area, inlet_velocity, density, *, storage: bool,
-                    inlet: str = "head", inlet_length: float = 0.0) -> FlowMatrices:
+                    inlet: str = "head", inlet_length: float = 0.0,
+                    integral: np.ndarray | None = None) -> FlowMatrices:
     """Linearise p = P - rho [(U^2 - U_in^2)/2 + d/dt int U ds] about a steady flow.
 
     Parameters
@@ -70,11 +71,13 @@ def linearised_flow(stations, area, inlet_velocity, density, *, storage: bool,
         "head": the pressure at the inlet is that of a reservoir,
         p = -rho (U u + inlet_length du/dt); "flux": the inlet velocity is held.
         Both have the outlet pressure at zero.
+    integral : ndarray, shape (m, m), optional
+        Integrals from the inlet to the stations; default the trapezoidal rule.
     """
     s, a = np.asarray(stations, float), np.asarray(area, float)
     m = s.size
     velocity = inlet_velocity * a[0] / a
-    integral = cumulative_trapezoid(s)
+    integral = cumulative_trapezoid(s) if integral is None else integral
     # u = from_area a + from_rate da/dt + from_inlet u_in
     from_area = -np.diag(velocity / a)
     from_area[:, 0] += velocity[0] / a  # a wall that moves at the inlet changes the flow rate

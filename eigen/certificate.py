@@ -1,0 +1,138 @@
+"""Leading modes together with the independent count of the unstable ones."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .condensation import Workspace, condensed_matrix
+from .factorization import StructureMatrices, SuperluFactorization
+from .options import SearchOptions
+from .pencil import CoupledPencil, real_apply
+from .response import Determinant
+from .search import leading_modes
+from .spectrum import Spectrum
+from .transfer import TransferBasis
+from .winding import Count, unstable_count
+
+
+@dataclass(frozen=True)
+class CertifiedSpectrum:
+    """Two routes to the number of unstable modes.
+
+    Attributes
+    ----------
+    spectrum : Spectrum
+    count : Count
+    agrees : bool
+        Both routes find the same number right of `count.line` and the count is certain.
+    unstable_count : int
+        From the spectrum, right of `count.line`; conjugates counted apart.
+    unstable_count_independent : int
+    response_error : float or None
+        Largest |log det| error of the reduced basis behind the count at the frequencies
+        checked exactly; None if the count was exact.
+    statement : str
+        The verdict in a sentence.
+    """
+
+    spectrum: Spectrum
+    count: Count
+    agrees: bool
+    unstable_count: int
+    unstable_count_independent: int
+    response_error: float | None
+    statement: str
+
+    @property
+    def stable(self) -> bool | None:
+        """True or False if both routes agree, else None."""
+        return self.unstable_count == 0 if self.agrees else None
+
+
+def certified_spectrum(pencil: CoupledPencil, count: int, options: SearchOptions | None = None, *,
+                       workspace: Workspace | None = None, basis: TransferBasis | None = None,
+                       exact: bool = False, check_points: int = 2) -> CertifiedSpectrum:
+    """Leading modes and an independent count of the unstable ones, with their agreement.
+
+    Parameters
+    ----------
+    pencil, count, options, workspace
+        As for `leading_modes`.
+    basis : TransferBasis, optional
+        For the count of a large pencil; made if missing.
+    exact : bool
+        Count with the full pencil at every frequency instead of the basis; slow.
+    check_points : int
+        Frequencies at which the basis is compared with the full pencil.
+
+    Returns
+    -------
+    CertifiedSpectrum
+    """
+    workspace = workspace or Workspace()
+    spectrum = leading_modes(pencil, count, options, workspace=workspace)
+    error = None
+    if pencil.n <= Determinant.dense_below:
+        winding = unstable_count(pencil)
+    else:
+        basis = basis or TransferBasis(pencil)
+        reduced = basis.reduced(pencil)
+        scale = 2 * np.pi * (float(basis.structural_frequencies[0]) or 1.0)
+        if exact:
+            damped = _reference_hints(basis, pencil)
+            winding = unstable_count(pencil, scale=scale, hints=[*damped, *spectrum.eigenvalues])
+        else:
+            winding = unstable_count(reduced, scale=scale, hints=spectrum.eigenvalues)
+            error = response_error(pencil, basis, _checks(spectrum, winding, check_points))
+    listed = spectrum.count_right_of(winding.line)
+    if winding.number > listed and len(spectrum) and spectrum.growth_rate[-1] > winding.line:
+        # all that were asked for are unstable: look at the rest of the unstable ones too
+        spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
+        listed = spectrum.count_right_of(winding.line)
+    trusted = winding.certain and (error is None or error < 0.1)
+    agrees = trusted and winding.number == listed
+    return CertifiedSpectrum(spectrum, winding, agrees, listed, winding.number, error,
+                             _statement(spectrum, winding, listed, agrees, error))
+
+
+def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> float:
+    """Largest error of log det of the condensed pencil made by the basis, at i 2 pi f."""
+    structure = StructureMatrices(pencil)
+    factor = SuperluFactorization(structure)
+    worst = 0.0
+    for f in frequencies:
+        s = 2j * np.pi * float(f)
+        factor.refactor(structure.values(s).astype(complex))
+        exact = real_apply(pencil.J, factor.solve(pencil.G.toarray().astype(complex)))
+        small = [condensed_matrix(*pencil.fluid_at(s), H)
+                 for H in (exact, basis.transfer(pencil, s))]
+        if small[0].size:
+            ratio = np.linalg.det(np.linalg.solve(small[0], small[1]))
+            worst = max(worst, float(abs(np.log(ratio))) if ratio != 0 else np.inf)
+    return worst
+
+
+def _checks(spectrum, winding, number):
+    """Frequencies to compare at: those of the leading modes, where the count is decided."""
+    frequencies = [f for f in spectrum.frequency if f > 0][:number]
+    return frequencies or list(winding.frequencies[1:2])
+
+
+def _reference_hints(basis, pencil):
+    reduced = basis.reduced(pencil)
+    return Determinant(reduced).reference_zeros()
+
+
+def _statement(spectrum, winding, listed, agrees, error):
+    where = "" if winding.line == 0 else f" with a growth rate above {winding.line:.4g} 1/s"
+    if agrees:
+        return (f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree.")
+    if not winding.certain:
+        return (f"The spectrum lists {listed} unstable eigenvalues{where}; the independent count "
+                f"({winding.number}) is uncertain: {' '.join(winding.notes)}")
+    if error is not None and error >= 0.1:
+        return (f"The spectrum lists {listed} unstable eigenvalues{where}; the reduced basis behind "
+                f"the independent count ({winding.number}) is too coarse (error {error:.2g}).")
+    return (f"The spectrum lists {listed} unstable eigenvalues{where}, the independent count finds "
+            f"{winding.number}: they disagree.")

@@ -1,0 +1,115 @@
+"""Derivative of an eigenvalue with respect to a parameter, from left and right vectors."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .pencil import FLUID_PARTS, CoupledPencil, real_apply
+from .products import coupling_of_modes
+from .spectrum import Mode
+
+
+@dataclass(frozen=True)
+class PencilDerivative:
+    """Derivatives of the parts of a pencil; a missing part does not depend on the parameter.
+
+    M, C, K, G, J may be matrices or callables that apply the derivative to a complex vector;
+    the parts of the fluid are arrays.
+    """
+
+    M: object | Callable | None = None
+    C: object | Callable | None = None
+    K: object | Callable | None = None
+    G: object | Callable | None = None
+    J: object | Callable | None = None
+    A0: np.ndarray | None = None
+    A1: np.ndarray | None = None
+    A2: np.ndarray | None = None
+    B0: np.ndarray | None = None
+    B1: np.ndarray | None = None
+    R0: np.ndarray | None = None
+    R1: np.ndarray | None = None
+    R2: np.ndarray | None = None
+    S0: np.ndarray | None = None
+    S1: np.ndarray | None = None
+
+
+def eigenvalue_derivative(pencil: CoupledPencil, mode: Mode, change: PencilDerivative) -> complex:
+    r"""d lambda = - w^H (dT) x / (w^H T' x) of a simple eigenvalue.
+
+    Parameters
+    ----------
+    pencil : CoupledPencil
+    mode : Mode
+        With left vectors, of any scaling.
+    change : PencilDerivative
+
+    Returns
+    -------
+    complex
+        Per unit of the parameter.
+
+    Raises
+    ------
+    ValueError
+        If the mode has no left vector or the eigenvalue is defective.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from eigen import SearchOptions, leading_modes
+    >>> pencil = CoupledPencil(M=np.eye(1), C=[[0.2]], K=[[4.0]])
+    >>> mode = leading_modes(pencil, 1, SearchOptions(left=True)).mode(0)
+    >>> derivative = eigenvalue_derivative(pencil, mode, PencilDerivative(C=np.eye(1)))
+    >>> round(derivative.real, 6)
+    -0.5
+    """
+    if mode.left_q is None:
+        raise ValueError("The derivative of an eigenvalue needs its left vector: search with left=True.")
+    s = np.array([mode.eigenvalue])
+    below = coupling_of_modes(pencil, s, mode.left_q[:, None], mode.left_u[:, None],
+                              s, mode.q[:, None], mode.u[:, None])[0, 0]
+    if abs(below) == 0.0:
+        raise ValueError("The eigenvalue is defective; it has no derivative.")
+    f, g = _changed(pencil, mode, change)
+    return complex(-(np.vdot(mode.left_q, f) + np.vdot(mode.left_u, g)) / below)
+
+
+def _changed(pencil, mode, change):
+    """(dT) x by rows."""
+    s, q, u = mode.eigenvalue, mode.q, mode.u
+
+    def part(name):
+        value = getattr(change, name)
+        return 0.0 if value is None else np.asarray(value)
+
+    def applied(name, x, size):
+        value = getattr(change, name)
+        if value is None:
+            return np.zeros(size, complex)
+        return value(x) if callable(value) else value @ x
+
+    def fluid(name, x, rows):
+        return part(name) @ x if getattr(change, name) is not None else np.zeros(rows, complex)
+
+    n, m, b = pencil.n, pencil.m, pencil.b
+    A, B, R, S = pencil.fluid_at(s)
+    y = real_apply(pencil.J, q)
+    dy = applied("J", q, m)
+    p = A @ y + B @ u
+    dp = A @ dy + sum(s**k * fluid(f"A{k}", y, m) for k in range(3)) + sum(
+        s**k * fluid(f"B{k}", u, m) for k in range(2))
+    f = (s * s * applied("M", q, n) + s * applied("C", q, n) + applied("K", q, n)
+         - applied("G", p, n) - real_apply(pencil.G, np.asarray(dp, complex)))
+    g = R @ dy + sum(s**k * fluid(f"R{k}", y, b) for k in range(3)) + sum(
+        s**k * fluid(f"S{k}", u, b) for k in range(2))
+    return f, g
+
+
+def difference(first: CoupledPencil, second: CoupledPencil, step: float) -> PencilDerivative:
+    """Derivative from two pencils a step apart."""
+    names = ("M", "C", "K", "G", "J") + FLUID_PARTS
+    return PencilDerivative(**{name: (getattr(second, name) - getattr(first, name)) / step
+                               for name in names})

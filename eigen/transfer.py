@@ -1,0 +1,161 @@
+"""A reduced structural basis, so that sweeps over the fluid cost small dense algebra."""
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from .factorization import MumpsFactorization, SingularShiftError, StructureMatrices
+from .pencil import FLUID_PARTS, CoupledPencil
+
+
+class TransferBasis:
+    r"""Structural modes and static corrections of one state.
+
+    The space V holds the lowest modes of (K + K^T)/2 and M, and what they leave out
+    statically: K^-1 G for the forces and K^-T J^T for the motions, compressed. The pencil
+    projected on V keeps its form, with k in place of n unknowns, so everything of this
+    package works on it: H(lambda) = J (lambda^2 M + lambda C + K)^-1 G, leading modes, count.
+
+    Parameters
+    ----------
+    pencil : CoupledPencil
+        Any pencil of the family; only M, K, G, J are used.
+    modes : int
+        Number of structural modes.
+    compression : float
+        Static corrections smaller than this, relative to the largest, are left out.
+
+    Attributes
+    ----------
+    V : ndarray, shape (n, k)
+        M-orthonormal.
+    structural_frequencies : ndarray
+        Hz, of the undamped symmetric structure in vacuo (an unstable one counts as zero).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> G = np.array([[1.0], [0.0]])
+    >>> pencil = CoupledPencil(M=np.eye(2), C=0.1 * np.eye(2), K=np.diag([1.0, 4.0]),
+    ...                        G=G, J=G.T, A0=[[0.5]])
+    >>> basis = TransferBasis(pencil, modes=1)
+    >>> basis.reduced(pencil).n
+    1
+    """
+
+    def __init__(self, pencil: CoupledPencil, *, modes: int = 24, compression: float = 1e-7):
+        self._G, self._J, self._M = pencil.G, pencil.J, pencil.M
+        self._projected: dict[int, tuple[object, np.ndarray]] = {}
+        symmetric = ((pencil.K + pencil.K.T) * 0.5).tocsr()
+        n = pencil.n
+        modes = min(modes, n)
+        if modes >= n - 1 or n < 60:
+            values, vectors = la.eigh(symmetric.toarray(), pencil.M.toarray())
+            values, vectors = values[:modes], vectors[:, :modes]
+        else:
+            values, vectors = _lowest_modes(symmetric, pencil.M, modes)
+        self.structural_frequencies = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
+        self.V = np.zeros((n, 0))
+        self._extend(vectors)
+        if pencil.m and self.V.shape[1] < n:
+            self._extend(self._static_corrections(pencil, values), compression)
+
+    @property
+    def size(self) -> int:
+        """Number k of basis vectors."""
+        return self.V.shape[1]
+
+    def _static_corrections(self, pencil, values):
+        lowest = np.sqrt(max(np.abs(values).min(), 1e-12 * np.abs(values).max()))
+        structure = StructureMatrices(pencil.replace(C=sp.csr_matrix(pencil.C.shape)))
+        factor = MumpsFactorization(structure)
+        # a little inertia stands in where the stiffness itself is singular
+        for shift in (0.0, 0.1 * lowest, lowest):
+            try:
+                factor.refactor(structure.values(shift))
+                parts = [factor.solve(pencil.G.toarray()).real,
+                         factor.solve_transposed(pencil.J.toarray().T).real]
+            except SingularShiftError:
+                continue
+            if all(np.isfinite(p).all() for p in parts):
+                return np.hstack([p / (np.linalg.norm(p) or 1.0) for p in parts])
+        return np.zeros((pencil.n, 0))
+
+    def enlarge(self, *vectors, compression: float = 1e-7) -> int:
+        """Add vectors, shape (n, j), real or complex; returns the new size."""
+        columns = [part for v in vectors for part in
+                   ((v.real, v.imag) if np.iscomplexobj(v) else (v,))]
+        self._extend(np.hstack(columns), compression)
+        return self.size
+
+    def _extend(self, X, compression: float = 1e-10):
+        """M-orthonormalise X against V and keep the directions that matter."""
+        size = np.sqrt(np.einsum("ij,ij->j", X, self._M @ X))
+        X = X[:, size > 0] / size[size > 0]
+        scale = 1.0
+        for sweep in range(2):
+            X = X - self.V @ (self.V.T @ (self._M @ X))
+            gram = X.T @ (self._M @ X)
+            weight, turn = np.linalg.eigh(0.5 * (gram + gram.T))
+            keep = weight > max(compression**2, 1e-15) * scale
+            X = (X @ turn[:, keep]) / np.sqrt(weight[keep])
+        room = self.V.shape[0] - self.V.shape[1]
+        self.V = np.hstack([self.V, X[:, ::-1][:, :room]])
+        self._projected.clear()
+        self._reduced_G = self.V.T @ self._G
+        self._reduced_J = self._J @ self.V
+
+    def project(self, matrix) -> np.ndarray:
+        """V^T matrix V; kept as long as the same matrix object comes again."""
+        known = self._projected.get(id(matrix))
+        if known is None or known[0] is not matrix:
+            if len(self._projected) > 16:
+                self._projected.clear()
+            known = (matrix, self.V.T @ (matrix @ self.V))
+            self._projected[id(matrix)] = known
+        return known[1]
+
+    def reduced(self, pencil: CoupledPencil, *, damping: np.ndarray | None = None) -> CoupledPencil:
+        """The pencil on the basis.
+
+        Parameters
+        ----------
+        pencil : CoupledPencil
+            Same G and J as the basis was made for.
+        damping : ndarray, shape (k, k), optional
+            V^T C V, where it is known more cheaply, as
+            alpha * project(M) + beta * project(Ks).
+        """
+        C = self.project(pencil.C) if damping is None else damping
+        return CoupledPencil(M=self.project(pencil.M), C=C, K=self.project(pencil.K),
+                             G=self._reduced_G, J=self._reduced_J,
+                             **{name: getattr(pencil, name) for name in FLUID_PARTS})
+
+    def transfer(self, pencil: CoupledPencil, s: complex) -> np.ndarray:
+        """H(s) = J (s^2 M + s C + K)^-1 G on the basis, shape (m, m)."""
+        D = (s * s * self.project(pencil.M) + s * self.project(pencil.C) + self.project(pencil.K))
+        return self._reduced_J @ np.linalg.solve(D, self._reduced_G)
+
+    def lift(self, vectors: np.ndarray) -> np.ndarray:
+        """Full structural vectors from reduced ones, shape (n, j)."""
+        return self.V @ vectors
+
+
+def _lowest_modes(stiffness, mass, count):
+    """Lowest modes of a symmetric pencil by shift and invert a little below zero."""
+    unit = np.median(stiffness.diagonal()) / np.median(mass.diagonal())
+    structure = StructureMatrices(CoupledPencil(M=mass, C=sp.csr_matrix(mass.shape), K=stiffness))
+    factor = MumpsFactorization(structure)
+    shift = 1e-8 * unit
+    for _ in range(6):
+        try:
+            factor.refactor(structure.values(np.sqrt(shift)))
+            break
+        except SingularShiftError:
+            shift *= 3.7
+    n = mass.shape[0]
+    inverse = spla.LinearOperator((n, n), matvec=lambda x: factor.solve(np.ravel(x)).real)
+    start = np.random.default_rng(5).standard_normal(n)
+    return spla.eigsh(stiffness, count, mass, sigma=-shift, OPinv=inverse, v0=start, tol=1e-9)

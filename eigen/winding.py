@@ -1,0 +1,219 @@
+"""Number of eigenvalues right of a line, by the argument principle."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .pencil import CoupledPencil
+from .response import Determinant
+
+MAX_PHASE = np.pi / 4   # largest accepted phase increment between neighbours
+MAX_LOG = 1.0           # largest accepted increment of log |f|: feels zeros beside the line
+MAX_PREDICTED = 1.5     # largest increment of log f that a neighbour's slope may predict
+
+
+@dataclass(frozen=True)
+class Count:
+    """Eigenvalues right of a vertical line, counted without computing any.
+
+    Attributes
+    ----------
+    number : int
+        Conjugates counted apart.
+    certain : bool
+        False if the phase could not be followed everywhere; then `notes` says why.
+    line : float
+        Growth rate of the line, 1/s.
+    distance : float
+        Distance from an integer of the winding found before the limit at infinity, where the
+        phase is known exactly, is put in.
+    frequencies : ndarray, shape (k,)
+        Points used, Hz, ascending from zero.
+    phase : ndarray, shape (k,)
+        Continuous phase there, rad.
+    largest_increment : float
+        Largest phase increment between neighbours, rad.
+    evaluations : int
+    notes : tuple of str
+    """
+
+    number: int
+    certain: bool
+    line: float
+    distance: float
+    frequencies: np.ndarray
+    phase: np.ndarray
+    largest_increment: float
+    evaluations: int
+    notes: tuple[str, ...] = ()
+
+
+def unstable_count(pencil: CoupledPencil, *, line: float | None = None, hints=(),
+                   scale: float | None = None, max_points: int | None = None) -> Count:
+    """Count the eigenvalues with growth rate above a line by the argument principle.
+
+    The phase of det T(line + i omega) relative to a stable structure is followed from zero
+    frequency to infinity, where its limit is known. The inner unknowns of the fluid are
+    kept, so it contributes no poles; what the structure alone contributes, through an
+    unsymmetric stiffness or negative damping, is counted along.
+
+    Parameters
+    ----------
+    pencil : CoupledPencil
+        M symmetric, positive definite. Orders up to 400 are treated densely.
+    line : float, optional
+        Growth rate, 1/s. Default 0; for a structure without any damping, whose eigenvalues
+        may lie on the imaginary axis, a small positive value, which `Count.line` reports.
+    hints : iterable of complex
+        Places near which the phase may turn fast (eigenvalues of structure or pencil).
+        They add points, nothing else.
+    scale : float, optional
+        A typical angular frequency, rad/s.
+    max_points : int, optional
+        Default 4000 for dense, 300 for sparse pencils.
+
+    Returns
+    -------
+    Count
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> count = unstable_count(CoupledPencil(M=np.eye(2), C=0.1 * np.eye(2), K=np.diag([1.0, -4.0])))
+    >>> count.number, count.certain
+    (1, True)
+    """
+    scale = scale or _typical_frequency(pencil)
+    if line is None:
+        undamped = pencil.C.nnz == 0 or abs(pencil.C).max() == 0
+        line = 1e-3 * scale if undamped else 0.0
+    determinant = Determinant(pencil, line)
+    dense = pencil.n <= Determinant.dense_below
+    # a zero of the pencil can hide from a coarse walk only beside a zero of the reference
+    hints = [complex(h) for h in hints] + [line + z for z in determinant.reference_zeros()]
+    walk = _Walk(determinant, max_points or (4000 if dense else 300))
+    walk.start(scale, hints)
+    walk.refine()
+    return walk.count()
+
+
+class _Walk:
+    """The phase along the line, refined until neighbours are close."""
+
+    def __init__(self, determinant, max_points):
+        self.f, self.max_points = determinant, max_points
+        self.values: dict[float, complex] = {}
+        self.notes: list[str] = []
+
+    def _add(self, omega):
+        if not any(abs(omega - w) <= 1e-12 * omega for w in self.values):
+            self.values[omega] = self.f(omega)
+
+    def start(self, scale, hints):
+        self._add(0.0)
+        for omega in scale * 10.0 ** np.arange(-3, 1.01, 0.25):
+            self._add(float(omega))
+        for h in hints:
+            if abs(h.imag) == 0:
+                continue
+            width = max(abs(h.real - self.f.line), 1e-9 * abs(h))
+            for offset in (-10, -3, -1, 0, 1, 3, 10):
+                omega = abs(h.imag) + offset * width
+                if omega > 0 and len(self.values) < self.max_points // 2:
+                    self._add(float(omega))
+        top = max(self.values)
+        settled = 0
+        for _ in range(40):
+            top *= 10.0 ** 0.5
+            self._add(float(top))
+            gap = self._tail(top)
+            settled = settled + 1 if abs(gap) < 0.05 else 0
+            if settled >= (3 if self.f.degree is not None else 10):
+                break
+        else:
+            self.notes.append("The phase did not settle towards its limit at high frequency.")
+
+    def _tail(self, top):
+        """Distance of the phase from its limit; without a known limit, from a multiple of pi/2."""
+        phase = self.values[top].imag
+        if self.f.degree is None:
+            return (phase + np.pi / 4) % (np.pi / 2) - np.pi / 4
+        return _principal(self.f.leading_phase + 0.5 * np.pi * self.f.degree - phase)
+
+    def refine(self):
+        """Bisect until neither an interval nor its neighbours point to a hidden zero."""
+        while True:
+            omegas = np.array(sorted(self.values))
+            wanted = self._suspects(omegas)
+            if not wanted.size:
+                return
+            for i in wanted:
+                a, b = omegas[i], omegas[i + 1]
+                where = f"{b / (2 * np.pi):.6g} Hz"
+                if b - a <= 1e-11 * b:
+                    self.notes.append(f"An eigenvalue lies on the line, near {where}.")
+                    return
+                if len(self.values) >= self.max_points:
+                    self.notes.append(f"{self.max_points} points did not resolve the phase near {where}.")
+                    return
+                # bisect in proportion over a wide interval, in length over a narrow one
+                middle = np.sqrt(a * b) if a > 0 and b > 4 * a else 0.5 * (a + b)
+                self._add(float(middle))
+
+    def _suspects(self, omegas):
+        """Intervals to bisect.
+
+        Besides a large increment of phase or size, a steep neighbour gives a zero away: two
+        zeros, one on either side of the line, turn the phase by nothing in all.
+        """
+        raw = np.array([self.values[w] for w in omegas])
+        steps = np.diff(raw)
+        steps = steps.real + 1j * ((steps.imag + np.pi) % (2 * np.pi) - np.pi)
+        length = np.diff(np.log(omegas[1:]))
+        length = np.concatenate([[1.0], length])  # the first interval begins at zero
+        slope = np.abs(steps) / np.maximum(length, 1e-14)
+        beside = np.maximum(np.concatenate([[0.0], slope[:-1]]), np.concatenate([slope[1:], [0.0]]))
+        power = 2.0 * (self.f.pencil.b + 1)  # a growth like a power of omega hides nothing
+        near = (slope > power) | (np.arange(slope.size) == 0)
+        return np.flatnonzero((np.abs(steps.imag) > MAX_PHASE)
+                              | (near & (np.abs(steps.real) > MAX_LOG))
+                              | ((beside > power) & (beside * length > MAX_PREDICTED)))
+
+    def count(self) -> Count:
+        omegas = np.array(sorted(self.values))
+        raw = np.array([self.values[w] for w in omegas])
+        steps = np.array([_principal(d) for d in np.diff(raw.imag)])
+        phase = raw[0].imag + np.concatenate([[0.0], np.cumsum(steps)])
+        tail = self._tail(omegas[-1])
+        degree = self.f.degree
+        if degree is None:
+            # |f| ~ omega^degree over the last decade
+            k = max(0, len(omegas) - 4)
+            slope = (raw[-1].real - raw[k].real) / np.log(omegas[-1] / omegas[k])
+            degree = int(round(slope))
+            self.notes.append("The leading coefficient at infinity vanishes; its degree was "
+                              f"estimated as {degree} from the growth of the determinant.")
+            tail = 0.0
+        winding = 0.5 * degree - (phase[-1] - phase[0]) / np.pi
+        closed = 0.5 * degree - (phase[-1] + tail - phase[0]) / np.pi
+        number = int(round(closed))
+        distance = float(abs(winding - number))
+        largest = float(np.abs(steps).max(initial=0.0))
+        certain = not [n for n in self.notes if "estimated" not in n]
+        if abs(closed - number) > 0.05 or number < 0:
+            certain = False
+            self.notes.append("The winding is not a whole number.")
+        return Count(number=number, certain=certain, line=self.f.line, distance=distance,
+                     frequencies=omegas / (2 * np.pi), phase=phase, largest_increment=largest,
+                     evaluations=self.f.evaluations, notes=tuple(self.notes))
+
+
+def _principal(angle: float) -> float:
+    return float((angle + np.pi) % (2 * np.pi) - np.pi)
+
+
+def _typical_frequency(pencil) -> float:
+    stiffness, inertia = np.abs(pencil.K.diagonal()), np.abs(pencil.M.diagonal())
+    value = np.sqrt(np.median(stiffness) / np.median(inertia)) if pencil.n else 1.0
+    return float(value) if np.isfinite(value) and value > 0 else 1.0
