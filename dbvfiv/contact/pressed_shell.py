@@ -112,6 +112,16 @@ class PressedShell:
         pressure_force(self.mesh.quads, self.mesh.nodes, nodal, self._uniform(pressure), self.loaded, out)
         return out
 
+    def pressure_force_second(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Second directional derivative (n,) of the force of unit pressure along nodal fields a and b (nn, 5); it is quadratic in the positions."""
+
+        def of(x):
+            out = np.zeros_like(x)
+            pressure_force(self.mesh.quads, np.zeros_like(self.mesh.nodes), x, self._uniform(1.0), self.loaded, out)
+            return out
+
+        return self.shell.dofs.restrict(of(a + b) - of(a) - of(b))
+
     def _uniform(self, pressure: float) -> np.ndarray:
         return np.full(self.mesh.node_count, self.sign * pressure)
 

@@ -22,12 +22,15 @@ class LoadStepOptions:
         Smallest load step over the target pressure before giving up.
     first_step, max_step : float, Pa
         Load step from the start, and the largest; without bounds the whole way is tried at once.
+    largest_jump : float, m
+        An equilibrium farther from the prediction than this is taken for one on another path, and the step is halved.
     """
 
     newton: NewtonOptions = NewtonOptions()
     min_step: float = 1e-4
     first_step: float = np.inf
     max_step: float = np.inf
+    largest_jump: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -122,12 +125,21 @@ class LoadSteps:
 
     def _attempt(self, aim: float) -> NewtonResult:
         start = self.q if self.slope is None else self.q + (aim - self.pressure) * self.slope
-        result = self.solver.solve(start, aim)
-        if result.converged:
-            return result
-        first = result
-        result = self.fallback.solve(self.q, aim)
+        first = self._judged(self.solver.solve(start, aim), start)
+        if first.converged:
+            return first
+        result = self._judged(self.fallback.solve(self.q, aim), start)
         return replace(result, iterations=result.iterations + first.iterations)
+
+    def _judged(self, result: NewtonResult, predicted: np.ndarray) -> NewtonResult:
+        """The result, refused if it lies far from the prediction."""
+        limit = self.options.largest_jump
+        if not result.converged or self.slope is None or not np.isfinite(limit):
+            return result
+        jump = float(np.abs(self.model.nodal(result.q - predicted)[:, :3]).max())
+        if jump <= limit:
+            return result
+        return replace(result, converged=False, reason=f"the equilibrium found lies {jump:.2g} m from the predicted one")
 
     def _accept(self, result: NewtonResult, pressure: float) -> None:
         self._take(result, pressure)
