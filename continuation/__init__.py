@@ -8,6 +8,7 @@ from continuation.errors import (
     DerivativeMissing,
     NotABifurcation,
     NotConverged,
+    OutOfDomain,
     SingularSystem,
 )
 from continuation.linear import MatrixLinearisation
@@ -22,7 +23,7 @@ __all__ = [
     "Branch", "Checkpoint", "ContinuationError", "ContinuationOptions", "CurvePoint",
     "Deflation", "DerivativeMissing", "Event", "HopfNormalForm", "JaxSystem", "Linearisation",
     "MatrixLinearisation", "NewtonOptions", "NewtonResult", "NotABifurcation", "NotConverged",
-    "Observer", "Parameters", "SingularSystem", "SpecialPoint", "Spectrum", "System",
+    "Observer", "OutOfDomain", "Parameters", "SingularSystem", "SpecialPoint", "Spectrum", "System",
     "SystemBase", "continue_branch", "continue_fold", "continue_hopf", "equilibrium",
     "fold_coefficient", "hopf_normal_form", "resume", "resume_curve", "switch_branch",
 ]

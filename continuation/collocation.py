@@ -66,6 +66,7 @@ class OrbitSystem(SystemBase):
         self._local = np.linspace(0.0, 1.0, self.degree + 1)
         self._value, self._slope = lagrange(self._local, 0.5 * (gauss + 1.0))
         self._quadrature = 0.5 * weights
+        self._period_scale = float(period_scale)
         own = getattr(system, "state_weights", None)
         each = np.full(self.n, 1.0 / self.n) if own is None else np.asarray(own, float)
         self.state_weights = np.append(np.tile(each / self.nodes, self.nodes),
@@ -88,7 +89,7 @@ class OrbitSystem(SystemBase):
     def restart_data(self) -> dict:
         """What a file needs to build this system again."""
         return {"mesh": self.mesh, "degree": np.array(self.degree),
-                "reference": self._reference}
+                "reference": self._reference, "period_scale": np.array(self._period_scale)}
 
     def _index(self, j):
         return (j * self.degree + np.arange(self.degree + 1)) % self.nodes

@@ -32,3 +32,7 @@ class NotConverged(ContinuationError):
 
 class NotABifurcation(ContinuationError):
     """A point handed over as a bifurcation does not qualify as one."""
+
+
+class OutOfDomain(ContinuationError):
+    """For a model to raise where it cannot be evaluated; the step is then tried shorter."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from continuation.errors import NotConverged, SingularSystem
+from continuation.errors import NotConverged, OutOfDomain, SingularSystem
 from continuation.options import NewtonOptions, require
 
 
@@ -143,7 +143,14 @@ def equilibrium(
         last = history[-1] if history else np.inf
         return NewtonResult(u, mu, reason == "converged", reason, count, last, tuple(history))
 
-    residual = system.residual(u, mu)
+    def evaluate(position):
+        try:
+            return system.residual(position, mu)
+        except OutOfDomain:
+            # Treated like an infinite residual: a line search steps back from it.
+            return np.full(system.size, np.inf)
+
+    residual = evaluate(u)
     for iteration in range(options.max_iterations + 1):
         size = residual_norm(system, residual)
         history.append(size)
@@ -163,14 +170,14 @@ def equilibrium(
             solver = system.linear(u, mu)
         try:
             step = solver.solve(-residual)
-        except SingularSystem:
+        except (SingularSystem, ArithmeticError, np.linalg.LinAlgError):
             return done("singular", iteration)
         if not np.all(np.isfinite(step)):
             return done("singular", iteration)
         if deflation is not None:
             step = step * deflation.step_factor(u, step)
         damping = 1.0
-        trial = system.residual(u + step, mu)
+        trial = evaluate(u + step)
         if options.line_search:
             def merit(position, value):
                 factor = 1.0 if deflation is None else deflation.magnitude(position)
@@ -181,7 +188,7 @@ def equilibrium(
                 damping *= 0.5
                 if damping < options.min_damping:
                     return done("line search stalled", iteration)
-                trial = system.residual(u + damping * step, mu)
+                trial = evaluate(u + damping * step)
         u = u + damping * step
         residual = trial
     raise AssertionError("unreachable")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -224,11 +224,31 @@ def orbits_from_hopf(
     return _follow(frame, u, mu, parameter, direction, options, observers)
 
 
-def _follow(frame, u, mu, parameter, direction, options, observers):
+def resume_orbits(system, branch: Branch, options: ContinuationOptions | None = None,
+                  observers=None) -> Branch:
+    """Go on from the last point of a branch of orbits, e.g. one loaded from a file."""
+    require(branch.kind == "orbits", f"This needs a branch of orbits, not {branch.kind}.")
+    options = options or ContinuationOptions(newton=NewtonOptions(tolerance=1e-9))
+    data, last = branch.restart, branch.points[-1]
+    frame = OrbitSystem(system, data["mesh"], int(data["degree"]), data["reference"],
+                        float(data["period_scale"]))
+    tracer = _tracer(frame, branch.fixed, branch.names[0], options, observers)
+    here = tracer.start(last.z, last.tangent, data["frame"])
+    longer = replace(branch, points=list(branch.points), special=list(branch.special),
+                     reason="running", restart=dict(branch.restart))
+    step = float(np.clip(branch.next_step or options.step, options.min_step, options.max_step))
+    return tracer.run(longer, here, step)
+
+
+def _tracer(frame, mu, parameter, options, observers):
     problem = Problem(frame, mu, (parameter,), None, options.state_scale,
                       options.parameter_scales)
-    tracer = Tracer(problem, options, [FloquetMonitor()], observers)
-    here = tracer.start(problem.pack(u, mu), direction)
+    return Tracer(problem, options, [FloquetMonitor()], observers)
+
+
+def _follow(frame, u, mu, parameter, direction, options, observers):
+    tracer = _tracer(frame, mu, parameter, options, observers)
+    here = tracer.start(tracer.problem.pack(u, mu), direction)
     branch = Branch("orbits", frame.size, (parameter,), (), dict(mu), [here.point()])
     return tracer.run(branch, here, options.step)
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from continuation.bordered import bordered
-from continuation.errors import SingularSystem
+from continuation.errors import OutOfDomain, SingularSystem
 from continuation.newton import residual_norm
 
 
@@ -54,6 +54,8 @@ class Problem:
         weights = np.full(self.n, 1.0 / self.n) if own is None else np.asarray(own, float)
         scales = parameter_scales or {}
         parameter = [scales.get(name, 1.0) ** -2 for name in self.names]
+        self.state_scale = state_scale
+        self.parameter_scale = np.array([scales.get(name, 1.0) for name in self.names])
         self.weights = np.concatenate([weights / state_scale**2, parameter, np.ones(self.e)])
 
     def u(self, z):
@@ -249,7 +251,10 @@ def correct(problem, z, frame, newton, normal=None, step_tolerance=1e-8) -> Corr
                 break
             offset = 0.0 if normal is None else float(normal @ (z - start))
             step = local.correction(normal, offset)
-        except SingularSystem:
+        except OutOfDomain as error:
+            reason = f"outside the domain of the model: {error}"
+            break
+        except (SingularSystem, ArithmeticError, np.linalg.LinAlgError):
             reason = "singular"
             break
         if not np.all(np.isfinite(step)):
@@ -257,15 +262,15 @@ def correct(problem, z, frame, newton, normal=None, step_tolerance=1e-8) -> Corr
             break
         # Scaled part by part: a frequency of 1e2 must not hide a parameter that moves.
         last = max(
-            _relative(problem.u(step), problem.u(z)),
-            _relative(problem.p(step), problem.p(z)),
-            _relative(problem.extra(step), problem.extra(z)),
+            _relative(problem.u(step), problem.u(z), problem.state_scale),
+            _relative(problem.p(step), problem.p(z), problem.parameter_scale),
+            _relative(problem.extra(step), problem.extra(z), 1.0),
         )
         z = z + step
     return Correction(z, None, False, reason, iterations, size)
 
 
-def _relative(step, position) -> float:
+def _relative(step, position, unit) -> float:
     if step.size == 0:
         return 0.0
-    return float(np.abs(step).max() / (1.0 + np.abs(position).max()))
+    return float(np.max(np.abs(step) / (unit + np.abs(position).max())))

@@ -66,6 +66,8 @@ class SpectrumMonitor:
 
     def __init__(self, spectrum=None):
         self._spectrum = spectrum
+        self._past = None
+        self._recent: list = []
 
     def modes(self, tracer, here):
         """Values and vectors at a point, computed once."""
@@ -87,9 +89,51 @@ class SpectrumMonitor:
     def between(self, tracer, before, after, index, found):
         special: list = []
         self._between(tracer, before, after, index, 0, found, special)
-        # Vectors of points left behind would only fill memory.
-        before.data.pop("modes", None)
+        if self._past is not None:
+            special += self._probe(tracer, self._past, before, after, index, special)
+            # Vectors of points left behind would only fill memory.
+            self._past.data.pop("modes", None)
+        self._past, self._recent = before, special
         return special
+
+    def _probe(self, tracer, past, before, after, index, special):
+        """Look for a crossing and its return within one step.
+
+        A parabola through the growth rates at three points tells where a mode that has the
+        same sign at all of them comes near the axis; there one more spectrum is computed.
+        """
+        limit = tracer.options.stability_tolerance
+        modes = [self.modes(tracer, here) for here in (past, before, after)]
+        onward = dict(match_modes(modes[1], modes[2]))
+        s = np.array([-tracer.problem.norm(before.z - past.z), 0.0,
+                      tracer.problem.norm(after.z - before.z)])
+        for i, j in match_modes(modes[0], modes[1]):
+            if j not in onward:
+                continue
+            y = np.array([modes[0][0][i].real, modes[1][0][j].real,
+                          modes[2][0][onward[j]].real]) - limit
+            if not (np.all(y > 0) or np.all(y < 0)):
+                continue
+            bend, slope, _ = np.polyfit(s, y, 2)
+            # Towards the axis and back: the vertex of the parabola points to zero.
+            if bend * y[1] <= 0:
+                continue
+            vertex = -slope / (2 * bend)
+            peak = y[1] - bend * vertex**2
+            if not s[0] < vertex < s[2] or peak * np.sign(y[1]) > 0.3 * np.abs(y).min():
+                continue
+            low, high, at = (past, before, index - 1) if vertex < 0 else (before, after, index)
+            share = (vertex - (s[0] if vertex < 0 else 0.0)) / (-s[0] if vertex < 0 else s[2])
+            middle = tracer.at(low, high, float(np.clip(share, 0.05, 0.95)))
+            if middle is None:
+                continue
+            new: list = []
+            self._between(tracer, low, middle, at, 1, [], new)
+            self._between(tracer, middle, high, at, 1, [], new)
+            known = special + self._recent
+            return [n for n in new if not any(
+                n.kind == k.kind and np.allclose(n.z, k.z, rtol=1e-7, atol=1e-9) for k in known)]
+        return []
 
     def _between(self, tracer, before, after, index, depth, found, special):
         a, b = self.modes(tracer, before), self.modes(tracer, after)

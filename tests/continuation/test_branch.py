@@ -15,6 +15,7 @@ from continuation import (
     NewtonOptions,
     NotConverged,
     Observer,
+    OutOfDomain,
     continue_branch,
     resume,
 )
@@ -134,6 +135,20 @@ def test_a_domain_that_ends_keeps_the_points_up_to_there():
                              ContinuationOptions(max_points=50, max_step=2.0, step=0.5))
     assert np.all(np.isfinite(branch.states))
     assert np.all(branch.values() < 1.0)
+
+
+def test_a_model_may_say_that_it_ends():
+    class Ending(JaxSystem):
+        def residual(self, u, mu):
+            if mu["p"] > 1.0:
+                raise OutOfDomain("the lips would cross")
+            return super().residual(u, mu)
+
+    stop = Stop(after=-1)
+    branch = continue_branch(Ending(lambda u, mu: u - mu["p"], 1), [0.0], {"p": 0.0}, "p",
+                             ContinuationOptions(max_points=60), observers=stop)
+    assert branch.reason.endswith("outside the domain of the model: the lips would cross")
+    assert 1.0 - 1e-6 < branch.values()[-1] <= 1.0
 
 
 class Stop(Observer):

@@ -72,6 +72,21 @@ def test_leaving_and_returning_within_a_few_steps():
     assert branch.of_kind("hopf")[1].values["crossing_real"] < 0
 
 
+@pytest.mark.parametrize("centre", [0.0, 0.07, 0.2])
+def test_a_tongue_narrower_than_the_step_is_not_stepped_over(centre):
+    """Unstable only within 0.06 of the centre, steps of 0.4; points on neither side see it."""
+    def residual(u, mu):
+        g = 0.06**2 - (mu["mu"] - centre) ** 2
+        return jnp.stack([g * u[0] - 2 * u[1] - u[0] ** 3, 2 * u[0] + g * u[1]])
+
+    branch = continue_branch(JaxSystem(residual, 2), np.zeros(2), {"mu": -1.0}, "mu",
+                             wide(eigenvalues=2, max_step=0.4, step=0.4))
+    at = [s.mu["mu"] for s in branch.of_kind("hopf")]
+    assert np.allclose(sorted(at), [centre - 0.06, centre + 0.06], rtol=0, atol=1e-9)
+    assert all(branch.values()[s.index] <= s.mu["mu"] <= branch.values()[s.index + 1]
+               for s in branch.special)
+
+
 def test_pole_of_the_branch_point_test_is_no_branch_point():
     """A fold is passed with the test function of branch points running all over the place."""
     branch = continue_branch(bogdanov_takens(), [-1.2, 0.0], {"b1": -0.3, "b2": -1.0, "s": -1.0},

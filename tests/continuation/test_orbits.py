@@ -14,6 +14,7 @@ from continuation.orbits import (
     find_orbit,
     orbit_at,
     orbits_from_hopf,
+    resume_orbits,
 )
 from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
 from tests.systems.van_der_pol import van_der_pol
@@ -115,6 +116,15 @@ def test_fold_of_cycles_of_the_bautin_system(tmp_path):
     at = fold.index
     assert set(branch.unstable[: at + 1]) == {1} and set(branch.unstable[at + 1:]) == {0}
     branch.save(tmp_path / "cycles.h5")
+    part = orbits_from_hopf(system, hopf, "mu", 0.2,
+                            ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON,
+                                                max_step=0.2, max_points=5),
+                            OrbitOptions(intervals=12))
+    part.save(tmp_path / "part.h5")
+    longer = resume_orbits(system, Branch.load(tmp_path / "part.h5"),
+                           ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON,
+                                               max_step=0.2))
+    assert np.allclose(longer.values(), branch.values(), rtol=0, atol=1e-7)
     again = orbit_at(system, Branch.load(tmp_path / "cycles.h5"), -1)
     r2 = 0.5 + np.sqrt(0.25 + 0.3)
     assert np.allclose(again.amplitude(), np.sqrt(r2), rtol=1e-6)

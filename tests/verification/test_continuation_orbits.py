@@ -1,0 +1,144 @@
+"""Periodic orbits with known period, amplitude and multipliers; criticality by integration."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from continuation import ContinuationOptions, NewtonOptions, continue_branch, hopf_normal_form
+from continuation.orbits import OrbitOptions, find_orbit, orbit_at, orbits_from_hopf, special_orbit
+from tests.systems.brusselator import brusselator
+from tests.systems.langford import langford
+from tests.systems.lorenz import lorenz
+from tests.systems.van_der_pol import van_der_pol
+
+PHASE = 2 * np.pi * np.arange(80) / 80
+NEWTON = NewtonOptions(tolerance=1e-9)
+
+
+@pytest.mark.parametrize(("mu", "period", "amplitude", "multiplier"), [
+    (0.5, 6.380676, 2.002488, 0.0391769), (1.0, 6.663287, 2.008620, 8.59695e-4)])
+def test_van_der_pol(mu, period, amplitude, multiplier):
+    """To the printed digits."""
+    guess = 2 * np.stack([np.cos(PHASE), -np.sin(PHASE)], axis=1)
+    orbit = find_orbit(van_der_pol(), guess, 2 * np.pi, {"mu": mu})
+    assert abs(orbit.period - period) < 5.1e-7
+    assert abs(orbit.amplitude()[0] - amplitude) < 5.1e-7
+    digit = 10.0 ** (np.floor(np.log10(multiplier)) - 5)
+    assert abs(orbit.nontrivial[0] - multiplier) < 0.51 * digit
+    # Liouville: the product of the multipliers is exp of the integrated divergence.
+    t = np.linspace(0, orbit.period, 2001)[:-1]
+    divergence = np.mean(mu * (1 - orbit(t)[:, 0] ** 2)) * orbit.period
+    assert np.isclose(np.prod(orbit.multipliers).real, np.exp(divergence), rtol=1e-6)
+
+
+def test_langford():
+    """Circular orbit from mu = 5 - sqrt(11); torus bifurcation at exactly 2."""
+    system = langford()
+    equilibria = continue_branch(system, [0, 0, 1.5], {"mu": 1.5}, "mu",
+                                 ContinuationOptions(eigenvalues=3, limits={"mu": (1.2, 2.5)}))
+    (hopf,) = equilibria.of_kind("hopf")
+    # On the axis z = mu the growth is 2 mu - 3 + 0.2 (1 - mu^2).
+    assert np.isclose(hopf.mu["mu"], 5 - np.sqrt(11), rtol=1e-10)
+    assert abs(hopf.mu["mu"] - 1.683) < 5e-4 and np.isclose(hopf.values["omega"], 0.25)
+    branch = orbits_from_hopf(system, hopf, "mu", 0.1,
+                              ContinuationOptions(limits={"mu": (1.6, 2.05)}, newton=NEWTON),
+                              OrbitOptions(intervals=40))
+    (torus,) = branch.of_kind("torus")
+    assert abs(torus.mu["mu"] - 2.0) < 1e-9
+    assert branch.unstable[0] == 0 and branch.unstable[-1] == 2
+    orbit = special_orbit(system, branch, torus)
+    assert np.isclose(orbit.period, 8 * np.pi, rtol=1e-9)
+    # Exponents are known up to whole turns per period, that is multiples of i/4.
+    exponent = orbit.exponents[np.argmax(orbit.exponents.imag)]
+    assert abs(exponent.real) < 1e-9
+    turns = (np.sqrt(1.2) - exponent.imag) / 0.25
+    assert abs(turns - round(turns)) < 1e-7
+    radius = np.linalg.norm(orbit(np.linspace(0, 25, 9))[:, :2], axis=1)
+    assert np.allclose(radius, 1.0, rtol=1e-7)
+
+
+def hopf_form(system, u, mu, parameter, low, high):
+    branch = continue_branch(system, u, mu, parameter,
+                             ContinuationOptions(eigenvalues=3, step=0.2, max_step=2.0,
+                                                 limits={parameter: (low, high)}))
+    (point,) = branch.of_kind("hopf")
+    return point, hopf_normal_form(system, point.u, point.mu, point.values["omega"],
+                                   point.vectors["right"], point.vectors["left"], parameter)
+
+
+def swing(system, start, mu, time, functional):
+    """Half of peak to peak over the first and the last few turns."""
+    solution = solve_ivp(lambda t, u: system.residual(u, mu), (0, time), start, method="LSODA",
+                         rtol=1e-9, atol=1e-11, dense_output=True)
+    first = functional @ solution.sol(np.linspace(0, 0.06 * time, 600))
+    last = functional @ solution.sol(np.linspace(0.94 * time, time, 600))
+    return 0.5 * np.ptp(first), 0.5 * np.ptp(last)
+
+
+def test_supercritical_brusselator_by_integration():
+    """Above: from inside and from outside to the predicted cycle. Below: everything decays."""
+    system = brusselator()
+    point, form = hopf_form(system, [1.0, 1.5], {"A": 1.0, "B": 1.5}, "B", 0.5, 3.0)
+    assert form.criticality == "super" and form.side() == 1
+    x = np.array([1.0, 0.0])
+    change = 0.02
+    # The leading order is off by a relative O(change), here less than 3 %.
+    predicted = form.amplitude_coefficient(x) * np.sqrt(change)
+    mu = {"A": 1.0, "B": 2.0 + change}
+    u0 = np.array([1.0, mu["B"]])
+    for factor in (0.3, 2.0):
+        start = u0 + form.orbit(factor * form.radius(change), np.zeros(1))[0] - point.u
+        _, final = swing(system, start, mu, 600.0, x)
+        assert np.isclose(final, predicted, rtol=0.03)
+    mu = {"A": 1.0, "B": 2.0 - change}
+    start = np.array([1.0, mu["B"]]) + [0.3, 0.0]
+    first, final = swing(system, start, mu, 600.0, x)
+    assert final < 0.02 * first
+
+
+@pytest.mark.slow
+def test_subcritical_lorenz_by_integration():
+    """Below: inside the unstable cycle motion decays, outside it grows. Above: all grows."""
+    system = lorenz()
+    x = np.sqrt(8 / 3 * 19)
+    point, form = hopf_form(system, [x, x, 19.0], {"sigma": 10.0, "b": 8 / 3, "r": 20.0}, "r", 15, 28)
+    assert form.criticality == "sub" and form.side() == -1
+    observed = np.array([0.0, 0.0, 1.0])
+
+    def run(change, factor, time):
+        r = point.mu["r"] + change
+        mu = {**point.mu, "r": r}
+        e = np.sqrt(8 / 3 * (r - 1))
+        radius = form.radius(-abs(change))
+        start = np.array([e, e, r - 1]) + form.orbit(factor * radius, np.zeros(1))[0] - point.u
+        return swing(system, start, mu, time, observed)
+
+    # The unstable cycle is where predicted within 20 % (leading order, change 0.1 in 24.7).
+    first, last = run(-0.1, 0.8, 250.0)
+    assert last < 0.8 * first
+    first, last = run(-0.1, 1.2, 250.0)
+    assert last > 1.2 * first
+    for factor in (0.2, 0.8):
+        first, last = run(0.1, factor, 250.0)
+        assert last > 1.5 * first
+
+
+def test_cycles_of_the_brusselator_agree_with_the_normal_form_to_first_order():
+    """Ratio of computed to predicted squared amplitude tends to 1 linearly in the distance."""
+    system = brusselator()
+    point, form = hopf_form(system, [1.0, 1.5], {"A": 1.0, "B": 1.5}, "B", 0.5, 3.0)
+    branch = orbits_from_hopf(system, point, "B", 0.08,
+                              ContinuationOptions(limits={"B": (1.9, 2.06)}, newton=NEWTON,
+                                                  step=0.02, max_step=0.05),
+                              OrbitOptions(intervals=16))
+    change = branch.values() - 2.0
+    x = np.array([1.0, 0.0])
+    ratios = []
+    for i in (0, len(branch) // 2, len(branch) - 1):
+        amplitude = orbit_at(system, branch, i).amplitude()[0]
+        ratios.append(amplitude**2 / (form.amplitude_coefficient(x) ** 2 * change[i]) - 1)
+        period = branch.points[i].tests["period"]
+        assert np.isclose(2 * np.pi / period, form.frequency(change[i]), atol=2 * change[i] ** 2)
+    slopes = np.array(ratios) / change[[0, len(branch) // 2, len(branch) - 1]]
+    assert np.ptp(slopes) < 0.15 * abs(slopes[0])
+    assert set(branch.unstable) == {0}
