@@ -75,4 +75,3 @@ def _frame(axes, points: np.ndarray) -> None:
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.pane.set_facecolor((1, 1, 1, 0))
         axis.pane.set_edgecolor("0.8")
-        axis._axinfo["grid"].update(color="0.9", linewidth=0.6)

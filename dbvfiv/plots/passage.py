@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Callable, Iterator
 from matplotlib.figure import Figure
 
 from .discharge import ordered
-from .shapes import _mark_pieces
+from .shapes import mark_pieces
 from .style import kilopascals, new_figure, pressure_colours, some_of
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def passage(result: "SteadyResults") -> Figure:
         axes.set_ylabel(label)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.set_xlim(0, z[-1])
-    _mark_pieces(result, *panels)
+    mark_pieces(result, *panels)
     panels[0].set_title("Along the passage (lip left, inlet right)", loc="left", fontweight="bold")
     panels[-1].set_xlabel("Distance from the lip z, mm")
     panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="inlet pressure")

@@ -49,7 +49,7 @@ def centre_line(result: "SteadyResults") -> Figure:
         for state, colour in zip(states, colours):
             moved = rest + state.nodal[line, :3]
             axes.plot(moved[:, 2] * 1e3, moved[:, across] * 1e3, color=colour, label=kilopascals(state.pressure))
-    _mark_pieces(result, upper, lower)
+    mark_pieces(result, upper, lower)
     upper.set_ylabel("y, mm")
     lower.set_ylabel("x, mm")
     lower.set_xlabel("Distance from the lip z, mm")
@@ -59,7 +59,7 @@ def centre_line(result: "SteadyResults") -> Figure:
     return figure
 
 
-def _mark_pieces(result: "SteadyResults", *panels) -> None:
+def mark_pieces(result: "SteadyResults", *panels) -> None:
     """Thin lines where duckbill, saddle and flange meet."""
     valve = result.case.valve
     if valve.key_points is not None:

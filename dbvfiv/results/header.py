@@ -15,6 +15,7 @@ import numpy as np
 from .. import __version__
 from ..case.model import Case
 from ..case.write import case_toml
+from ..errors import CaseError
 from .attachments import Attachment, attachments_of, placed
 from .layout import LAYOUT
 
@@ -114,10 +115,17 @@ def read_header(file: h5py.File) -> Header:
     attached = [files[name] for name in sorted(files, key=int)]
     return Header(
         kind=str(attributes["dbvfiv_kind"]),
-        case=Case.from_dict(json.loads(file["case/json"].asstr()[()])),
+        case=_case(file["case/json"].asstr()[()]),
         versions={name: str(version) for name, version in file["versions"].attrs.items()},
         attachments=tuple(Attachment(str(d.attrs["path"]), d.asstr()[()]) for d in attached),
         complete=bool(attributes["complete"]),
         layout=int(attributes["layout"]),
         **{name: str(attributes[name]) for name in ("name", "program", "created", "command")},
     )
+
+
+def _case(text: str) -> Case:
+    try:
+        return Case.from_dict(json.loads(text))
+    except CaseError as error:  # not the user's slip but the file's
+        raise ValueError(f"its case cannot be used, {error}") from error
