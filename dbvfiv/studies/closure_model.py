@@ -49,6 +49,10 @@ class ClosureModel:
         return self.pressed.size
 
     @property
+    def shell(self) -> Shell:
+        return self.pressed.shell
+
+    @property
     def folded_start(self) -> np.ndarray:
         """Numbers of the nodes whose inner face starts nearer to the closing plane than the least gap, or beyond it."""
         return self.face.nodes[self.face.lifted]

@@ -1,0 +1,240 @@
+"""The walk along back-pressure equilibria: load steps, multiplier updates, the watch for buckling, arclength past limit points."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from continuation import NotConverged
+
+from ..errors import SolveError
+from ..model.newton import NewtonOptions
+from .closure_arclength import arclength_path
+from .closure_balance import EnergyLedger
+from .closure_model import ClosureModel
+from .closure_opening import FACES, opening
+from .closure_stability import StiffnessSpectrum, stiffness_spectrum
+from .closure_state import QUARTERS, ClosureState, contact_front, describe_closure
+from .load_steps import LoadStepOptions, LoadSteps
+from .observer import Observer
+
+#: Farthest that an equilibrium may lie from its prediction, over the mean wall thickness.
+LARGEST_JUMP = 0.15
+#: Renewals of the multipliers before giving up.
+MOST_UPDATES = 40
+
+
+@dataclass(frozen=True)
+class ClosureOptions:
+    """Options of a walk along back pressures.
+
+    Attributes
+    ----------
+    newton : NewtonOptions
+    max_step : float, Pa
+        Largest load step.
+    first_step : float, Pa
+        Load step from rest, where the lips meet.
+    min_step : float
+        Smallest load step over the target pressure.
+    penetration : float, m
+        Largest penetration that is left.
+    eigenvalues : int
+        How many stiffness eigenvalues to follow.
+    arclength : bool
+        Go on past limit points.
+    """
+
+    newton: NewtonOptions = NewtonOptions()
+    max_step: float = 1e3
+    first_step: float = 50.0
+    min_step: float = 1e-5
+    penetration: float = 1e-6
+    eigenvalues: int = 4
+    arclength: bool = True
+
+    @classmethod
+    def of(cls, case) -> "ClosureOptions":
+        """Options of a case file."""
+        steady, closure = case.steady, case.closure
+        return cls(
+            NewtonOptions(steady.tolerance, steady.max_iterations), closure.max_step, closure.max_step / 20,
+            penetration=closure.penetration, eigenvalues=closure.eigenvalues, arclength=closure.arclength,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PathPoint:
+    """One equilibrium on the way; areas and forces of the whole valve.
+
+    Attributes
+    ----------
+    pressure : float, Pa
+    max_displacement : float, m
+    contact_force : float, N
+    least_opening : float, m2
+    sealed_length : float, m
+    contact_front : float, m
+    eigenvalues : (k,) array, 1/s2
+        Real parts, ascending; empty on stretches followed by arclength.
+    arclength : bool
+        Found by arclength.
+    """
+
+    pressure: float
+    max_displacement: float
+    contact_force: float
+    least_opening: float
+    sealed_length: float
+    contact_front: float
+    eigenvalues: np.ndarray
+    arclength: bool = False
+
+
+@dataclass(frozen=True)
+class Buckling:
+    """A state in which the tangent stiffness is singular.
+
+    Attributes
+    ----------
+    kind : str
+        "limit point": the pressure can rise no further on this path; "bifurcation": another path crosses.
+    pressure : float, Pa
+        Critical pressure.
+    q, shape : (n,) arrays
+        The state, and the shape it buckles into, largest entry one.
+    eigenvalue : float, 1/s2
+        Lowest stiffness eigenvalue in magnitude there.
+    """
+
+    kind: str
+    pressure: float
+    q: np.ndarray
+    shape: np.ndarray
+    eigenvalue: float
+
+
+@dataclass
+class ClosurePath:
+    """Walks a model from one back pressure to the next."""
+
+    model: ClosureModel
+    options: ClosureOptions = ClosureOptions()
+    observer: Observer = field(default_factory=Observer)
+
+    def __post_init__(self):
+        options, pressed = self.options, self.model.pressed
+        jump = LARGEST_JUMP * float(np.mean(self.model.mesh.thickness))
+        steps = LoadStepOptions(options.newton, options.min_step, options.first_step, options.max_step, jump)
+        self.steps = LoadSteps(pressed, steps, observer=self.observer, accepted=self._accepted)
+        self.points: list[PathPoint] = []
+        self.buckling: list[Buckling] = []
+        self.beyond_limit = False
+        self.energy = EnergyLedger(pressed)
+        self.energy.begin(self.steps.q, 0.0)
+        self._spectrum: StiffnessSpectrum | None = None
+        self._before: tuple[float, np.ndarray, float] | None = None
+
+    def go_to(self, target: float) -> ClosureState:
+        """Equilibrium at a back pressure, Pa, with the penetration asked for.
+
+        Raises
+        ------
+        SolveError
+        """
+        iterations, count = 0, 0
+        try:
+            way = self.steps.reach(target)
+            last, iterations, count = way.result, way.iterations, way.steps
+        except SolveError as error:
+            if not self.options.arclength:
+                raise
+            self._past_limit(target, error)
+            last = self.steps.settle()
+        updates = 0
+        pressed = self.model.pressed
+        while pressed.contact_state(self.steps.q).penetration > self.options.penetration:
+            if updates == MOST_UPDATES:
+                raise SolveError(
+                    f"At {target:.6g} Pa {updates} renewals of the contact multipliers left a penetration of "
+                    f"{pressed.contact_state(self.steps.q).penetration:.2g} m; a larger closure.contact_depth may help."
+                )
+            pressed.renew_multipliers(self.steps.q)
+            self.energy.renewed()
+            last = self.steps.settle()
+            self.energy.add(self.steps.q, target, self.steps.slope)
+            iterations, updates = iterations + last.iterations, updates + 1
+        spectrum = self._watch(target, self.steps.q)
+        return describe_closure(
+            self.model, self.steps.q, target, spectrum, beyond_limit=self.beyond_limit, energy_balance=self.energy.error,
+            converged=True, iterations=iterations, load_steps=count, multiplier_updates=updates,
+            residual=last.residual, rounding=last.rounding, reason=last.reason,
+        )  # fmt: skip
+
+    # -- on the way -----------------------------------------------------------------------------------------------------------------
+
+    def _accepted(self, pressure: float, q: np.ndarray) -> None:
+        self.energy.add(q, pressure, self.steps.slope)
+        self._watch(pressure, q)
+        self.points.append(self._point(pressure, q, self._spectrum.values.real))
+
+    def _watch(self, pressure: float, q: np.ndarray) -> StiffnessSpectrum:
+        """Stiffness eigenvalues of an equilibrium; locates where the lowest has passed zero since the last."""
+        spectrum = self._spectrum = stiffness_spectrum(self.model.pressed, q, pressure, self.options.eigenvalues)
+        if self._before is not None and not self.beyond_limit and self._before[2] > 0 > spectrum.lowest:
+            self.buckling.append(self._locate(self._before, (pressure, q, spectrum.lowest)))
+        self._before = (pressure, q, spectrum.lowest)
+        return spectrum
+
+    def _locate(self, stable, unstable) -> Buckling:
+        """The state between two where the lowest eigenvalue vanishes, by the secant rule kept within its bracket."""
+        pressed, scale = self.model.pressed, stable[2]
+        steps = LoadSteps(pressed, self.steps.options, stable[0], stable[1])
+        (pa, _, fa), (pb, qb, fb) = stable, unstable
+        best = (pb, qb, fb)
+        for _ in range(40):
+            aim = pa + (pb - pa) * min(max(fa / (fa - fb), 0.05), 0.95)
+            steps.reach(aim)
+            value = stiffness_spectrum(pressed, steps.q, aim, self.options.eigenvalues).lowest
+            best = (aim, steps.q, value)
+            if abs(value) <= 1e-7 * scale or abs(pb - pa) <= 1e-10 * abs(pb):
+                break
+            if value > 0:
+                pa, fa = aim, value
+            else:
+                pb, fb = aim, value
+        pressure, q, value = best
+        shape = stiffness_spectrum(pressed, q, pressure, self.options.eigenvalues).shape
+        return Buckling("bifurcation", float(pressure), q, shape, float(value))
+
+    def _past_limit(self, target: float, error: SolveError) -> None:
+        """Arclength from the last equilibrium to the target pressure."""
+        start = self.steps.pressure
+        self.observer.progress(f"arclength from {start:.6g} Pa")
+        try:
+            path = arclength_path(self.model.pressed, self.steps.q, start, target, self.options.newton.tolerance, observer=self.observer)
+        except NotConverged as reason:
+            raise SolveError(f"{error} Arclength did not get under way either: {reason}") from reason
+        for point in path.branch.points[1:]:
+            self.points.append(self._point(float(point.z[-1]), point.z[:-1], np.empty(0), arclength=True))
+            self.energy.add(point.z[:-1], float(point.z[-1]))
+        for limit in path.limits:
+            self.buckling.append(Buckling("limit point", limit.pressure, limit.q, limit.shape, limit.eigenvalue))
+        self.beyond_limit = self.beyond_limit or bool(path.limits)
+        self.steps.q, self.steps.pressure, self.steps.slope, self._before = path.q, path.pressure, None, None
+        if not path.reached:
+            raise SolveError(f"{error} Arclength ended at {path.pressure:.6g} Pa after {len(path.branch)} points ({path.branch.reason}).")
+
+    def _point(self, pressure: float, q: np.ndarray, eigenvalues: np.ndarray, arclength: bool = False) -> PathPoint:
+        model = self.model
+        passage, contact = opening(model, q), model.pressed.contact_state(q)
+        return PathPoint(
+            pressure=float(pressure),
+            max_displacement=float(np.linalg.norm(model.pressed.nodal(q)[:, :3], axis=1).max()),
+            contact_force=FACES * contact.total,
+            least_opening=float(QUARTERS * passage.area.min()),
+            sealed_length=passage.shut_length(model.case.closure.shut_fraction),
+            contact_front=contact_front(passage, model),
+            eigenvalues=eigenvalues,
+            arclength=arclength,
+        )
