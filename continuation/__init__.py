@@ -11,8 +11,8 @@ from continuation.errors import (
     OutOfDomain,
     SingularSystem,
 )
+from continuation.events import Event
 from continuation.linear import MatrixLinearisation
-from continuation.monitors import Event
 from continuation.newton import Deflation, NewtonResult, equilibrium
 from continuation.normal_form import HopfNormalForm, fold_coefficient, hopf_normal_form
 from continuation.observers import Checkpoint, Observer

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from continuation.branch import Branch, SpecialPoint
+from continuation.branch_points import BranchPointMonitor
 from continuation.errors import NotABifurcation, NotConverged
-from continuation.monitors import BranchPointMonitor, EventMonitor, FoldMonitor
+from continuation.events import EventMonitor
+from continuation.folds import FoldMonitor
 from continuation.options import ContinuationOptions
 from continuation.problem import Problem
 from continuation.stability import SpectrumMonitor

@@ -9,7 +9,7 @@ from continuation.errors import ContinuationError, DerivativeMissing, SingularSy
 from continuation.locate import special_at
 from continuation.normal_form import fold_coefficient, hopf_normal_form
 from continuation.problem import Problem, correct
-from continuation.tracer import Here
+from continuation.here import Here
 
 
 def solve_bogdanov_takens(tracer, z, v, w):

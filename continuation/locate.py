@@ -6,9 +6,17 @@ import numpy as np
 
 from continuation.branch import SpecialPoint
 from continuation.errors import DerivativeMissing, SingularSystem
+from continuation.problem import Problem
 
 #: How far outside its bracket, in chord lengths, a located point may lie.
 SLACK = 0.02
+
+
+def companion(tracer, condition, names=None, system=None, mu=None):
+    """A problem in the same units as the tracer's, with a condition."""
+    problem, options = tracer.problem, tracer.options
+    return Problem(system or problem.system, mu or problem.fixed, names or problem.names,
+                   condition, options.state_scale, options.parameter_scales)
 
 
 def special_at(tracer, kind, here, index, located, reason="", values=None, vectors=None):

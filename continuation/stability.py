@@ -3,52 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
-from continuation.conditions import HopfCondition, null_pair
-from continuation.errors import ContinuationError, DerivativeMissing
+from continuation.branch_points import BranchPointMonitor
+from continuation.hopf import describe_hopf, solve_hopf
 from continuation.locate import safeguarded, special_at
-from continuation.monitors import BranchPointMonitor, companion
-from continuation.normal_form import hopf_normal_form
-from continuation.problem import correct
-from continuation.tracer import Here
-
-
-def count_unstable(values, tolerance=0.0) -> int:
-    """Unstable eigenvalues, given one of each conjugate pair."""
-    return int(sum((2 if value.imag > 0 else 1) for value in values if value.real > tolerance))
-
-
-def match_modes(first, second) -> list[tuple[int, int]]:
-    """Pair the modes of two nearby points by eigenvalue and shape.
-
-    Parameters
-    ----------
-    first, second : (values, vectors)
-        With one mode of each conjugate pair.
-
-    Returns
-    -------
-    list of (i, j)
-    """
-    if first[0].size == 0 or second[0].size == 0:
-        return []
-    rows, columns = linear_sum_assignment(mode_distance(first, second))
-    return list(zip(rows.tolist(), columns.tolist()))
-
-
-def mode_distance(first, second) -> np.ndarray:
-    """How unlike the modes of two points are, shape (first, second), from 0 to about 2.5."""
-    (a, x), (b, y) = first, second
-    size = max(np.abs(a).max(), np.abs(b).max(), 1e-300)
-    near = np.abs(a[:, None] - b[None, :])
-    near = near / (np.abs(a)[:, None] + np.abs(b)[None, :] + 1e-3 * size)
-    overlap = np.abs(x.conj().T @ y)
-    norms = np.linalg.norm(x, axis=0)[:, None] * np.linalg.norm(y, axis=0)[None, :]
-    likeness = overlap / np.maximum(norms, 1e-300)
-    # A complex mode cannot have become a real one without another that met it.
-    kind = 0.5 * ((a.imag == 0)[:, None] != (b.imag == 0)[None, :])
-    return near + (1.0 - likeness) + kind
+from continuation.modes import count_unstable, match_modes, mode_distance
 
 
 class SpectrumMonitor:
@@ -250,56 +209,6 @@ class SpectrumMonitor:
 
 def _sign(x) -> int:
     return 1 if x > 0 else -1
-
-
-def hopf_borders(linear, omega, vector):
-    """Left and right vectors near the null vectors of ``A - i omega B``."""
-    shifted = linear.shifted(1j * omega)
-    q = np.asarray(vector, complex)
-    p = linear.mass_matvec(q)
-    if np.linalg.norm(p) <= 1e-12 * np.linalg.norm(q):
-        p = q
-    for _ in range(2):
-        _, q, p, _ = null_pair(shifted, p / np.linalg.norm(p), q / np.linalg.norm(q))
-    return p, q
-
-
-def solve_hopf(tracer, guess, omega, vector):
-    """Newton on ``F = 0, g = 0`` in state, parameter and frequency."""
-    p, q = hopf_borders(guess.local.linear, omega, vector)
-    augmented = companion(tracer, HopfCondition(p, q))
-    frame = augmented.frame(guess.tangent[:, None])
-    result = correct(augmented, np.append(guess.z, omega), frame, tracer.options.newton, None,
-                     tracer.options.location_tolerance)
-    if not result.converged:
-        return f"Newton's method on the augmented system: {result.reason}"
-    if not result.z[-1] > 0:
-        return "Newton's method went to a frequency that is not positive"
-    return result
-
-
-def describe_hopf(tracer, result, tangent, index):
-    """The special point with frequency, normal form and a check of the eigenpair."""
-    problem, value = tracer.problem, result.local.condition
-    omega = float(result.z[-1])
-    linear, q = value.linear, value.v / np.linalg.norm(value.v)
-    aq, bq = linear.matvec(q), linear.mass_matvec(q)
-    defect = np.linalg.norm(aq - 1j * omega * bq) / max(np.linalg.norm(aq), 1e-300)
-    values = {"omega": omega, "iterations": result.iterations, "eigen_residual": float(defect)}
-    vectors = {"right": q, "left": value.w}
-    try:
-        form = hopf_normal_form(problem.system, result.local.u, result.local.mu, omega,
-                                q, value.w, problem.names[0])
-        values.update(
-            first_lyapunov_coefficient=form.l1, c1_real=form.c1.real, c1_imag=form.c1.imag,
-            crossing_real=form.crossing.real, crossing_imag=form.crossing.imag,
-            criticality=form.criticality, amplitude_coefficient=form.amplitude_coefficient(),
-        )
-        vectors["left"] = form.p
-    except (DerivativeMissing, ContinuationError) as error:
-        values["normal_form"] = str(error)
-    here = Here(result.z[:-1], tangent, result.local)
-    return special_at(tracer, "hopf", here, index, True, "", values, vectors)
 
 
 class CountMonitor(SpectrumMonitor):

@@ -2,45 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
-from continuation.branch import Branch, CurvePoint
+from continuation.branch import Branch
 from continuation.errors import NotConverged, SingularSystem
+from continuation.here import Here
 from continuation.observers import as_observers
 from continuation.problem import Local, Problem, correct
-
-
-@dataclass
-class Here:
-    """A point on the curve with its linearisation and what the monitors made of it.
-
-    Attributes
-    ----------
-    z, tangent : ndarray
-    local : Local
-    tests : dict of str to float
-    unstable : int
-    eigenvalues : ndarray, complex
-    data : dict
-        Private to the monitors.
-    """
-
-    z: np.ndarray
-    tangent: np.ndarray
-    local: Local
-    iterations: int = 0
-    step: float = 0.0
-    tests: dict = field(default_factory=dict)
-    unstable: int = -1
-    eigenvalues: np.ndarray = field(default_factory=lambda: np.empty(0, complex))
-    data: dict = field(default_factory=dict)
-
-    def point(self) -> CurvePoint:
-        return CurvePoint(self.z, self.tangent, self.step, self.iterations,
-                           float(self.local.size), dict(self.tests), self.unstable,
-                           self.eigenvalues)
 
 
 class Tracer:

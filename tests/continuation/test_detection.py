@@ -7,7 +7,7 @@ import pytest
 from continuation import ContinuationOptions, Spectrum, continue_branch
 from continuation.jax_system import JaxSystem
 from continuation.normal_form import hopf_normal_form
-from continuation.stability import count_unstable, match_modes
+from continuation.modes import count_unstable, match_modes
 from tests.systems.brusselator import brusselator, brusselator_1d
 from tests.systems.normal_forms import (
     bogdanov_takens,

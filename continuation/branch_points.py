@@ -1,80 +1,16 @@
-"""What is watched for along a branch of equilibria without a spectrum: folds, branch points, events."""
+"""Simple branch points along a branch of equilibria, and the directions that leave them."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from continuation.bordered import Bordered
-from continuation.conditions import (
-    BranchPointCondition,
-    FoldCondition,
-    generic_borders,
-    null_pair,
-)
+from continuation.conditions import BranchPointCondition, generic_borders, null_pair
 from continuation.errors import SingularSystem
-from continuation.locate import safeguarded, special_at
-from continuation.normal_form import fold_coefficient
-from continuation.problem import Problem, correct
+from continuation.here import Here
+from continuation.locate import companion, safeguarded, special_at
+from continuation.problem import correct
 from continuation.system import SystemBase
-from continuation.tracer import Here
-
-
-def companion(tracer, condition, names=None, system=None, mu=None):
-    """A problem in the same units as the tracer's, with a condition."""
-    problem, options = tracer.problem, tracer.options
-    return Problem(system or problem.system, mu or problem.fixed, names or problem.names,
-                   condition, options.state_scale, options.parameter_scales)
-
-
-class FoldMonitor:
-    """Folds: the parameter's part of the tangent changes sign."""
-
-    def measure(self, tracer, here):
-        here.tests["fold"] = float(here.tangent[tracer.problem.n])
-
-    def between(self, tracer, before, after, index, found):
-        if before.tests["fold"] * after.tests["fold"] >= 0 and after.tests["fold"] != 0:
-            return []
-        n = tracer.problem.n
-        if not tracer.options.locate:
-            return [special_at(tracer, "fold", after, index, False, "location was not asked for")]
-
-        def attempt(guess, *_):
-            point = solve_fold(tracer, guess)
-            return point if isinstance(point, str) else (point.z, point)
-
-        result, guess, reason = safeguarded(
-            tracer, before, after, lambda here: here.tangent[n], attempt
-        )
-        if result is None:
-            return [special_at(tracer, "fold", guess, index, False, reason)]
-        v, w = result.local.condition.v, result.local.condition.w
-        values = {"iterations": result.iterations}
-        values["quadratic_coefficient"] = fold_coefficient(
-            tracer.problem.system, result.local.u, result.local.mu, v, w
-        )
-        here = Here(result.z, np.append(v, 0.0), result.local)
-        here.tangent = here.tangent / tracer.problem.norm(here.tangent)
-        return [special_at(tracer, "fold", here, index, True, "", values, {"right": v, "left": w})]
-
-
-def solve_fold(tracer, guess):
-    """Newton on ``F = 0, g = 0`` from a point of the branch; a `Correction` or a sentence."""
-    problem = tracer.problem
-    q = problem.u(guess.tangent)
-    p = guess.local.columns[0]
-    for _ in range(2):
-        _, q, p, _ = null_pair(guess.local.linear, p / np.linalg.norm(p), q / np.linalg.norm(q))
-    augmented = companion(tracer, FoldCondition(p, q))
-    frame = augmented.frame(guess.tangent[:, None])
-    result = correct(augmented, guess.z, frame, tracer.options.newton, None,
-                     tracer.options.location_tolerance)
-    if not result.converged:
-        return f"Newton's method on the augmented system: {result.reason}"
-    return result
 
 
 class BranchPointMonitor:
@@ -268,47 +204,3 @@ class Unfolded(SystemBase):
         if self.name in (first, second):
             return np.zeros(self.size)
         return self.inner.d_parameters2(u, self._rest(mu), first, second)
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something of the user's own to watch for.
-
-    Attributes
-    ----------
-    name : str
-        Becomes the kind of the special point.
-    function : callable
-        ``function(u, mu)`` -> float; its sign changes are located.
-    stop : bool
-        End the branch there.
-    """
-
-    name: str
-    function: Callable
-    stop: bool = False
-
-
-class EventMonitor:
-    """Locates sign changes of an `Event`."""
-
-    def __init__(self, event: Event):
-        self.event = event
-
-    def value(self, tracer, here):
-        return float(self.event.function(tracer.problem.u(here.z), tracer.problem.mu(here.z)))
-
-    def measure(self, tracer, here):
-        here.tests[self.event.name] = self.value(tracer, here)
-
-    def between(self, tracer, before, after, index, found):
-        f0, f1 = before.tests[self.event.name], after.tests[self.event.name]
-        if f0 * f1 > 0 or f0 == 0:
-            return []
-        values = {"stop": float(self.event.stop)} if self.event.stop else {}
-        if f1 == 0:
-            return [special_at(tracer, self.event.name, after, index, True, "", values)]
-        here = tracer.root(before, after, lambda point: self.value(tracer, point))
-        located = here is not None
-        reason = "" if located else "the curve was lost in the bracket"
-        return [special_at(tracer, self.event.name, here or after, index, located, reason, values)]
