@@ -16,12 +16,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..materials import energy_of
+from ..materials.incompressible import mooney_rivlin_energy
+from ..materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, linear_elastic_energy
 from .reference import SHAPE, SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE, ReferenceGeometry, strain_map
 from .rotation import director
 from .section import Section
 
 FIRST_ORDER, TRUE_METRIC = "first-order", "true"
+_LAWS = {LINEAR_ELASTIC: linear_elastic_energy, MOONEY_RIVLIN: mooney_rivlin_energy}
 
 
 def section_arrays(section: Section, geometry: ReferenceGeometry, metric: str) -> dict:
@@ -127,18 +129,16 @@ def material_strains(strains, layers):
 
 
 def point_energies(kinds, parameters, strains):
-    """Energy densities (..., np) of strains (..., np, 5); `kinds` is static, so each law is traced once per run of equal points."""
-    parts, start = [], 0
-    while start < len(kinds):
-        stop = start
-        while stop < len(kinds) and kinds[stop] == kinds[start]:
-            stop += 1
-        law = partial(energy_of, kinds[start])
-        over_points = jax.vmap(law, in_axes=(0, 0))
+    """Energy densities (..., np) of strains (..., np, 5); `kinds` is static, so each law is traced once, and only if it occurs."""
+    kinds = np.asarray(kinds)
+    parts, chosen = [], []
+    for kind in np.unique(kinds):
+        points = np.flatnonzero(kinds == kind)
+        over_points = jax.vmap(_LAWS[int(kind)], in_axes=(0, 0))
         over_gauss = jax.vmap(over_points, in_axes=(None, 0))
-        parts.append(over_gauss(parameters[start:stop], strains[:, start:stop]))
-        start = stop
-    return jnp.concatenate(parts, axis=1)
+        parts.append(over_gauss(parameters[points], strains[:, points]))
+        chosen.append(points)
+    return jnp.concatenate(parts, axis=1)[:, np.argsort(np.concatenate(chosen))]
 
 
 def element_energy(kinds, metric, unknowns, element, layers):

@@ -1,0 +1,147 @@
+"""The compiled element loop against automatic differentiation of the energy, and both against differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbvfiv.materials import IsotropicElastic, MooneyRivlin, OrthotropicPly
+from dbvfiv.shell import Layer, Section, Shell
+from tests.shell.structures import random_state
+
+
+def assembled(shell, q):
+    """Force and dense tangent from the automatically differentiated energy."""
+    unknowns = shell.dofs.expand(q)[shell.mesh.quads]
+    force = np.zeros((shell.mesh.node_count, 5))
+    np.add.at(force, shell.mesh.quads, np.asarray(shell.energies.force(unknowns)).reshape(-1, 4, 5))
+    tangent = np.zeros((5 * shell.mesh.node_count,) * 2)
+    dofs = (5 * shell.mesh.quads[:, :, None] + np.arange(5)).reshape(-1, 20)
+    for index, block in zip(dofs, np.asarray(shell.energies.tangent(unknowns))):
+        tangent[np.ix_(index, index)] += block
+    free = shell.dofs.free.ravel()
+    return shell.dofs.restrict(force), tangent[np.ix_(free, free)]
+
+
+@pytest.mark.parametrize("seed, stretch, turn", [(0, 0.1, 0.4), (1, 0.15, 1.0), (2, 1e-5, 1e-5), (3, 0.05, 0.05)])
+def test_force_and_tangent_are_those_of_the_energy(mixed_shell, seed, stretch, turn):
+    shell = mixed_shell
+    q = shell.dofs.restrict(random_state(shell.mesh, seed, stretch, turn))
+    expected_force, expected_tangent = assembled(shell, q)
+    force, data = shell.force_and_tangent(q)
+    tangent = shell.dofs.matrix(data).toarray()
+    # a nearly rigid motion leaves forces that are differences of much larger numbers: their scale is stiffness times size
+    scale = max(np.abs(expected_force).max(), np.abs(expected_tangent).max() * np.abs(shell.mesh.nodes).max() * 1e-2)
+    assert np.abs(force - expected_force).max() < 1e-12 * scale
+    assert np.abs(shell.force(q) - expected_force).max() < 1e-12 * scale
+    assert np.abs(tangent - expected_tangent).max() < 1e-12 * np.abs(expected_tangent).max()
+
+
+SECTIONS = {
+    "rubber only": Section((Layer(MooneyRivlin(4e5, 1e5, 2e5, 1300.0), 0.012),), 3),
+    "ply only": Section((Layer(OrthotropicPly(25e6, 1e6, 0.25, 0.5e6, 0.5e6, 0.2e6, 1.0), 0.012, 30.0, 5 / 6),)),
+    "one point a layer": Section(
+        (Layer(IsotropicElastic(1e6, 0.3, 1.0), 0.004), Layer(MooneyRivlin(4e5, 0.0, 0.0, 1300.0), 0.008)), 1
+    ),
+}
+
+
+@pytest.mark.parametrize("name", sorted(SECTIONS))
+def test_other_walls(cylinder_mesh, name):
+    shell = Shell(cylinder_mesh, SECTIONS[name])
+    q = shell.dofs.restrict(random_state(shell.mesh, 5, 0.1, 0.5))
+    direction = unit_direction(shell, 6)
+    expected = np.asarray(shell.energies.force(shell.dofs.expand(q)[shell.mesh.quads]))
+    total = np.zeros((shell.mesh.node_count, 5))
+    np.add.at(total, shell.mesh.quads, expected.reshape(-1, 4, 5))
+    force, data = shell.force_and_tangent(q)
+    assert np.abs(force - total.ravel()).max() < 1e-12 * np.abs(total).max()
+    slope = difference(shell.force, q, direction, 1e-3)
+    assert np.linalg.norm(shell.dofs.matrix(data) @ direction - slope) < 1e-7 * np.linalg.norm(slope)
+
+
+def test_held_unknowns_drop_out(saddle_shell):
+    shell = saddle_shell
+    q = shell.dofs.restrict(random_state(shell.mesh, 3, rigid=0.0))
+    expected_force, expected_tangent = assembled(shell, q)
+    force, data = shell.force_and_tangent(q)
+    assert force.shape == (shell.size,)
+    assert np.abs(force - expected_force).max() < 1e-12 * np.abs(expected_force).max()
+    assert np.abs(shell.dofs.matrix(data).toarray() - expected_tangent).max() < 1e-12 * np.abs(expected_tangent).max()
+
+
+def difference(function, q, direction, step):
+    """Fourth-order central difference of a function along a direction."""
+    f = [function(q + k * step * direction) for k in (-2, -1, 1, 2)]
+    return (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step)
+
+
+def unit_direction(shell, seed):
+    """A direction in which displacements and rotations change by comparable strains."""
+    generator = np.random.default_rng(seed)
+    size = np.ptp(shell.mesh.nodes, axis=0).max()
+    nodal = generator.standard_normal((shell.mesh.node_count, 5)) * np.array([size] * 3 + [1.0] * 2) * 0.05
+    return shell.dofs.restrict(nodal)
+
+
+def test_force_is_the_slope_of_the_energy(mixed_shell):
+    shell = mixed_shell
+    q = shell.dofs.restrict(random_state(shell.mesh, 11, 0.08, 0.3))
+    direction = unit_direction(shell, 12)
+    slope = difference(shell.energy, q, direction, 1e-3)
+    assert shell.force(q) @ direction == pytest.approx(slope, rel=1e-7)
+
+
+def test_tangent_is_the_slope_of_the_force(mixed_shell):
+    shell = mixed_shell
+    q = shell.dofs.restrict(random_state(shell.mesh, 13, 0.08, 0.3))
+    direction = unit_direction(shell, 14)
+    _, data = shell.force_and_tangent(q)
+    slope = difference(shell.force, q, direction, 1e-3)
+    assert np.linalg.norm(shell.dofs.matrix(data) @ direction - slope) < 1e-7 * np.linalg.norm(slope)
+
+
+def test_tangent_is_symmetric(mixed_shell):
+    shell = mixed_shell
+    q = shell.dofs.restrict(random_state(shell.mesh, 15, 0.1, 0.4))
+    matrix = shell.dofs.matrix(shell.force_and_tangent(q)[1])
+    assert abs(matrix - matrix.T).max() < 1e-13 * abs(matrix).max()
+
+
+def test_values_are_added_to_given_ones(saddle_shell):
+    q = np.zeros(saddle_shell.size)
+    _, fresh = saddle_shell.force_and_tangent(q)
+    given = np.ones_like(fresh)
+    _, added = saddle_shell.force_and_tangent(q, given)
+    assert added is given
+    assert np.allclose(added, fresh + 1.0, rtol=1e-14)
+
+
+def test_second_derivative(saddle_shell):
+    shell = saddle_shell
+    q = shell.dofs.restrict(random_state(shell.mesh, 16, 0.08, 0.3, rigid=0.0))
+    a, b = unit_direction(shell, 17), unit_direction(shell, 18)
+    slope = difference(lambda x: shell.dofs.matrix(shell.force_and_tangent(x)[1]) @ a, q, b, 1e-3)
+    second = shell.second(q, a, b)
+    assert np.linalg.norm(second - slope) < 1e-7 * np.linalg.norm(slope)
+    assert np.linalg.norm(second - shell.second(q, b, a)) < 1e-12 * np.linalg.norm(second)
+
+
+def test_third_derivative(saddle_shell):
+    shell = saddle_shell
+    q = shell.dofs.restrict(random_state(shell.mesh, 19, 0.08, 0.3, rigid=0.0))
+    a, b, c = (unit_direction(shell, seed) for seed in (20, 21, 22))
+    slope = difference(lambda x: shell.second(x, a, b), q, c, 1e-3)
+    third = shell.third(q, a, b, c)
+    assert np.linalg.norm(third - slope) < 1e-7 * np.linalg.norm(slope)
+    assert np.linalg.norm(third - shell.third(q, c, a, b)) < 1e-12 * np.linalg.norm(third)
+
+
+def test_true_metric_is_differentiated_too(cylinder_mesh, one_layer):
+    shell = Shell(cylinder_mesh, one_layer, metric="true")
+    q = shell.dofs.restrict(random_state(cylinder_mesh, 23, 0.05, 0.2))
+    direction = unit_direction(shell, 24)
+    force, data = shell.force_and_tangent(q)
+    assert force @ direction == pytest.approx(difference(shell.energy, q, direction, 1e-3), rel=1e-7)
+    slope = difference(shell.force, q, direction, 1e-3)
+    assert np.linalg.norm(shell.dofs.matrix(data) @ direction - slope) < 1e-7 * np.linalg.norm(slope)
