@@ -122,19 +122,32 @@ class LinearisedState:
         if not flow.unsteady:
             _, slope = flow.steady_operator(self.area, self.inlet)
             return CoupledPencil(self.mass, damping, self.stiffness, self.forces, self.slope, A0=slope)
-        if storage is not None and storage != flow.storage:
-            flow = Channel(flow.z, flow.floor, storage, flow.unsteady)
-        parts = flow.operators(self.area, self.inlet, conditions.density)
-        inner = {"A0": parts.area0, "A1": parts.area1, "A2": parts.area2, "B0": parts.velocity0[:, None], "B1": parts.velocity1[:, None]}
-        kept = {}
-        for name, value in inner.items():
-            kept[name] = value.copy()
-            kept[name][0] = 0.0  # the outlet pressure vanishes
-        return CoupledPencil(
-            self.mass, damping, self.stiffness, self.forces, self.slope, **kept,
-            R0=parts.area0[:1], R1=parts.area1[:1], R2=parts.area2[:1],
-            S0=parts.velocity0[None, :1], S1=parts.velocity1[None, :1],
-        )  # fmt: skip
+        storage = flow.storage if storage is None else storage
+        parts = fluid_parts(flow, self.area, self.inlet, conditions.density, storage)
+        return CoupledPencil(self.mass, damping, self.stiffness, self.forces, self.slope, **parts)
+
+
+def fluid_parts(flow: Channel, area: np.ndarray, inlet: float, density: float, storage: float, velocity: float | None = None) -> dict:
+    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow or at a given inlet velocity."""
+    if storage != flow.storage:
+        flow = Channel(flow.z, flow.floor, storage, flow.unsteady)
+    parts = flow.operators(area, inlet, density, velocity=velocity)
+    kept = {
+        "A0": parts.area0.copy(),
+        "A1": parts.area1.copy(),
+        "A2": parts.area2.copy(),
+        "B0": parts.velocity0[:, None].copy(),
+        "B1": parts.velocity1[:, None].copy(),
+    }
+    for value in kept.values():
+        value[0] = 0.0  # the outlet pressure vanishes
+    return kept | {
+        "R0": parts.area0[:1],
+        "R1": parts.area1[:1],
+        "R2": parts.area2[:1],
+        "S0": parts.velocity0[None, :1],
+        "S1": parts.velocity1[None, :1],
+    }
 
 
 def linearise(model: ValveModel, q: np.ndarray, inlet: float) -> LinearisedState:

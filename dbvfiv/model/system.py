@@ -1,0 +1,284 @@
+"""The valve as a System of `continuation`: B(u, mu) u' = F(u, mu) with u = (q, v, U).
+
+    q' = v,    (M - G A2 J) v' - G B1 U' = -r(q, v, U),    R2 J v' + S1 U' = -p_outlet(q, v, U)
+
+Rates of velocity enter linearly, so the mass matrix depends on the state only. Parameters: inlet pressure, fluid density, Rayleigh alpha and beta, and the
+blend of the continuity laws; whatever else a case holds is a design parameter, for which the model is built anew.
+"""
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Callable
+
+import numpy as np
+
+from continuation import OutOfDomain, Spectrum, SystemBase
+from eigen import CoupledPencil, SearchOptions, Workspace, leading_modes
+from eigen.pencil import real_apply
+
+from .analytic import PARAMETERS, AnalyticResidual
+from .dynamics import Conditions, fluid_parts
+from .valve import ValveModel
+
+
+class ValveSystem(SystemBase):
+    """A coupled valve with flow as a dynamical system.
+
+    Parameters
+    ----------
+    model : ValveModel
+    rebuild : callable, optional
+        From the design parameters (a dict) to a model; lets names outside `PARAMETERS` be continuation parameters.
+    search : SearchOptions, optional
+        How leading eigenvalues are sought.
+    """
+
+    constant_mass = False
+
+    def __init__(self, model: ValveModel, rebuild: Callable[[dict], ValveModel] | None = None, search: SearchOptions | None = None):
+        self._base = model
+        self._rebuild = rebuild
+        self._models: dict[tuple, ValveModel] = {(): model}
+        self._residuals: dict[tuple, AnalyticResidual] = {}
+        self._search = search or SearchOptions()
+        self._length = float(np.ptp(model.mesh.nodes[:, 2]))
+        self.size = 2 * model.size + 1
+
+    # -- layout ---------------------------------------------------------------------------------------------------------------------
+
+    def state(self, q: np.ndarray, mu) -> np.ndarray:
+        """State u of a steady valve with displacements q."""
+        model = self.model(mu)
+        area = model.rows.areas(model.nodal(q))
+        return np.concatenate([q, np.zeros(model.size), [model.flow.inlet_velocity(area, mu["inlet"], mu["density"])]])
+
+    def split(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        n = self._base.size
+        return u[:n], u[n : 2 * n], u[2 * n]
+
+    @cached_property
+    def state_weights(self) -> np.ndarray:
+        """Weights of the arclength: displacements over the valve's length, per unknown; velocities follow from them at steady states."""
+        n = self._base.size
+        weights = np.zeros(self.size)
+        weights[:n] = 1.0 / (n * self._length**2) * 1e4
+        return weights
+
+    def model(self, mu) -> ValveModel:
+        """Model for the design parameters among mu."""
+        return self._models_get(self._design(mu))
+
+    def _design(self, mu) -> tuple:
+        return tuple(sorted((key, float(value)) for key, value in mu.items() if key not in PARAMETERS))
+
+    def _models_get(self, key: tuple) -> ValveModel:
+        if key not in self._models:
+            if self._rebuild is None:
+                raise ValueError(f"This valve cannot be rebuilt for the parameters {', '.join(name for name, _ in key)}.")
+            if len(self._models) > 8:
+                self._models = {(): self._base}
+                self._residuals = {}
+            self._models[key] = self._rebuild(dict(key))
+        return self._models[key]
+
+    def _analytic(self, mu) -> AnalyticResidual:
+        key = self._design(mu)
+        if key not in self._residuals:
+            self._residuals[key] = AnalyticResidual(self._models_get(key))
+        return self._residuals[key]
+
+    def _at(self, u, mu):
+        q, v, velocity = self.split(np.asarray(u, float))
+        zero = np.zeros_like(q)
+        return (q, v, zero, velocity, 0.0), {name: float(mu[name]) for name in PARAMETERS}
+
+    @staticmethod
+    def _static(u_direction, n):
+        return (u_direction[:n], u_direction[n : 2 * n], np.zeros(n), u_direction[2 * n], 0.0)
+
+    @staticmethod
+    def _rates(u_rate, n):
+        return (np.zeros(n), np.zeros(n), u_rate[n : 2 * n], 0.0, u_rate[2 * n])
+
+    # -- the contract ---------------------------------------------------------------------------------------------------------------
+
+    def residual(self, u, mu):
+        motion, parameters = self._at(u, mu)
+        if not np.isfinite(u).all() or np.abs(motion[0]).max() > 2 * self._length + np.pi:
+            raise OutOfDomain("The valve is displaced by more than its own length.")
+        return np.concatenate([motion[1], -self._analytic(mu).value(motion, parameters)])
+
+    def residual_norm(self, residual) -> float:
+        """Largest of the force imbalance over the load of 1 Pa, outlet pressure in Pa and velocity mismatch."""
+        n = self._base.size
+        return float(max(np.linalg.norm(residual[n : 2 * n]) / self._unit_load, abs(residual[2 * n]), np.abs(residual[:n]).max() / self._length))
+
+    @cached_property
+    def _unit_load(self) -> float:
+        return self._base.force_scale(self._base.rest(), 1.0)
+
+    def linear(self, u, mu) -> "ValveLinearisation":
+        q, v, velocity = self.split(np.asarray(u, float))
+        model = self.model(mu)
+        pencil = pencil_at(model, q, velocity, mu)
+        return ValveLinearisation(pencil)
+
+    def d_parameter(self, u, mu, name):
+        if name not in PARAMETERS:
+            return super().d_parameter(u, mu, name)
+        motion, parameters = self._at(u, mu)
+        return np.concatenate([np.zeros(self._base.size), -self._analytic(mu).parameter_slope(motion, parameters, name)])
+
+    def d2(self, u, mu, a, b):
+        motion, parameters = self._at(u, mu)
+        n = self._base.size
+        return np.concatenate([np.zeros(n), -self._analytic(mu).second(motion, parameters, self._static(a, n), self._static(b, n))])
+
+    def d3(self, u, mu, a, b, c):
+        motion, parameters = self._at(u, mu)
+        n = self._base.size
+        directions = (self._static(x, n) for x in (a, b, c))
+        return np.concatenate([np.zeros(n), -self._analytic(mu).third(motion, parameters, *directions)])
+
+    def d2_parameter(self, u, mu, name, a):
+        if name not in PARAMETERS:
+            return super().d2_parameter(u, mu, name, a)
+        motion, parameters = self._at(u, mu)
+        n = self._base.size
+        return np.concatenate([np.zeros(n), -self._analytic(mu).mixed(motion, parameters, self._static(a, n), name)])
+
+    def mass_d(self, u, mu, c, a):
+        motion, parameters = self._at(u, mu)
+        n = self._base.size
+        return np.concatenate([np.zeros(n), self._analytic(mu).second(motion, parameters, self._rates(c, n), self._static(a, n))])
+
+    def mass_d2(self, u, mu, c, a, b):
+        motion, parameters = self._at(u, mu)
+        n = self._base.size
+        forms = self._analytic(mu).third(motion, parameters, self._rates(c, n), self._static(a, n), self._static(b, n))
+        return np.concatenate([np.zeros(n), forms])
+
+    def mass_parameter(self, u, mu, name, c):
+        if name not in PARAMETERS:
+            return super().mass_parameter(u, mu, name, c)
+        motion, parameters = self._at(u, mu)
+        n = self._base.size
+        return np.concatenate([np.zeros(n), self._analytic(mu).mixed(motion, parameters, self._rates(c, n), name)])
+
+    def spectrum(self, u, mu, count, near=None):
+        q, _, velocity = self.split(np.asarray(u, float))
+        pencil = pencil_at(self.model(mu), q, velocity, mu)
+        options = self._search if near is None else replace(self._search, shifts=(near,))
+        found = leading_modes(pencil, count, options)
+        vectors = np.concatenate([found.q, found.eigenvalues * found.q, found.u])
+        return Spectrum(found.eigenvalues, vectors, np.ones(len(found), bool), found.applications)
+
+
+def pencil_at(model: ValveModel, q, velocity: float, mu) -> CoupledPencil:
+    """Pencil at any state at rest, in equilibrium or not; mu holds the parameters."""
+    matrix = model.shell.dofs.matrix
+    nodal = model.nodal(q)
+    area = model.rows.areas(nodal)
+    zero = np.zeros_like(area)
+    p = np.array(model.flow.pressure(area, zero, zero, velocity, 0.0, mu["inlet"], mu["density"]))
+    p[0] = 0.0
+    _, structure = model.structure(q)
+    stiffness = matrix(model.follower_stiffness(nodal, p, structure))
+    mass, own = matrix(model.mass(q)), matrix(structure)
+    conditions = Conditions(mu["density"], mu["alpha"], mu["beta"])
+    parts = fluid_parts(model.flow, area, mu["inlet"], conditions.density, mu["storage"], velocity)
+    damping = conditions.alpha * mass + conditions.beta * own
+    return CoupledPencil(mass, damping, stiffness, model.station_forces(nodal), model.rows.jacobian(nodal), **parts)
+
+
+class ValveLinearisation:
+    """A = dF/du and B at a state at rest, as products and solves through the pencil.
+
+    Parameters
+    ----------
+    pencil : CoupledPencil
+    """
+
+    def __init__(self, pencil: CoupledPencil):
+        self.pencil = pencil
+        self.size = 2 * pencil.n + 1
+        self._at_zero = None
+
+    def _parts(self, x):
+        n = self.pencil.n
+        return x[:n], x[n : 2 * n], x[2 * n :]
+
+    def matvec(self, x):
+        p = self.pencil
+        q, v, u = self._parts(x)
+        yq, yv = real_apply(p.J, q), real_apply(p.J, v)
+        force = real_apply(p.K, q) + real_apply(p.C, v) - real_apply(p.G, p.A0 @ yq + p.A1 @ yv + p.B0 @ u)
+        return np.concatenate([v, -force, -(p.R0 @ yq + p.R1 @ yv + p.S0 @ u)])
+
+    def rmatvec(self, x):
+        p = self.pencil
+        a, w, c = self._parts(x)
+        t = real_apply(p.G.T.tocsr(), w)
+        back = p.J.T.tocsr()
+        q = -real_apply(p.K.T.tocsr(), w) + real_apply(back, p.A0.T @ t - p.R0.T @ c)
+        v = a - real_apply(p.C.T.tocsr(), w) + real_apply(back, p.A1.T @ t - p.R1.T @ c)
+        return np.concatenate([q, v, p.B0.T @ t - p.S0.T @ c])
+
+    def mass_matvec(self, x):
+        p = self.pencil
+        q, v, u = self._parts(x)
+        y = real_apply(p.J, v)
+        return np.concatenate([q, real_apply(p.M, v) - real_apply(p.G, p.A2 @ y + p.B1 @ u), p.R2 @ y + p.S1 @ u])
+
+    def mass_rmatvec(self, x):
+        p = self.pencil
+        a, w, c = self._parts(x)
+        t = real_apply(p.G.T.tocsr(), w)
+        v = real_apply(p.M.T.tocsr(), w) + real_apply(p.J.T.tocsr(), p.R2.T @ c - p.A2.T @ t)
+        return np.concatenate([a, v, p.S1.T @ c - p.B1.T @ t])
+
+    def shifted(self, shift: complex) -> "_Shifted":
+        return _Shifted(self, shift)
+
+    def _zero(self):
+        if self._at_zero is None:
+            self._at_zero = _Shifted(self, 0.0)
+        return self._at_zero
+
+    def solve(self, rhs):
+        return self._zero().solve(rhs)
+
+    def solve_transpose(self, rhs):
+        return self._zero().solve_transpose(rhs)
+
+
+class _Shifted:
+    """Solves with A - shift B by elimination of v: T(shift) (q, U) on the left."""
+
+    def __init__(self, linear: ValveLinearisation, shift: complex):
+        self.linear, self.shift = linear, shift
+        self._factor = Workspace().shifted(linear.pencil, shift)
+
+    def matvec(self, x):
+        return self.linear.matvec(x) - self.shift * self.linear.mass_matvec(x)
+
+    def rmatvec(self, x):
+        return self.linear.rmatvec(x) - self.shift * self.linear.mass_rmatvec(x)
+
+    def solve(self, rhs):
+        p, s = self.linear.pencil, self.shift
+        r1, r2, r3 = self.linear._parts(rhs)
+        y = real_apply(p.J, r1)
+        carried = real_apply(p.C, r1) + s * real_apply(p.M, r1) - real_apply(p.G, (p.A1 + s * p.A2) @ y)
+        q, u = self._factor.solve(-r2 - carried, -r3 - (p.R1 + s * p.R2) @ y)
+        return np.concatenate([q, r1 + s * q, u])
+
+    def solve_transpose(self, rhs):
+        p, s = self.linear.pencil, self.shift
+        rq, rv, ru = self.linear._parts(rhs)
+        w, c = self._factor.solve_transposed(-(rq + s * rv), -ru)
+        t = real_apply(p.G.T.tocsr(), w)
+        back = real_apply(p.J.T.tocsr(), (p.R1 + s * p.R2).T @ c - (p.A1 + s * p.A2).T @ t)
+        a = rv + real_apply(p.C.T.tocsr(), w) + s * real_apply(p.M.T.tocsr(), w) + back
+        return np.concatenate([a, w, c])
