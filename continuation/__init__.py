@@ -1,4 +1,26 @@
-"""Branches of equilibria and orbits of ``B(u, mu) u' = F(u, mu)``, and their bifurcations."""
+"""Branches of equilibria and orbits of ``B(u, mu) u' = F(u, mu)``, and their bifurcations.
+
+A model fulfils `System` (or is written once as a `JaxSystem`); `continue_branch` follows its
+equilibria, finds and locates folds, branch points and Hopf points; `switch_branch`,
+`continue_fold` and `continue_hopf` go on from those; `continuation.orbits` holds periodic
+orbits.
+
+Examples
+--------
+>>> import jax.numpy as jnp
+>>> from continuation import ContinuationOptions, JaxSystem, continue_branch, continue_hopf
+>>> brusselator = JaxSystem(lambda u, mu: jnp.stack([
+...     mu["A"] - (mu["B"] + 1) * u[0] + u[0]**2 * u[1], mu["B"] * u[0] - u[0]**2 * u[1]]), 2)
+>>> branch = continue_branch(brusselator, [1.0, 1.0], {"A": 1.0, "B": 1.0}, "B",
+...     ContinuationOptions(eigenvalues=2, limits={"B": (0.0, 4.0)}))
+>>> hopf, = branch.of_kind("hopf")
+>>> round(hopf.mu["B"], 9), round(hopf.values["omega"], 9), hopf.values["criticality"]
+(2.0, 1.0, 'super')
+>>> curve = continue_hopf(brusselator, hopf, ("B", "A"),
+...     ContinuationOptions(limits={"A": (0.5, 2.0)}))
+>>> bool(abs(curve.values("B") - 1 - curve.values("A")**2).max() < 1e-8)
+True
+"""
 
 from continuation.branch import Branch, CurvePoint, SpecialPoint
 from continuation.branches import continue_branch, resume, switch_branch

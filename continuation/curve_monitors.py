@@ -161,5 +161,7 @@ class HopfCurveMonitor:
             point = special_at(tracer, "bogdanov-takens", before, index, False, result.reason)
         else:
             point = bogdanov_takens_special(tracer, result, before.tangent[: n + 2], index)
-        point.values["stop"] = 1.0
+            point.z, point.tangent = np.append(point.z, 0.0), np.append(point.tangent, 0.0)
+        # Behind the point the equations only mirror omega; that part is not the curve's.
+        point.values["beyond"] = 1.0
         return point

@@ -41,7 +41,8 @@ class EventMonitor:
 
     def between(self, tracer, before, after, index, found):
         f0, f1 = before.tests[self.event.name], after.tests[self.event.name]
-        if f0 * f1 > 0 or f0 == 0:
+        # A value that is not finite is no crossing, and a zero was told when it was reached.
+        if not (f0 * f1 < 0 or (f1 == 0 and f0 != 0)):
             return []
         values = {"stop": float(self.event.stop)} if self.event.stop else {}
         if f1 == 0:

@@ -125,12 +125,21 @@ class Tracer:
         return here
 
     def run(self, branch: Branch, here: Here, step: float) -> Branch:
-        """Add points to ``branch`` from ``here`` on until something ends it."""
+        """Add points to ``branch`` from ``here`` on until something ends it.
+
+        An interruption ends the branch; an error of the model goes on to the caller, with
+        the branch so far as its attribute ``branch``.
+        """
         self._tell("started", branch)
         try:
             branch.reason = self._steps(branch, here, step)
         except KeyboardInterrupt:
             branch.reason = "interrupted"
+        except Exception as error:
+            branch.reason = f"error: {error}"
+            self._tell("ended", branch)
+            error.branch = branch
+            raise
         self._tell("ended", branch)
         return branch
 
@@ -147,6 +156,14 @@ class Tracer:
             found: list = []
             for monitor in self.monitors:
                 found += monitor.between(self, here, after, len(branch) - 1, found)
+            last = [s for s in found if s.values.pop("beyond", None)]
+            if last:
+                branch.special += found
+                for special in found:
+                    self._tell("found", branch, special)
+                return f"stopped at: {last[0].kind}"
+            # In the order in which the branch meets them.
+            found.sort(key=lambda s: (s.index, self.fraction(here, after, s.z)[0]))
             branch.points.append(after.point())
             branch.special += found
             self.frame = self.problem.frame(after.local.basis)

@@ -1,6 +1,11 @@
 """Following a branch: steps, limits, endings, events, files, resumption."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import h5py
 import jax.numpy as jnp
@@ -214,6 +219,53 @@ def test_file_holds_everything(tmp_path):
     one, two = branch.of_kind("hopf")[0], again.of_kind("hopf")[0]
     assert np.array_equal(one.vectors["right"], two.vectors["right"])
     assert one.values == two.values
+
+
+def test_a_killed_run_resumes_from_its_checkpoint(tmp_path):
+    """kill -9 in the middle of a step; nothing but the file survives."""
+    path = tmp_path / "killed.h5"
+    script = f"""
+import os, signal
+from continuation import Checkpoint, ContinuationOptions, continue_branch
+from tests.systems.normal_forms import cusp
+def die(branch):
+    if len(branch) == 11:
+        os.kill(os.getpid(), signal.SIGKILL)
+continue_branch(cusp(), [-1.5], {MU}, "a", ContinuationOptions(limits={LIMITS}),
+                observers=[Checkpoint({str(path)!r}, 5), die])
+"""
+    root = Path(__file__).parents[2]
+    ended = subprocess.run([sys.executable, "-c", script], cwd=root, env={**os.environ,
+                           "PYTHONPATH": str(root)}, capture_output=True)
+    assert ended.returncode == -signal.SIGKILL, ended.stderr
+    left = Branch.load(path)
+    assert len(left) == 10 and left.reason == "running"
+    whole = s_curve()
+    longer = resume(cusp(), left, ContinuationOptions(limits=LIMITS))
+    assert len(longer) == len(whole)
+    assert np.allclose(longer.values(), whole.values(), rtol=0, atol=1e-9)
+
+
+def test_an_error_of_the_model_keeps_the_branch(tmp_path):
+    class Breaking(JaxSystem):
+        def residual(self, u, mu):
+            if mu["p"] > 1.0:
+                raise RuntimeError("disk full")
+            return super().residual(u, mu)
+
+    path = tmp_path / "b.h5"
+    with pytest.raises(RuntimeError, match="disk full") as error:
+        continue_branch(Breaking(lambda u, mu: u - mu["p"], 1), [0.0], {"p": 0.0}, "p",
+                        observers=Checkpoint(path))
+    kept = error.value.branch
+    assert len(kept) > 3 and kept.reason == "error: disk full"
+    assert len(Branch.load(path)) == len(kept)
+
+
+def test_an_event_that_is_not_a_number_is_no_crossing():
+    event = Event("root", lambda u, mu: np.sqrt(mu["a"]) if mu["a"] >= 0 else np.nan)
+    branch = continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS), [event])
+    assert not branch.of_kind("root", located=False) and len(branch) > 10
 
 
 def test_a_foreign_file_is_refused(tmp_path):

@@ -59,6 +59,7 @@ def test_hopf_curve_ends_at_the_bogdanov_takens_point(takens):
                           ContinuationOptions(limits={"b2": (-2.0, 2.0)}))
     assert curve.reason == "stopped at: bogdanov-takens"
     w = curve.values("omega")
+    assert np.all(w > 0)  # the mirror image behind the point is left out
     assert np.abs(w**2 + curve.values("b2")).max() < 1e-9
     assert np.abs(curve.values("b1")).max() < 1e-9
     (point,) = curve.of_kind("bogdanov-takens")
