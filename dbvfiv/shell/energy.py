@@ -18,7 +18,7 @@ import numpy as np
 
 from ..materials.incompressible import mooney_rivlin_energy
 from ..materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, linear_elastic_energy
-from .reference import SHAPE, SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE, ReferenceGeometry, strain_map
+from .reference import SHAPE, SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE, ReferenceGeometry, strain_map, thickness_over_radius
 from .rotation import director
 from .section import Section
 
@@ -56,8 +56,9 @@ def element_arrays(mesh, geometry: ReferenceGeometry, section: Section, metric: 
         t = geometry.thickness[:, None] * section.points[:, 0]  # (ne, np)
         shift = np.eye(2) + t[:, None, :, None, None] * geometry.curvature[:, :, None]
         jacobian = np.linalg.det(shift)
-        if jacobian.min() <= 0:
-            element = int(np.argmin(jacobian.min(axis=(1, 2))))
+        folded = thickness_over_radius(geometry).max(axis=1)  # at the faces: the points inside the layers may still be sound
+        if folded.max() >= 1:
+            element = int(np.argmax(folded))
             place = ", ".join(f"{value:.4g}" for value in geometry.position[element].mean(axis=0))
             raise ValueError(
                 f"The true metric is not valid at ({place}) m: half the wall exceeds the radius there, so the inner face folds over itself; "
