@@ -12,6 +12,7 @@ from .errors import CaseError, SolveError
 
 if TYPE_CHECKING:
     from .model import ValveModel
+    from .results.closure import ClosureResults
     from .results.state import State
     from .results.steady import SteadyResults
     from .studies.observer import Observer
@@ -105,6 +106,57 @@ class Valve:
         if not result.states:
             raise KeyboardInterrupt
         return result.states[0]
+
+    def closure(
+        self,
+        pressure: Iterable[float | str] | None = None,
+        *,
+        output: str | Path | None = None,
+        observer: "Observer | None" = None,
+    ) -> "ClosureResults":
+        """Equilibria under back pressure: whether, where and how firmly the valve shuts.
+
+        Parameters
+        ----------
+        pressure : several of numbers (Pa) or texts with a unit, optional
+            Those of the case by default.
+        output : path, optional
+            Result file, written state by state.
+        observer : Observer, optional
+
+        Raises
+        ------
+        CaseError
+            For a pressure that cannot be used or a case that gives no model.
+
+        Examples
+        --------
+        >>> result = dbvfiv.load().closure(["7 kPa", "28 kPa"])          # doctest: +SKIP
+        >>> result.states[-1].closed, result.critical_pressure           # doctest: +SKIP
+        """
+        from .results.closure import ClosureResults
+        from .results.closure_file import ClosureFile
+        from .results.header import Header
+        from .studies.closure import run_closure
+        from .studies.closure_model import closure_model
+        from .studies.observer import Observer, Observers
+
+        pressures = read_pressures(self.case.closure.pressures if pressure is None else pressure, "pressure")
+        case = self.case.replace({"closure.pressures": list(pressures)})
+        observer = observer or Observer()
+        try:
+            model = closure_model(case)
+        except CaseError:
+            raise
+        except ValueError as error:  # what geometry, mesh and shell refuse
+            raise CaseError(str(error)) from error
+        header = Header.of("closure", case, self.name)
+        if output is None:
+            return ClosureResults.of(run_closure(case, pressures, observer=observer, model=model), header)
+        with ClosureFile(output, model, header) as file:
+            result = run_closure(case, pressures, observer=Observers(file, observer), model=model)
+            file.conclude(result)
+        return ClosureResults.of(result, header)
 
     def _run(self, pressures: Sequence[float], output: str | Path | None, observer: "Observer | None") -> "SteadyResults":
         from .results.header import Header

@@ -34,17 +34,22 @@ class Steady(Section):
 class Modes(Section):
     """Leading eigenvalues of the coupled state."""
 
-    count: StrictInt = key(10, "How many modes.", ge=1, le=1000)
-    shift: Rate = key(50.0, "Real part of the shift; positive stands clear of the pile at -1/beta.", ge=-1e6, le=1e6)
-    shift_frequency: Frequency = key(0.0, "Frequency of the shift.", ge=0, le=1e6)
+    count: StrictInt = key(10, "How many modes; a conjugate pair is one.", ge=1, le=1000)
+    max_frequency: Frequency | None = key(None, "Only modes up to this frequency; chosen where damping does not order the modes.", gt=0, le=1e6)
+    shift: Rate | None = key(None, "Real part of a shift to search near, instead of automatic ones.", ge=-1e6, le=1e6)
+    shift_frequency: Frequency = key(0.0, "Frequency of that shift.", ge=0, le=1e6)
     tolerance: Number = key(1e-8, "Largest accepted relative residual of the full pencil.", gt=0, le=1e-2)
-    in_vacuo: StrictBool = key(False, "Leave the fluid out.")
+    in_vacuo: StrictBool = key(False, "Leave the fluid out: the stressed structure alone.")
 
 
 class Sweep(Section):
     """Modes tracked along one parameter."""
 
     over: Range = key("density=1:1000:40:log", "Parameter and its values: PARAMETER=START:STOP:COUNT[:log].")
+    count: StrictInt = key(6, "How many leading modes to follow.", ge=1, le=100)
+    checks: StrictInt = key(3, "Values at which the reduced basis, or the count of unstable modes, is checked.", ge=1, le=50)
+    tolerance: Number = key(1e-6, "Accepted relative error of the eigenvalues on the reduced basis.", gt=0, le=1e-2)
+    least_confidence: Number = key(0.6, "A step is halved while the match of a leading mode is less certain than this.", gt=0, lt=1)
 
     @property
     def axis(self) -> Axis:
@@ -103,7 +108,7 @@ class Closure(Section):
     )
     penetration: Length = key(1e-6, "Largest penetration that is left.", gt=0, le=1e-3)
     shut_fraction: Number = key(
-        0.1, "A section counts as shut when less than this fraction of the lip's opening at rest is left.", ge=0, lt=1
+        0.2, "A section counts as shut when less than this fraction of the lip's opening at rest is left.", ge=0, lt=1
     )
     eigenvalues: StrictInt = key(4, "Lowest eigenvalues of the tangent stiffness to follow.", ge=1, le=100)
     arclength: StrictBool = key(True, "Go on along the equilibrium path by arclength when load steps end at a limit point.")

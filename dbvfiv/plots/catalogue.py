@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 FAMILIES: dict[str, tuple[str, ...]] = {
     "steady": ("discharge", "shapes", "passage", "deformed", "layers"),
+    "closure": ("closure", "closure_curves", "layers"),
 }
 FORMATS = ("png", "svg")
 

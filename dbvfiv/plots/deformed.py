@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..results.steady import SteadyResults
 
 #: Turbo without its nearly black ends.
-_COLOURS = ListedColormap(matplotlib.colormaps["turbo"](np.linspace(0.08, 0.95, 256)))
+COLOURS = ListedColormap(matplotlib.colormaps["turbo"](np.linspace(0.08, 0.95, 256)))
 _LIGHT = np.array([-0.35, -0.45, 0.82])
 
 
@@ -38,10 +38,10 @@ def deformed(state: "State") -> Figure:
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
     scale = Normalize(0.0, size.max() or 1.0)
     corners = points[valve.quads]
-    colours = _shaded(corners, _COLOURS(scale(size[valve.quads].mean(axis=1))))
+    colours = shaded(corners, COLOURS(scale(size[valve.quads].mean(axis=1))))
     axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.3, clip_on=False))
     _frame(axes, points)
-    bar = figure.colorbar(ScalarMappable(scale, _COLOURS), ax=axes, shrink=0.62, pad=0.06, aspect=22)
+    bar = figure.colorbar(ScalarMappable(scale, COLOURS), ax=axes, shrink=0.62, pad=0.06, aspect=22)
     bar.set_label("Displacement, mm")
     bar.outline.set_visible(False)
     x, y, z = (1e3 * value for value in state.max_displacement_position)
@@ -53,7 +53,7 @@ def deformed(state: "State") -> Figure:
     return figure
 
 
-def _shaded(corners: np.ndarray, colours: np.ndarray) -> np.ndarray:
+def shaded(corners: np.ndarray, colours: np.ndarray) -> np.ndarray:
     """Colours (n, 4) darkened where the faces turn from the light; inner and outer side alike."""
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

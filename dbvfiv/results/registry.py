@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 READERS: dict[str, str] = {
     "steady": "dbvfiv.results.steady:SteadyResults",
+    "closure": "dbvfiv.results.closure:ClosureResults",
 }
 
 

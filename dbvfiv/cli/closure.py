@@ -1,0 +1,96 @@
+"""``dbvfiv closure``: the valve under back pressure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from ._options import AsJson, CaseFile, Output, Override, read_case
+from ._output import print_json
+from ._progress import Progress
+
+ORDER = 35
+
+Pressures = Annotated[
+    Optional[list[str]],
+    typer.Option("--pressure", "-p", metavar="P", help="Back pressure, 7e3 (Pa) or '7 kPa'; may be repeated."),
+]
+PlotFolder = Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")]
+
+
+def command(
+    case_file: CaseFile = None,
+    pressures: Pressures = None,
+    output: Output = None,
+    plots: PlotFolder = None,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Do the same with the other kind of supports, and draw both in one figure.")
+    ] = False,
+    overrides: Override = None,
+    as_json: AsJson = False,
+) -> None:
+    """Back pressure: does the valve shut, where and how firmly, what stays open, how far is the wall from buckling?
+
+    The pressures are those of --pressure, else closure.pressures of the case; each state is found from the one before. closure.supports chooses
+    contact of the inner faces or the simplified supports of the thesis, closure.start = "open" turns a flow back first.
+
+    dbvfiv closure cases/closure.toml -o closure.h5 --plots figures
+    """
+    from ..api import Valve, read_pressures
+    from ..errors import SolveError
+    from ..results.closure_table import HEAD, row_of
+
+    case = read_case(case_file, overrides)
+    wanted = read_pressures(pressures, "--pressure") if pressures else case.closure.pressures
+    if plots is not None and plots.exists() and not plots.is_dir():
+        from ..errors import CaseError
+
+        raise CaseError(f"--plots {str(plots)!r} is a file and not a folder.")
+    name = case_file.stem if case_file else "dbv12"
+    results, failures = [], []
+    supports = [case.closure.supports]
+    if compare:
+        supports.append("held-lips" if supports[0] == "contact" else "contact")
+    for number, kind in enumerate(supports):
+        valve = Valve(case.replace({"closure.supports": kind}), name)
+        if not as_json:
+            title = [f"Supports: {kind}"] if compare else []
+            print("\n".join([*title, *HEAD]), flush=True)
+        target = output if output is None or not number else output.with_name(f"{output.stem}-{kind}{output.suffix}")
+        result = valve.closure(wanted, output=target, observer=Progress(quiet=as_json, row=None if as_json else row_of))
+        if not as_json:
+            print("\n".join([*result.verdict(), *([f"Kept in {target}."] if target else [])]))
+        results.append(result)
+        failures += result.failures
+        if not result.complete:
+            break
+    figures = _figures(results, plots) if plots is not None else []
+    if as_json:
+        document = results[0].summary()
+        if len(results) > 1:
+            document["compared"] = results[1].summary()
+        print_json(document | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
+    elif figures:
+        print(f"{len(figures)} figures in {plots}.")
+    if not all(result.complete for result in results):
+        raise KeyboardInterrupt
+    if failures:
+        raise SolveError(f"{len(results[0].states)} of {len(wanted)} back pressures were reached.")  # why was said when it happened
+
+
+def _figures(results, folder: Path) -> list[Path]:
+    written = []
+    for number, result in enumerate(results):
+        if result.states:
+            written += result.plot(folder if not number else folder / result.supports)
+    if len(results) > 1 and all(result.states for result in results):
+        from ..plots.closure_curves import supports_compared
+        from ..plots.style import style
+
+        path = folder / "supports-compared.png"
+        with style():
+            supports_compared(*results).savefig(path)
+        written.append(path)
+    return written
