@@ -105,7 +105,7 @@ class _ShiftAndInvert:
 def near_shift(shifted: ShiftedPencil, wanted: int, *, tolerance: float = 1e-10,
                subspace: int | None = None,
                max_restarts: int = 60, patience: int = 3,
-               transposed: bool = False) -> KrylovPairs:
+               transposed: bool = False, limit_point: float | None = None) -> KrylovPairs:
     """The eigenvalues nearest to the shift of a factored pencil.
 
     Parameters
@@ -122,6 +122,9 @@ def near_shift(shifted: ShiftedPencil, wanted: int, *, tolerance: float = 1e-10,
         next to a limit point of eigenvalues no number of restarts helps.
     transposed : bool
         Left vectors (conjugated) instead of right ones, from the same factor.
+    limit_point : float, optional
+        Real limit point of eigenvalues: the search ends when all that is left to converge lies as
+        far from the shift as this, 3 per cent less.
 
     Returns
     -------
@@ -142,28 +145,50 @@ def near_shift(shifted: ShiftedPencil, wanted: int, *, tolerance: float = 1e-10,
     solver.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
     solver.setTolerances(tolerance, max_restarts)
-    solver.setStoppingTest(_Patience(patience, SLEPc.EPS.ConvergedReason))
+    stopping = _Patience(patience, SLEPc.EPS.ConvergedReason, _limit_size(shifted, limit_point))
+    solver.setStoppingTest(stopping)
+    if stopping.limit:
+        solver.setMonitor(stopping.watch)
     solver.setDimensions(wanted, min(size, subspace or max(2 * wanted, wanted + 24)))
     start = shell.createVecRight()
     start.setArray(np.random.default_rng(7).standard_normal(size))
     solver.setInitialSpace(start)
     solver.solve()
-    pairs = _collect(solver, shell, operator, size)
+    pairs = _collect(solver, shell, operator, size, stopping.limit if stopping.at_limit else 0.0)
     for item in (solver, shell, start):
         item.destroy()
     return pairs
 
 
-class _Patience:
-    """Stopping test: enough pairs, too many restarts, or no progress."""
+def _limit_size(shifted, limit_point) -> float:
+    """Size of the transformed eigenvalue just right of a limit point; 0 without one."""
+    if limit_point is None:
+        return 0.0
+    shift, place = complex(shifted.shift), 0.97 * limit_point
+    mirror = shift.conjugate() if shift.imag else None
+    distance = abs(place - shift)
+    return 1.0 / (distance if mirror is None else distance * abs(place - mirror))
 
-    def __init__(self, patience, reasons):
-        self.patience, self.reasons = patience, reasons
+
+class _Patience:
+    """Stopping test: enough pairs, too many restarts, no progress, or a limit point reached."""
+
+    def __init__(self, patience, reasons, limit=0.0):
+        self.patience, self.reasons, self.limit = patience, reasons, limit
         self.best, self.since = 0, 0
+        self.ritz = np.zeros(0)
+        self.at_limit = False
+
+    def watch(self, _solver, _restart, _converged, ritz, _errors):
+        self.ritz = np.abs(np.array(ritz))
 
     def __call__(self, _solver, restart, max_restarts, converged, wanted):
         if converged >= wanted:
             return self.reasons.CONVERGED_TOL
+        # the values of the restart before: they only move outwards
+        if self.limit and converged < self.ritz.size and 0 < self.ritz[converged] < self.limit:
+            self.at_limit = True
+            return self.reasons.CONVERGED_USER
         if converged > self.best:
             self.best, self.since = converged, restart
         if restart >= max_restarts or restart - self.since >= self.patience:
@@ -171,7 +196,7 @@ class _Patience:
         return self.reasons.CONVERGED_ITERATING
 
 
-def _collect(solver, shell, operator, size) -> KrylovPairs:
+def _collect(solver, shell, operator, size, limit=0.0) -> KrylovPairs:
     shift, n = operator.shifted.shift, operator.n
     found = solver.getConverged()
     real = shell.createVecRight()
@@ -195,8 +220,8 @@ def _collect(solver, shell, operator, size) -> KrylovPairs:
             q.append(x[:n])
             u.append(x[2 * n:])
     k = len(values)
-    far = min(theta_size) if k else np.inf
-    reach = (far ** -0.5 if operator.paired else 1.0 / far) if k else 0.0
+    far = limit or (min(theta_size) if k else np.inf)
+    reach = far ** -0.5 if operator.paired else 1.0 / far
     return KrylovPairs(
         eigenvalues=np.array(values, complex),
         vectors_q=np.array(q, complex).reshape(k, n).T,

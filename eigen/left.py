@@ -12,12 +12,14 @@ from .products import coupling_of_modes
 from .residual import factored_beside
 
 
-def attach_left(pencil, shifted: ShiftedPencil, batch, wanted, tolerance, found) -> None:
+def attach_left(pencil, shifted: ShiftedPencil, batch, wanted, tolerance, found,
+                limit_point: float | None = None) -> None:
     """Left vectors from the same factor, matched by eigenvalue; strays by inverse iteration."""
     k = batch.values.size
     batch.left_q = np.zeros((pencil.n, k), complex)
     batch.left_u = np.zeros((pencil.b, k), complex)
-    pairs = near_shift(shifted, wanted, tolerance=tolerance, transposed=True)
+    pairs = near_shift(shifted, wanted, tolerance=tolerance, transposed=True,
+                       limit_point=limit_point)
     found.applications += pairs.applications
     free = np.ones(pairs.eigenvalues.size, bool)
     workspace = Workspace()

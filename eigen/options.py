@@ -16,6 +16,10 @@ class SearchOptions:
         whole band. None: the band reaches to the highest frequency among the leading modes.
         Give a band where damping does not order the modes (undamped structures): without it
         "leading" depends on how far up one looks.
+    limit_point : float or None
+        1/s, negative. A real number at which infinitely many eigenvalues accumulate, as they do at
+        -1/beta under damping proportional to stiffness. No list of leading modes reaches past
+        it: the search is for those clearly right of it, and others are given only if they turn up.
     shifts : tuple of complex or None
         Shifts, 1/s, instead of those chosen automatically; real ones cost least.
     tolerance : float
@@ -37,6 +41,7 @@ class SearchOptions:
     """
 
     max_frequency: float | None = None
+    limit_point: float | None = None
     shifts: tuple[complex, ...] | None = None
     tolerance: float = 1e-8
     krylov_tolerance: float = 1e-12
@@ -50,6 +55,8 @@ class SearchOptions:
     def __post_init__(self):
         if self.max_frequency is not None and not self.max_frequency > 0:
             raise ValueError("max_frequency must be positive, in Hz.")
+        if self.limit_point is not None and not -math.inf < self.limit_point < 0:
+            raise ValueError("limit_point must be a negative growth rate, in 1/s.")
         if self.method not in ("auto", "krylov", "dense"):
             raise ValueError(f"The method '{self.method}' is unknown; it is 'auto', 'krylov' or 'dense'.")
         if self.shifts is not None:

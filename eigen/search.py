@@ -16,6 +16,7 @@ from .pencil import CoupledPencil
 from .region import Oval, SearchedRegion
 from .spectrum import Spectrum
 
+CLEAR = 0.8  # what counts as clearly right of a limit point of eigenvalues, as a fraction of it
 DEPTH = 0.4  # growth rate over angular frequency, down to which a band is searched at most
 
 
@@ -79,7 +80,8 @@ def _search(pencil, count, options, workspace) -> Found:
             got = _at_shift(pencil, shift, wanted, aim, options, workspace, found)
             if found.everything or queue or _is_covered(found, aim, options):
                 break
-            if got < wanted or wanted >= min(options.max_pairs, pencil.order):
+            # no more converge, or a pair that was rejected closes the region
+            if got < wanted or found.limited or wanted >= min(options.max_pairs, pencil.order):
                 break
             wanted = min(int(1.6 * wanted) + 2, options.max_pairs)
         fresh = _in_band(found, options) - before
@@ -106,11 +108,14 @@ def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
     shift, shifted, pairs = _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found)
     found.shifts.append(shift)
     found.applications += pairs.applications
-    batch = verified(pencil, *upper_half(pairs.eigenvalues, pairs.vectors_q, pairs.vectors_u))
+    apart = _apart_from_limit(pairs.eigenvalues, options)
+    batch = verified(pencil, *upper_half(pairs.eigenvalues[apart], pairs.vectors_q[:, apart],
+                                         pairs.vectors_u[:, apart]))
     polish(pencil, shifted, batch, options.tolerance)
     dropped = refine(pencil, batch, aim, _band(options), options.tolerance, found)
     if options.left:
-        attach_left(pencil, shifted, batch, wanted, options.krylov_tolerance, found)
+        attach_left(pencil, shifted, batch, wanted, options.krylov_tolerance, found,
+                    options.limit_point)
     merge(found, batch)
     paired = isinstance(shift, complex) and not petsc_is_complex()
     mirror = np.conj(shift) if paired else shift
@@ -118,8 +123,16 @@ def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
                 + [(1 - 1e-6) * np.sqrt(abs(d - shift) * abs(d - mirror)) for d in dropped])
     if reach > 0:
         found.ovals[shift] = Oval(shift, reach, paired)
+    found.limited = bool(dropped.size)
     found.everything = found.everything or (pairs.exhausted and not dropped.size)
     return pairs.eigenvalues.size
+
+
+def _apart_from_limit(values, options) -> np.ndarray:
+    """Which eigenvalues do not belong to those that crowd around the limit point."""
+    if options.limit_point is None:
+        return np.ones(values.size, bool)
+    return np.abs(values - options.limit_point) > 0.05 * abs(options.limit_point)
 
 
 def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found):
@@ -133,7 +146,8 @@ def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found):
             shifted = workspace.shifted(pencil, moved)
         except SingularShiftError:
             continue
-        pairs = near_shift(shifted, wanted, tolerance=options.krylov_tolerance)
+        pairs = near_shift(shifted, wanted, tolerance=options.krylov_tolerance,
+                           limit_point=options.limit_point)
         nearest = np.abs(pairs.eigenvalues - moved).min(initial=np.inf)
         if nearest > 1e-9 * unit:
             if attempt:
@@ -146,6 +160,8 @@ def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found):
 
 def _first_shift(pencil, aim, options, workspace) -> float:
     """A positive real shift of the size of the frequencies sought."""
+    if options.limit_point is not None:
+        return 1.5 * abs(options.limit_point)
     if options.max_frequency is not None:
         return 1.5 * 2 * np.pi * options.max_frequency
     stiffness, inertia = np.abs(pencil.K.diagonal()), np.abs(pencil.M.diagonal())
@@ -175,6 +191,8 @@ def _first_shift(pencil, aim, options, workspace) -> float:
 
 def _next_shift(found, aim, options) -> complex:
     """A complex shift at the upper end of what has been covered."""
+    if options.limit_point is not None:  # a larger disc hugs the line through the limit point
+        return 3.0 * max(abs(s) for s in found.shifts)
     if options.max_frequency is not None:
         band = 2 * np.pi * options.max_frequency
     else:
@@ -187,6 +205,12 @@ def _next_shift(found, aim, options) -> complex:
 def _leading(found, aim, options) -> tuple[float, float]:
     """Growth rate of the last of the leading modes, and the band that holds them, rad/s."""
     values = found.values
+    if options.limit_point is not None:
+        floor = CLEAR * options.limit_point
+        values = values[values.real > floor]
+        growth = np.sort(values.real)[::-1]
+        band = min(_band(options), float(values.imag.max(initial=0.0)))
+        return float(growth[aim - 1]) if growth.size >= aim else floor, band
     if options.max_frequency is not None:
         band = 2 * np.pi * options.max_frequency
         values = values[values.imag <= band * (1 + 1e-12)]
@@ -202,6 +226,9 @@ def _is_covered(found, aim, options) -> bool:
     if found.everything:
         return True
     growth, band = _leading(found, aim, options)
+    if options.limit_point is not None:
+        low, high = SearchedRegion(tuple(found.ovals.values())).complete_between(band)
+        return low <= growth and high > 0
     inside = found.values.imag <= band * (1 + 1e-12)
     low, high = SearchedRegion(tuple(found.ovals.values())).complete_between(band)
     if inside.sum() < aim:
@@ -231,7 +258,10 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
     region = SearchedRegion(tuple(found.ovals.values()), found.everything)
     _, band = _leading(found, max(count, options.least), options)
     order = np.lexsort((found.values.imag, -found.values.real))
-    order = order[found.values.imag[order] <= band * (1 + 1e-12)][:count]
+    order = order[found.values.imag[order] <= band * (1 + 1e-12)]
+    if options.limit_point is not None:
+        order = order[found.values.real[order] > CLEAR * options.limit_point]
+    order = order[:count]
     if options.max_frequency is None and order.size:
         band = float(found.values.imag[order].max())
     low, high = region.complete_between(band)
@@ -240,7 +270,12 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
     certified = int(np.sum(growth >= low))
     all_there_are = found.everything and order.size == int(np.sum(found.values.imag <= band * (1 + 1e-12)))
     complete = certified == order.size and (order.size >= count or all_there_are)
-    if order.size < count:
+    if options.limit_point is not None and order.size < count:
+        complete = certified == order.size and low <= CLEAR * options.limit_point
+        notes.append(f"{order.size} modes have growth rates above {CLEAR * options.limit_point:.6g} 1/s. "
+                     f"Infinitely many eigenvalues accumulate at {options.limit_point:.6g} 1/s, so no "
+                     f"list of leading modes goes on from there to the {count} asked for.")
+    elif order.size < count:
         where = "" if all_there_are or options.max_frequency is None else (
             f" up to {options.max_frequency:.6g} Hz with a growth rate above {low:.6g} 1/s")
         notes.append(f"{count} modes were asked for, {order.size} were found{where}"
