@@ -1,9 +1,9 @@
-"""The coupled equations of motion as a time step sees them: residual at a weighted instant and its iteration matrix.
+"""The coupled equations of motion as a time step sees them.
 
     M(q) a + h(q, v) + alpha M v + beta w + F - G(q) p = 0,     p_outlet = 0
 
-F is the internal force of shell and stops and w its rate, both treated as unknowns of first order, so that stiffness damping beta K_s(q) v = beta dF/dt is
-consistent with the tangent without an evaluation of it.
+F is the internal force of shell and stops and w its rate. F, the load G p and the flow's psi (see `fluid`) are kept in the state as quantities of first
+order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent with the tangent without an evaluation of it.
 """
 from __future__ import annotations
 
@@ -15,57 +15,60 @@ from ..flow import Channel
 from ..model import ValveModel
 from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
+from .fluid import MovingFluid
 from .kernels import inertia_force, kinetic_energy, strain_energy
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Derivatives of what enters the equations at the weighted instant with respect to the new unknowns.
+    """Derivatives of the equations' parts with respect to the new positions.
 
     Attributes
     ----------
-    position, velocity, acceleration : float
-        Of q, v and a with respect to the new q: -, 1/s, 1/s2.
+    inertia : float
+        Factor of M, 1/s2; mass damping included.
     force : float
-        Of F + beta w with respect to the new F.
-    speed, speed_rate : float
-        Of U and its rate with respect to the new U: -, 1/s.
+        Factor of the tangent of F.
+    load : float
+        Factor of the derivative of G p.
+    velocity : float
+        Derivative of the new velocities, 1/s.
+    psi : float
+        Derivative of the rate of psi with respect to psi, 1/s.
     """
 
-    position: float
-    velocity: float
-    acceleration: float
+    inertia: float
     force: float
-    speed: float
-    speed_rate: float
+    load: float
+    velocity: float
+    psi: float
 
 
 @dataclass
-class Weighted:
-    """Forces at the weighted instant.
+class Load:
+    """Fluid and its force on the wall at one instant.
 
     Attributes
     ----------
-    inertia : (n,) array
-        M a + h.
-    damping : (n,) array
-        alpha M v.
-    load : (n,) array
+    force : (n,) array
         G p.
     outlet : float
-        Pressure at the outlet, Pa, to vanish; zero if U is no unknown.
-    pressure, area : (m,) arrays
-    speed : float
-        Inlet velocity that goes with them, m/s.
+        Pressure at the outlet, Pa, to vanish; zero where U is no unknown.
+    pressure, area, speed : (m,) arrays
+        Pa, m2 of a quarter, m/s.
+    psi, psi_rate : (m,) arrays
+    inlet : float
+        Inlet pressure, Pa.
     """
 
-    inertia: np.ndarray
-    damping: np.ndarray
-    load: np.ndarray
+    force: np.ndarray
     outlet: float
     pressure: np.ndarray
     area: np.ndarray
-    speed: float
+    speed: np.ndarray
+    psi: np.ndarray
+    psi_rate: np.ndarray
+    inlet: float
 
 
 class ValveMotion:
@@ -82,7 +85,9 @@ class ValveMotion:
         self.model = model
         self.conditions = Conditions.of(model.case) if conditions is None else conditions
         self.moving_fluid = isinstance(model.flow, Channel) and model.flow.unsteady
+        self.fluid = MovingFluid(model.flow, self.conditions.density) if self.moving_fluid else None
         self.size = model.size
+        self.stations = model.stations
         shell = model.shell
         self._quads = shell.mesh.quads
         self._integrals = shell._integrals
@@ -106,41 +111,55 @@ class ValveMotion:
             return np.zeros(self.size)
         return self.model.shell.dofs.matrix(self.model.structure(q)[1]) @ v
 
-    def weighted(self, q, v, a, speed: float, speed_rate: float, inlet: float) -> Weighted:
-        """Forces at positions, velocities, accelerations (n,), inlet velocity and its rate, for an inlet pressure, Pa."""
-        model, alpha, density = self.model, self.conditions.alpha, self.conditions.density
-        nodal, nodal_rate = model.nodal(q), model.nodal(v)
-        inertia, damping = self._inertia(nodal, nodal_rate, model.nodal(a))
+    def inertia(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """M(q) a + h(q, v), (n,)."""
+        model = self.model
+        nodal = model.nodal(q)
+        _, d1, d2 = model.shell.directors(nodal)
+        out = np.zeros_like(nodal)
+        inertia_force(self._quads, self._integrals, d1, d2, model.nodal(v), model.nodal(a), out)
+        return model.shell.dofs.restrict(out)
+
+    def momentum(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """M(q) v, (n,)."""
+        return self.inertia(q, np.zeros_like(v), v)
+
+    def load(self, q, v, inlet: float, psi_weight: float, psi_known: np.ndarray, speed: float | None = None) -> Load:
+        """Fluid at positions and velocities (n,) for an inlet pressure, Pa.
+
+        Parameters
+        ----------
+        psi_weight : float
+        psi_known : (m,) array
+            The rate of psi is psi_weight psi + psi_known.
+        speed : float, optional
+            Inlet velocity, m/s; by default the one at which the outlet pressure vanishes.
+        """
+        model = self.model
+        nodal = model.nodal(q)
         area = model.rows.areas(nodal)
-        outlet = 0.0
         if self.moving_fluid:
-            area_rate = model.rows.second(self._position(nodal), nodal_rate)
-            area_acceleration = model.rows.second(self._position(nodal), model.nodal(a)) + model.rows.second(nodal_rate, nodal_rate)
-            p = model.flow.pressure(area, area_rate, area_acceleration, speed, speed_rate, inlet, density).copy()
-            outlet = float(p[0])
-            p[0] = 0.0
-        else:
-            p = model.flow.steady_pressure(area, inlet)
-            speed = model.flow.inlet_velocity(area, inlet, density) if inlet > 0 else 0.0
-        load = model.pressure_force(nodal, p)
-        return Weighted(inertia, alpha * damping if alpha else np.zeros_like(load), load, outlet, p, area, speed)
+            rate = self._area_rate(nodal, v)
+            if speed is None:
+                speed = self.fluid.velocity(area, rate, inlet, psi_weight, float(psi_known[0]))
+            flow = self.fluid.state(area, rate, speed)
+            psi_rate = psi_weight * flow.psi + psi_known
+            p = self.fluid.pressure(flow, psi_rate, inlet)
+            outlet, p[0] = float(p[0]), 0.0
+            return Load(model.pressure_force(nodal, p), outlet, p, area, flow.speed, flow.psi, psi_rate, inlet)
+        p = model.flow.steady_pressure(area, inlet)
+        speed = model.flow.inlet_velocity(area, inlet, self.conditions.density) if inlet > 0 else 0.0
+        zero = np.zeros(self.stations)
+        return Load(model.pressure_force(nodal, p), 0.0, p, area, model.flow.velocities(area, speed), zero, zero, inlet)
+
+    def _area_rate(self, nodal: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Rates (m,) of the areas, which are quadratic in the deformed positions."""
+        return self.model.rows.second(self._position(nodal), self.model.nodal(v))
 
     def _position(self, nodal):
-        """Deformed positions as a nodal field: the areas are quadratic in it, so their rate is its second derivative form."""
         out = nodal.copy()
         out[:, :3] += self.model.shell.mesh.nodes
         return out
-
-    def _inertia(self, nodal, rate, acceleration):
-        _, d1, d2 = self.model.shell.directors(nodal)
-        inertia = np.zeros_like(nodal)
-        inertia_force(self._quads, self._integrals, d1, d2, rate, acceleration, inertia)
-        damping = None
-        if self.conditions.alpha:
-            damping = np.zeros_like(nodal)
-            inertia_force(self._quads, self._integrals, d1, np.zeros_like(d2), np.zeros_like(rate), rate, damping)
-            damping = self.model.shell.dofs.restrict(damping)
-        return self.model.shell.dofs.restrict(inertia), damping
 
     def length(self, dq: np.ndarray) -> float:
         """Largest displacement in a change (n,) of the unknowns, m; rotations count by the path of the wall's face."""
@@ -148,8 +167,8 @@ class ValveMotion:
 
     # -- linear algebra -------------------------------------------------------------------------------------------------------------
 
-    def linearise(self, q_new, q, v, a, speed: float, speed_rate: float, inlet: float, weights: Weights) -> None:
-        """Factor the iteration matrix at the new positions and the weighted state.
+    def linearise(self, q, q_inertia, v, load: Load, weights: Weights) -> None:
+        """Factor the iteration matrix at new positions and velocities, with the inertia taken at its own positions.
 
         Raises
         ------
@@ -157,32 +176,24 @@ class ValveMotion:
         """
         model = self.model
         nodal = model.nodal(q)
-        found = self.weighted(q, v, a, speed, speed_rate, inlet)
-        _, structure = model.structure(q_new)
+        _, structure = model.structure(q)
         values = weights.force * structure
-        mass = weights.acceleration + self.conditions.alpha * weights.velocity
-        if mass:
-            values += mass * model.mass(q)
-        values = model.follower_stiffness(nodal, weights.position * found.pressure, values)
-        forces = model.station_forces(nodal).data
+        values += weights.inertia * model.mass(q_inertia)
+        values = model.follower_stiffness(nodal, weights.load * load.pressure, values)
+        forces = weights.load * model.station_forces(nodal).data
         slope = model.rows.jacobian(nodal).data
         if not self.moving_fluid:
-            _, gradient = model.flow.steady_operator(found.area, inlet)
-            self._solver(0).refactor(values, forces, slope, weights.position * gradient)
+            _, gradient = model.flow.steady_operator(load.area, load.inlet)
+            self._solver(0).refactor(values, forces, slope, gradient)
             return
-        rate, acceleration = self._area_rates(nodal, model.nodal(v), model.nodal(a))
-        parts = model.flow.operators(found.area, inlet, self.conditions.density, rate, acceleration, speed, speed_rate)
-        by_area = weights.position * parts.area0 + weights.velocity * parts.area1 + weights.acceleration * parts.area2
-        by_speed = weights.speed * parts.velocity0 + weights.speed_rate * parts.velocity1
+        rate = self._area_rate(nodal, v)
+        by_area, by_rate, by_speed = self.fluid.pressure_slopes(load.area, rate, load.speed[-1], weights.psi)
+        self._refactor_moving(values, forces, slope, by_area + weights.velocity * by_rate, by_speed)
+
+    def _refactor_moving(self, values, forces, slope, by_area, by_speed):
         row, corner = by_area[0].copy(), by_speed[0]
-        by_area, by_speed = by_area.copy(), by_speed.copy()
         by_area[0], by_speed[0] = 0.0, 0.0
         self._solver(1).refactor(values, forces, slope, by_area, by_speed, row, corner)
-
-    def _area_rates(self, nodal, rate, acceleration):
-        rows = self.model.rows
-        x = self._position(nodal)
-        return rows.second(x, rate), rows.second(x, acceleration) + rows.second(rate, rate)
 
     def solve(self, force: np.ndarray, outlet: float) -> tuple[np.ndarray, float]:
         """Changes of q (n,) and U that the last factored matrix gives for a force (n,) and an outlet pressure."""
@@ -200,6 +211,35 @@ class ValveMotion:
             pattern = model.shell.dofs.matrix(np.ones(len(model.shell.dofs.pattern[1])))
             self._factor = CoupledFactor(pattern, model.station_forces(rest), model.rows.jacobian(rest), inner)
         return self._factor
+
+    def accelerations(self, q, v, speed: float, inlet: float) -> tuple[np.ndarray, Load]:
+        """Accelerations (n,) that the equations ask for at positions, velocities and inlet velocity, and the fluid with them.
+
+        The equations are linear in the accelerations and the rate of the inlet velocity: one solve.
+        """
+        model, alpha, beta = self.model, self.conditions.alpha, self.conditions.beta
+        nodal = model.nodal(q)
+        zero = np.zeros(self.size)
+        forces = self.internal_force(q) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
+        mass = model.mass(q)
+        if not self.moving_fluid:
+            load = self.load(q, v, inlet, 0.0, np.zeros(self.stations))
+            none = np.zeros((self.stations, self.stations))
+            self._solver(0).refactor(mass, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
+            return self.solve(load.force - forces, 0.0)[0], load
+        rows, fluid = model.rows, self.fluid
+        area, rate = rows.areas(nodal), self._area_rate(nodal, v)
+        by_area, by_rate, by_speed = (fluid.integrate(slope) for slope in fluid.slopes(area, rate, speed))
+        bend = rows.second(model.nodal(v), model.nodal(v))
+        known = by_area @ rate + by_rate @ bend
+        load = self.load(q, v, inlet, 0.0, known, speed)
+        density = self.conditions.density
+        self._refactor_moving(
+            mass, model.station_forces(nodal).data, rows.jacobian(nodal).data, -density * by_rate, -density * by_speed
+        )
+        a, speed_rate = self.solve(load.force - forces, -load.outlet)
+        psi_rate = known + by_rate @ rows.second(self._position(nodal), model.nodal(a)) + by_speed * speed_rate
+        return a, self.load(q, v, inlet, 0.0, psi_rate, speed)
 
     # -- energies -------------------------------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from typing import Callable
 import numpy as np
 
 from ..model.linear import SingularMatrix
-from .equations import Weighted, Weights
+from .equations import Load, Weights
 from .scheme import Scheme
 from .state import MotionState
 
@@ -52,10 +52,12 @@ class StepResult:
     Attributes
     ----------
     state : MotionState
-    weighted : Weighted
-        Forces at the instant where the equations were met.
-    inlet : float
-        Inlet pressure at that instant, Pa.
+    load : Load
+        Fluid at the end of the step.
+    work : float
+        Of the pressure on the wall during the step, J of the quarter model.
+    dissipation : float
+        By Rayleigh damping, J.
     residuals, solves, factorisations : int
         Work done.
     error : float
@@ -63,8 +65,9 @@ class StepResult:
     """
 
     state: MotionState
-    weighted: Weighted
-    inlet: float
+    load: Load
+    work: float
+    dissipation: float
     residuals: int
     solves: int
     factorisations: int
@@ -95,7 +98,7 @@ class Stepper:
     def forget(self) -> None:
         """Drop the factors and the memory of the predictor, so that the next step depends on the state alone."""
         self._factored: float | None = None
-        self._history: list[tuple[float, np.ndarray, float]] = []
+        self._history: list[tuple[float, np.ndarray]] = []
 
     # -- the step -------------------------------------------------------------------------------------------------------------------
 
@@ -107,18 +110,27 @@ class Stepper:
         StepFailure
         """
         before = (self.residuals, self.solves, self.factorisations)
-        trial = _Trial(self.motion, self.scheme, state, h, self.pressure(state.time + self.scheme.now * h))
+        trial = _Trial(self.motion, self.scheme, state, h, self.pressure(state.time + h))
         try:
             self._iterate(trial)
         except SingularMatrix as error:
             raise StepFailure(str(error)) from error
         new = trial.state()
         past = self._history[-1] if self._history else None
-        here = (state.time + (1.0 - self.scheme.alpha_m) * h, trial.at[2], trial.speed_rate)
+        here = (state.time + (1.0 - self.scheme.alpha_m) * h, trial.a_mid)
         self._history = [*self._history[-2:], here]
         work = [now - then for now, then in zip((self.residuals, self.solves, self.factorisations), before)]
         jump = 0.0 if past is None else self.motion.length(here[1] - past[1]) * h / (here[0] - past[0])
-        return StepResult(new, trial.weighted, trial.inlet, *work, self.scheme.error_constant * h * h * jump)
+        return StepResult(new, trial.load, *self._works(trial), *work, self.scheme.error_constant * h * h * jump)
+
+    def _works(self, trial: "_Trial") -> tuple[float, float]:
+        """Work of the pressure and dissipation of a step, by the scheme's own weights."""
+        way = trial.q - trial.old.q
+        alpha = self.motion.conditions.alpha
+        lost = trial.damping @ way
+        if alpha:
+            lost += alpha * (self.motion.momentum(trial.q_mid, trial.v_mid) @ way)
+        return float(trial.push @ way), float(lost)
 
     # -- the iteration --------------------------------------------------------------------------------------------------------------
 
@@ -131,7 +143,7 @@ class Stepper:
         norm = self._start(trial)
         if self._factored == trial.h and self._full(trial, norm, renew=False):
             return
-        if self._full(trial, self._residual(trial), renew=True):
+        if self._full(trial, self._start(trial), renew=True):
             return
         if self._searched(trial, self._start(trial)):
             return
@@ -143,7 +155,7 @@ class Stepper:
         if renew:
             self._factor(trial)
         correction = self._solve(trial)
-        size = first = self.motion.length(correction[0])
+        size = first = self.motion.length(correction)
         for _ in range(options.max_iterations):
             allowed = trial.allowed(options)
             if size <= 1e-2 * allowed:
@@ -156,17 +168,17 @@ class Stepper:
                 trial.move(-1.0, correction)
                 return False
             correction = self._solve(trial)
-            size, size_old = self.motion.length(correction[0]), size
+            size, size_old = self.motion.length(correction), size
             if size <= allowed:
                 return True
-            if not size <= options.diverged * first:
-                return False
-            if size > options.refactor_at * size_old:
+            if not size <= options.refactor_at * size_old:
                 if not renew:
                     return False
                 self._factor(trial)
                 correction = self._solve(trial)
-                size = self.motion.length(correction[0])
+                size = self.motion.length(correction)
+                if not size <= options.diverged * first:
+                    return False
         return False
 
     def _searched(self, trial: "_Trial", norm: float) -> bool:
@@ -175,13 +187,13 @@ class Stepper:
         for _ in range(options.max_iterations):
             self._factor(trial)
             correction = self._solve(trial)
-            size, fraction = self.motion.length(correction[0]), 1.0
+            size, fraction = self.motion.length(correction), 1.0
             if size <= 1e-2 * trial.allowed(options):
                 return True
             while True:
                 trial.move(fraction, correction)
                 finite = np.isfinite(self._residual(trial))
-                left = self.motion.length(self._solve(trial)[0]) if finite else np.inf
+                left = self.motion.length(self._solve(trial)) if finite else np.inf
                 if left <= (1.0 - 0.25 * fraction) * size:
                     break
                 trial.move(-fraction, correction)
@@ -200,28 +212,27 @@ class Stepper:
         """
         state, s, h = trial.old, self.scheme, trial.h
         if self._history:
-            a, rate = self._extrapolated(state.time + (1.0 - s.alpha_m) * h)
-            trial.set((a - s.alpha_m * state.a) / (1.0 - s.alpha_m), rate)
+            a = self._extrapolated(state.time + (1.0 - s.alpha_m) * h)
+            trial.set((a - s.alpha_m * state.a) / (1.0 - s.alpha_m))
             norm = self._residual(trial)
             if np.isfinite(norm):
                 return norm
-        trial.set((1.0 - 0.5 / s.beta) * state.a, state.speed_rate)
+        trial.set((1.0 - 0.5 / s.beta) * state.a)
         norm = self._residual(trial)
         if not np.isfinite(norm):
             raise StepFailure("The equations cannot be evaluated at the start of the step.")
         return norm
 
-    def _extrapolated(self, time: float) -> tuple[np.ndarray, float]:
+    def _extrapolated(self, time: float) -> np.ndarray:
         points = self._history
-        a, rate = np.zeros_like(points[0][1]), 0.0
-        for i, (here, value, value_rate) in enumerate(points):
+        a = np.zeros_like(points[0][1])
+        for i, (here, value) in enumerate(points):
             weight = 1.0
-            for j, (there, *_) in enumerate(points):
+            for j, (there, _) in enumerate(points):
                 if i != j:
                     weight *= (time - there) / (here - there)
             a += weight * value
-            rate += weight * value_rate
-        return a, rate
+        return a
 
     def _residual(self, trial: "_Trial") -> float:
         self.residuals += 1
@@ -233,79 +244,76 @@ class Stepper:
         trial.linearise()
         self._factored = trial.h
 
-    def _solve(self, trial: "_Trial") -> tuple[np.ndarray, float]:
+    def _solve(self, trial: "_Trial") -> np.ndarray:
         self.solves += 1
-        return self.motion.solve(-trial.residual, -trial.weighted.outlet)
+        return self.motion.solve(-trial.residual, -trial.load.outlet)[0]
 
 
 class _Trial:
-    """A candidate for the new state; its unknowns are the accelerations and the rate of the inlet velocity."""
+    """A candidate for the new state; its unknowns are the accelerations. The inlet velocity follows from them."""
 
     def __init__(self, motion, scheme: Scheme, old: MotionState, h: float, inlet: float):
         self.motion, self.scheme, self.old, self.h, self.inlet = motion, scheme, old, h, inlet
         s, now = scheme, scheme.now
+        weight = 1.5 if self._smooth() else 1.0
+        self.psi_known = (1.0 - weight) * old.psi_rate - (weight / h) * old.psi
         self.weights = Weights(
-            position=now,
-            velocity=now * s.gamma / (s.beta * h),
-            acceleration=(1.0 - s.alpha_m) / (s.beta * h * h),
+            inertia=(1.0 - s.alpha_m) / (s.beta * h * h) + motion.conditions.alpha * now * s.gamma / (s.beta * h),
             force=now + motion.conditions.beta * s.rate / h,
-            speed=now,
-            speed_rate=s.rate / h,
+            load=now,
+            velocity=s.gamma / (s.beta * h),
+            psi=weight / h,
         )
 
-    def set(self, a: np.ndarray, speed_rate: float) -> None:
+    def _smooth(self) -> bool:
+        """Whether the second backward difference serves psi; a fall of the momentum to less than half calls for the first one."""
+        psi, change = self.old.psi[:1], self.h * self.old.psi_rate[:1]
+        return bool(np.all(psi + change > 0.0))
+
+    def set(self, a: np.ndarray) -> None:
         """Start from new accelerations."""
         s, h, old = self.scheme, self.h, self.old
         self.a = np.array(a)
-        self.speed_rate = float(speed_rate)
         self.v = old.v + h * ((1.0 - s.gamma) * old.a + s.gamma * self.a)
         self.q = old.q + h * old.v + h * h * ((0.5 - s.beta) * old.a + s.beta * self.a)
-        self.speed = old.speed + h * self.speed_rate
 
-    def move(self, fraction: float, correction: tuple[np.ndarray, float]) -> None:
-        """Add a fraction of a correction of q and U."""
+    def move(self, fraction: float, dq: np.ndarray) -> None:
+        """Add a fraction of a correction of q."""
         s, h = self.scheme, self.h
-        dq, du = correction
         self.q = self.q + fraction * dq
         self.v = self.v + (fraction * s.gamma / (s.beta * h)) * dq
         self.a = self.a + (fraction / (s.beta * h * h)) * dq
-        self.speed += fraction * du
-        self.speed_rate += fraction * du / h
 
     def evaluate(self) -> float:
-        """Set residual and weighted forces; return the norm of the former."""
-        s, now, old = self.scheme, self.scheme.now, self.old
-        self.force = self.motion.internal_force(self.q)
+        """Set residual and forces; return the norm of the former."""
+        s, now, old, motion = self.scheme, self.scheme.now, self.old, self.motion
+        self.force = motion.internal_force(self.q)
         self.force_rate = (self.force - old.force) / self.h
-        self.at = (
-            old.q + now * (self.q - old.q),
-            old.v + now * (self.v - old.v),
-            old.a + (1.0 - s.alpha_m) * (self.a - old.a),
-            old.speed + now * (self.speed - old.speed),
-            old.speed_rate + s.rate * (self.speed_rate - old.speed_rate),
-        )
-        self.weighted = w = self.motion.weighted(*self.at, self.inlet)
-        residual = old.force + now * (self.force - old.force)
-        beta = self.motion.conditions.beta
-        if beta:
-            residual = residual + beta * (old.force_rate + s.rate * (self.force_rate - old.force_rate))
-        residual += w.inertia
-        residual += w.damping
-        residual -= w.load
-        self.residual = residual
-        return float(np.linalg.norm(residual))
+        self.load = motion.load(self.q, self.v, self.inlet, self.weights.psi, self.psi_known)
+        self.q_mid = old.q + now * (self.q - old.q)
+        self.v_mid = old.v + now * (self.v - old.v)
+        self.a_mid = old.a + (1.0 - s.alpha_m) * (self.a - old.a)
+        alpha, beta = motion.conditions.alpha, motion.conditions.beta
+        self.damping = beta * (old.force_rate + s.rate * (self.force_rate - old.force_rate))
+        self.elastic = old.force + now * (self.force - old.force)
+        self.push = old.load + now * (self.load.force - old.load)
+        inertia = motion.inertia(self.q_mid, self.v_mid, self.a_mid + alpha * self.v_mid if alpha else self.a_mid)
+        self.residual = inertia + self.damping + self.elastic - self.push
+        return float(np.linalg.norm(self.residual))
 
     def linearise(self) -> None:
-        self.motion.linearise(self.q, *self.at, self.inlet, self.weights)
+        self.motion.linearise(self.q, self.q_mid, self.v, self.load, self.weights)
 
     def allowed(self, options: StepOptions) -> float:
         """Largest correction that may be left, m."""
         motion = self.motion
-        moved = self.h**2 * self.scheme.beta * motion.length(self.at[2])
-        return options.tolerance * moved + options.floor * motion.length(self.q) + np.finfo(float).tiny
+        moved = self.h**2 * self.scheme.beta * motion.length(self.a_mid)
+        floor = max(options.floor, 1e3 * np.finfo(float).eps)
+        return options.tolerance * moved + floor * motion.length(self.q) + np.finfo(float).tiny
 
     def state(self) -> MotionState:
-        speed = self.speed if self.motion.moving_fluid else self.weighted.speed
+        old, load = self.old, self.load
+        rate = (load.psi - old.psi) / self.h if self.motion.moving_fluid else load.psi_rate
         return MotionState(
-            self.old.time + self.h, self.q, self.v, self.a, self.force, self.force_rate, speed, self.speed_rate
+            old.time + self.h, float(load.speed[-1]), self.q, self.v, self.a, self.force, self.force_rate, load.force, load.psi, rate
         )  # fmt: skip
