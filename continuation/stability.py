@@ -6,7 +6,7 @@ import numpy as np
 
 from continuation.branch_points import BranchPointMonitor
 from continuation.hopf import describe_hopf, solve_hopf
-from continuation.locate import safeguarded, special_at
+from continuation.locate import SLACK, safeguarded, special_at
 from continuation.modes import count_unstable, match_modes, mode_distance
 
 
@@ -107,7 +107,11 @@ class SpectrumMonitor:
         known = before.unstable >= 0 and after.unstable >= 0
         mixed = len(oscillating) + len(real) < len(crossing)
         contradictory = mixed or (known and expected != after.unstable - before.unstable)
-        if contradictory and depth < tracer.options.max_subdivisions:
+        # Two real eigenvalues that cross together may have been a pair in between.
+        explained = [s for s in found if s.kind in ("fold", "branch point")
+                     and -SLACK <= tracer.fraction(before, after, s.z)[0] <= 1 + SLACK]
+        hidden = len(real) >= 2 and len(real) > len(explained)
+        if (contradictory or hidden) and depth < tracer.options.max_subdivisions:
             middle = tracer.at(before, after, 0.5)
             if middle is not None:
                 self._between(tracer, before, middle, index, depth + 1, found, special)
@@ -119,7 +123,6 @@ class SpectrumMonitor:
             special.append(special_at(tracer, "stability change", after, index, False, reason))
         for i, j in oscillating:
             special.append(self._locate(tracer, before, after, index, i, j, special))
-        explained = [s for s in found if s.kind in ("fold", "branch point")]
         if len(real) > len(explained):
             for i, j in real:
                 special += self._real(tracer, before, after, index, i, j, explained + special)
@@ -224,7 +227,10 @@ class CountMonitor(SpectrumMonitor):
         critical = 1j * abs(float(extra[0])) if extra.size else 0.0
         if here.unstable < 0 or values.size == 0:
             return
-        rest = np.delete(values, np.argmin(np.abs(values - critical)))
+        nearest = int(np.argmin(np.abs(values - critical)))
+        # The critical mode may lie outside of what the spectrum was asked for.
+        found = abs(values[nearest] - critical) <= 1e-4 * max(1.0, abs(critical))
+        rest = np.delete(values, nearest) if found else values
         here.unstable = count_unstable(rest, tracer.options.stability_tolerance)
 
     def between(self, tracer, before, after, index, found):

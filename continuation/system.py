@@ -8,7 +8,7 @@ products, solves and directional derivatives; never for a dense matrix of the fu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -56,7 +56,7 @@ class Spectrum:
         for i, value in enumerate(values):
             # Only a value that came from the lower half can be the partner of an upper one.
             partner = any(
-                abs(value - values[j]) <= 1e-7 * max(1.0, abs(value)) and flip[i] != flip[j]
+                abs(value - values[j]) <= 1e-6 * max(1.0, abs(value)) and flip[i] != flip[j]
                 for j in chosen
             )
             if value.imag == 0.0 or not partner:
@@ -216,11 +216,3 @@ class SystemBase:
         from continuation.spectra import spectrum_of
 
         return spectrum_of(self.linear(u, mu), count, near)
-
-
-@dataclass(frozen=True)
-class Direction:
-    """A real or complex direction in state and parameters, for directional derivatives."""
-
-    u: np.ndarray
-    mu: dict[str, float] = field(default_factory=dict)

@@ -5,12 +5,15 @@ import numpy as np
 import pytest
 
 from continuation import ContinuationOptions, Spectrum, continue_branch
+from continuation.branches import branch_tracer
 from continuation.jax_system import JaxSystem
-from continuation.normal_form import hopf_normal_form
+from continuation.locate import safeguarded
 from continuation.modes import count_unstable, match_modes
+from continuation.normal_form import hopf_normal_form
 from tests.systems.brusselator import brusselator, brusselator_1d
 from tests.systems.normal_forms import (
     bogdanov_takens,
+    cusp,
     pitchfork,
     stuart_landau,
     subcritical_double,
@@ -56,6 +59,42 @@ def test_three_hopf_points_within_one_step(frequencies):
     assert np.allclose([s.mu["mu"] for s in points], thresholds, rtol=0, atol=1e-9)
     assert np.allclose([s.values["omega"] for s in points], frequencies, rtol=0, atol=1e-9)
     assert not branch.of_kind("stability change", located=False)
+
+
+@pytest.mark.parametrize(("start", "step"), [(-0.4, 0.9), (-0.8, 1.7)])
+def test_pair_that_crosses_and_then_splits_into_real_ones_within_the_step(start, step):
+    """lambda^2 - 4 mu lambda + 1: Hopf at 0, complex for |mu| < 1/2, real at one or both ends."""
+    def residual(u, mu):
+        return jnp.stack([u[1], -u[0] + 4 * mu["mu"] * u[1] - u[1] ** 3])
+
+    branch = continue_branch(JaxSystem(residual, 2), np.zeros(2), {"mu": start}, "mu",
+                             wide(eigenvalues=2, step=step))
+    assert len(branch) <= 4
+    (point,) = branch.special
+    assert point.kind == "hopf" and point.located
+    assert abs(point.mu["mu"]) < 1e-9 and np.isclose(point.values["omega"], 1.0)
+
+
+def test_a_located_point_outside_of_its_bracket_is_refused():
+    """Newton's method may find another point; then the bracket is halved and it starts anew."""
+    system, mu = cusp(), {"a": -2.0, "b": 1.0}
+    tracer = branch_tracer(system, mu, "a", ContinuationOptions())
+    direction = np.array([0.0, 1.0])
+    here = [tracer.start(np.array([x, x**3 - x]), direction) for x in (-0.7, -0.5)]
+    fold = -1 / np.sqrt(3)
+    calls = []
+
+    def attempt(guess, low, high):
+        calls.append(guess.z[0])
+        x = -fold if len(calls) < 3 else fold  # the other fold, at first
+        return np.array([x, x**3 - x]), x
+
+    result, _, reason = safeguarded(tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, attempt)
+    assert result == fold and len(calls) == 3 and reason == ""
+    never, guess, reason = safeguarded(tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1,
+                                       lambda *_: (np.array([-fold, 0.0]), 0.0))
+    assert never is None and "left the bracket" in reason
+    assert abs(guess.z[0] - fold) < 1e-3  # the best bracket is kept
 
 
 def test_leaving_and_returning_within_a_few_steps():

@@ -64,6 +64,18 @@ def test_constant_mass_changes_nothing_of_substance(reference):
     assert np.allclose(brusselator_numbers(system, [1.0, 1.5]), reference, rtol=1e-9, atol=1e-12)
 
 
+def test_mass_that_moves_with_state_and_parameter(reference):
+    """The equilibrium moves with B here, so the mass does along the branch."""
+    plain = brusselator()
+
+    def mass(u, mu, v):
+        x, y = u
+        return jnp.array([[1 + x**2, mu["B"] * y], [-x * y, 2 + mu["B"] ** 2]]) @ v
+
+    system = JaxSystem(lambda u, mu: mass(u, mu, plain._residual(u, mu)), 2, mass=mass)
+    assert np.allclose(brusselator_numbers(system, [1.0, 1.5]), reference, rtol=1e-8, atol=1e-11)
+
+
 def test_algebraic_constraint_with_singular_mass(reference):
     """The reaction rate x^2 y as an unknown with 0 = x^2 y - s."""
     def residual(u, mu):
