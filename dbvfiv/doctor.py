@@ -109,6 +109,15 @@ def _petsc(problems: list[Problem]) -> dict[str, Any]:
     found["scalar"] = "complex" if np.dtype(PETSc.ScalarType).kind == "c" else "real"
     found["integer_bits"] = np.dtype(PETSc.IntType).itemsize * 8
     found["solvers"] = [name for name in _SOLVERS if _factors(PETSc, name)]
+    found["blas"] = _reference_blas()
+    if found["blas"] == "reference":
+        problems.append(
+            Problem(
+                "PETSc runs on the reference BLAS, which makes factorisations several times slower.",
+                "apt-get install libopenblas0-pthread (as root or with sudo)",
+                fatal=False,
+            )
+        )
     if np.dtype(PETSc.RealType).itemsize < 8:
         problems.append(Problem("PETSc works in single precision.", petsc_remedy()))
     if "mumps" not in found["solvers"]:
@@ -116,6 +125,16 @@ def _petsc(problems: list[Problem]) -> dict[str, Any]:
             Problem("PETSc has no MUMPS, so factorisations are slower.", petsc_remedy(), fatal=not found["solvers"])
         )
     return found
+
+
+def _reference_blas() -> str:
+    """"reference" if the loaded libblas is the plain one, "optimised" otherwise, "unknown" where the system does not tell."""
+    try:
+        with open("/proc/self/maps") as maps:
+            loaded = {line.split()[-1] for line in maps if "libblas" in line}
+    except OSError:
+        return "unknown"
+    return "reference" if any("/blas/libblas" in path for path in loaded) else "optimised"
 
 
 def _factors(PETSc: Any, name: str) -> bool:
@@ -143,7 +162,7 @@ def petsc_remedy() -> str:
     if os.environ.get("CONDA_PREFIX"):
         return "conda install -c conda-forge petsc4py slepc4py"
     if os.path.exists("/etc/debian_version"):
-        return "make setup (as root or with sudo: apt-get install python3-petsc4py-real python3-slepc4py-real)"
+        return "make setup (as root or with sudo: apt-get install python3-petsc4py-real python3-slepc4py-real libopenblas0-pthread)"
     return "conda env create -f environment.yml, or load your cluster's petsc4py and slepc4py modules, then make setup"
 
 

@@ -48,7 +48,7 @@ class DirectFactor:
 
     def __init__(self, indptr: np.ndarray, indices: np.ndarray):
         self.size = len(indptr) - 1
-        self._data = np.zeros(len(indices))
+        self._data = np.zeros(len(indices), PETSc.ScalarType)  # real numbers, whatever PETSc's scalars
         indptr, indices = np.ascontiguousarray(indptr, PETSc.IntType), np.ascontiguousarray(indices, PETSc.IntType)
         self._matrix = PETSc.Mat().createAIJWithArrays((self.size, self.size), (indptr, indices, self._data), comm=PETSc.COMM_SELF)
         self._keep = (indptr, indices)
@@ -92,12 +92,12 @@ class DirectFactor:
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         self._rhs.setArray(rhs)
         self._pc.apply(self._rhs, self._solution)
-        return self._solution.getArray().copy()
+        return np.array(self._solution.getArray().real)
 
     def solve_transpose(self, rhs: np.ndarray) -> np.ndarray:
         self._rhs.setArray(rhs)
         self._pc.applyTranspose(self._rhs, self._solution)
-        return self._solution.getArray().copy()
+        return np.array(self._solution.getArray().real)
 
 
 class SingularMatrix(ArithmeticError):

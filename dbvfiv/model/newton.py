@@ -126,9 +126,9 @@ class EquilibriumSolver:
         except PETSc.Error as error:
             reason = self._error or f"PETSc stopped with error {error.ierr}"
             return NewtonResult(start, False, self._snes.getIterationNumber(), np.inf, self._rounding, reason)
-        q = self.last = self._vector.getArray().copy()
+        q = self.last = _real(self._vector).copy()
         code = self._snes.getConvergedReason()
-        norm = float(np.linalg.norm(self._residual.getArray())) / self._scale
+        norm = float(np.linalg.norm(_real(self._residual))) / self._scale
         reason = "converged" if code > 0 else self._error or _REASONS.get(code, f"SNES stopped with reason {code}")
         return NewtonResult(q, code > 0, self._snes.getIterationNumber(), norm, self._rounding / self._scale, reason)
 
@@ -140,11 +140,11 @@ class EquilibriumSolver:
 
     def _evaluate(self, snes, x, f):
         self.residuals += 1
-        f.setArray(self.model.residual(x.getArray(readonly=True), self._pressure))
+        f.setArray(self.model.residual(_real(x), self._pressure))
 
     def _linearise(self, snes, x, jacobian, preconditioner):
         self.tangents += 1
-        q = x.getArray(readonly=True)
+        q = _real(x)
         self.tangent = self.model.tangent(q, self._pressure)
         if not self._rounding:
             self._rounding = self.model.rounding(q, self.tangent)
@@ -168,6 +168,11 @@ class EquilibriumSolver:
         return PETSc.SNES.ConvergedReason.ITERATING
 
 
+def _real(vector) -> np.ndarray:
+    """Entries of a PETSc vector; real also where PETSc's scalars are complex."""
+    return vector.getArray(readonly=True).real
+
+
 class _CoupledTangent:
     """The tangent as an operator, for the slopes that line searches ask for."""
 
@@ -175,7 +180,7 @@ class _CoupledTangent:
         self.solver = solver
 
     def mult(self, matrix, x, y):
-        y.setArray(self.solver.model.apply(self.solver.tangent, x.getArray(readonly=True)))
+        y.setArray(self.solver.model.apply(self.solver.tangent, _real(x)))
 
 
 class _DirectPC:
@@ -185,4 +190,4 @@ class _DirectPC:
         self.solver = solver
 
     def apply(self, pc, x, y):
-        y.setArray(self.solver.factor.solve(x.getArray(readonly=True)))
+        y.setArray(self.solver.factor.solve(_real(x)))

@@ -32,11 +32,11 @@ def draw(result: "ClosureResults") -> Iterator[tuple[str, Callable[[], Figure]]]
 
 
 def side_views(result: "ClosureResults") -> Figure:
-    """Valve seen from the side at up to four back pressures, coloured by displacement, with a view in space (compare Fig. 3-21 of Wang 2014)."""
+    """Valve seen from the side at up to four back pressures, coloured by displacement, with a view in space (compare Fig. 3-21 of the thesis)."""
     states = some_of(sorted(result.states, key=lambda s: s.pressure), 4)
     valve = WholeValve.of(result.mesh)
     rows = -(-len(states) // 2)
-    figure = new_figure(11.0, 3.9 * rows + 0.5)
+    figure = new_figure(11.0, 3.2 * rows + 0.6)
     panels = figure.subplots(rows, 2 if len(states) > 1 else 1, squeeze=False, sharex=True, sharey=True).ravel()
     scale = Normalize(0.0, max(s.max_displacement for s in states) * 1e3)
     for letter, axes, state in zip("abcd", panels, states):
@@ -113,7 +113,7 @@ def contact_map(result: "ClosureResults") -> Figure:
     bar = figure.colorbar(ScalarMappable(scale, MAGNITUDE), ax=list(panels), pad=0.02, aspect=28, extend="max")
     bar.set_label("Contact pressure over back pressure")
     bar.outline.set_visible(False)
-    figure.suptitle(f"Contact of the inner faces, {_supports(result)} (dots: touching nodes)", fontweight="bold", fontsize=11)
+    figure.suptitle(f"Contact pressure, {_supports(result)} (dots: touching nodes)", fontweight="bold", fontsize=11)
     return figure
 
 

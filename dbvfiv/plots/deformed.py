@@ -29,7 +29,7 @@ def draw(result: "SteadyResults", pressure: float | None = None) -> Iterator[tup
 
 
 def deformed(state: "State") -> Figure:
-    """Whole valve, true to scale, coloured by displacement (compare Fig. 7-11 of Wang 2014)."""
+    """Whole valve, true to scale, coloured by displacement (compare Fig. 7-11 of the thesis)."""
     valve = WholeValve.of(state.results.mesh)
     shift = valve.vectors(state.nodal[:, :3])
     size = np.linalg.norm(shift, axis=1) * 1e3

@@ -29,7 +29,7 @@ def ordered(result: "SteadyResults") -> "list[State]":
 
 
 def head_discharge(result: "SteadyResults") -> Figure:
-    """Pressure drop over mass flow (compare Fig. 7-4 of Wang 2014)."""
+    """Pressure drop over mass flow (compare Fig. 7-4 of the thesis)."""
     states = ordered(result)
     figure, axes = _axes("Mass flow, kg/s", "Pressure drop, kPa")
     axes.plot([s.mass_flow for s in states], [s.pressure / 1e3 for s in states], "o-", color=COMPUTED, label=_name(result))
@@ -40,7 +40,7 @@ def head_discharge(result: "SteadyResults") -> Figure:
 
 
 def area_discharge(result: "SteadyResults") -> Figure:
-    """Lip area over mass flow (compare Fig. 7-5 of Wang 2014)."""
+    """Lip area over mass flow (compare Fig. 7-5 of the thesis)."""
     states = ordered(result)
     figure, axes = _axes("Mass flow, kg/s", "Flow area at the lip, cm²")
     axes.plot([s.mass_flow for s in states], [s.outlet_area * 1e4 for s in states], "o-", color=COMPUTED, label=_name(result))
@@ -48,7 +48,7 @@ def area_discharge(result: "SteadyResults") -> Figure:
 
 
 def jet_velocity(result: "SteadyResults") -> Figure:
-    """Jet velocity over pressure (compare Fig. 7-7 of Wang 2014)."""
+    """Jet velocity over pressure (compare Fig. 7-7 of the thesis)."""
     states = ordered(result)
     figure, axes = _axes("Pressure drop, kPa", "Velocity, m/s")
     p = np.array([s.pressure for s in states])

@@ -21,7 +21,7 @@ def draw(result: "SteadyResults", pressure: float | None = None) -> Iterator[tup
 
 
 def layer_stress(state: "State") -> Figure:
-    """Von Mises stress of each layer over the quarter, unrolled: arc length from the centre against the axis (compare Fig. 7-12 of Wang 2014)."""
+    """Von Mises stress of each layer over the quarter, unrolled: arc length from the centre against the axis (compare Fig. 7-12 of the thesis)."""
     mesh = state.results.mesh
     arc, z = unrolled(mesh)
     values = state.layers.von_mises.T / 1e6

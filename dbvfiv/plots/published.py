@@ -28,9 +28,9 @@ class Published:
     source: str
 
 
-#: Mass flows of the coupled model of Wang 2014, Th. 4.3.3: handed to the viscous flow model at the pressures of Fig. 4-4.
+#: Mass flows of the coupled model of Th. 4.3.3: handed to the viscous flow model at the pressures of Fig. 4-4.
 HEAD_DISCHARGE = Published(
-    "Wang 2014, coupled model", (18e3, 29e3, 36e3), (47.88, 75.52, 90.82), "Wang 2014 thesis, 4.3.3, Fig. 4-4 and chapter 7"
+    "thesis, coupled model", (18e3, 29e3, 36e3), (47.88, 75.52, 90.82), "Th. 4.3.3, Fig. 4-4 and chapter 7"
 )
 
 

@@ -20,7 +20,7 @@ def draw(result: "SteadyResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
 
 
 def lip_shapes(result: "SteadyResults") -> Figure:
-    """Mid-surface of the lip at several pressures, all four quarters (compare Fig. 7-10 of Wang 2014)."""
+    """Mid-surface of the lip at several pressures, all four quarters (compare Fig. 7-10 of the thesis)."""
     figure = new_figure(7.2, 4.4)
     axes = figure.add_subplot()
     lip = result.mesh.rows[0]
