@@ -159,7 +159,7 @@ class CoupledFactor:
         values[kk], values[gg], values[jj], values[dd] = k, -g, -j, -d.ravel()
         if self.inner:
             values[bb], values[rr], values[ss] = -np.ravel(b), np.ravel(r), np.ravel(s)
-        np.take(values, self._source, out=self._factor.values)
+        self._factor.values[:] = values[self._source]
         self._factor.refactor()
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
