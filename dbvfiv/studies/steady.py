@@ -103,8 +103,8 @@ def run_steady(
     interrupted = False
     try:
         for state in _states(path, pressures, failures, observer):
-            observer.item(state)
             states.append(state)
+            observer.item(state)
     except KeyboardInterrupt:
         interrupted = True
     for sentence in state_warnings(model, states):

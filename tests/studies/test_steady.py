@@ -1,0 +1,118 @@
+"""Equilibria over pressures: what is reached, what is said when it is not, and what an interrupt leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbvfiv.case.model import Case
+from dbvfiv.errors import SolveError
+from dbvfiv.model import ValveModel
+from dbvfiv.model.newton import NewtonOptions
+from dbvfiv.studies.observer import Observer
+from dbvfiv.studies.steady import LoadPath, SteadyOptions, model_warnings, run_steady
+
+
+@pytest.fixture(scope="module")
+def model():
+    return ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 12}))
+
+
+@pytest.mark.parametrize("pressure", [50.0, 400.0, 2e3, 18e3, 60e3])
+def test_any_pressure_from_rest_in_one_go(model, pressure):
+    state = LoadPath(model).go_to(pressure)
+    assert state.converged and state.residual < 1e-7
+    residual = model.residual(state.q, pressure)
+    assert np.linalg.norm(residual) < 1e-7 * model.force_scale(state.q, pressure)
+    assert state.outlet_area > 0 and state.mass_flow > 0
+
+
+def test_the_way_does_not_matter(model):
+    at_once = LoadPath(model).go_to(20e3)
+    walk = LoadPath(model)
+    for pressure in (1e3, 60e3, 5e3, 20e3):
+        state = walk.go_to(pressure)
+    assert np.abs(state.q - at_once.q).max() < 1e-7
+
+
+def test_flow_is_that_of_bernoulli_at_the_outlet(model):
+    """Outlet velocity from the inlet pressure and the areas; mass flow from either end."""
+    state = LoadPath(model).go_to(18e3)
+    density = model.case.fluid.density
+    a, b = state.station_area[0], state.station_area[-1]
+    velocity = np.sqrt(2 * 18e3 / density / (1 - (a / b) ** 2))
+    assert state.outlet_velocity == pytest.approx(velocity, rel=1e-6)
+    assert state.mass_flow == pytest.approx(4 * density * a * velocity, rel=1e-6)
+    assert state.station_pressure[0] == pytest.approx(0.0, abs=1e-9) and state.station_pressure[-1] == pytest.approx(18e3)
+    assert state.lip_opening > 0.01
+
+
+def test_run_keeps_the_order_asked_for(model):
+    pressures = [5e3, 20e3, 2e3]
+    result = run_steady(model, pressures)
+    assert [state.pressure for state in result.states] == pressures
+    assert not result.failures and not result.interrupted
+    points = result.summary()["points"]
+    assert points[0]["mass_flow"] < points[1]["mass_flow"]
+    wanted = {"pressure", "mass_flow", "outlet_area", "outlet_velocity", "max_displacement", "max_displacement_position",
+              "lip_opening", "converged", "iterations", "residual"}  # fmt: skip
+    assert wanted <= set(points[0])
+
+
+def test_folded_wall_is_told():
+    """Half the wall (7.5 mm) exceeds the radius (6.2 mm) at the side edge just behind the duckbill."""
+    fine = ValveModel(Case().replace({"mesh.around": 28, "mesh.along": 24}))
+    (sentence,) = model_warnings(fine)
+    assert "Half the wall exceeds the radius" in sentence and "z 0.21" in sentence
+    thin = ValveModel(Case().replace({"mesh.around": 28, "mesh.along": 24, "valve.thickness_factor": 0.5}))
+    assert not list(model_warnings(thin))
+
+
+def one_iteration(model) -> SteadyOptions:
+    """Options no valve can meet: one iteration, and load steps no smaller than a third."""
+    return SteadyOptions(NewtonOptions(tolerance=1e-12, max_iterations=1), min_step=0.3)
+
+
+def test_failure_is_one_sentence(model, one_sentence):
+    path = LoadPath(model, one_iteration(model))
+    with pytest.raises(SolveError) as caught:
+        path.go_to(18e3)
+    message = str(caught.value)
+    assert one_sentence(message)
+    assert "18000 Pa" in message and "iterations ran out" in message
+    assert path.pressure == 0.0 and np.all(path.q == 0.0)
+
+
+def test_failed_pressures_are_reported_and_the_list_goes_on(model):
+    rest = LoadPath(model).go_to(2e3)
+    result = run_steady(model, [40e3, 2e3], one_iteration(model), start=rest)
+    assert len(result.failures) == 1 and "40000 Pa" in result.failures[0]
+    assert [state.pressure for state in result.states] == [2e3]
+
+
+class Interrupt(Observer):
+    """Stops a run at its second item."""
+
+    def __init__(self):
+        self.items, self.ended = 0, None
+
+    def item(self, result):
+        self.items += 1
+        if self.items == 2:
+            raise KeyboardInterrupt
+
+    def end(self, interrupted):
+        self.ended = interrupted
+
+
+def test_an_interrupt_keeps_what_is_done(model):
+    observer = Interrupt()
+    result = run_steady(model, [2e3, 4e3, 6e3], observer=observer)
+    assert result.interrupted and observer.ended is True
+    assert [state.pressure for state in result.states] == [2e3, 4e3]
+
+
+def test_uniform_pressure():
+    model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 12, "drive.kind": "uniform"}))
+    state = LoadPath(model).go_to(2e3)
+    assert state.converged and state.mass_flow == 0.0 and state.lip_opening > 0
