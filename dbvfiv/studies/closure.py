@@ -9,8 +9,9 @@ import numpy as np
 from ..case.model import Case
 from ..errors import SolveError
 from ..model import ValveModel
+from .closure_buckling import Buckling
 from .closure_model import HELD_LIPS, ClosureModel, closure_model
-from .closure_path import Buckling, ClosureOptions, ClosurePath, PathPoint
+from .closure_path import ClosureOptions, ClosurePath, PathPoint
 from .closure_state import ClosureState
 from .observer import Observer
 from .state import SteadyState

@@ -11,9 +11,9 @@ from ..errors import SolveError
 from ..model.newton import NewtonOptions
 from .closure_arclength import arclength_path
 from .closure_balance import EnergyLedger
+from .closure_buckling import Buckling, BucklingWatch
 from .closure_model import ClosureModel
 from .closure_opening import FACES, opening
-from .closure_stability import StiffnessSpectrum, stiffness_spectrum
 from .closure_state import QUARTERS, ClosureState, contact_front, describe_closure
 from .load_steps import LoadStepOptions, LoadSteps
 from .observer import Observer
@@ -91,29 +91,6 @@ class PathPoint:
     arclength: bool = False
 
 
-@dataclass(frozen=True)
-class Buckling:
-    """A state in which the tangent stiffness is singular.
-
-    Attributes
-    ----------
-    kind : str
-        "limit point": the pressure can rise no further on this path; "bifurcation": another path crosses.
-    pressure : float, Pa
-        Critical pressure.
-    q, shape : (n,) arrays
-        The state, and the shape it buckles into, largest entry one.
-    eigenvalue : float, 1/s2
-        Lowest stiffness eigenvalue in magnitude there.
-    """
-
-    kind: str
-    pressure: float
-    q: np.ndarray
-    shape: np.ndarray
-    eigenvalue: float
-
-
 @dataclass
 class ClosurePath:
     """Walks a model from one back pressure to the next."""
@@ -128,12 +105,15 @@ class ClosurePath:
         steps = LoadStepOptions(options.newton, options.min_step, options.first_step, options.max_step, jump)
         self.steps = LoadSteps(pressed, steps, observer=self.observer, accepted=self._accepted)
         self.points: list[PathPoint] = []
-        self.buckling: list[Buckling] = []
+        self.watch = BucklingWatch(pressed, steps, options.eigenvalues)
         self.beyond_limit = False
         self.energy = EnergyLedger(pressed)
         self.energy.begin(self.steps.q, 0.0)
-        self._spectrum: StiffnessSpectrum | None = None
-        self._before: tuple[float, np.ndarray, float] | None = None
+
+    @property
+    def buckling(self) -> list[Buckling]:
+        """Where the tangent stiffness became singular, in the order met."""
+        return self.watch.found
 
     def go_to(self, target: float) -> ClosureState:
         """Equilibrium at a back pressure, Pa, with the penetration asked for.
@@ -164,7 +144,7 @@ class ClosurePath:
             last = self.steps.settle()
             self.energy.add(self.steps.q, target, self.steps.slope)
             iterations, updates = iterations + last.iterations, updates + 1
-        spectrum = self._watch(target, self.steps.q)
+        spectrum = self.watch.see(target, self.steps.q)
         return describe_closure(
             self.model, self.steps.q, target, spectrum, beyond_limit=self.beyond_limit, energy_balance=self.energy.error,
             converged=True, iterations=iterations, load_steps=count, multiplier_updates=updates,
@@ -175,37 +155,7 @@ class ClosurePath:
 
     def _accepted(self, pressure: float, q: np.ndarray) -> None:
         self.energy.add(q, pressure, self.steps.slope)
-        self._watch(pressure, q)
-        self.points.append(self._point(pressure, q, self._spectrum.values.real))
-
-    def _watch(self, pressure: float, q: np.ndarray) -> StiffnessSpectrum:
-        """Stiffness eigenvalues of an equilibrium; locates where the lowest has passed zero since the last."""
-        spectrum = self._spectrum = stiffness_spectrum(self.model.pressed, q, pressure, self.options.eigenvalues)
-        if self._before is not None and not self.beyond_limit and self._before[2] > 0 > spectrum.lowest:
-            self.buckling.append(self._locate(self._before, (pressure, q, spectrum.lowest)))
-        self._before = (pressure, q, spectrum.lowest)
-        return spectrum
-
-    def _locate(self, stable, unstable) -> Buckling:
-        """The state between two where the lowest eigenvalue vanishes, by the secant rule kept within its bracket."""
-        pressed, scale = self.model.pressed, stable[2]
-        steps = LoadSteps(pressed, self.steps.options, stable[0], stable[1])
-        (pa, _, fa), (pb, qb, fb) = stable, unstable
-        best = (pb, qb, fb)
-        for _ in range(40):
-            aim = pa + (pb - pa) * min(max(fa / (fa - fb), 0.05), 0.95)
-            steps.reach(aim)
-            value = stiffness_spectrum(pressed, steps.q, aim, self.options.eigenvalues).lowest
-            best = (aim, steps.q, value)
-            if abs(value) <= 1e-7 * scale or abs(pb - pa) <= 1e-10 * abs(pb):
-                break
-            if value > 0:
-                pa, fa = aim, value
-            else:
-                pb, fb = aim, value
-        pressure, q, value = best
-        shape = stiffness_spectrum(pressed, q, pressure, self.options.eigenvalues).shape
-        return Buckling("bifurcation", float(pressure), q, shape, float(value))
+        self.points.append(self._point(pressure, q, self.watch.see(pressure, q).values.real))
 
     def _past_limit(self, target: float, error: SolveError) -> None:
         """Arclength from the last equilibrium to the target pressure."""
@@ -221,7 +171,8 @@ class ClosurePath:
         for limit in path.limits:
             self.buckling.append(Buckling("limit point", limit.pressure, limit.q, limit.shape, limit.eigenvalue))
         self.beyond_limit = self.beyond_limit or bool(path.limits)
-        self.steps.q, self.steps.pressure, self.steps.slope, self._before = path.q, path.pressure, None, None
+        self.watch.forget()
+        self.steps.q, self.steps.pressure, self.steps.slope = path.q, path.pressure, None
         if not path.reached:
             raise SolveError(f"{error} Arclength ended at {path.pressure:.6g} Pa after {len(path.branch)} points ({path.branch.reason}).")
 

@@ -1,0 +1,83 @@
+"""The watch for buckling along a path of equilibria: where the lowest stiffness eigenvalue passes zero, and with which shape."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..contact import PressedShell
+from .closure_stability import StiffnessSpectrum, stiffness_spectrum
+from .load_steps import LoadStepOptions, LoadSteps
+
+#: The eigenvalue at a located buckling state over that at the stable end of its bracket.
+TOLERANCE = 1e-7
+
+
+@dataclass(frozen=True)
+class Buckling:
+    """A state in which the tangent stiffness is singular.
+
+    Attributes
+    ----------
+    kind : str
+        "limit point": the pressure can rise no further on this path; "bifurcation": another path crosses.
+    pressure : float, Pa
+        Critical pressure.
+    q, shape : (n,) arrays
+        The state, and the shape it buckles into, largest entry one.
+    eigenvalue : float, 1/s2
+        Lowest stiffness eigenvalue in magnitude there.
+    """
+
+    kind: str
+    pressure: float
+    q: np.ndarray
+    shape: np.ndarray
+    eigenvalue: float
+
+
+@dataclass
+class BucklingWatch:
+    """Looks at the equilibria of a path one after the other.
+
+    A path that is walked by rising pressure turns back at a limit point, so that an eigenvalue which passes zero on the way belongs to a
+    bifurcation.
+
+    Attributes
+    ----------
+    found : list of Buckling
+    """
+
+    pressed: PressedShell
+    steps: LoadStepOptions
+    eigenvalues: int = 4
+    found: list[Buckling] = field(default_factory=list)
+    _stable: tuple[float, np.ndarray, float] | None = field(default=None, repr=False)
+
+    def see(self, pressure: float, q: np.ndarray) -> StiffnessSpectrum:
+        """Stiffness eigenvalues of the next equilibrium; locates where the lowest has passed zero since the last."""
+        spectrum = stiffness_spectrum(self.pressed, q, pressure, self.eigenvalues)
+        if spectrum.lowest > 0:
+            self._stable = (pressure, q, spectrum.lowest)
+        elif self._stable is not None:
+            self.found.append(self._locate(*self._stable, pressure, spectrum.lowest))
+            self._stable = None
+        return spectrum
+
+    def forget(self) -> None:
+        """The path has jumped: the next equilibrium does not follow from the last."""
+        self._stable = None
+
+    def _locate(self, low: float, start: np.ndarray, at_low: float, high: float, at_high: float) -> Buckling:
+        """The state between two pressures where the lowest eigenvalue vanishes, by the secant rule kept within its bracket."""
+        scale, steps = at_low, LoadSteps(self.pressed, self.steps, low, start)
+        while True:
+            aim = low + (high - low) * min(max(at_low / (at_low - at_high), 0.02), 0.98)
+            steps.reach(aim)
+            spectrum = stiffness_spectrum(self.pressed, steps.q, aim, self.eigenvalues)
+            if abs(spectrum.lowest) <= TOLERANCE * scale or abs(high - low) <= 1e-11 * abs(high):
+                return Buckling("bifurcation", float(aim), steps.q, spectrum.shape, spectrum.lowest)
+            if spectrum.lowest > 0:
+                low, at_low = aim, spectrum.lowest
+            else:
+                high, at_high = aim, spectrum.lowest
