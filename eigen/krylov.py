@@ -116,7 +116,7 @@ def near_shift(shifted: ShiftedPencil, wanted: int, *, tolerance: float = 1e-10,
     tolerance : float
         Relative, on the transformed eigenvalue.
     subspace : int, optional
-        Largest Krylov basis; default twice the number wanted.
+        Largest Krylov basis; default twice the number wanted, or the whole of a small space.
     max_restarts, patience : int
         Give up after so many restarts, or after `patience` of them without a further pair:
         next to a limit point of eigenvalues no number of restarts helps.
@@ -149,7 +149,8 @@ def near_shift(shifted: ShiftedPencil, wanted: int, *, tolerance: float = 1e-10,
     solver.setStoppingTest(stopping)
     if stopping.limit:
         solver.setMonitor(stopping.watch)
-    solver.setDimensions(wanted, min(size, subspace or max(2 * wanted, wanted + 24)))
+    subspace = subspace or (size if size <= 5 * wanted else max(2 * wanted, wanted + 24))
+    solver.setDimensions(wanted, min(size, subspace))
     start = shell.createVecRight()
     start.setArray(np.random.default_rng(7).standard_normal(size))
     solver.setInitialSpace(start)

@@ -8,9 +8,10 @@ import numpy as np
 from .condensation import Workspace
 from .pencil import CoupledPencil
 from .region import Oval
-from .residual import Residuals, acceptable, derivative_times, newton
+from .residual import (Residuals, acceptable, balanced, derivative_times, newton, preferable)
 
 SAME = 1e-6  # relative distance below which two shifts are taken to have found one eigenvalue
+TIGHT = 1e-9  # residual above which the inner unknowns of the fluid are computed afresh
 
 
 @dataclass
@@ -30,8 +31,13 @@ class Found:
     applications: int = 0
     refined: int = 0
     rejected: int = 0
-    stalled: bool = False
+    limited: bool = False
     notes: list[str] = field(default_factory=list)
+
+    def note(self, sentence: str) -> None:
+        """Add a sentence once."""
+        if sentence not in self.notes:
+            self.notes.append(sentence)
 
 
 def upper_half(values, q, u):
@@ -54,7 +60,16 @@ def upper_half(values, q, u):
 def verified(pencil, values, q, u) -> Found:
     """Pairs normalised and measured on the full pencil."""
     q, u = normalised(q, u)
-    residual, backward = Residuals(pencil).measure(values, q, u)
+    residuals = Residuals(pencil)
+    residual, backward = residuals.measure(values, q, u)
+    coarse = np.flatnonzero(residual > TIGHT)
+    if pencil.b and coarse.size:
+        other = balanced(pencil, values[coarse], q[:, coarse], u[:, coarse])
+        again = residuals.measure(values[coarse], q[:, coarse], other)
+        better = preferable(*again, residual[coarse], backward[coarse])
+        chosen = coarse[better]
+        u[:, chosen] = other[:, better]
+        residual[chosen], backward[chosen] = again[0][better], again[1][better]
     return Found(values, q, u, residual, backward)
 
 
@@ -109,7 +124,7 @@ def refine(pencil, batch, aim, band, tolerance, found) -> np.ndarray:
     ndarray
         Eigenvalues dropped: the search does not vouch for their surroundings.
     """
-    good = acceptable(batch.residual, batch.backward, tolerance)
+    good = batch.residual <= tolerance
     if good.all():
         return np.zeros(0, complex)
     inside = batch.values.imag <= band * (1 + 1e-12)
@@ -118,6 +133,7 @@ def refine(pencil, batch, aim, band, tolerance, found) -> np.ndarray:
     workspace = Workspace()
     for i in np.flatnonzero(~good):
         if batch.values[i].real < matters or not inside[i]:
+            good[i] = acceptable(batch.residual[i], batch.backward[i], tolerance)
             continue
         value, q, u, residual, backward = newton(
             pencil, batch.values[i], batch.q[:, i], batch.u[:, i],
@@ -125,8 +141,8 @@ def refine(pencil, batch, aim, band, tolerance, found) -> np.ndarray:
         moved = abs(value - batch.values[i]) > 1e-3 * abs(batch.values[i])
         if moved or not acceptable(residual, backward, tolerance):
             found.rejected += 1
-            found.notes.append(f"A pair near {batch.values[i]:.6g} was rejected: its residual "
-                               f"{residual:.2g} exceeds the tolerance.")
+            found.note(f"A pair near {batch.values[i]:.6g} was rejected: its residual "
+                       f"{residual:.1g} exceeds the tolerance.")
             continue
         good[i] = True
         batch.values[i], batch.residual[i], batch.backward[i] = value, residual, backward

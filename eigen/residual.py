@@ -10,7 +10,7 @@ from .condensation import Workspace
 from .factorization import SingularShiftError
 from .pencil import CoupledPencil, real_apply
 
-ROUNDING = 8 * np.finfo(float).eps
+ROUNDING = 64 * np.finfo(float).eps
 
 
 class Residuals:
@@ -73,6 +73,27 @@ class Residuals:
         return residual, backward
 
 
+def balanced(pencil: CoupledPencil, eigenvalues, q, u) -> np.ndarray:
+    """Inner unknowns that satisfy the rows of the fluid exactly, U = -S^-1 R J q.
+
+    Where a stiff structure leaves more rounding error in q than in the few rows of the fluid.
+    Pairs for which S is nearly singular (motions of the fluid alone) keep theirs.
+    """
+    u = np.array(u, complex)
+    y = real_apply(pencil.J, q)
+    for j, s in enumerate(eigenvalues):
+        _, _, R, S = pencil.fluid_at(s)
+        if np.linalg.cond(S) < 1e8:
+            u[:, j] = -np.linalg.solve(S, R @ y[:, j])
+    return u
+
+
+def preferable(residual, backward, old_residual, old_backward):
+    """Whether a pair is better than the one before: closer, or at rounding level at last."""
+    return (residual < old_residual) & ((backward <= ROUNDING) | (old_backward > ROUNDING)) | (
+        (backward <= ROUNDING) & (old_backward > ROUNDING))
+
+
 def acceptable(residual, backward_error, tolerance) -> np.ndarray:
     """Pairs below the tolerance, or as good as rounding allows."""
     return (residual <= tolerance) | (backward_error <= ROUNDING)
@@ -96,7 +117,13 @@ def newton(pencil: CoupledPencil, eigenvalue: complex, q, u, *, workspace: Works
         size = np.linalg.norm(q) or np.linalg.norm(u) or 1.0
         q, u = q / size, u / size
         r, e = residuals.measure(np.array([l]), q[:, None], u[:, None])
-        return l, q, u, float(r[0]), float(e[0])
+        plain = l, q, u, float(r[0]), float(e[0])
+        if r[0] <= 0.1 * tolerance or not u.size:
+            return plain
+        other = balanced(pencil, [l], q[:, None], u[:, None])
+        r, e = residuals.measure(np.array([l]), q[:, None], other)
+        return (l, q, other[:, 0], float(r[0]), float(e[0])) if preferable(
+            r, e, plain[3], plain[4])[0] else plain
 
     best = scaled(eigenvalue, np.asarray(q, complex), np.asarray(u, complex))
     current = best
@@ -117,7 +144,7 @@ def newton(pencil: CoupledPencil, eigenvalue: complex, q, u, *, workspace: Works
         current = scaled(complex(l.real) if real else l, y, w)
         if not np.isfinite(current[3]):
             break
-        if current[3] < best[3]:
+        if preferable(current[3], current[4], best[3], best[4]):
             best = current
     return best
 

@@ -7,12 +7,15 @@ zeros right of the line are the eigenvalues counted, the structure's own among t
 """
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
 from .condensation import condensed_matrix
-from .factorization import (StructureMatrices, SuperluFactorization, is_positive_definite, superlu)
+from .factorization import (SingularShiftError, StructureMatrices, SuperluFactorization,
+                            is_positive_definite, superlu)
 from .pencil import CoupledPencil, real_apply
 
 
@@ -127,8 +130,19 @@ class Determinant:
         return values[values.imag > 0]
 
     def __call__(self, omega: float) -> complex:
-        """log |ratio| + i arg ratio at line + i omega; the argument is known modulo 2 pi."""
+        """log |ratio| + i arg ratio at line + i omega; the argument is known modulo 2 pi.
+
+        NaN where the structure is singular to the last bit.
+        """
         self.evaluations += 1
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore", la.LinAlgWarning)
+            try:
+                return self._evaluate(omega)
+            except SingularShiftError:
+                return complex(np.nan, np.nan)
+
+    def _evaluate(self, omega):
         p, s, z = self.pencil, complex(self.line, omega), complex(0.0, omega)
         if self._dense:
             M, C, K, Cr, Kr = self._parts

@@ -90,7 +90,7 @@ def _search(pencil, count, options, workspace) -> Found:
         if not queue and not given and len(found.shifts) < options.max_shifts:
             if options.max_frequency is not None and fresh == 0 and len(found.shifts) > 1:
                 break  # the band holds no more within reach
-            queue = [_next_shift(found, aim, options)]
+            queue = [_next_shift(pencil, found, aim, options, workspace)]
     return found
 
 
@@ -189,10 +189,14 @@ def _first_shift(pencil, aim, options, workspace) -> float:
     return max(lowest, probe) * max(3.0, 1.0 * aim)
 
 
-def _next_shift(found, aim, options) -> complex:
-    """A complex shift at the upper end of what has been covered."""
+def _next_shift(pencil, found, aim, options, workspace) -> complex:
+    """The natural real shift where the band was far off, then complex ones up the band."""
     if options.limit_point is not None:  # a larger disc hugs the line through the limit point
         return 3.0 * max(abs(s) for s in found.shifts)
+    if options.max_frequency is not None and len(found.shifts) == 1:
+        natural = _first_shift(pencil, aim, replace(options, max_frequency=None), workspace)
+        if natural < 0.5 * found.shifts[0].real:
+            return natural
     if options.max_frequency is not None:
         band = 2 * np.pi * options.max_frequency
     else:

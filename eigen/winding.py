@@ -108,10 +108,19 @@ class _Walk:
 
     def _add(self, omega):
         if not any(abs(omega - w) <= 1e-12 * omega for w in self.values):
-            self.values[omega] = self.f(omega)
+            value = self.f(omega)
+            if np.isfinite(value):
+                self.values[omega] = value
+            else:
+                self._complain(f"An eigenvalue lies on the line, at {omega / (2 * np.pi):.6g} Hz.")
+
+    def _complain(self, sentence):
+        if sentence not in self.notes:
+            self.notes.append(sentence)
 
     def start(self, scale, hints):
         self._add(0.0)
+        self.values.setdefault(0.0, 0j)  # kept as a place even where the value is lost
         for omega in scale * 10.0 ** np.arange(-3, 1.01, 0.25):
             self._add(float(omega))
         for h in hints:
@@ -160,6 +169,9 @@ class _Walk:
                 # bisect in proportion over a wide interval, in length over a narrow one
                 middle = np.sqrt(a * b) if a > 0 and b > 4 * a else 0.5 * (a + b)
                 self._add(float(middle))
+                if float(middle) not in self.values:
+                    self._complain(f"The phase could not be resolved near {where}.")
+                    return
 
     def _suspects(self, omegas):
         """Intervals to bisect.

@@ -1,0 +1,112 @@
+"""The independent count against dense spectra."""
+import numpy as np
+import pytest
+
+from eigen import CoupledPencil, TransferBasis, certified_spectrum, unstable_count
+from eigen.response import Determinant
+from tests.systems.plate_over_channel import plate_over_channel
+from tests.systems.random_pencils import dense_eigenvalues, random_pencil
+
+
+def random_case(rng):
+    m = int(rng.integers(0, 4))
+    return random_pencil(
+        rng, int(rng.integers(1, 9)), m, int(rng.integers(0, 3)) if m else 0,
+        added_mass=rng.random() < 0.5, unsymmetric=rng.random() < 0.6,
+        damping=rng.choice(["general", "positive", "none", "mass"]),
+        scale=10 ** rng.uniform(-3, 1), algebraic=rng.random() < 0.2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_counts_of_random_pencils(seed):
+    rng = np.random.default_rng(seed)
+    uncertain = 0
+    for _ in range(60):
+        pencil = random_case(rng)
+        count = unstable_count(pencil)
+        values = dense_eigenvalues(pencil)
+        expected = int(np.sum(values.real > count.line))
+        if not count.certain:
+            assert count.notes
+            uncertain += 1
+            continue
+        assert count.number == expected
+        assert count.distance < 0.2
+        assert count.largest_increment < np.pi / 3
+    assert uncertain <= 2
+
+
+@pytest.mark.parametrize("line", [-0.5, -0.1, 0.3])
+def test_lines_other_than_the_axis(line):
+    rng = np.random.default_rng(8)
+    for _ in range(10):
+        pencil = random_pencil(rng, 6, 2, 1)
+        count = unstable_count(pencil, line=line)
+        assert count.certain
+        assert count.number == int(np.sum(dense_eigenvalues(pencil).real > line))
+
+
+def test_a_structure_unstable_by_itself_is_counted():
+    # a circulatory force flutters, a negative stiffness diverges; no coupling at all
+    K = np.array([[1.0, 0.5, 0], [-0.5, 1.0, 0], [0, 0, -2.0]])
+    count = unstable_count(CoupledPencil(M=np.eye(3), C=0.1 * np.eye(3), K=K))
+    assert count.certain and count.number == 3
+
+
+def test_poles_of_the_fluid_in_the_right_half_plane_are_no_trouble():
+    # the fluid alone grows: (s - 2) U = s q; weakly coupled, so U's eigenvalue stays near 2
+    pencil = CoupledPencil(M=[[1.0]], C=[[0.2]], K=[[1.0]], G=[[1.0]], J=[[1.0]], B0=[[0.01]],
+                           R1=[[-1.0]], S0=[[-2.0]], S1=[[1.0]])
+    assert unstable_count(pencil).number == 1
+
+
+def test_sparse_and_dense_determinants_agree(monkeypatch):
+    pencil = plate_over_channel(4, 6, storage=True, density=300.0)
+    dense = unstable_count(pencil)
+    monkeypatch.setattr(Determinant, "dense_below", 0)
+    sparse = unstable_count(pencil, scale=50.0)
+    assert dense.certain and sparse.certain
+    assert dense.number == sparse.number == int(np.sum(dense_eigenvalues(pencil).real > 0))
+
+
+@pytest.mark.parametrize("velocity, storage, density", [
+    (3.0, False, 10.0), (3.0, True, 10.0), (6.0, False, 10.0), (8.0, False, 2.0), (5.0, True, 1000.0)])
+def test_large_pencils_by_basis(velocity, storage, density):
+    pencil = plate_over_channel(6, 15, inlet_velocity=velocity, storage=storage, density=density)
+    assert pencil.n > Determinant.dense_below
+    result = certified_spectrum(pencil, 4)
+    assert result.agrees, result.statement
+    assert result.unstable_count == int(np.sum(dense_eigenvalues(pencil).real > result.count.line))
+    assert result.response_error < 1e-4
+
+
+def test_more_unstable_modes_than_asked_for():
+    K = np.diag([-1.0, -2.0, -3.0, 4.0])
+    result = certified_spectrum(CoupledPencil(M=np.eye(4), C=0.1 * np.eye(4), K=K), 1)
+    assert result.agrees and result.unstable_count == 3 and len(result.spectrum) >= 3
+
+
+def test_undamped_structure_uses_a_line_beside_the_axis():
+    pencil = CoupledPencil(M=np.eye(3), C=np.zeros((3, 3)), K=np.diag([1.0, 4.0, 9.0]))
+    count = unstable_count(pencil)
+    assert count.line > 0 and count.number == 0 and count.certain
+
+
+def test_an_eigenvalue_on_the_line_is_uncertain():
+    pencil = CoupledPencil(M=np.eye(1), C=[[0.0]], K=[[1.0]], G=[[1.0]], J=[[1.0]], A0=[[-0.5]])
+    count = unstable_count(pencil, line=0.0)
+    assert not count.certain and count.notes
+
+
+def test_a_mass_that_is_not_positive_is_refused():
+    with pytest.raises(ValueError, match="positive definite"):
+        unstable_count(CoupledPencil(M=np.diag([1.0, -1.0]), C=np.eye(2), K=np.eye(2)))
+
+
+def test_reduced_basis_has_the_transfer_function():
+    pencil = plate_over_channel(8, 16)
+    basis = TransferBasis(pencil)
+    s = 3 + 120j
+    D = (s * s * pencil.M + s * pencil.C + pencil.K).toarray()
+    exact = pencil.J @ np.linalg.solve(D, pencil.G.toarray())
+    assert np.abs(basis.transfer(pencil, s) - exact).max() < 1e-6 * np.abs(exact).max()
