@@ -35,7 +35,7 @@ class TrackOptions:
     count: int = 6
     margin: int = 4
     search: SearchOptions = field(default_factory=SearchOptions)
-    least_confidence: float = 0.6
+    least_confidence: float = 0.8
     max_halvings: int = 6
 
     def __post_init__(self):
