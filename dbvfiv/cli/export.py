@@ -23,16 +23,22 @@ def command(
     deformed: Annotated[
         bool, typer.Option("--deformed", help="Move the points; without it use 'Warp By Vector' along displacement.")
     ] = False,
+    mode: Annotated[
+        Optional[int], typer.Option("--mode", metavar="N", help="Of modes: one cycle of mode N, its phases as time steps in s.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Write a result as VTKHDF for ParaView: displacement, rotation, director; thickness, pressure, von Mises stress and stretch of each layer.
 
-    The states are the time steps of the file; the "time" that ParaView shows is the inlet pressure in Pa.
+    The states are the time steps of the file; the "time" that ParaView shows is the inlet pressure in Pa. Of modes it is the number of the mode:
+    mode_real, mode_imag and mode_amplitude come with the displacement of the steady state; --mode N writes one cycle of that mode instead.
     """
     from ..results import load_result
 
     result = load_result(file)
-    written = result.export(output if output is not None else file.with_suffix(".vtkhdf"), quarter, deformed)
+    choices = {} if mode is None else {"mode": mode}
+    beside = file.with_suffix(".vtkhdf") if mode is None else file.with_name(f"{file.stem}-mode{mode}.vtkhdf")
+    written = result.export(output if output is not None else beside, quarter, deformed, **choices)
     if as_json:
         print_json({"written": str(written)})
     else:

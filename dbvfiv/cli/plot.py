@@ -29,9 +29,14 @@ def command(
     pressure: Annotated[
         Optional[str], typer.Option("--pressure", "-p", metavar="P", help="Draw 3D view and layer stresses for the state nearest to this pressure.")
     ] = None,
+    mode: Annotated[Optional[int], typer.Option("--mode", metavar="N", help="Draw centre line and shape of this mode only.")] = None,
+    animate: Annotated[
+        Optional[list[int]], typer.Option("--animate", metavar="N", help="Also write a GIF of one cycle of mode N; may be repeated.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Draw the figures of a result file; those of one state show the highest pressure unless --pressure is given."""
+    from ..errors import CaseError
     from ..results import load_result
 
     choices = {}
@@ -39,7 +44,14 @@ def command(
         from ..api import read_pressures
 
         choices["pressure"] = read_pressures([pressure], "--pressure")[0]
-    written = load_result(file).plot(folder, format.value, only=only or (), **choices)
+    if mode is not None:
+        choices["mode"] = mode
+    result = load_result(file)
+    written = result.plot(folder, format.value, only=only or (), **choices)
+    for number in animate or ():
+        if not hasattr(result, "animate"):
+            raise CaseError(f"The {result.kind} result {str(file)!r} has no modes to animate.")
+        written.append(result.animate(folder / f"mode-{number}.gif", number))
     if as_json:
         print_json({"written": [str(path) for path in written]})
     else:

@@ -1,10 +1,11 @@
 """Results as fields on the valve for ParaView."""
 from __future__ import annotations
 
+import inspect
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Iterator, Sequence
 
 import numpy as np
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 _UNITS = {"displacement": "m", "rotation": "rad", "thickness": "m", "pressure": "Pa", "velocity": "m/s"}
 
 
-def export_result(result: "Result", path: str | Path, quarter: bool = False, deformed: bool = False) -> Path:
+def export_result(result: "Result", path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any) -> Path:
     """Write a result as one VTKHDF file with a step for each state.
 
     Parameters
@@ -31,6 +32,8 @@ def export_result(result: "Result", path: str | Path, quarter: bool = False, def
         Only the quarter that was computed.
     deformed : bool
         Points move with the states; otherwise they stay at rest, for ParaView's "Warp By Vector" along ``displacement``.
+    choices
+        What results of some kinds may be told, such as ``mode`` for one cycle of a mode.
 
     Returns
     -------
@@ -39,15 +42,18 @@ def export_result(result: "Result", path: str | Path, quarter: bool = False, def
     Raises
     ------
     CaseError
-        If the result has nothing to show in space or the file cannot be written.
+        If the result has nothing to show in space, cannot be told a choice, or the file cannot be written.
     """
     valve = WholeValve.of(result.mesh, quarter)
-    steps = result.steps(valve)
+    for name in choices:
+        if name not in inspect.signature(result.steps).parameters:
+            raise CaseError(f"The {result.kind} result of {result.header.name!r} has no {name} to choose.")
+    steps = result.steps(valve, **choices)
     if not len(steps):
         raise CaseError(f"The {result.kind} result of {result.header.name!r} holds no state that could be exported.")
     path = Path(path)
     if path.suffix.lower() not in (".vtkhdf", ".hdf"):
-        path = path / f"{result.header.name}-{result.kind}.vtkhdf"
+        path = path / f"{result.header.name}-{result.kind}{_suffix(choices)}.vtkhdf"
     units = _UNITS | {name: "Pa" for name in steps[0].cell_data if name.startswith("von_mises")}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -55,6 +61,10 @@ def export_result(result: "Result", path: str | Path, quarter: bool = False, def
     except OSError as error:
         raise CaseError(f"{str(path)!r} cannot be written ({error.strerror or 'the folder may not be written'}).") from error
     return path
+
+
+def _suffix(choices: dict[str, Any]) -> str:
+    return "".join(f"-{name}{value}" for name, value in choices.items())
 
 
 def _moved(steps: Sequence[Step], valve: WholeValve, deformed: bool) -> Iterator[Step]:

@@ -1,0 +1,110 @@
+"""Why a verdict on stability can be trusted: two counts of the unstable eigenvalues, and how far the search reached."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from .layout import Column, read_array, write_array
+
+if TYPE_CHECKING:
+    from ..studies.modes import ModesResult
+
+_ATTRIBUTES = (
+    "agrees", "unstable_count", "unstable_count_independent", "statement", "certain", "line", "distance", "response_error", "status", "asked",
+    "complete_above", "band", "rejected",
+)  # fmt: skip
+_CURVE = (
+    Column("frequency", "Hz", "Points on the line at which the determinant was evaluated"),
+    Column("phase", "rad", "Continuous phase of the determinant against that of a stable structure"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What two routes say about the number of unstable eigenvalues.
+
+    Attributes
+    ----------
+    stable : bool or None
+        None where the routes do not agree on it.
+    agrees : bool
+    unstable_count, unstable_count_independent : int
+        From the list of modes, and from the winding of the determinant; both eigenvalues of a conjugate pair count.
+    statement : str
+        The same in a sentence.
+    certain : bool
+        Whether the phase of the determinant could be followed everywhere.
+    line : float, 1/s
+        Growth rate above which is counted: 0 but for undamped structures.
+    distance : float
+        Of the winding from a whole number.
+    response_error : float
+        Error of log det made by the reduced basis behind the count; NaN if no basis was used.
+    status : str
+        "complete" if no mode was missed among those listed.
+    asked : int
+    complete_above : float, 1/s
+    band : float, Hz
+        Every eigenvalue above this growth rate and up to this frequency was found.
+    rejected : int
+        Pairs thrown away because of their residual.
+    frequency, phase : (k,) Hz, rad
+        The phase of the determinant on the line.
+    """
+
+    stable: bool | None
+    agrees: bool
+    unstable_count: int
+    unstable_count_independent: int
+    statement: str
+    certain: bool
+    line: float
+    distance: float
+    response_error: float
+    status: str
+    asked: int
+    complete_above: float
+    band: float
+    rejected: int
+    frequency: np.ndarray
+    phase: np.ndarray
+
+    @classmethod
+    def of(cls, result: "ModesResult") -> "Certificate":
+        certified, spectrum, count = result.certified, result.spectrum, result.certified.count
+        error = certified.response_error
+        return cls(
+            stable=result.stable, agrees=certified.agrees, unstable_count=certified.unstable_count,
+            unstable_count_independent=certified.unstable_count_independent, statement=certified.statement, certain=count.certain,
+            line=float(count.line), distance=count.distance, response_error=float("nan") if error is None else float(error),
+            status=spectrum.status, asked=spectrum.asked, complete_above=float(spectrum.complete_above), band=float(spectrum.band),
+            rejected=spectrum.rejected, frequency=count.frequencies, phase=count.phase,
+        )  # fmt: skip
+
+    def write(self, group: h5py.Group) -> None:
+        group.attrs["stable"] = {True: "yes", False: "no", None: "unknown"}[self.stable]
+        for name in _ATTRIBUTES:
+            group.attrs[name] = getattr(self, name)
+        for column in _CURVE:
+            write_array(group, column, getattr(self, column.name))
+
+    @classmethod
+    def read(cls, group: h5py.Group) -> "Certificate":
+        attributes = {name: group.attrs[name] for name in _ATTRIBUTES}
+        plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
+        stable = {"yes": True, "no": False, "unknown": None}[group.attrs["stable"]]
+        return cls(stable=stable, **plain, **{column.name: read_array(group, column) for column in _CURVE})
+
+    @property
+    def verdict(self) -> str:
+        """One sentence for people."""
+        word = {True: "Stable", False: "Unstable", None: "Undecided"}[self.stable]
+        return f"{word}: {self.statement[0].lower()}{self.statement[1:]}"
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers for JSON, without the curve."""
+        names = [name for name in _ATTRIBUTES if name not in ("unstable_count", "unstable_count_independent")]
+        return {name: getattr(self, name) for name in names}

@@ -1,0 +1,240 @@
+"""Leading modes of the coupled valve at one steady state, with an independent count of the unstable ones."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from eigen import CertifiedSpectrum, CoupledPencil, SearchOptions, SingularShiftError, Spectrum, TransferBasis, certified_spectrum
+
+from ..errors import CaseError, SolveError
+from ..flow import Channel
+from ..model import ValveModel
+from ..model.dynamics import Conditions, linearise
+from .modes_search import suited
+from .observer import Observer
+from .state import SteadyState, describe_state
+
+#: Unbalanced force over pressure force above which a state is no equilibrium of its model.
+_UNBALANCED = 1e-4
+
+
+@dataclass(frozen=True)
+class ModesOptions:
+    """Options of `run_modes`.
+
+    Attributes
+    ----------
+    count : int
+        Modes wanted, a conjugate pair being one; fewer are given where eigenvalues accumulate.
+    in_vacuo : bool
+        Leave the fluid out; the steady pressures stay as follower loads.
+    search : SearchOptions
+        Band and limit point are chosen by the damping where they are not given.
+    """
+
+    count: int = 10
+    in_vacuo: bool = False
+    search: SearchOptions = field(default_factory=SearchOptions)
+
+    @classmethod
+    def of(cls, case) -> "ModesOptions":
+        """Options of a case file."""
+        modes = case.modes
+        shift = None if modes.shift is None else (complex(modes.shift, 2 * math.pi * modes.shift_frequency),)
+        return cls(modes.count, modes.in_vacuo, SearchOptions(modes.max_frequency, shifts=shift, tolerance=modes.tolerance))
+
+
+@dataclass(frozen=True)
+class ModesResult:
+    """Leading modes of one state.
+
+    Attributes
+    ----------
+    model : ValveModel
+    state : SteadyState
+    conditions : Conditions
+    in_vacuo : bool
+    certified : CertifiedSpectrum
+        Eigenvalues, vectors, residuals and both counts of the unstable ones.
+    shapes : (k, nn, 5) complex
+        Displacements and rotations of the nodes, the largest displacement being 1 and real.
+    areas, pressures : (k, m) complex
+        Changes of the row areas (m2, a quarter) and station pressures (Pa) for a largest displacement of 1 m; no pressures in vacuo.
+    inlet_velocities : (k,) complex, m/s
+        Likewise.
+    notes : tuple of str
+    """
+
+    model: ValveModel
+    state: SteadyState
+    conditions: Conditions
+    in_vacuo: bool
+    certified: CertifiedSpectrum
+    shapes: np.ndarray
+    areas: np.ndarray
+    pressures: np.ndarray
+    inlet_velocities: np.ndarray
+    notes: tuple[str, ...] = ()
+
+    @property
+    def spectrum(self) -> Spectrum:
+        return self.certified.spectrum
+
+    @property
+    def eigenvalues(self) -> np.ndarray:
+        """(k,) complex, 1/s, sorted by growth rate."""
+        return self.spectrum.eigenvalues
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether all modes decay.
+
+        One unstable pair that satisfies the equations is proof that they do not. If none is listed and the independent count does not confirm it: None.
+        """
+        return False if self.certified.unstable_count else self.certified.stable
+
+
+def run_modes(
+    model: ValveModel,
+    state: SteadyState,
+    conditions: Conditions | None = None,
+    options: ModesOptions | None = None,
+    observer: Observer | None = None,
+) -> ModesResult:
+    """Leading modes of a steady state.
+
+    Parameters
+    ----------
+    model : ValveModel
+    state : SteadyState
+        An equilibrium of the model.
+    conditions : Conditions, optional
+        Fluid density and Rayleigh damping; those of the case otherwise.
+    options : ModesOptions, optional
+    observer : Observer, optional
+
+    Raises
+    ------
+    CaseError
+        For a valve at rest with fluid in it: without a pressure its velocity is undetermined.
+    SolveError
+        If the state is no equilibrium, or no shift was found at which the pencil can be factored.
+    """
+    conditions = Conditions.of(model.case) if conditions is None else conditions
+    options = ModesOptions.of(model.case) if options is None else options
+    observer = Observer() if observer is None else observer
+    require_equilibrium(model, state)
+    without_fluid = options.in_vacuo or not isinstance(model.flow, Channel)
+    if not without_fluid and state.pressure <= 0:
+        raise CaseError(
+            "Coupled modes need an inlet pressure greater than 0, because without one the velocity of an ideal fluid is undetermined; "
+            "modes.in_vacuo gives those of the structure at rest."
+        )
+    observer.begin("modes", 1)
+    observer.progress("linearising")
+    linear = linearise(model, state.q, state.pressure)
+    pencil = linear.pencil(conditions, fluid=not without_fluid)
+    observer.progress("searching")
+    with solving(state.pressure):
+        basis = TransferBasis(pencil)
+        search, notes = suited(options.search, conditions, basis, options.count)
+        certified = certified_spectrum(pencil, options.count, search, basis=basis)
+    certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))
+    if search.max_frequency is not None and certified.unstable_count_independent > certified.unstable_count:
+        notes = (*notes, f"The independent count covers all frequencies, the search ends at {search.max_frequency:.4g} Hz.")
+    notes = (*notes, *certified.spectrum.notes)
+    result = _described(model, state, conditions, without_fluid, certified, pencil, linear, notes)
+    observer.item(result)
+    for note in notes:
+        observer.warn(note)
+    if not certified.agrees:
+        observer.warn(certified.statement)
+    observer.end(False)
+    return result
+
+
+def _described(model, state, conditions, in_vacuo, certified: CertifiedSpectrum, pencil: CoupledPencil, linear, notes) -> ModesResult:
+    """Shapes, areas and pressures of the eigenvectors, scaled to a largest displacement of 1."""
+    spectrum = certified.spectrum
+    shapes, scales = [], []
+    for q in spectrum.q.T:
+        nodal = model.nodal(q)
+        scales.append(_largest(nodal))
+        shapes.append(nodal / scales[-1])
+    scale = np.array(scales, complex).reshape(len(spectrum))
+    change = linear.slope @ spectrum.q
+    pressure = np.zeros((pencil.m, len(spectrum)), complex)
+    for i, value in enumerate(spectrum.eigenvalues if pencil.m else ()):
+        by_area, by_velocity, _, _ = pencil.fluid_at(value)
+        pressure[:, i] = by_area @ change[:, i] + by_velocity @ spectrum.u[:, i]
+    velocity = spectrum.u[0] if pencil.b else np.zeros(len(spectrum), complex)
+    return ModesResult(
+        model, state, conditions, in_vacuo, certified,
+        shapes=np.array(shapes, complex).reshape(len(spectrum), len(model.mesh.nodes), 5),
+        areas=(change / scale).T, pressures=(pressure / scale).T, inlet_velocities=velocity / scale, notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _ties_by_frequency(spectrum: Spectrum) -> Spectrum:
+    """Modes whose growth rates differ by rounding only, as without damping, in the order of their frequencies."""
+    values = spectrum.eigenvalues
+    unit = 1e-9 * np.abs(values).max(initial=0.0)
+    return spectrum.select(np.lexsort((values.imag, -np.round(values.real / unit)))) if unit > 0 else spectrum
+
+
+def _largest(nodal: np.ndarray) -> complex:
+    """Largest displacement in any direction at any instant of a cycle, as a factor to divide by."""
+    u = nodal[:, :3]
+    # semi-axes of the ellipses on which the nodes move
+    square, turning = np.sum(np.abs(u) ** 2, axis=1), np.sum(u**2, axis=1)
+    reach = np.sqrt(0.5 * (square + np.abs(turning)))
+    where = int(np.argmax(reach))
+    phase = np.sqrt(turning[where] / abs(turning[where])) if abs(turning[where]) > 0 else 1.0
+    return complex(reach[where] * phase) if reach[where] > 0 else 1.0 + 0j
+
+
+def require_equilibrium(model: ValveModel, state: SteadyState) -> None:
+    """Refuse a state that is no equilibrium of a model.
+
+    Raises
+    ------
+    SolveError
+    """
+    if not state.converged:
+        raise SolveError(
+            f"The steady state at {state.pressure:.6g} Pa has not converged (residual {state.residual:.1e}), so it has no modes; find the equilibrium first."
+        )
+    if len(state.q) != model.size:
+        raise SolveError(f"The steady state at {state.pressure:.6g} Pa belongs to another mesh, so it has no modes in this model.")
+    scale = model.force_scale(state.q, state.pressure)
+    unbalanced = float(np.linalg.norm(model.residual(state.q, state.pressure)))
+    allowed = max(_UNBALANCED * scale, 1e3 * model.rounding(state.q, model.tangent(state.q, state.pressure)))
+    if not unbalanced <= allowed:
+        raise SolveError(
+            f"The state at {state.pressure:.6g} Pa is no equilibrium of this model: its unbalanced force is {unbalanced:.2g} N against "
+            f"{scale:.2g} N of pressure, so it has no modes; find the equilibrium first."
+        )
+
+
+def rest_state(model: ValveModel) -> SteadyState:
+    """The valve at rest without pressure, as a state."""
+    return describe_state(
+        model, model.rest(), 0.0, converged=True, iterations=0, load_steps=0, residual=0.0, rounding=0.0, reason="at rest without pressure"
+    )
+
+
+class solving:
+    """Turns what an eigenvalue search refuses into a sentence that names the pressure."""
+
+    def __init__(self, pressure: float):
+        self.pressure = pressure
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind, error, _trace) -> None:
+        if isinstance(error, (SingularShiftError, ValueError, np.linalg.LinAlgError)):
+            said = str(error).rstrip(".")
+            raise SolveError(f"The modes at {self.pressure:.6g} Pa were not found: {said}.") from error
