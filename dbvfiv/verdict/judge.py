@@ -1,0 +1,269 @@
+"""What a time series does in the end, judged so that sampling at the period, beats, slow growth and noise do not mislead."""
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .cycles import Cycles, extremes, harmonics
+from .period import find_period, refine
+from .series import Series
+from .trend import comes_and_goes, remaining, settled, trend_of
+from .verdict import Verdict
+
+
+@dataclass(frozen=True)
+class JudgeOptions:
+    """Options of a verdict.
+
+    Attributes
+    ----------
+    steady : float
+        Largest change, over the last fifth and still to come, of a steady signal relative to its size.
+    residual : float
+        Largest residual of a steady state, where a residual is known.
+    cycles : int
+        Cycles that a limit cycle must have kept.
+    periodic : float
+        Largest periodicity error of a limit cycle without noise.
+    noisy : float
+        Largest periodicity error of a limit cycle with noise on it.
+    drift : float
+        Largest relative change of the amplitude over the cycles looked at, and still to come.
+    band : float
+        Relative band within which amplitudes count as equal.
+    """
+
+    steady: float = 1e-4
+    residual: float = 1e-3
+    cycles: int = 10
+    periodic: float = 0.02
+    noisy: float = 0.4
+    drift: float = 2e-3
+    band: float = 0.02
+
+
+def judge(
+    time, values, options: JudgeOptions = JudgeOptions(), *, residual: float | None = None, closed_below: float | None = None
+) -> Verdict:
+    """Verdict on a signal.
+
+    Parameters
+    ----------
+    time, values : (k,) arrays
+        Samples at increasing times; uneven ones are interpolated.
+    options : JudgeOptions
+    residual : float, optional
+        How far from equilibrium the system is at the end, relative; a signal that stands still while its system does not is not steady.
+    closed_below : float, optional
+        Level below which the signal counts as closed.
+
+    Returns
+    -------
+    Verdict
+
+    Raises
+    ------
+    ValueError
+        If the samples are no series.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 20.0, 2001)
+    >>> verdict = judge(t, 3.0 + np.sin(2 * np.pi * t))
+    >>> verdict.name, round(verdict.frequency, 6), round(verdict.amplitude, 6)
+    ('limit cycle', 1.0, 1.0)
+    """
+    series = Series.of(time, values)
+    whole = {"smallest": float(np.min(values)), "largest": float(np.max(values))}
+    if len(series.values) < 16:
+        end = series.values[-1]
+        return Verdict("undecided", False, "There are fewer than 16 samples.", mean=float(end), amplitude=0.0, rms=0.0, **whole)
+    return replace(_judge(series, options, residual, closed_below), **whole)
+
+
+def _judge(series: Series, options: JudgeOptions, residual: float | None, closed_below: float | None) -> Verdict:
+    tail = series.last(0.2 * series.duration)
+    at_end = {"mean": float(tail.values.mean()), "amplitude": 0.5 * float(np.ptp(tail.values)), "rms": float(tail.values.std())}
+    if closed_below is not None and series.last(0.3 * series.duration).values.max() <= closed_below:
+        return Verdict("closed", True, "The signal stays below the level of a closed valve.", **at_end)
+    size = max(abs(at_end["mean"]), float(np.ptp(series.values)))
+    if at_end["amplitude"] > 1e-9 * size:
+        found = _oscillation(series, options, size)
+        if found is not None:
+            return found
+    return _without_cycles(series, options, size, residual, at_end)
+
+
+# -- signals with cycles ------------------------------------------------------------------------------------------------------------
+
+
+def _oscillation(series: Series, options: JudgeOptions, size: float) -> Verdict | None:
+    """Verdict on a signal with cycles; None if it has none, or is steady but for cycles too small to matter."""
+    period, error = _period(series)
+    if not period > 0 or error > 1.0:
+        return None
+    cycles = Cycles.of(series, period)
+    if len(cycles) < 3:
+        return None
+    low, high = extremes(series, period)
+    recent = cycles.last(max(options.cycles, len(cycles) // 2))
+    kept = cycles.last(options.cycles)
+    facts = {
+        "mean": float(kept.mean.mean()),
+        "amplitude": 0.5 * (high - low),
+        "period": period,
+        "cycles": len(recent),
+        "periodicity_error": float(np.sqrt(np.mean(kept.error**2))),
+        "periodicity_trend": _factor(kept.error),
+        "amplitude_trend": trend_of(kept.spread).slope,
+        "harmonics": harmonics(series, period, min(len(cycles), options.cycles)),
+        "rms": float(kept.spread.mean() / np.sqrt(2.0)),
+    }
+    small = 0.5 * (high - low) <= options.steady * size
+    direction = _direction(cycles, options)
+    if small and direction != "growing":
+        return None
+    return _name(series, cycles, recent, facts, direction, options)
+
+
+def _name(series: Series, cycles: Cycles, recent: Cycles, facts: dict, direction: str, options: JudgeOptions) -> Verdict:
+    error, count = facts["periodicity_error"], len(cycles)
+    rate = abs(facts["amplitude_trend"])
+    if error > options.noisy and direction in ("growing", "decaying") and rate < 0.5 * error:
+        direction = ""  # the amplitudes wander because nothing repeats
+    if direction in ("growing", "decaying"):
+        words = f"The amplitude changes by {100 * facts['amplitude_trend']:+.2g} % a cycle"
+        if comes_and_goes(cycles.spread, 2.5 * options.band):
+            return Verdict("irregular", count >= 2 * options.cycles, words + " after having come and gone before.", **facts)
+        doubled = abs(np.log(cycles.spread[-1] / cycles.spread[max(0, count - options.cycles)])) > 0.3
+        return Verdict(direction, count >= options.cycles or (count >= 5 and doubled), words + ".", **facts)
+    if count < options.cycles and error > options.periodic and _swings(series) > 4 * options.cycles:
+        return Verdict("irregular", True, f"After {_swings(series)} swings it still repeats within {100 * error:.2g} % only.", **facts)
+    if count < options.cycles:
+        return Verdict("undecided", False, f"Only {count} cycles have been seen and {options.cycles} are needed.", **facts)
+    if error > options.noisy:
+        return Verdict("irregular", True, f"Nothing repeats: the periodicity error is {error:.2g}.", **facts)
+    if error > options.periodic and not _noise_on_cycle(cycles, options):
+        return Verdict("irregular", True, f"Cycles differ from one to the next by {100 * error:.2g} %, and not by noise.", **facts)
+    noisy = error > options.periodic
+    band = max(options.band, 6.0 * trend_of(recent.spread).scatter) if noisy else options.band
+    if comes_and_goes(cycles.spread[-max(options.cycles, 3 * count // 4) :], band if noisy else 0.5 * options.band):
+        return Verdict("irregular", True, "The amplitude comes and goes: beats.", **facts)
+    still = settled(cycles.spread, band)
+    if still < max(options.cycles, count // 5):
+        return Verdict("undecided", False, f"The amplitude has been settled for {still} cycles only.", **facts)
+    if direction == "settling":
+        return Verdict("undecided", False, "The amplitude still settles.", **facts)
+    means = cycles.last(options.cycles).mean
+    if np.ptp(means) > max(10 * options.drift, 0.5 * error) * recent.spread.mean():
+        if trend_of(np.exp((means - means.mean()) / np.ptp(means))).significant:
+            return Verdict("undecided", False, "The mean of the cycles still moves.", **facts)
+        return Verdict("irregular", True, "The mean of the cycles comes and goes.", **facts)
+    words = f"{still} cycles of equal amplitude, repeating within {100 * error:.2g} %" + (", the difference being noise." if noisy else ".")
+    return Verdict("limit cycle", True, words, **facts)
+
+
+def _period(series: Series) -> tuple[float, float]:
+    """Best period over several ends of the series, each freed of its slow drift while it is looked for."""
+    best = (np.nan, np.inf)
+    for share in (0.5, 0.25, 0.12, 1.0):
+        part = series.last(share * series.duration)
+        if len(part.values) < 32:
+            continue
+        t = np.linspace(-1.0, 1.0, len(part.values))
+        level = part.values - np.polyval(np.polyfit(t, part.values, 2), t)
+        if np.ptp(level) <= 1e-8 * np.ptp(part.values):
+            continue
+        period, error = find_period(replace(part, values=level))
+        if not period > 0 or period * 3 > part.duration:
+            continue
+        period, error = refine(part, period, error)
+        if error < 0.7 * best[1]:
+            best = (period, error)
+    return best
+
+
+def _direction(cycles: Cycles, options: JudgeOptions) -> str:
+    """"growing", "decaying", "settling" or "" from nested ends of the sequence of amplitudes."""
+    spread, count = cycles.spread, len(cycles)
+    if count < options.cycles:
+        found = trend_of(spread)
+        if found.significant and abs(found.change) > 0.05:
+            return "growing" if found.slope > 0 else "decaying"
+        return ""
+    length, name = options.cycles, ""
+    while True:
+        part = spread[-length:]
+        found = trend_of(part)
+        if found.significant and abs(found.change) > options.drift:
+            left = remaining(part)
+            if not np.isfinite(left):
+                return "growing" if found.slope > 0 else "decaying"
+            if abs(left) > 2.5 * options.drift and length == options.cycles:
+                name = "settling"
+        if length >= count // 2:
+            return name
+        length = min(2 * length, max(options.cycles, count // 2))
+
+
+def _swings(series: Series) -> int:
+    """How often the signal passed its mean upwards."""
+    above = series.values > series.values.mean()
+    return int(np.count_nonzero(above[1:] & ~above[:-1]))
+
+
+def _noise_on_cycle(cycles: Cycles, options: JudgeOptions) -> bool:
+    """Whether cycles differ by something without memory, within a cycle and from one to the next."""
+    kept = cycles.last(4 * options.cycles)
+    left = kept.shape - kept.shape.mean(axis=0)
+    left = left - left.mean()
+    power = np.mean(left**2)
+    if power == 0:
+        return True
+    within = np.mean(left[:, :-8] * left[:, 8:]) / power  # an eighth of a radian times pi: a sixteenth of a cycle
+    across = np.mean(left[:-1] * left[1:]) / power
+    return bool(within < 0.5 and across < 0.35)
+
+
+def _factor(error: np.ndarray) -> float:
+    """Factor from one error to the next; not a number where the errors are rounding."""
+    return float(np.exp(trend_of(error).slope)) if len(error) >= 3 and error.min() > 1e-12 else np.nan
+
+
+# -- signals without ----------------------------------------------------------------------------------------------------------------
+
+
+def _without_cycles(series: Series, options: JudgeOptions, size: float, residual: float | None, at_end: dict) -> Verdict:
+    tail = series.last(0.2 * series.duration).values
+    thirds = [part.mean() for part in np.array_split(tail, 3)]
+    first, second = thirds[1] - thirds[0], thirds[2] - thirds[1]
+    to_come = abs(second) / (1.0 - min(abs(second / first), 0.99)) if first and abs(second) > 1e-13 * size else 0.0
+    if 2.0 * at_end["amplitude"] <= options.steady * size and to_come <= options.steady * size:
+        if residual is not None and not residual <= options.residual:
+            return Verdict(
+                "undecided", False, f"The signal stands still but its system does not (residual {residual:.2g}): it may be sampled at its own period.",
+                **at_end,
+            )  # fmt: skip
+        return Verdict("steady", True, f"It changes by less than {options.steady:g} of its size, and little is to come.", **at_end)
+    ranges = np.array([np.ptp(part) for part in np.array_split(series.values, 8)])
+    levels = np.array([part.mean() for part in np.array_split(series.values, 8)])
+    late = ranges[-4:]
+    falling, rising = np.all(np.diff(late) < 0), np.all(np.diff(late) > 0)
+    if falling and late[-1] < 0.6 * late[0]:
+        return Verdict("decaying", bool(late[-1] < 0.1 * ranges.max()), "Its changes become smaller and smaller.", **at_end)
+    if rising and late[-1] > 1.5 * late[0] and ranges[-1] == ranges.max():
+        return Verdict("growing", bool(late[-1] > 10 * max(late[0], 1e-300)), "Its changes become larger and larger.", **at_end)
+    steps = np.diff(levels[-5:])
+    if np.all(steps > 0) or np.all(steps < 0):
+        if np.ptp(levels[-5:]) > 2.0 * np.median([_scatter(part) for part in np.array_split(series.values, 8)[-4:]]):
+            shrinking = abs(steps[-1]) < 0.5 * abs(steps[0])
+            return Verdict("decaying" if shrinking else "growing", False, "It drifts one way" + (", slower and slower." if shrinking else "."), **at_end)
+    if _swings(series) < options.cycles:
+        return Verdict("undecided", False, "It moves, and too few swings have been seen to tell how.", **at_end)
+    return Verdict("irregular", True, "It moves without a period.", **at_end)
+
+
+def _scatter(part: np.ndarray) -> float:
+    t = np.arange(len(part))
+    return float(np.ptp(part - np.polyval(np.polyfit(t, part, 1), t)))

@@ -1,0 +1,90 @@
+"""A time series: checks, even samples, smooth interpolation, spectrum."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline, make_interp_spline
+
+
+@dataclass(frozen=True)
+class Series:
+    """Even samples of a signal.
+
+    Attributes
+    ----------
+    start : float, s
+    step : float, s
+    values : (k,) array
+    """
+
+    start: float
+    step: float
+    values: np.ndarray
+
+    @classmethod
+    def of(cls, time, values) -> "Series":
+        """From samples at increasing times; uneven ones are interpolated by a cubic spline at their typical distance.
+
+        Raises
+        ------
+        ValueError
+            If lengths differ, times do not increase, or numbers are not finite.
+        """
+        time, values = np.asarray(time, float), np.asarray(values, float)
+        if time.ndim != 1 or time.shape != values.shape:
+            raise ValueError(f"The series has {time.size} times and {values.size} values; both must be lists of the same length.")
+        if time.size < 2:
+            raise ValueError("A series needs at least two samples.")
+        if not (np.isfinite(time).all() and np.isfinite(values).all()):
+            where = int(np.flatnonzero(~(np.isfinite(time) & np.isfinite(values)))[0])
+            raise ValueError(f"Sample {where + 1} of the series is not a finite number.")
+        gaps = np.diff(time)
+        if gaps.min() <= 0:
+            where = int(np.argmin(gaps > 0))
+            raise ValueError(f"The times of the series do not increase at sample {where + 2}.")
+        step = float(np.median(gaps))
+        if np.ptp(gaps) <= 1e-6 * step or time.size < 4:
+            return cls(float(time[0]), float((time[-1] - time[0]) / (time.size - 1)), values)
+        step = max(step, (time[-1] - time[0]) / 200_000)
+        count = int(np.floor((time[-1] - time[0]) / step * (1 + 1e-12)))
+        even = time[-1] - step * np.arange(count, -1, -1)
+        return cls(float(even[0]), step, CubicSpline(time, values)(even))
+
+    @property
+    def duration(self) -> float:
+        """s"""
+        return self.step * (len(self.values) - 1)
+
+    @property
+    def end(self) -> float:
+        """s"""
+        return self.start + self.duration
+
+    def last(self, duration: float) -> "Series":
+        """The end of the series."""
+        count = min(len(self.values), max(2, int(round(duration / self.step)) + 1))
+        return Series(self.end - (count - 1) * self.step, self.step, self.values[-count:])
+
+    def times(self) -> np.ndarray:
+        return self.start + self.step * np.arange(len(self.values))
+
+    def spline(self):
+        """Interpolating spline of degree five, or of what the number of samples allows."""
+        degree = min(5, len(self.values) - 1)
+        degree -= 1 - degree % 2
+        return make_interp_spline(self.times(), self.values, k=max(degree, 1))
+
+
+def spectrum(series: Series) -> tuple[np.ndarray, np.ndarray]:
+    """One-sided amplitude spectrum about the mean with a Hann window: a sine of amplitude a shows a peak of about a.
+
+    Returns
+    -------
+    frequency : (k,) array, Hz
+    amplitude : (k,) array
+    """
+    values = series.values - series.values.mean()
+    window = np.hanning(len(values) + 2)[1:-1]
+    amplitude = 2.0 * np.abs(np.fft.rfft(values * window)) / window.sum()
+    return np.fft.rfftfreq(len(values), series.step), amplitude

@@ -1,0 +1,228 @@
+"""The verdict on series whose answer is known, among them those that mislead simpler rules."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.signal import butter, lfilter
+
+from dbvfiv.verdict import judge
+
+T = np.linspace(0.0, 10.0, 10001)
+W = 2 * np.pi * 3.0
+
+
+def noise(seed=1, count=T.size):
+    return np.random.default_rng(seed).standard_normal(count)
+
+
+def narrow_band():
+    return lfilter(*butter(2, [2.7 / 500, 3.3 / 500], "band"), noise(2, 2 * T.size))[T.size :]
+
+
+STEADY = {
+    "constant": 0 * T + 5,
+    "zero": 0 * T,
+    "negative": 0 * T - 2e5,
+    "approached": 5 * (1 - np.exp(-3 * T)),
+    "oscillation died": 3 + np.exp(-3 * T) * np.sin(W * T),
+    "noise below the tolerance": 5 + 1e-6 * noise(),
+}
+CYCLES = {
+    "sine": (3 + np.sin(W * T), 1 / 3, 1.0),
+    "sine, small beside the mean": (80 + 0.05 * np.sin(W * T), 1 / 3, 0.05),
+    "spikes": (np.maximum(np.sin(W * T), 0) ** 20, 1 / 3, 0.5),
+    "slamming": (np.maximum(np.sin(W * T) - 0.5, 0), 1 / 3, 0.25),
+    "doubled period": (np.sin(W * T) + 0.3 * np.sin(W * T / 2), 2 / 3, None),
+    "strong second harmonic": (np.sin(W * T) + 0.8 * np.sin(2 * W * T + 1), 1 / 3, None),
+    "second harmonic stronger than the first": (0.4 * np.sin(W * T) + np.sin(2 * W * T + 1), 1 / 3, None),
+    "reached fast": (3 + np.tanh(2 * T) * np.sin(W * T), 1 / 3, 1.0),
+    "mean settled": (np.sin(W * T) + 5 * np.exp(-T), 1 / 3, 1.0),
+    "overshot amplitude": ((1 + np.exp(-1.5 * T) * np.sin(3 * T)) * np.sin(W * T), 1 / 3, 1.0),
+}
+NOISY_CYCLES = {
+    "5 % noise": 5 + np.sin(W * T) + 0.05 * noise(),
+    "20 % noise": 5 + np.sin(W * T) + 0.2 * noise(),
+    "square wave, jumps between samples": np.sign(np.sin(W * T)),
+}
+GROWING = {
+    "growing": 3 + 1e-3 * np.exp(0.5 * T) * np.sin(W * T),
+    "growing, still far below the steady tolerance": 3 + 1e-7 * np.exp(0.5 * T) * np.sin(W * T),
+    "growing by a factor 23 a cycle": 3 + 1e-7 * np.exp(1.5 * T) * np.sin(3 * T),
+    "0.1 % a cycle": 3 + np.exp(0.003 * T) * np.sin(W * T),
+    "0.03 % a cycle": 3 + np.exp(0.001 * T) * np.sin(W * T),
+    "running away": np.exp(0.5 * T),
+    "ramp": T,
+}
+DECAYING = {
+    "decaying": 3 + np.exp(-0.5 * T) * np.sin(W * T),
+    "0.1 % a cycle": 3 + np.exp(-0.003 * T) * np.sin(W * T),
+    "heavily damped": 3 + np.exp(-T) * np.sin(4 * T),
+    "creeping": 5 * (1 - np.exp(-0.3 * T)),
+}
+IRREGULAR = {
+    "beats": np.sin(W * T) + 0.1 * np.sin(1.05 * W * T),
+    "strong beats": np.sin(W * T) + 0.5 * np.sin(1.1 * W * T),
+    "noise": 5 + noise(),
+    "noise in a narrow band": narrow_band(),
+    "random walk": np.cumsum(noise(3)),
+}
+UNDECIDED = {
+    "four cycles": np.sin(2 * np.pi * 0.4 * T),
+    "cycle on a ramp": np.sin(W * T) + T,
+    "still settling": 3 + np.tanh(0.2 * T) * np.sin(W * T),
+    "less than one beat": np.sin(W * T) + 0.3 * np.sin(1.02 * W * T),
+}
+
+
+@pytest.mark.parametrize("name", STEADY)
+def test_steady(name):
+    verdict = judge(T, STEADY[name])
+    assert (verdict.name, verdict.decided) == ("steady", True), verdict.reason
+    assert verdict.mean == pytest.approx(STEADY[name][-1], abs=1e-4 * max(1, abs(STEADY[name][-1])))
+
+
+@pytest.mark.parametrize("name", CYCLES)
+def test_limit_cycles(name):
+    values, period, amplitude = CYCLES[name]
+    verdict = judge(T, values)
+    assert (verdict.name, verdict.decided) == ("limit cycle", True), verdict.reason
+    assert verdict.period == pytest.approx(period, rel=2e-4)
+    assert verdict.cycles >= 10
+    assert verdict.periodicity_error < 0.02
+    if amplitude is not None:
+        assert verdict.amplitude == pytest.approx(amplitude, rel=2e-3)
+
+
+@pytest.mark.parametrize("name", NOISY_CYCLES)
+def test_cycles_under_noise(name):
+    verdict = judge(T, NOISY_CYCLES[name])
+    assert verdict.name == "limit cycle", verdict.reason
+    assert verdict.period == pytest.approx(1 / 3, rel=1e-3)
+    assert "noise" in verdict.reason
+    assert verdict.periodicity_error > 0.02
+
+
+@pytest.mark.parametrize("name", GROWING)
+def test_growing(name):
+    verdict = judge(T, GROWING[name])
+    assert verdict.name == "growing", verdict.reason
+
+
+@pytest.mark.parametrize("name", DECAYING)
+def test_decaying(name):
+    verdict = judge(T, DECAYING[name])
+    assert verdict.name == "decaying", verdict.reason
+
+
+@pytest.mark.parametrize("name", IRREGULAR)
+def test_irregular(name):
+    verdict = judge(T, IRREGULAR[name])
+    assert verdict.name == "irregular", verdict.reason
+
+
+@pytest.mark.parametrize("name", UNDECIDED)
+def test_not_decided_too_early(name):
+    verdict = judge(T, UNDECIDED[name])
+    assert not verdict.decided and verdict.name in ("undecided", "growing"), verdict.reason
+
+
+def test_rates_of_growth_a_cycle():
+    assert judge(T, GROWING["0.1 % a cycle"]).amplitude_trend == pytest.approx(1e-3, rel=0.01)
+    assert judge(T, GROWING["growing"]).amplitude_trend == pytest.approx(0.5 / 3, rel=0.01)
+
+
+def test_sampling_at_the_period_is_not_steady_while_the_system_moves():
+    strobed = 3 + np.sin(2 * np.pi * 1000 * T)
+    assert judge(T, strobed).name == "steady"  # a bare series cannot tell
+    verdict = judge(T, strobed, residual=0.5)
+    assert verdict.name == "undecided" and "sampled at its own period" in verdict.reason
+    assert judge(T, 0 * T + 3, residual=1e-6).name == "steady"
+
+
+def test_two_incommensurate_lines_are_no_cycle():
+    t = np.linspace(0, 60, 30001)
+    assert judge(t, np.sin(W * t) + 0.5 * np.sin(1.6180339887 * W * t)).name == "irregular"
+
+
+def test_beats_seen_for_long_are_not_taken_for_growth_at_any_moment():
+    t = np.linspace(0, 120, 60001)
+    beat = np.sin(W * t) + 0.3 * np.sin(1.01 * W * t)
+    for end in range(42, 121, 6):
+        verdict = judge(t[: end * 500], beat[: end * 500])
+        assert not (verdict.name in ("limit cycle", "steady") or (verdict.name in ("growing", "decaying") and verdict.decided)), (end, verdict)
+
+
+def test_closed():
+    values = np.where(T < 4, np.sin(W * T) + 2, 1e-4)
+    assert judge(T, values, closed_below=1e-3).name == "closed"
+    assert judge(T, CYCLES["slamming"][0], closed_below=1e-3).name == "limit cycle"
+
+
+def test_harmonics():
+    values = np.sin(W * T) + 0.8 * np.sin(2 * W * T + 1) + 0.5 * np.cos(3 * W * T)
+    found = judge(T, values).harmonics
+    assert found[:4, 0] == pytest.approx([1, 0.8, 0.5, 0], abs=1e-6)
+    assert found[:3, 1] == pytest.approx([-np.pi / 2, 1 - np.pi / 2, 0], abs=1e-5)
+
+
+def test_uneven_samples():
+    t = np.sort(np.concatenate([np.linspace(0, 10, 3000), np.random.default_rng(5).uniform(0, 10, 2000)]))
+    verdict = judge(t, 2 + np.sin(W * t))
+    assert verdict.name == "limit cycle" and verdict.period == pytest.approx(1 / 3, rel=1e-6)
+
+
+def test_units_and_offset_of_time_do_not_matter():
+    for name in ("reached fast", "doubled period"):
+        values = CYCLES[name][0]
+        one, other = judge(T, values), judge(1e3 + 1e-3 * T, 1e-6 * values)
+        assert other.name == one.name
+        assert other.period == pytest.approx(1e-3 * one.period, rel=1e-5)
+        assert other.amplitude == pytest.approx(1e-6 * one.amplitude, rel=1e-6)
+
+
+# period and amplitude of van der Pol's oscillator, computed to the digits given
+@pytest.mark.parametrize("mu, period, amplitude", [(0.5, 6.380676, 2.002488), (1.0, 6.663287, 2.008620)])
+def test_van_der_pol(mu, period, amplitude):
+    t = np.linspace(0, 200, 8001)
+    run = solve_ivp(
+        lambda _, y: [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]], (0, 200), [0.1, 0], t_eval=t, rtol=1e-11, atol=1e-12, method="DOP853"
+    )
+    verdict = judge(t, run.y[0])
+    assert verdict.name == "limit cycle" and verdict.decided
+    assert verdict.period == pytest.approx(period, abs=6e-7)
+    assert verdict.amplitude == pytest.approx(amplitude, abs=6e-7)
+    early = judge(t[:400], run.y[0][:400])
+    assert early.name in ("growing", "undecided")
+
+
+def rossler(t, y):
+    return [-y[1] - y[2], y[0] + 0.2 * y[1], 0.2 + y[2] * (y[0] - 5.7)]
+
+
+def lorenz(t, y):
+    return [10 * (y[1] - y[0]), y[0] * (28 - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]]
+
+
+@pytest.mark.parametrize("system, span, component", [(rossler, (100, 400), 0), (lorenz, (10, 60), 0), (lorenz, (10, 60), 2)])
+def test_chaos_is_irregular(system, span, component):
+    t = np.linspace(*span, 10001)
+    values = solve_ivp(system, (0, span[1]), [1, 1, 1], t_eval=t, rtol=1e-9).y[component]
+    assert judge(t, values).name == "irregular"
+
+
+@pytest.mark.parametrize(
+    "time, values, words",
+    [
+        ([0, 1, 1], [1, 2, 3], "do not increase"),
+        ([0, 1, 2], [1, np.nan, 3], "not a finite number"),
+        ([0, 1], [1, 2, 3], "same length"),
+        ([0], [1], "at least two"),
+    ],
+)
+def test_what_is_no_series_is_refused(time, values, words):
+    with pytest.raises(ValueError, match=words):
+        judge(time, values)
+
+
+def test_few_samples_are_no_verdict():
+    assert judge(range(10), range(10)).name == "undecided"
