@@ -1,6 +1,9 @@
 """Natural frequencies of square isotropic plates against converged Mindlin solutions (shear correction 5/6).
 
-10 m by 10 m, E 200 GPa, nu 0.3, density 8000 kg/m3.
+10 m by 10 m, E 200 GPa, nu 0.3, density 8000 kg/m3. Twisting moments fall to zero within about a third of the thickness of a free edge, and a
+solution that does not resolve this layer comes out too high: Legendre-Ritz series of degree 16 give 1.6203 and 4.1863 Hz for the free plate where
+degrees 44 and 56 agree on 1.6184 and 4.1820. The values below are those of degree 56 (free) and 54 (clamped); often quoted ones, next to them, lie up
+to 0.12 % higher.
 """
 
 from __future__ import annotations
@@ -12,16 +15,17 @@ from scipy.sparse.linalg import eigsh
 from dbvfiv.shell import Shell, ShellMesh
 from tests.shell.structures import grid, isotropic_section
 
+# thickness, frequencies with the edge layer resolved, and as quoted
 REFERENCE = {
-    "free": (0.05, (1.6203, 2.3593, 2.9219, 4.1868, 4.1868, 7.3537)),
-    "one edge clamped": (0.05, (0.4179, 1.0236, 2.5622, 3.2735, 3.7244, 6.5179)),
-    "hard simply supported": (1.0, (45.911, 109.528, 109.528, 168.074)),
+    "free": (0.05, (1.61839, 2.35922, 2.92177, 4.18197, 4.18197, 7.35316), (1.6203, 2.3593, 2.9219, 4.1868, 4.1868, 7.3537)),
+    "one edge clamped": (0.05, (0.417880, 1.02270, 2.56174, 3.27195, 3.72128, 6.51030), (0.4179, 1.0236, 2.5622, 3.2735, 3.7244, 6.5179)),
+    "hard simply supported": (1.0, (45.911, 109.528, 109.528, 168.074), (45.911, 109.528, 109.528, 168.074)),
 }
 
 
 def frequencies(support: str, n: int) -> np.ndarray:
     """Lowest frequencies, Hz, on n by n elements; rigid-body modes left out, in-plane motion held."""
-    h, exact = REFERENCE[support]
+    h, exact, _ = REFERENCE[support]
     # finer towards the edges: twisting moments fall to zero within about a thickness of a free edge, and a regular mesh misses that
     cosine = lambda t: 5.0 * (1 - np.cos(np.pi * t))  # noqa: E731
     patch = grid(n, n, lambda u, v: (cosine(u), cosine(v), 0 * u))
@@ -48,15 +52,16 @@ def frequencies(support: str, n: int) -> np.ndarray:
 
 @pytest.mark.parametrize("support", sorted(REFERENCE))
 def test_plate_frequencies(support):
-    """0.5 % on 48 x 48 elements; the error falls with the square of the element size; extrapolated within 0.05 %."""
-    _, exact = REFERENCE[support]
+    """0.6 % on 48 x 48 elements; the error falls with the square of the element size; extrapolated within 0.02 %, and 0.15 % of quoted values."""
+    _, exact, quoted = REFERENCE[support]
     exact = np.array(exact)
     coarse, fine = frequencies(support, 24), frequencies(support, 48)
     limit = fine + (fine - coarse) / 3
     print(f"\n{support}")
-    for row in zip(coarse, fine, limit, exact):
-        print("  24: {:.4f}  48: {:.4f}  extrapolated {:.4f}  exact {:.4f}".format(*row))
-    assert fine == pytest.approx(exact, rel=5e-3)
-    assert limit == pytest.approx(exact, rel=5e-4)
-    # second order: the error falls by four
-    assert (coarse - exact) / (fine - exact) == pytest.approx(4.0, abs=0.8)
+    for row in zip(coarse, fine, limit, exact, quoted):
+        print("  24: {:.4f}  48: {:.4f}  extrapolated {:.4f}  exact {:.4f}  quoted {:.4f}".format(*row))
+    assert fine == pytest.approx(exact, rel=6e-3)
+    assert limit == pytest.approx(exact, rel=2e-4)
+    assert limit == pytest.approx(quoted, rel=1.5e-3)
+    # second order: the error falls by four, a little less where the corners of the clamped edge count
+    assert (coarse - exact) / (fine - exact) == pytest.approx(4.0, abs=0.4)
