@@ -45,8 +45,9 @@ def side_views(result: "ClosureResults") -> Figure:
         _inset(figure, axes, valve, state, scale)
     for axes in panels[len(states):]:
         axes.set_visible(False)
-    for axes in panels[-2:]:
+    for axes in panels[: len(states)][-2:]:
         axes.set_xlabel("Distance from the lip z, mm")
+        axes.tick_params(labelbottom=True)
     for axes in panels[::2]:
         axes.set_ylabel("y, mm")
     bar = figure.colorbar(ScalarMappable(scale, COLOURS), ax=list(panels), shrink=0.7, pad=0.02, aspect=30)
@@ -137,16 +138,18 @@ def buckling_shape(result: "ClosureResults") -> Figure:
     left.set_axis_off()
     left.set_title("Buckling state plus 30 mm of its shape", loc="left", fontsize=10)
     right = figure.add_subplot(1, 2, 2)
-    line = mesh.rows[:, 0]
-    rest, moved = mesh.nodes[line], (mesh.nodes + first.nodal[:, :3])[line]
-    right.plot(rest[:, 2] * 1e3, rest[:, 1] * 1e3, "--", color="0.55", lw=1.2, label="at rest")
-    right.plot(moved[:, 2] * 1e3, moved[:, 1] * 1e3, color="#1f4e79", label="buckling state")
+    row = mesh.rows[int(np.argmax(np.linalg.norm(mode[mesh.rows], axis=2).max(axis=1)))]
+    rest, moved = mesh.nodes[row], (mesh.nodes + first.nodal[:, :3])[row]
+    right.plot(*rest[:, :2].T * 1e3, "--", color="0.55", lw=1.2, label="at rest")
+    right.plot(*moved[:, :2].T * 1e3, color="#1f4e79", label="buckling state")
     for sign in (1, -1):
-        there = moved + sign * 0.015 * mode[line]
-        right.plot(there[:, 2] * 1e3, there[:, 1] * 1e3, color="#c0392b", lw=1.1, ls=":", label="± 15 mm of the shape" if sign > 0 else None)
-    right.set_xlabel("Distance from the lip z, mm")
-    right.set_ylabel("y on the centre line, mm")
-    right.legend()
+        there = moved + sign * 0.015 * mode[row]
+        right.plot(*there[:, :2].T * 1e3, color="#c0392b", lw=1.1, ls=":", label="± 15 mm of the shape" if sign > 0 else None)
+    right.set_aspect("equal")
+    right.set_xlabel("x, mm")
+    right.set_ylabel("y, mm")
+    right.set_title(f"Section at z = {rest[0, 2] * 1e3:.0f} mm, where the shape is largest", loc="left", fontsize=10)
+    right.legend(loc="lower left")
     figure.suptitle(f"Buckling at {kilopascals(first.pressure)} ({first.kind}), {_supports(result)}", fontweight="bold", fontsize=11)
     return figure
 

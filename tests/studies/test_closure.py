@@ -1,0 +1,182 @@
+"""The valve under back pressure on a coarse mesh: what is found is an equilibrium, is told honestly, and does not depend on how it was found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dbvfiv.case.model import Case
+from dbvfiv.errors import SolveError
+from dbvfiv.studies import closure_path
+from dbvfiv.studies.closure import run_closure
+from dbvfiv.studies.closure_balance import EnergyLedger
+from dbvfiv.studies.closure_model import closure_model
+from dbvfiv.studies.closure_opening import Opening, opening
+from dbvfiv.studies.closure_path import ClosureOptions, ClosurePath
+from dbvfiv.studies.observer import Observer
+
+COARSE = {"mesh.around": 8, "mesh.along": 14, "closure.max_step": "4 kPa", "closure.pressures": ["7 kPa", "28 kPa"]}
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return Case().replace(COARSE)
+
+
+@pytest.fixture(scope="module")
+def pressed(case):
+    """Result with contact of the inner faces."""
+    return run_closure(case)
+
+
+@pytest.fixture(scope="module")
+def held(case):
+    """Result with the supports of Th. 3.6."""
+    return run_closure(case.replace({"closure.supports": "held-lips"}))
+
+
+def test_states_are_equilibria_without_penetration(pressed):
+    assert not pressed.failures and len(pressed.states) == 2
+    model = pressed.model.pressed
+    for state in pressed.states:
+        assert state.converged and state.residual <= 1e-8
+        assert state.penetration <= pressed.model.case.closure.penetration
+        assert state.force_balance < 1e-8
+        assert state.stable and not state.beyond_limit
+        assert state.contact_pressure.min() >= 0.0
+        assert state.contact_force == pytest.approx(2 * np.sum(model.contact.area * state.contact_pressure[model.contact.nodes]))
+
+
+def test_the_contact_carries_the_pressure_on_the_lips(pressed):
+    """In the middle of the duckbill's faces, away from its ends, the mean contact pressure is the pressure outside."""
+    model, state = pressed.model, pressed.states[-1]
+    rows = model.mesh.rows[(model.mesh.z > 0.02) & (model.mesh.z < 0.1), :5]
+    assert len(rows) >= 2
+    assert state.contact_pressure[rows].mean() == pytest.approx(state.pressure, rel=0.05)
+
+
+def test_the_valve_shuts_more_firmly_under_more_pressure(pressed):
+    low, high = pressed.states
+    assert low.closed and high.closed
+    assert high.contact_force > 3 * low.contact_force > 0
+    assert high.sealed_area > low.sealed_area
+    assert high.contact_front > low.contact_front
+    assert low.lip_opening == pytest.approx(-(0.00619 - 0.006), abs=2e-6)
+    assert high.least_opening < 0.2 * 4 * opening(pressed.model, pressed.model.pressed.rest()).reference
+
+
+def test_the_thesis_supports_hold_the_lips_and_say_so(held):
+    for state in held.states:
+        assert state.closed and state.sealed_length >= 0.21
+        nodal = held.model.pressed.nodal(state.q)
+        assert np.abs(nodal[held.model.mesh.rows[held.model.held], 1]).max() == 0.0
+    assert held.states[-1].overlap > 1e-4
+    assert any("held shut by its supports" in text for text in held.warnings)
+    assert any("overlap" in text for text in held.warnings)
+
+
+def test_both_supports_agree_before_the_saddle_touches(pressed, held):
+    assert pressed.states[0].max_displacement == pytest.approx(held.states[0].max_displacement, rel=0.1)
+
+
+def test_nodes_that_start_beyond_the_plane_are_counted_and_told(pressed):
+    model = pressed.model
+    assert len(model.nodes_beyond) > 0
+    z = model.mesh.nodes[model.nodes_beyond, 2]
+    assert np.all((z > 0.2) & (z < 0.3))
+    assert any(f"beyond the closing plane at {len(model.nodes_beyond)} nodes" in text for text in pressed.warnings)
+
+
+def test_the_answer_does_not_depend_on_the_penalty(case, pressed):
+    """Three times softer: the multipliers bring the same forces, but for the wider rounding of the law's kink."""
+    other = run_closure(case, [7e3], model=closure_model(case, contact_depth=1e-5))
+    state, reference = other.states[0], pressed.states[0]
+    assert state.multiplier_updates > 0
+    assert state.contact_force == pytest.approx(reference.contact_force, rel=1e-3)
+    assert state.max_displacement == pytest.approx(reference.max_displacement, rel=1e-3)
+
+
+def test_the_answer_does_not_depend_on_the_steps(case, pressed):
+    one = run_closure(case, [28e3], replace(ClosureOptions.of(case), max_step=1.5e3))
+    assert one.states[0].contact_force == pytest.approx(pressed.states[-1].contact_force, rel=1e-4)
+    assert one.states[0].max_displacement == pytest.approx(pressed.states[-1].max_displacement, rel=1e-4)
+
+
+def test_stiffness_is_followed_at_every_step(pressed):
+    assert len(pressed.path) > 5
+    lowest = [point.eigenvalues[0] for point in pressed.path]
+    assert min(lowest) > 0 and pressed.critical_pressure is None
+    assert min(lowest) < 0.8 * lowest[0]
+    state = pressed.states[-1]
+    assert state.lowest_symmetric_eigenvalue <= state.lowest_stiffness_eigenvalue * (1 + 1e-9)
+    assert state.asymmetry < 1e-3
+
+
+def test_an_open_start_turns_a_flow_back(case):
+    result = run_closure(case.replace({"closure.start": "open"}), [2e3])
+    flows = [state.mass_flow for state in result.opened]
+    assert flows == sorted(flows, reverse=True) and flows[-1] < 0.1 * flows[0]
+    assert result.opened[0].pressure == 10e3
+    assert result.states[0].max_displacement == pytest.approx(run_closure(case, [2e3]).states[0].max_displacement, rel=1e-8)
+
+
+def test_a_pressure_that_is_not_reached_ends_the_list(case):
+    """Without arclength a thin wall ends at its limit point, and says where."""
+    thin = case.replace({"valve.thickness_factor": 0.25, "closure.arclength": False, "closure.max_step": "0.5 kPa"})
+    result = run_closure(thin, [200.0, 28e3, 29e3], replace(ClosureOptions.of(thin), min_step=1e-3))
+    assert len(result.failures) == 1 and "No equilibrium was found between" in result.failures[0]
+    assert [state.pressure for state in result.states] == [200.0]
+
+
+def test_an_interrupt_keeps_what_was_found(case):
+    class Stop(Observer):
+        def item(self, result):
+            raise KeyboardInterrupt
+
+    result = run_closure(case, [1e3, 2e3], observer=Stop())
+    assert result.interrupted and not result.failures
+
+
+def test_a_penetration_out_of_reach_is_an_error(case, monkeypatch):
+    monkeypatch.setattr(closure_path, "MOST_UPDATES", 0)
+    path = ClosurePath(closure_model(case, contact_depth=1e-4), ClosureOptions.of(case))
+    with pytest.raises(SolveError, match="penetration"):
+        path.go_to(500.0)
+
+
+def test_shut_intervals_are_cut_linearly_between_rows():
+    z = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
+    passage = Opening(z, np.array([0.0, 0.0, 2.0, 0.0, 2.0]), 1.0, np.zeros((5, 2)), np.ones(5))
+    assert passage.shut_intervals(0.5) == [(0.0, 1.25), (2.75, 3.25)]
+    assert passage.shut_length(0.5) == pytest.approx(1.75)
+    assert passage.narrowest == 0
+
+
+def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
+    case = Case().replace({"mesh.around": 56, "mesh.along": 16})
+    model = closure_model(case)
+    passage = opening(model, model.pressed.rest())
+    assert passage.reference == pytest.approx(0.00019 * 0.125, rel=0.05)
+    # the flange is a circle of the inner radius
+    inner = case.valve.flange_radius - 0.008
+    assert passage.area[-1] == pytest.approx(0.25 * np.pi * inner**2, rel=0.02)
+
+
+@pytest.mark.slow
+def test_energy_balances_to_1e_8_with_contact_under_way(case):
+    """Work of the pressure, strain energy and contact potential along a stretch in which nodes come into contact."""
+    model = closure_model(case)
+    path = ClosurePath(model, replace(ClosureOptions.of(case), eigenvalues=2))
+    path.go_to(25e3)
+    touching = path.steps.model.contact_state(path.steps.q).touching.sum()
+    ledger = EnergyLedger(model.pressed)
+    path.steps.accepted = None
+    path.steps.reach(25.001e3)
+    ledger.begin(path.steps.q, 25.001e3, path.steps.slope)
+    for p in np.linspace(25.001e3, 26e3, 301)[1:]:
+        path.steps.reach(p)
+        ledger.add(path.steps.q, p, path.steps.slope)
+    assert path.steps.model.contact_state(path.steps.q).touching.sum() >= touching
+    assert ledger.error < 1e-8

@@ -1,0 +1,145 @@
+"""Buckling under outside pressure: the ring's closed forms, and a snapping arch followed past its limit points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from dbvfiv.contact import PressedShell
+from dbvfiv.errors import SolveError
+from dbvfiv.model.newton import NewtonOptions
+from dbvfiv.shell import Shell, ShellMesh
+from dbvfiv.studies.closure_arclength import PressedSystem, arclength_path
+from dbvfiv.studies.closure_buckling import BucklingWatch
+from dbvfiv.studies.closure_stability import stiffness_spectrum
+from dbvfiv.studies.load_steps import LoadStepOptions, LoadSteps
+from tests.shell.structures import grid, isotropic_section
+
+E, NU, RADIUS, WALL, WIDTH = 5e6, 0.3, 0.1, 1e-3, 0.02
+#: Bending stiffness of a strip that cannot strain along the axis.
+EI = E / (1 - NU**2) * WALL**3 / 12
+
+
+def _ring(elements: int, radius: float = RADIUS) -> PressedShell:
+    """Quarter of a long cylinder, symmetric about two planes, without strain along its axis: it may ovalise."""
+    place = lambda u, v: (radius * np.sin(0.5 * np.pi * u), radius * np.cos(0.5 * np.pi * u), -WIDTH * v)  # noqa: E731
+    patch = grid(elements, 1, place)
+    planes = [(patch.index[0], 0), (patch.index[-1], 1)]
+    mesh = ShellMesh.build(patch.nodes, patch.quads, WALL, planes=planes)
+    assert mesh.directors[0] == pytest.approx([0, 1, 0])  # outwards, so that the pressure of sign -1 acts from outside
+    free = np.ones((mesh.node_count, 5), bool)
+    free[:, 2] = False
+    free[:, 3] = False  # the first rotation turns the director along the axis
+    free[patch.index[0], 0] = False
+    free[patch.index[0], 4] = False
+    free[patch.index[-1], 1] = False
+    free[patch.index[-1], 4] = False
+    return PressedShell(Shell(mesh, isotropic_section(E, NU, WALL), free), None, -1.0)
+
+
+def _options(step=np.inf) -> LoadStepOptions:
+    return LoadStepOptions(NewtonOptions(1e-9, 30), 1e-8, max_step=step)
+
+
+def _critical(elements: int) -> tuple[float, PressedShell, object]:
+    model = _ring(elements)
+    watch = BucklingWatch(model, _options(), 3)
+    steps = LoadSteps(model, _options(), accepted=watch.see)
+    for p in np.array([0.5, 2.5, 2.9, 3.2]) * EI / RADIUS**3:
+        steps.reach(p)
+    assert len(watch.found) == 1
+    return watch.found[0].pressure * RADIUS**3 / EI, model, watch.found[0]
+
+
+def test_a_ring_under_outside_follower_pressure_buckles_at_three_ei_over_r_cubed():
+    values = [_critical(n)[0] for n in (16, 32, 64)]
+    errors = np.abs(np.array(values) - 3.0)
+    assert errors[-1] < 1.5e-3, values
+    assert np.all(errors[1:] < 0.35 * errors[:-1]), values
+    _, model, found = _critical(16)
+    shape = model.nodal(found.shape)[:, :3]
+    angle = np.arctan2(model.mesh.nodes[:, 0], model.mesh.nodes[:, 1])
+    radial = np.einsum("ni,ni->n", shape, model.mesh.directors)
+    assert found.kind == "bifurcation"
+    assert abs(np.corrcoef(radial, np.cos(2 * angle))[0, 1]) > 0.9999
+
+
+def test_the_pressure_of_a_closed_ring_has_a_potential():
+    """Nothing of the loaded surface ends freely, so the tangent is symmetric and both lowest eigenvalues are one."""
+    _, model, found = _critical(16)
+    spectrum = stiffness_spectrum(model, found.q, 0.9 * found.pressure, 3)
+    assert spectrum.asymmetry < 1e-12
+    assert spectrum.symmetric_values == pytest.approx(spectrum.values.real, rel=1e-6)
+    assert np.abs(spectrum.values.imag).max() == 0.0
+
+
+def test_the_same_ring_under_dead_pressure_buckles_at_four():
+    """Forces that keep their direction: the tangent without the follower part vanishes at 4 EI / R^3."""
+    model = _ring(32)
+    steps = LoadSteps(model, _options())
+
+    def lowest(p: float) -> float:
+        steps.reach(p * EI / RADIUS**3)
+        tangent = model.tangent(steps.q, steps.pressure)
+        matrix, mass = (model.shell.dofs.matrix(v).toarray() for v in (tangent.structure, model.mass(steps.q)))
+        return float(np.linalg.eigvalsh(np.linalg.solve(np.linalg.cholesky(mass), np.linalg.solve(np.linalg.cholesky(mass), matrix).T)).min())
+
+    steps.reach(1.0 * EI / RADIUS**3)
+    # the round state stays an equilibrium past 3 EI/R^3, where the follower load leaves it
+    assert brentq(lowest, 3.5, 4.5, rtol=1e-6) == pytest.approx(4.0, rel=3e-3)
+
+
+def _arch(elements: int = 24, radius=0.5, angle=0.5, wall=0.01) -> PressedShell:
+    """Half of a shallow arch clamped at its end, symmetric about its crown."""
+    place = lambda u, v: (radius * np.sin(angle * u), radius * np.cos(angle * u), -WIDTH * v)  # noqa: E731
+    patch = grid(elements, 1, place)
+    mesh = ShellMesh.build(patch.nodes, patch.quads, wall, planes=[(patch.index[0], 0)])
+    free = np.ones((mesh.node_count, 5), bool)
+    free[:, 2] = False
+    free[:, 3] = False
+    free[patch.index[0], 0] = False
+    free[patch.index[0], 4] = False
+    free[patch.index[-1]] = False
+    return PressedShell(Shell(mesh, isotropic_section(E, NU, wall), free), None, -1.0)
+
+
+def test_an_arch_snaps_at_a_limit_point_and_is_followed_beyond_it():
+    model = _arch()
+    lowest = []
+    see = lambda p, q: lowest.append((p, stiffness_spectrum(model, q, p, 2).lowest))  # noqa: E731
+    steps = LoadSteps(model, LoadStepOptions(NewtonOptions(1e-9, 30), 1e-6, max_step=20.0, largest_jump=1e-3), accepted=see)
+    target = 8000.0
+    with pytest.raises(SolveError):
+        steps.reach(target)
+    path = arclength_path(model, steps.q, steps.pressure, target)
+    assert path.reached and path.pressure == pytest.approx(target)
+    assert len(path.limits) % 2 == 0 and len(path.limits) >= 2
+    top, bottom = path.limits[0], path.limits[1]
+    assert top.pressure >= steps.pressure and bottom.pressure < top.pressure
+    assert abs(top.eigenvalue) < 1e-6 * lowest[0][1] and abs(bottom.eigenvalue) < 1e-6 * lowest[0][1]
+    # the square of the lowest eigenvalue falls to zero in proportion to the pressure that is still to come
+    (pa, a), (pb, b) = lowest[-2], lowest[-1]
+    assert pa + (pb - pa) * a**2 / (a**2 - b**2) == pytest.approx(top.pressure, rel=1e-4)
+    # load steps back from beyond, with the pressure falling, end at the other limit point
+    back = LoadSteps(model, LoadStepOptions(NewtonOptions(1e-9, 30), 1e-6, largest_jump=1e-3, max_step=200.0), path.pressure, path.q)
+    if bottom.pressure > 0:
+        with pytest.raises(SolveError):
+            back.reach(0.5 * bottom.pressure)
+        assert back.pressure == pytest.approx(bottom.pressure, rel=1e-3)
+
+
+def test_derivatives_of_the_pressed_system_agree_with_differences():
+    model = _arch(6)
+    system = PressedSystem(model, 1e3)
+    generator = np.random.default_rng(2)
+    u = 1e-3 * generator.standard_normal(system.size)
+    a, b = generator.standard_normal((2, system.size))
+    mu, h = {"pressure": 700.0}, 1e-6
+    change = (system.linear(u + h * b, mu).matvec(a) - system.linear(u - h * b, mu).matvec(a)) / (2 * h)
+    assert system.d2(u, mu, a, b) == pytest.approx(change, rel=1e-5, abs=1e-7 * np.abs(change).max())
+    up, down = {"pressure": 701.0}, {"pressure": 699.0}
+    change = (system.residual(u, up) - system.residual(u, down)) / 2
+    assert system.d_parameter(u, mu, "pressure") == pytest.approx(change, rel=1e-6, abs=1e-8 * np.abs(change).max())
+    change = (system.linear(u, up).matvec(a) - system.linear(u, down).matvec(a)) / 2
+    assert system.d2_parameter(u, mu, "pressure", a) == pytest.approx(change, rel=1e-5, abs=1e-6 * np.abs(change).max())
