@@ -1,0 +1,97 @@
+"""A pressure that follows a table: rows of time and pressure, with units."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+from .quantity import Quantity
+
+_TIME, _PRESSURE = Quantity("s", "s"), Quantity("Pa", "kPa")
+_UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
+
+
+def read_drive_table(path: Path) -> list[tuple[float, float]]:
+    """Read a drive table.
+
+    Parameters
+    ----------
+    path : Path
+        CSV (commas, semicolons, tabs or blanks) of time and pressure. The first line may name the columns with units in brackets,
+        ``time [ms], pressure [kPa]``; single entries may carry their own, ``10 ms, 6 kPa``. Plain numbers without a header are s and Pa.
+        Empty lines and text after ``#`` are skipped.
+
+    Returns
+    -------
+    list of tuple
+        Times in s, increasing, and pressures in Pa.
+
+    Raises
+    ------
+    ValueError
+        With a clause that completes "drive_table is given as FILE, ...".
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (FileNotFoundError, NotADirectoryError):
+        raise ValueError("which does not exist") from None
+    except UnicodeDecodeError:
+        raise ValueError("which is not a text file") from None
+    except (OSError, ValueError) as error:
+        raise ValueError(f"which cannot be read ({getattr(error, 'strerror', None) or 'bad name'})") from None
+    units, rows = ["s", "Pa"], []
+    for number, line in enumerate(text.splitlines(), 1):
+        words = _words(line.split("#")[0])
+        if not words:
+            continue
+        if not rows and re.match(r"[A-Za-z]", words[0]):
+            units = _header_units(line.split("#")[0], number)
+            continue
+        if len(words) != 2:
+            raise ValueError(f"whose line {number} is not a time and a pressure")
+        rows.append(tuple(_value(word, unit, kind, number) for word, unit, kind in zip(words, units, (_TIME, _PRESSURE))))
+    if not rows:
+        raise ValueError("which holds no rows")
+    for (before, _), (after, _) in zip(rows, rows[1:]):
+        if not after > before:
+            raise ValueError(f"whose times do not increase at {after:g} s")
+    lowest = min(pressure for _, pressure in rows)
+    if lowest < 0:
+        raise ValueError(f"which holds a pressure of {lowest:g} Pa, and pressures must not be negative")
+    return rows
+
+
+def _words(line: str) -> list[str]:
+    line = line.strip()
+    for separator in ",;\t":
+        if separator in line:
+            return [word.strip().strip('"') for word in line.split(separator) if word.strip()]
+    return line.split()
+
+
+def _header_units(line: str, number: int) -> list[str]:
+    found = _UNIT.findall(line)
+    if not found:
+        return ["s", "Pa"]
+    if len(found) != 2:
+        raise ValueError(f"whose line {number} names {len(found)} units and not two")
+    for unit, kind in zip(found, (_TIME, _PRESSURE)):
+        try:
+            kind.parse(f"1 {unit}")
+        except ValueError as error:
+            raise ValueError(f"whose line {number} names the unit {unit!r}, {error}") from None
+    return found
+
+
+def _value(word: str, unit: str, kind: Quantity, number: int) -> float:
+    try:
+        value = kind.parse(f"{float(word)!r} {unit}")
+    except ValueError:
+        try:
+            value = kind.parse(word)
+        except ValueError as error:
+            raise ValueError(f"whose line {number} holds {word!r}, {error}") from None
+    if not math.isfinite(value):
+        raise ValueError(f"whose line {number} holds {word!r}, which is not finite")
+    return value
