@@ -62,16 +62,31 @@ def leading_modes(pencil: CoupledPencil, count: int, options: SearchOptions | No
     workspace = workspace or Workspace()
     dense = options.method == "dense" or (options.method == "auto"
                                           and pencil.order <= options.dense_below)
-    found = (_dense if dense else _search)(pencil, count, options, workspace)
-    return _result(pencil, found, count, options)
+    if dense:
+        return _result(pencil, _dense(pencil, count, options, workspace), count, options)
+    options, first = _plan(pencil, count, options, workspace)
+    return _result(pencil, _search(pencil, count, options, workspace, first), count, options)
 
 
-def _search(pencil, count, options, workspace) -> Found:
+def _plan(pencil, count, options, workspace):
+    """First shift, and whether a limit point of eigenvalues is near enough to matter."""
+    if options.shifts is not None:
+        return options, None
+    first = _first_shift(pencil, max(count, options.least), options, workspace)
+    if options.limit_point is None:
+        return options, first
+    beside = 1.5 * abs(options.limit_point)
+    if beside < first:
+        return options, beside
+    return replace(options, limit_point=None), first
+
+
+def _search(pencil, count, options, workspace, first) -> Found:
     found = empty(pencil, options.left)
     aim = max(count, options.least)
     pairs = min(2 * aim + 4, options.max_pairs)
     given = options.shifts is not None
-    queue = list(options.shifts) if given else [_first_shift(pencil, aim, options, workspace)]
+    queue = list(options.shifts) if given else [first]
     while queue:
         shift = queue.pop(0)
         wanted = pairs
@@ -160,8 +175,6 @@ def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found):
 
 def _first_shift(pencil, aim, options, workspace) -> float:
     """A positive real shift of the size of the frequencies sought."""
-    if options.limit_point is not None:
-        return 1.5 * abs(options.limit_point)
     if options.max_frequency is not None:
         return 1.5 * 2 * np.pi * options.max_frequency
     stiffness, inertia = np.abs(pencil.K.diagonal()), np.abs(pencil.M.diagonal())
