@@ -1,0 +1,44 @@
+"""``dbvfiv closure`` on the command line."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+COARSE = ("--set", "mesh.around=6", "--set", "mesh.along=10", "--set", "closure.max_step=5 kPa")
+
+
+def test_one_json_document(command_line):
+    done = command_line("closure", *COARSE, "-p", "5 kPa", "--json")
+    assert done.status == 0, done.err
+    document = json.loads(done.out)
+    point = document["points"][0]
+    assert point["pressure"] == 5000.0 and point["closed"] is True
+    assert {"sealed_length", "contact_force", "max_displacement", "lowest_stiffness_eigenvalue"} <= set(point)
+    assert document["critical_pressure"] is None
+
+
+@pytest.mark.slow
+def test_both_supports_with_file_and_figures(command_line, tmp_path):
+    done = command_line("closure", *COARSE, "-p", "5 kPa", "--compare", "-o", tmp_path / "run.h5", "--plots", tmp_path / "figures")
+    assert done.status == 0, done.err
+    assert "Supports: contact" in done.out and "Supports: held-lips" in done.out
+    assert (tmp_path / "run.h5").exists() and (tmp_path / "run-held-lips.h5").exists()
+    assert (tmp_path / "figures" / "supports-compared.png").exists()
+
+
+@pytest.mark.slow
+def test_a_wall_that_snaps_is_told_in_a_sentence(command_line, one_sentence):
+    done = command_line(
+        "closure", *COARSE, "--set", "valve.thickness_factor=0.25", "--set", "closure.arclength=false", "--set", "closure.max_step=0.5 kPa",
+        "-p", "28 kPa",
+    )  # fmt: skip
+    assert done.status == 1
+    last = done.err.strip().splitlines()[-1]
+    assert one_sentence(last) and "were reached" in last
+
+
+def test_an_impossible_pressure(command_line, one_sentence):
+    done = command_line("closure", "-p", "-3 kPa")
+    assert done.status == 2 and one_sentence(done.err)

@@ -1,0 +1,74 @@
+"""Back-pressure results: what a file holds is what was computed; ParaView and figures take it."""
+
+from __future__ import annotations
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.api import load
+from dbvfiv.plots.closure_curves import supports_compared
+from dbvfiv.results import load_result
+
+COARSE = {"mesh.around": 6, "mesh.along": 10, "closure.max_step": "5 kPa", "closure.start": "open", "closure.eigenvalues": 2}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A result in memory and the file it was written to."""
+    path = tmp_path_factory.mktemp("closure") / "run.h5"
+    return load(None, COARSE).closure(["2 kPa", 9e3], output=path), path
+
+
+def test_a_file_reads_back_as_the_result(run):
+    result, path = run
+    again = load_result(path)
+    assert again.kind == "closure" and again.complete and again.supports == "contact"
+    assert json.loads(json.dumps(again.summary())) == json.loads(json.dumps(result.summary()))
+    assert again.lines() == result.lines()
+    for a, b in zip(again.states, result.states):
+        assert np.array_equal(a.nodal, b.nodal) and np.array_equal(a.contact_pressure, b.contact_pressure)
+        assert np.array_equal(a.layers.von_mises, b.layers.von_mises)
+    assert again.case.closure.pressures == (2e3, 9e3)
+
+
+def test_the_keys_that_scripts_rely_on(run):
+    point = run[0].summary()["points"][-1]
+    keys = {"pressure", "closed", "sealed_length", "contact_force", "max_displacement", "lowest_stiffness_eigenvalue"}
+    assert keys <= set(point)
+    assert point["closed"] is True and point["contact_force"] > 0
+
+
+def test_a_copy_saves_the_same(run, tmp_path):
+    result, path = run
+    copy = load_result(path).save(tmp_path / "copy.h5")
+    assert load_result(copy).summary() == result.summary()
+
+
+def test_paraview_gets_contact_pressure_and_gap_on_all_four_quarters(run, tmp_path):
+    result, _ = run
+    written = result.export(tmp_path / "run.vtkhdf")
+    with h5py.File(written) as file:
+        root = file["VTKHDF"]
+        assert list(root["Steps/Values"]) == [2e3, 9e3]
+        points = len(root["Points"])
+        fields = root["PointData"]
+        assert {"displacement", "contact_pressure", "gap"} <= set(fields)
+        assert len(fields["contact_pressure"]) == 2 * points
+        assert fields["contact_pressure"][:].max() == pytest.approx(max(s.largest_contact_pressure for s in result.states))
+
+
+def test_figures(run, tmp_path):
+    result, _ = run
+    names = {path.stem for path in result.plot(tmp_path)}
+    assert {"side-views", "contact-map", "closure-curve", "passage", "reversal", "layer-stress"} == names
+    figure = supports_compared(result, result)
+    assert len(figure.axes) == 4
+
+
+def test_python_interface_refuses_what_is_no_pressure():
+    with pytest.raises(dbvfiv.errors.CaseError, match="pressure"):
+        load(None, COARSE).closure(["7 mm"])
