@@ -40,7 +40,7 @@ def deformed(state: "State") -> Figure:
     corners = points[valve.quads]
     colours = shaded(corners, COLOURS(scale(size[valve.quads].mean(axis=1))))
     axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.3, clip_on=False))
-    _frame(axes, points)
+    frame(axes, points)
     bar = figure.colorbar(ScalarMappable(scale, COLOURS), ax=axes, shrink=0.62, pad=0.06, aspect=22)
     bar.set_label("Displacement, mm")
     bar.outline.set_visible(False)
@@ -61,7 +61,7 @@ def shaded(corners: np.ndarray, colours: np.ndarray) -> np.ndarray:
     return np.concatenate([colours[:, :3] * light[:, None], colours[:, 3:]], axis=1)
 
 
-def _frame(axes, points: np.ndarray) -> None:
+def frame(axes, points: np.ndarray) -> None:
     low, high = points.min(axis=0), points.max(axis=0)
     for set_limits, a, b in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high):
         set_limits(a, b)

@@ -41,6 +41,8 @@ class ModesResults(Result):
         The equilibrium they belong to.
     certificate : Certificate
     stable : bool or None
+    notes : tuple of str
+        What the search and its certificate have to say.
 
     Examples
     --------
@@ -51,9 +53,17 @@ class ModesResults(Result):
     kind = "modes"
 
     def __init__(
-        self, header: Header, mesh: MeshData, state: Mapping[str, Any], modes: Sequence[Mapping[str, Any]], certificate: Certificate, **common: Any
+        self,
+        header: Header,
+        mesh: MeshData,
+        state: Mapping[str, Any],
+        modes: Sequence[Mapping[str, Any]],
+        certificate: Certificate,
+        notes: Sequence[str] = (),
+        **common: Any,
     ):
         super().__init__(header, mesh, **common)
+        self.notes = tuple(notes)
         self._row, self._rows = dict(state), tuple(modes)
         self.certificate = certificate
         self.modes = tuple(ModeShape(number=i + 1, **row) for i, row in enumerate(self._rows))
@@ -83,7 +93,7 @@ class ModesResults(Result):
         return self.modes[number - 1]
 
     @classmethod
-    def of(cls, result: "ModesResult", header: Header | None = None) -> "ModesResults":
+    def of(cls, result: "ModesResult", header: Header | None = None, warnings: Sequence[str] = ()) -> "ModesResults":
         """From a run that has just ended.
 
         Parameters
@@ -91,12 +101,14 @@ class ModesResults(Result):
         result : dbvfiv.studies.modes.ModesResult
         header : Header, optional
             Where it comes from; made from the model's case and the conditions of the run without one.
+        warnings : sequence of str
+            About the model and the state.
         """
         model = result.model
         header = header or Header.of("modes", case_of(result))
         return cls(
             replace(header, complete=True), MeshData.of(model), row_from(model, result.state), rows_of(result), Certificate.of(result),
-            warnings=result.notes, model=model,
+            notes=result.notes, warnings=warnings, model=model,
         )  # fmt: skip
 
     @classmethod
@@ -108,7 +120,7 @@ class ModesResults(Result):
         row["max_displacement_position"] = tuple(row["max_displacement_position"].tolist())
         return cls(
             read_header(file), read_mesh(file), row, rows, Certificate.read(file["certificate"]),
-            warnings=read_texts(file, "messages/warnings"), path=path,
+            notes=read_texts(file, "messages/notes"), warnings=read_texts(file, "messages/warnings"), path=path,
         )  # fmt: skip
 
     def save(self, path: str | Path) -> Path:
@@ -123,7 +135,9 @@ class ModesResults(Result):
             for row in self._rows:
                 modes.append(row)
             self.certificate.write(file.create_group("certificate"))
-            replace_texts(file.create_group("messages"), "warnings", self.warnings)
+            messages = file.create_group("messages")
+            replace_texts(messages, "warnings", self.warnings)
+            replace_texts(messages, "notes", self.notes)
         return Path(path)
 
     def summary(self) -> dict[str, Any]:
@@ -134,14 +148,15 @@ class ModesResults(Result):
             "unstable_count_independent": self.certificate.unstable_count_independent,
             "stable": self.stable,
             "certificate": self.certificate.summary(),
-            "notes": list(self.warnings),
+            "notes": list(self.notes),
+            "warnings": list(self.warnings),
         }
 
     def lines(self) -> list[str]:
         rows = [
             f"{m.number:6d}{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:16.4f}{m.residual:11.1e}" for m in self.modes
         ]
-        return [*HEAD, *rows, "", self.certificate.verdict]
+        return [*HEAD, *rows, "", self.certificate.verdict, *(f"Note: {note}" for note in self.notes)]
 
     def steps(self, valve: "WholeValve", mode: int | None = None, phases: int = 24) -> "Sequence[Step]":
         """The modes one after the other, or one cycle of one of them; see `dbvfiv.results.modes_export`."""

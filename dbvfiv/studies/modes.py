@@ -147,8 +147,6 @@ def run_modes(
     notes = (*notes, *certified.spectrum.notes)
     result = _described(model, state, conditions, without_fluid, certified, pencil, linear, notes)
     observer.item(result)
-    for note in notes:
-        observer.warn(note)
     if not certified.agrees:
         observer.warn(certified.statement)
     observer.end(False)

@@ -1,0 +1,104 @@
+"""Modes and sweeps from Python: what `Valve` and `State` offer, once for both."""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import CaseError, SolveError
+
+if TYPE_CHECKING:
+    from .api import Valve
+    from .results.modes import ModesResults
+    from .results.state import State
+    from .results.sweep import SweepResults
+    from .studies.observer import Observer
+    from .studies.state import SteadyState
+
+#: Keyword arguments and the keys of the case that they stand for.
+KEYS = {
+    "pressure": "drive.pressure",
+    "density": "fluid.density",
+    "continuity": "fluid.continuity",
+    "alpha": "damping.alpha",
+    "beta": "damping.beta",
+    "in_vacuo": "modes.in_vacuo",
+    "max_frequency": "modes.max_frequency",
+}
+
+
+def changed(valve: "Valve", given: dict[str, Any], more: dict[str, Any]) -> "Valve":
+    """The valve with what was given as arguments put into its case; None stands for nothing given.
+
+    Raises
+    ------
+    CaseError
+    """
+    unknown = [name for name in given if name not in KEYS]
+    if unknown:
+        raise CaseError(f"{unknown[0]!r} is given, which is nothing to choose here; known are {', '.join(KEYS)}.")
+    changes = {KEYS[name]: value for name, value in given.items() if value is not None} | {k: v for k, v in more.items() if v is not None}
+    return valve.replace(changes) if changes else valve
+
+
+def modes_of(valve: "Valve", start: "State | None", output: str | Path | None, observer: "Observer | None") -> "ModesResults":
+    """Leading modes of a valve at its drive.pressure, or at a state found before.
+
+    Raises
+    ------
+    CaseError, SolveError
+    """
+    from .results.header import Header
+    from .results.modes import ModesResults
+    from .studies.modes import run_modes
+    from .studies.observer import Observer
+
+    observer = observer or Observer()
+    state, warnings = state_of(valve, start, observer)
+    found = run_modes(valve.model, state, observer=observer)
+    result = ModesResults.of(found, Header.of("modes", valve.case, valve.name), warnings)
+    if output is not None:
+        result.save(output)
+    return result
+
+
+def state_of(valve: "Valve", start: "State | None", observer: "Observer") -> "tuple[SteadyState, tuple[str, ...]]":
+    """The equilibrium at drive.pressure, and warnings: from a state found before, at rest, or by load steps."""
+    from .studies.modes import rest_state
+    from .studies.state import describe_state
+    from .studies.steady import run_steady
+
+    model, pressure = valve.model, valve.case.drive.pressure
+    if start is not None:
+        kept = ("converged", "iterations", "load_steps", "residual", "rounding", "reason")
+        # flow and jet follow the density of this case
+        return describe_state(model, start.q, start.pressure, **{name: getattr(start, name) for name in kept}), start.results.warnings
+    if pressure == 0:
+        return rest_state(model), ()
+    result = run_steady(model, [pressure], observer=observer)
+    if result.failures:
+        raise SolveError(result.failures[0])
+    if not result.states:
+        raise KeyboardInterrupt
+    return result.states[0], result.warnings
+
+
+def sweep_of(valve: "Valve", start: "State | None", output: str | Path | None, observer: "Observer | None") -> "SweepResults":
+    """Modes tracked along the parameter of sweep.over.
+
+    Raises
+    ------
+    CaseError, SolveError
+    """
+    from .results.header import Header
+    from .results.sweep import SweepResults
+    from .studies.observer import Observer
+    from .studies.sweep import run_sweep
+
+    observer = observer or Observer()
+    axis = valve.case.sweep.axis
+    state, warnings = (None, ()) if axis.parameter == "pressure" else state_of(valve, start, observer)
+    found = run_sweep(valve.model, axis, state=state, observer=observer)
+    result = SweepResults.of(found, Header.of("sweep", valve.case, valve.name), warnings)
+    if output is not None:
+        result.save(output)
+    return result
