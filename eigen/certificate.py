@@ -1,7 +1,7 @@
 """Leading modes together with the independent count of the unstable ones."""
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,7 +25,8 @@ class CertifiedSpectrum:
     spectrum : Spectrum
     count : Count
     agrees : bool
-        Both routes find the same number right of `count.line` and the count is certain.
+        Both routes find the same number right of `count.line`, up to `count.band`, and the
+        count is certain.
     unstable_count : int
         From the spectrum, right of `count.line`; conjugates counted apart.
     unstable_count_independent : int
@@ -46,7 +47,7 @@ class CertifiedSpectrum:
 
     @property
     def stable(self) -> bool | None:
-        """True or False if both routes agree, else None."""
+        """True or False if both routes agree, else None; for the band counted."""
         return self.unstable_count == 0 if self.agrees else None
 
 
@@ -72,28 +73,46 @@ def certified_spectrum(pencil: CoupledPencil, count: int, options: SearchOptions
     """
     workspace = workspace or Workspace()
     spectrum = leading_modes(pencil, count, options, workspace=workspace)
-    error = None
-    if pencil.n <= Determinant.dense_below:
-        winding = unstable_count(pencil)
-    else:
+    small = pencil.n <= Determinant.dense_below
+    model, scale, hints = pencil, None, []
+    if not small:
         basis = basis or TransferBasis(pencil)
         reduced = basis.reduced(pencil)
         scale = 2 * np.pi * (float(basis.structural_frequencies[0]) or 1.0)
         if exact:
-            damped = _reference_hints(basis, pencil)
-            winding = unstable_count(pencil, scale=scale, hints=[*damped, *spectrum.eigenvalues])
+            hints = list(Determinant(reduced).reference_zeros())
         else:
-            winding = unstable_count(reduced, scale=scale, hints=spectrum.eigenvalues)
-            error = response_error(pencil, basis, _checks(spectrum, winding, check_points))
-    listed = spectrum.count_right_of(winding.line)
-    if winding.number > listed and len(spectrum) and spectrum.growth_rate[-1] > winding.line:
+            model = reduced
+
+    def counted(band=None):
+        return unstable_count(model, scale=scale, hints=[*hints, *spectrum.eigenvalues], band=band)
+
+    winding = counted()
+    if winding.number > _listed(spectrum, winding) and len(spectrum) \
+            and spectrum.growth_rate[-1] > winding.line and np.isinf(spectrum.band):
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
-        listed = spectrum.count_right_of(winding.line)
+    if winding.number != _listed(spectrum, winding) and np.isfinite(spectrum.band):
+        # the spectrum, and the basis, speak for a band only; count in the same
+        winding = counted(band=0.999 * spectrum.band)
+        if winding.number > _listed(spectrum, winding) and spectrum.growth_rate[-1] > winding.line:
+            band = SearchOptions() if options is None else options
+            spectrum = leading_modes(pencil, winding.number + 2, replace(
+                band, max_frequency=spectrum.band), workspace=workspace)
+    listed = _listed(spectrum, winding)
+    error = None
+    if not small and not exact:
+        error = response_error(pencil, basis, _checks(spectrum, winding, check_points))
     trusted = winding.certain and (error is None or error < 0.1)
     agrees = trusted and winding.number == listed
     return CertifiedSpectrum(spectrum, winding, agrees, listed, winding.number, error,
                              _statement(spectrum, winding, listed, agrees, error))
+
+
+def _listed(spectrum, winding) -> int:
+    """Eigenvalues of the spectrum in the region of the count."""
+    inside = np.flatnonzero(spectrum.frequency <= winding.band)
+    return spectrum.select(inside).count_right_of(winding.line)
 
 
 def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> float:
@@ -119,13 +138,9 @@ def _checks(spectrum, winding, number):
     return frequencies or list(winding.frequencies[1:2])
 
 
-def _reference_hints(basis, pencil):
-    reduced = basis.reduced(pencil)
-    return Determinant(reduced).reference_zeros()
-
-
 def _statement(spectrum, winding, listed, agrees, error):
     where = "" if winding.line == 0 else f" with a growth rate above {winding.line:.4g} 1/s"
+    where += "" if np.isinf(winding.band) else f" up to {winding.band:.4g} Hz"
     if agrees:
         return (f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree.")
     if not winding.certain:

@@ -19,16 +19,8 @@ def all_pairs(pencil: CoupledPencil, *, left: bool):
     w, W : ndarray or None
         Left vectors of the polynomial, w^H T = 0.
     """
-    F, E = pencil.first_order()
+    F, E, unit, row, col = _scaled(pencil)
     n = pencil.n
-    # frequencies in units of their typical size, else infinite eigenvalues are hard to tell
-    unit = np.sqrt(_largest(pencil.K) / (_largest(pencil.M) or 1.0)) or 1.0
-    col = np.ones(pencil.order)
-    col[n:2 * n] = unit
-    F, E = F * col, E * (col * unit)
-    size = np.maximum(np.abs(F).max(axis=1), np.abs(E).max(axis=1))
-    row = 1.0 / np.where(size > 0, size, 1.0)
-    F, E = F * row[:, None], E * row[:, None]
     values, right, conjugate_left = _standard(F, E, left)
     if values is None:
         values, right, conjugate_left = _general(F, E, left)
@@ -38,6 +30,32 @@ def all_pairs(pencil: CoupledPencil, *, left: bool):
         return values, x[:n], x[2 * n:], None, None
     z = conjugate_left[:, keep] * row[:, None]
     return values, x[:n], x[2 * n:], z[n:2 * n], z[2 * n:]
+
+
+def all_eigenvalues(pencil: CoupledPencil) -> np.ndarray:
+    """Finite eigenvalues without vectors, conjugates given once; several times as fast."""
+    F, E, unit, _, _ = _scaled(pencil)
+    getrf, getrs, gecon = la.get_lapack_funcs(("getrf", "getrs", "gecon"), (E,))
+    lu, pivots, info = getrf(E)
+    if info != 0 or gecon(lu, np.linalg.norm(E, 1))[0] < 1e-9:
+        values = all_pairs(pencil, left=False)[0]
+        return values
+    values = la.eigvals(getrs(lu, pivots, F)[0], check_finite=False) * unit
+    return values[values.imag >= 0]
+
+
+def _scaled(pencil):
+    """F, E in units of a typical frequency, rows equilibrated, and the scales."""
+    F, E = pencil.first_order()
+    n = pencil.n
+    # else infinite eigenvalues are hard to tell
+    unit = np.sqrt(_largest(pencil.K) / (_largest(pencil.M) or 1.0)) or 1.0
+    col = np.ones(pencil.order)
+    col[n:2 * n] = unit
+    F, E = F * col, E * (col * unit)
+    size = np.maximum(np.abs(F).max(axis=1), np.abs(E).max(axis=1))
+    row = 1.0 / np.where(size > 0, size, 1.0)
+    return F * row[:, None], E * row[:, None], unit, row, col
 
 
 def _standard(F, E, left):

@@ -129,8 +129,8 @@ class Determinant:
         values = la.eigvals(form)
         return values[values.imag > 0]
 
-    def __call__(self, omega: float) -> complex:
-        """log |ratio| + i arg ratio at line + i omega; the argument is known modulo 2 pi.
+    def __call__(self, z: complex) -> complex:
+        """log |ratio| + i arg ratio at line + z; the argument is known modulo 2 pi.
 
         NaN where the structure is singular to the last bit.
         """
@@ -138,12 +138,12 @@ class Determinant:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore", la.LinAlgWarning)
             try:
-                return self._evaluate(omega)
+                return self._evaluate(complex(z))
             except SingularShiftError:
                 return complex(np.nan, np.nan)
 
-    def _evaluate(self, omega):
-        p, s, z = self.pencil, complex(self.line, omega), complex(0.0, omega)
+    def _evaluate(self, z):
+        p, s = self.pencil, self.line + z
         if self._dense:
             M, C, K, Cr, Kr = self._parts
             lu = la.lu_factor(s * s * M + s * C + K, check_finite=False)

@@ -84,7 +84,7 @@ def _plan(pencil, count, options, workspace):
 def _search(pencil, count, options, workspace, first) -> Found:
     found = empty(pencil, options.left)
     aim = max(count, options.least)
-    pairs = min(2 * aim + 4, options.max_pairs)
+    pairs = min(int(2.4 * aim) + 4, options.max_pairs)
     given = options.shifts is not None
     queue = list(options.shifts) if given else [first]
     while queue:
@@ -233,10 +233,28 @@ def _leading(found, aim, options) -> tuple[float, float]:
         values = values[values.imag <= band * (1 + 1e-12)]
         growth = np.sort(values.real)[::-1]
         return (growth[min(aim, growth.size) - 1] if growth.size else -np.inf), band
-    order = np.argsort(-values.real)[:aim]
-    if not order.size:
+    if not values.size:
         return -np.inf, np.inf
+    if not found.everything:
+        covered = _widest_band(found, aim)
+        if covered is not None:
+            return covered
+    order = np.argsort(-values.real)[:aim]
     return float(values.real[order].min()), float(values.imag[order].max())
+
+
+def _widest_band(found, aim) -> tuple[float, float] | None:
+    """The widest band whose leading modes the region covers, with the growth rate of the last."""
+    region = SearchedRegion(tuple(found.ovals.values()))
+    tops = np.unique(found.values.imag)[::-1]
+    for band in tops[::max(1, tops.size // 60)]:
+        growth = np.sort(found.values.real[found.values.imag <= band])[::-1]
+        if growth.size < aim:
+            return None
+        low, high = region.complete_between(float(band), samples=100)
+        if low <= growth[aim - 1] and high > 0:
+            return float(growth[aim - 1]), float(band)
+    return None
 
 
 def _is_covered(found, aim, options) -> bool:
@@ -279,7 +297,7 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
     if options.limit_point is not None:
         order = order[found.values.real[order] > CLEAR * options.limit_point]
     order = order[:count]
-    if options.max_frequency is None and order.size:
+    if options.limit_point is not None and options.max_frequency is None and order.size:
         band = float(found.values.imag[order].max())
     low, high = region.complete_between(band)
     notes = list(found.notes)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .condensation import Workspace
+from .dense import all_eigenvalues
 from .options import SearchOptions
 from .pencil import CoupledPencil
 from .search import leading_modes
@@ -79,7 +80,7 @@ def sweep(pencil_at: Callable[[float], CoupledPencil], values, count: int,
     options = options or SearchOptions()
     workspace = workspace or Workspace()
     basis = basis or TransferBasis(pencil_at(float(values[0])))
-    small = replace(options, method="dense", left=False)
+    band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
 
     def reduced(value):
         pencil = pencil_at(value)
@@ -100,16 +101,21 @@ def sweep(pencil_at: Callable[[float], CoupledPencil], values, count: int,
             break
         index = queue.pop(0)
         value = float(values[index])
-        full = leading_modes(pencil_at(value), count, replace(options, left=True), workspace=workspace)
-        error = _difference(full, leading_modes(reduced(value), count + 4, small))
+        pencil = pencil_at(value)
+        full = leading_modes(pencil, count, options, workspace=workspace)
+        error = _difference(full, all_eigenvalues(reduced(value)))
         done.append((value, error))
         if error > tolerance:
+            if full.left_q is None:
+                full = leading_modes(pencil, count, replace(options, left=True), workspace=workspace)
             basis.enlarge(full.q, full.left_q)
             # what was enlarged has to be checked at a place it was not made for
             queue.append(_farthest(values, [v for v, _ in done]))
     table = np.full((values.size, count), np.nan, complex)
     for row, value in zip(table, values):
-        found = leading_modes(reduced(float(value)), count, small).eigenvalues
+        found = all_eigenvalues(reduced(float(value)))
+        found = found[found.imag <= band]
+        found = found[np.lexsort((found.imag, -found.real))][:count]
         row[:found.size] = found
     notes = () if certified else (
         f"After {len(done)} full solves the basis still missed the tolerance {tolerance:.1g}; "
@@ -120,7 +126,7 @@ def sweep(pencil_at: Callable[[float], CoupledPencil], values, count: int,
 def _difference(full, reduced) -> float:
     worst = 0.0
     for value in full.eigenvalues:
-        gap = np.abs(reduced.eigenvalues - value).min(initial=np.inf)
+        gap = np.abs(reduced - value).min(initial=np.inf)
         worst = max(worst, float(gap / max(abs(value), 1e-300)))
     return worst
 

@@ -25,11 +25,13 @@ class Count:
         False if the phase could not be followed everywhere; then `notes` says why.
     line : float
         Growth rate of the line, 1/s.
+    band : float
+        Hz, infinite if all frequencies were counted.
     distance : float
         Distance from an integer of the winding found before the limit at infinity, where the
         phase is known exactly, is put in.
     frequencies : ndarray, shape (k,)
-        Points used, Hz, ascending from zero.
+        Points used, Hz, ascending from zero; beyond `band` they lie to the right at that frequency.
     phase : ndarray, shape (k,)
         Continuous phase there, rad.
     largest_increment : float
@@ -41,6 +43,7 @@ class Count:
     number: int
     certain: bool
     line: float
+    band: float
     distance: float
     frequencies: np.ndarray
     phase: np.ndarray
@@ -49,8 +52,8 @@ class Count:
     notes: tuple[str, ...] = ()
 
 
-def unstable_count(pencil: CoupledPencil, *, line: float | None = None, hints=(),
-                   scale: float | None = None, max_points: int | None = None) -> Count:
+def unstable_count(pencil: CoupledPencil, *, line: float | None = None,
+                   band: float | None = None, hints=(), scale: float | None = None, max_points: int | None = None) -> Count:
     """Count the eigenvalues with growth rate above a line by the argument principle.
 
     The phase of det T(line + i omega) relative to a stable structure is followed from zero
@@ -65,6 +68,9 @@ def unstable_count(pencil: CoupledPencil, *, line: float | None = None, hints=()
     line : float, optional
         Growth rate, 1/s. Default 0; for a structure without any damping, whose eigenvalues
         may lie on the imaginary axis, a small positive value, which `Count.line` reports.
+    band : float, optional
+        Hz. Count only eigenvalues up to this frequency: the path turns off to the right there.
+        For structures with hardly any damping, or a pencil that is only good up to there.
     hints : iterable of complex
         Places near which the phase may turn fast (eigenvalues of structure or pencil).
         They add points, nothing else.
@@ -92,7 +98,7 @@ def unstable_count(pencil: CoupledPencil, *, line: float | None = None, hints=()
     dense = pencil.n <= Determinant.dense_below
     # a zero of the pencil can hide from a coarse walk only beside a zero of the reference
     hints = [complex(h) for h in hints] + [line + z for z in determinant.reference_zeros()]
-    walk = _Walk(determinant, max_points or (4000 if dense else 300))
+    walk = _Walk(determinant, max_points or (4000 if dense else 300), band)
     walk.start(scale, hints)
     walk.refine()
     return walk.count()
@@ -101,18 +107,23 @@ def unstable_count(pencil: CoupledPencil, *, line: float | None = None, hints=()
 class _Walk:
     """The phase along the line, refined until neighbours are close."""
 
-    def __init__(self, determinant, max_points):
+    def __init__(self, determinant, max_points, band=None):
         self.f, self.max_points = determinant, max_points
+        self.turn = np.inf if band is None else 2 * np.pi * band
         self.values: dict[float, complex] = {}
         self.notes: list[str] = []
 
     def _add(self, omega):
         if not any(abs(omega - w) <= 1e-12 * omega for w in self.values):
-            value = self.f(omega)
+            value = self.f(self._place(omega))
             if np.isfinite(value):
                 self.values[omega] = value
             else:
                 self._complain(f"An eigenvalue lies on the line, at {omega / (2 * np.pi):.6g} Hz.")
+
+    def _place(self, t):
+        """Up the line to the band's end, there to the right."""
+        return complex(0.0, t) if t <= self.turn else complex(t - self.turn, self.turn)
 
     def _complain(self, sentence):
         if sentence not in self.notes:
@@ -121,10 +132,14 @@ class _Walk:
     def start(self, scale, hints):
         self._add(0.0)
         self.values.setdefault(0.0, 0j)  # kept as a place even where the value is lost
-        for omega in scale * 10.0 ** np.arange(-3, 1.01, 0.25):
+        steps = scale * 10.0 ** np.arange(-3, 1.01, 0.25)
+        for omega in steps:
             self._add(float(omega))
+        if np.isfinite(self.turn):
+            for omega in (self.turn, *(self.turn + steps)):
+                self._add(float(omega))
         for h in hints:
-            if abs(h.imag) == 0:
+            if h.imag == 0 or abs(h.imag) > self.turn:
                 continue
             width = max(abs(h.real - self.f.line), 1e-9 * abs(h))
             for offset in (-10, -3, -1, 0, 1, 3, 10):
@@ -146,6 +161,9 @@ class _Walk:
     def _tail(self, top):
         """Distance of the phase from its limit; without a known limit, from a multiple of pi/2."""
         phase = self.values[top].imag
+        if np.isfinite(self.turn):
+            target = self.f.leading_phase if self.f.degree is not None else np.pi * round(phase / np.pi)
+            return _principal(target - phase)
         if self.f.degree is None:
             return (phase + np.pi / 4) % (np.pi / 2) - np.pi / 4
         return _principal(self.f.leading_phase + 0.5 * np.pi * self.f.degree - phase)
@@ -198,7 +216,8 @@ class _Walk:
         steps = np.array([_principal(d) for d in np.diff(raw.imag)])
         phase = raw[0].imag + np.concatenate([[0.0], np.cumsum(steps)])
         tail = self._tail(omegas[-1])
-        degree = self.f.degree
+        # to the right of a band the path ends at the real axis, where a power has no phase
+        degree = 0 if np.isfinite(self.turn) else self.f.degree
         if degree is None:
             # |f| ~ omega^degree over the last decade
             k = max(0, len(omegas) - 4)
@@ -216,7 +235,8 @@ class _Walk:
         if abs(closed - number) > 0.05 or number < 0:
             certain = False
             self.notes.append("The winding is not a whole number.")
-        return Count(number=number, certain=certain, line=self.f.line, distance=distance,
+        return Count(number=number, certain=certain, line=self.f.line,
+                     band=self.turn / (2 * np.pi), distance=distance,
                      frequencies=omegas / (2 * np.pi), phase=phase, largest_increment=largest,
                      evaluations=self.f.evaluations, notes=tuple(self.notes))
 

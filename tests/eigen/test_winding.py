@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from eigen import CoupledPencil, TransferBasis, certified_spectrum, unstable_count
+from eigen import CoupledPencil, SearchOptions, TransferBasis, certified_spectrum, unstable_count
 from eigen.response import Determinant
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues, random_pencil
@@ -44,6 +44,30 @@ def test_lines_other_than_the_axis(line):
         count = unstable_count(pencil, line=line)
         assert count.certain
         assert count.number == int(np.sum(dense_eigenvalues(pencil).real > line))
+
+
+def test_counts_within_a_band():
+    rng = np.random.default_rng(12)
+    for k in range(40):
+        pencil = random_case(rng)
+        values = dense_eigenvalues(pencil)
+        band = 0.5
+        line = unstable_count(pencil).line
+        count = unstable_count(pencil, band=band)
+        if np.abs(np.abs(values.imag[values.real > line]) - 2 * np.pi * band).min(initial=1.0) < 1e-3:
+            continue  # on the edge of the band
+        inside = (values.real > count.line) & (np.abs(values.imag) <= 2 * np.pi * band)
+        assert count.certain and count.number == int(inside.sum())
+
+
+def test_an_undamped_plate_is_counted_in_the_band_of_its_spectrum():
+    pencil = plate_over_channel(6, 15, beta=0.0)
+    result = certified_spectrum(pencil, 8, SearchOptions(max_frequency=40.0))
+    assert result.agrees, result.statement
+    assert result.count.band < 40.0 and "Hz" in result.statement
+    values = dense_eigenvalues(pencil)
+    inside = (values.real > result.count.line) & (np.abs(values.imag) <= 2 * np.pi * result.count.band)
+    assert result.unstable_count == int(inside.sum())
 
 
 def test_a_structure_unstable_by_itself_is_counted():
