@@ -1,0 +1,120 @@
+"""Parameters that stability is asked over: of the load, of the surroundings, of the design."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Callable, Mapping
+
+from ..case.model import Case
+from ..errors import SolveError
+from ..model import ValveModel
+from ..model.dynamics import Conditions
+
+#: Parameters of the surroundings, which leave the steady state as it is.
+SURROUNDINGS = ("density", "alpha", "beta", "storage")
+#: Parameters of the design, for which the model is built anew.
+DESIGN = ("thickness", "angle", "strain")
+#: Names in `dbvfiv.model.system.ValveSystem`.
+SYSTEM_NAMES = {"pressure": "inlet"}
+#: Labels with units.
+LABELS = {
+    "pressure": "Inlet pressure, kPa", "density": "Fluid density, kg/m³", "alpha": "Mass damping α, 1/s", "beta": "Stiffness damping β, s",
+    "storage": "Continuity law (0 quasi-steady, 1 storage)", "thickness": "Wall thickness factor", "angle": "Fibre angle, degrees",
+    "strain": "Strain level of the rubbers",
+}  # fmt: skip
+UNITS = {"pressure": "Pa", "density": "kg/m3", "alpha": "1/s", "beta": "s", "storage": "", "thickness": "", "angle": "degrees", "strain": ""}
+#: What figures divide a parameter by.
+SCALES = {"pressure": 1e3}
+
+
+@dataclass(frozen=True)
+class Place:
+    """One set of parameters.
+
+    Attributes
+    ----------
+    pressure : float, Pa
+    density, alpha, beta : float
+        kg/m3, 1/s, s.
+    storage : float
+        Blend of the continuity laws, 0 quasi-steady, 1 storage.
+    design : dict
+        Values of those of `DESIGN` that are not the case's own.
+    """
+
+    pressure: float
+    density: float
+    alpha: float
+    beta: float
+    storage: float
+    design: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, case: Case) -> "Place":
+        """The parameters of a case."""
+        storage = 1.0 if case.fluid.continuity == "storage" else 0.0
+        return cls(case.drive.pressure, case.fluid.density, case.damping.alpha, case.damping.beta, storage)
+
+    def at(self, **values: float) -> "Place":
+        """With some parameters changed."""
+        own = {name: float(value) for name, value in values.items() if name not in DESIGN}
+        design = {name: float(value) for name, value in values.items() if name in DESIGN}
+        return replace(self, **own, design={**self.design, **design})
+
+    @property
+    def condition(self) -> tuple[float, float, float, float]:
+        """(density, alpha, beta, storage)."""
+        return self.density, self.alpha, self.beta, self.storage
+
+    @property
+    def conditions(self) -> Conditions:
+        return Conditions(self.density, self.alpha, self.beta)
+
+    def value(self, name: str) -> float:
+        return float(self.design[name] if name in DESIGN else getattr(self, name))
+
+    def mu(self) -> dict[str, float]:
+        """Parameters of a `ValveSystem`."""
+        return {"inlet": self.pressure, "density": self.density, "alpha": self.alpha, "beta": self.beta, "storage": self.storage, **self.design}
+
+
+def is_surrounding(name: str) -> bool:
+    """Whether a parameter leaves the linearised structure as it is."""
+    return name in SURROUNDINGS
+
+
+def check_flow(case: Case) -> None:
+    """Refuse a case without flow.
+
+    Raises
+    ------
+    SolveError
+    """
+    if case.drive.kind != "flow":
+        raise SolveError("Without flow nothing couples the fluid to the wall, so there is no onset to look for; drive.kind must be 'flow'.")
+
+
+def redesigned(case: Case, design: Mapping[str, float]) -> Case:
+    """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain level (0.1 for 10 %).
+
+    Raises
+    ------
+    CaseError
+        For values that the case does not allow.
+    """
+    changes: dict[str, object] = {}
+    if "thickness" in design:
+        changes["valve.thickness_factor"] = case.valve.thickness_factor * design["thickness"]
+    if "strain" in design:
+        changes["materials.strain_level"] = design["strain"]
+    if "angle" in design:
+        layers = case.to_dict()["layers"]
+        for layer in layers:
+            if layer["angle"]:
+                layer["angle"] = design["angle"] if layer["angle"] > 0 else -design["angle"]
+        changes["layers"] = layers
+    return case.replace(changes) if changes else case
+
+
+def rebuilder(case: Case) -> Callable[[Mapping[str, float]], ValveModel]:
+    """Models of a case for design parameters."""
+    return lambda design: ValveModel(redesigned(case, design))

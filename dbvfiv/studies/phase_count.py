@@ -1,0 +1,247 @@
+"""How many unstable eigenvalues a reduced state has, by the argument principle, for many conditions at once.
+
+The response h(s) = J (s^2 M + s C + K)^-1 G of the structure is condensed to the few patterns of area and pressure that matter; then
+
+    d(s) = det [ I - h A, -h B ; R, S ]
+
+is analytic right of the imaginary axis apart from unstable poles of the structure itself, and grows like s at most. Its phase along the imaginary axis is
+followed for every density, with points added where it turns fast. No eigenvalue of the coupled pencil is used except as a hint where to look.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from .reduction import POWERS, Reduced
+
+#: Largest accepted step of the phase between neighbours, rad.
+LARGEST_STEP = np.pi / 3
+#: Patterns of area and pressure weaker than this are left out.
+PATTERNS = 1e-5
+#: Determinants evaluated at once, so that they stay in the processor's cache.
+CHUNK = 96
+#: Distance of the last phase from its limit that calls for higher frequencies, rad.
+LATE = 0.1
+#: Distance from a whole number up to which a count is certain.
+CERTAIN = 0.1
+
+
+@dataclass(frozen=True)
+class PhaseCounts:
+    """Counts of unstable eigenvalues, conjugates counted apart.
+
+    Attributes
+    ----------
+    number : (cells,) int array
+    certain : (cells,) bool array
+        The phase was followed everywhere and ended at its limit.
+    points : int
+        Frequencies at which some determinant was evaluated.
+    """
+
+    number: np.ndarray
+    certain: np.ndarray
+    points: int
+
+
+class Response:
+    """h(s) of a reduced state at one damping, condensed to the patterns that matter.
+
+    Parameters
+    ----------
+    reduced : Reduced
+    alpha, beta : float
+    """
+
+    def __init__(self, reduced: Reduced, alpha: float, beta: float):
+        k = reduced.size
+        damping = alpha * reduced.M + beta * reduced.Ks
+        form = np.zeros((2 * k, 2 * k))
+        form[:k, k:] = np.eye(k)
+        form[k:] = -np.linalg.solve(reduced.M, np.hstack([reduced.K, damping]))
+        self.poles, right = la.eig(form)
+        left = np.linalg.solve(right, np.vstack([np.zeros_like(reduced.G), np.linalg.solve(reduced.M, reduced.G)]).astype(complex))
+        self._out, self._in = reduced.J @ right[:k], left
+        self.unstable = int(np.sum(self.poles.real > 0))
+        scale = self.scale = float(np.abs(self.poles[np.abs(self.poles.imag) > 0]).min(initial=np.inf))
+        if not np.isfinite(scale):
+            scale = self.scale = float(np.abs(self.poles).min())
+        sample = [self._full(1j * scale * f) for f in (0.0, 0.9, 2.0, 5.0, 20.0, 100.0, 1e3)]
+        sample = [x / np.abs(x).max() for x in sample]
+        P = _patterns([part for x in sample for part in (x.real, x.imag)])
+        Q = _patterns([part.T for x in sample for part in (x.real, x.imag)])
+        rank = min(P.shape[1], Q.shape[1])  # equally many, so that h has an inverse
+        self.P, self.Q = P[:, :rank], Q[:, :rank]
+        self.top = 30.0 * float(np.abs(self.poles).max())
+        self._left, self._right = self.P.T @ self._out, self._in @ self.Q
+
+    def _full(self, s: complex) -> np.ndarray:
+        return (self._out / (s - self.poles)) @ self._in
+
+    def __call__(self, omega: np.ndarray) -> np.ndarray:
+        """h(i omega), (len(omega), r, r)."""
+        weight = 1.0 / (1j * np.asarray(omega)[:, None] - self.poles)
+        return (self._left[None] * weight[:, None, :]) @ self._right
+
+    def inverse(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Inverses of h(i omega), and the phases of its determinants."""
+        h = self(omega)
+        return np.linalg.inv(h), np.angle(np.linalg.slogdet(h)[0])
+
+
+def _patterns(parts) -> np.ndarray:
+    vectors, weight, _ = np.linalg.svd(np.hstack(parts), full_matrices=False)
+    return vectors[:, weight > PATTERNS * weight[0]]
+
+
+def phase_counts(reduced: Reduced, conditions, hints=None, most_points: int = 400) -> PhaseCounts:
+    """Count unstable eigenvalues at several conditions.
+
+    Parameters
+    ----------
+    reduced : Reduced
+    conditions : sequence of (density, alpha, beta, storage)
+    hints : sequence of complex arrays, optional
+        For each condition, places near which the phase may turn fast.
+    most_points : int
+        Per condition.
+    """
+    conditions = [tuple(map(float, c)) for c in conditions]
+    number, certain = np.zeros(len(conditions), int), np.zeros(len(conditions), bool)
+    points = 0
+    for damping in dict.fromkeys(c[1:3] for c in conditions):
+        members = [i for i, c in enumerate(conditions) if c[1:3] == damping]
+        walk = _Walk(Response(reduced, *damping), reduced, [conditions[i] for i in members])
+        walk.start([() if hints is None else hints[i] for i in members])
+        walk.refine(most_points)
+        number[members], certain[members] = walk.counts()
+        points += walk.points
+    return PhaseCounts(number, certain, points)
+
+
+class _Walk:
+    """Phases along the imaginary axis for conditions of one damping, as sorted arrays per condition."""
+
+    def __init__(self, response: Response, reduced: Reduced, conditions):
+        self.response, self.conditions = response, conditions
+        self.root = np.sqrt([c[0] for c in conditions])
+        self._known: dict[float, np.ndarray] = {}
+        self._parts = [self._condensed(reduced.fluid.parts(c[3])) for c in conditions]
+        self.order = 1 if self._parts[0]["S0"].size else 0
+        self.omega = [np.zeros(0) for _ in conditions]
+        self.phase = [np.zeros(0) for _ in conditions]
+        self.points = 0
+        self._cut = [False] * len(conditions)
+        self._same = len({id(p) for p in self._parts}) == 1
+
+    def _condensed(self, parts):
+        P, Q = self.response.P, self.response.Q
+        key = id(parts)
+        if key not in self._known:
+            made = {}
+            for name, value in parts.items():
+                value = Q.T @ value if name[0] in "AB" else value
+                made[name] = value @ P if name[0] in "AR" else value
+            self._known[key] = made
+        return self._known[key]
+
+    def _angles(self, cells: np.ndarray, omega: np.ndarray) -> np.ndarray:
+        """Phase of d(i omega), for pairs of a cell and a frequency."""
+        unique, where = np.unique(omega, return_inverse=True)
+        inverse, own = self.response.inverse(unique)
+        self.points += len(omega)
+        angle = own[where]
+        for first in range(0, len(omega), CHUNK):
+            some = slice(first, first + CHUNK)
+            angle[some] += self._chunk(cells[some], omega[some], inverse[where[some]])
+        return angle
+
+    def _chunk(self, cells, omega, inverse) -> np.ndarray:
+        """Phase of det [h^-1 - A, -B; R, S]."""
+        r, b = inverse.shape[1], self.order
+        z = (1j * omega * self.root[cells])[:, None, None]
+        parts = self._parts[0] if self._same else {name: np.stack([self._parts[i][name] for i in cells]) for name in POWERS}
+        A = z * parts["A2"]
+        A += parts["A1"]
+        A *= z
+        A += parts["A0"]
+        np.subtract(inverse, A, out=A)
+        if b:
+            matrix = np.empty((len(omega), r + b, r + b), complex)
+            matrix[:, :r, :r] = A
+            matrix[:, :r, r:] = -(parts["B0"] + z * parts["B1"])
+            matrix[:, r:, :r] = parts["R0"] + z * (parts["R1"] + z * parts["R2"])
+            matrix[:, r:, r:] = parts["S0"] + z * parts["S1"]
+            A = matrix
+        return np.angle(np.linalg.slogdet(A)[0])
+
+    def _add(self, cells, omega):
+        if not len(cells):
+            return
+        cells, omega = np.asarray(cells), np.asarray(omega, float)
+        angles = self._angles(cells, omega)
+        for i in np.unique(cells):
+            mine = cells == i
+            joined, first = np.unique(np.concatenate([self.omega[i], omega[mine]]), return_index=True)
+            self.omega[i] = joined
+            self.phase[i] = np.concatenate([self.phase[i], angles[mine]])[first]
+
+    def start(self, hints):
+        scale = self.response.scale
+        poles = self.response.poles
+        base = [0.0, *np.geomspace(0.05 * scale, self.response.top, 22)]
+        near = poles[(poles.imag > 0) & (np.abs(poles.real) < 0.2 * poles.imag)]
+        base += list(near.imag)
+        cells, omega = [], []
+        for i, hint in enumerate(hints):
+            own = list(base)
+            for value in np.asarray(hint, complex):
+                width, middle = max(abs(value.real), 1e-6 * abs(value)), abs(value.imag)
+                own += [middle + f * width for f in (-1.0, 0.0, 1.0) if middle + f * width > 0]
+            cells += [i] * len(own)
+            omega += own
+        self._add(cells, omega)
+
+    def refine(self, most_points):
+        # a dense fluid that carries much added mass reaches its limit late
+        for _ in range(5):
+            late = [i for i, phase in enumerate(self.phase) if abs(self._gap(phase[-1])) > LATE]
+            self._add(late, [4.0 * self.omega[i][-1] for i in late])
+        for _ in range(40):
+            cells, middle = [], []
+            for i, (omega, phase) in enumerate(zip(self.omega, self.phase)):
+                if self._cut[i]:
+                    continue
+                wide = np.flatnonzero(np.abs(principal(np.diff(phase))) > LARGEST_STEP)
+                wide = wide[np.diff(omega)[wide] > 1e-10 * omega[wide + 1]]
+                if len(omega) + len(wide) > most_points:
+                    self._cut[i] = True
+                    continue
+                a, b = omega[wide], omega[wide + 1]
+                cells += [i] * len(wide)
+                middle += list(np.where((a > 0) & (b > 4 * a), np.sqrt(a * b), 0.5 * (a + b)))
+            if not cells:
+                return
+            self._add(cells, middle)
+
+    def _gap(self, phase: float) -> float:
+        """Distance from the limit at infinity: a multiple of pi, and a quarter turn more for the inner unknown."""
+        return float(principal(2 * (phase - 0.5 * np.pi * self.order)) / 2)
+
+    def counts(self):
+        number, certain = [], []
+        for i, (omega, phase) in enumerate(zip(self.omega, self.phase)):
+            steps = principal(np.diff(phase))
+            turned = steps.sum()
+            gap = self._gap(phase[-1])
+            found = 0.5 * self.order - (turned - gap) / np.pi + self.response.unstable
+            number.append(int(round(found)))
+            certain.append(bool(abs(found - round(found)) < CERTAIN and abs(gap) < 2 * LATE and np.abs(steps).max() <= LARGEST_STEP + 1e-9 and not self._cut[i]))
+        return np.array(number), np.array(certain)
+
+
+def principal(angle):
+    """Angles brought to -pi..pi."""
+    return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
