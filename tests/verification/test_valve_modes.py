@@ -1,0 +1,95 @@
+"""Coupled eigenvalues of the 12-inch valve: known point, two independent counts, insensitivity to how they were sought, mesh."""
+import numpy as np
+import pytest
+
+from dbvfiv.case.model import Case
+from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.studies.steady import run_steady
+from eigen import SearchOptions, Workspace, leading_modes
+from eigen.certificate import certified_spectrum
+from eigen.transfer import TransferBasis
+
+pytestmark = pytest.mark.slow
+LIGHT = Conditions(10.0, 0.0, 0.003)
+
+
+def model_of(around, along, **changes):
+    return ValveModel(Case().replace({"mesh.around": around, "mesh.along": along} | changes))
+
+
+def linearised(model, pressures):
+    return [linearise(model, state.q, state.pressure) for state in run_steady(model, pressures).states]
+
+
+@pytest.fixture(scope="module")
+def valve():
+    """28 x 48 at 6 kPa."""
+    return linearised(model_of(28, 48), [6e3])[0]
+
+
+def options(beta=0.003, **more):
+    return SearchOptions(limit_point=-1 / beta, **more)
+
+
+def test_light_fluid_at_6_kpa(valve):
+    """A first model gave about +27 1/s at 36.3 Hz and -24 at 16.8 Hz; a few per cent between two honest implementations."""
+    found = leading_modes(valve.pencil(LIGHT), 4, options())
+    print(f"\nleading {found.eigenvalues[0].real:+.2f} 1/s at {found.frequency[0]:.2f} Hz (about +27, 36.3), "
+          f"next {found.eigenvalues[1].real:+.2f} at {found.frequency[1]:.2f} Hz (-24, 16.8)")  # fmt: skip
+    assert found.eigenvalues[0].real == pytest.approx(27.0, rel=0.05)
+    assert found.frequency[0] == pytest.approx(36.3, rel=0.03)
+    assert found.eigenvalues[1].real == pytest.approx(-24.0, rel=0.06)
+    assert found.frequency[1] == pytest.approx(16.8, rel=0.05)
+    assert found.residual.max() < 1e-8
+
+
+def test_twice_as_many_and_another_shift_give_the_same(valve):
+    pencil = valve.pencil(LIGHT)
+    few = leading_modes(pencil, 3, options())
+    many = leading_modes(pencil, 6, options())
+    other = leading_modes(pencil, 6, options(shifts=(350.0,)))
+    np.testing.assert_allclose(many.eigenvalues[:3], few.eigenvalues, rtol=1e-8)
+    np.testing.assert_allclose(other.eigenvalues[:3], few.eigenvalues, rtol=1e-8)
+
+
+def test_water_is_damped_from_2_to_50_kpa():
+    print()
+    for lin in linearised(model_of(28, 48), [2e3, 6e3, 12e3, 18e3, 29e3, 36e3, 50e3]):
+        for storage in (0.0, 1.0):
+            found = leading_modes(lin.pencil(Conditions(1000.0, 5.0, 0.003), storage=storage), 4, options())
+            print(f"{lin.inlet / 1e3:5.0f} kPa, {'storage' if storage else 'quasi-steady':12s}: leading {found.eigenvalues[0]:.3f} 1/s")
+            assert found.status == "complete"
+            assert found.growth_rate[0] < 0
+
+
+def test_two_counts_agree_at_200_random_states():
+    """Pressure, density, damping and continuity drawn at random; spectrum and argument principle must find the same number."""
+    rng = np.random.default_rng(20)
+    model = model_of(14, 24)
+    pressures = np.sort(np.exp(rng.uniform(np.log(200.0), np.log(50e3), 20)))
+    unstable, missed = 0, []
+    for lin in linearised(model, pressures):
+        workspace = Workspace()
+        basis = TransferBasis(lin.pencil(LIGHT))
+        for _ in range(10):
+            conditions = Conditions(10 ** rng.uniform(-0.5, 3.2), rng.choice([0.0, rng.uniform(0, 10)]), 10 ** rng.uniform(-4, -2))
+            storage = float(rng.integers(2))
+            both = certified_spectrum(lin.pencil(conditions, storage=storage), 6, options(conditions.beta), workspace=workspace, basis=basis)
+            unstable += both.unstable_count > 0
+            if not both.agrees:
+                missed.append((lin.inlet, conditions, storage, both.statement))
+    print(f"\n200 states, {unstable} of them unstable, {len(missed)} disagreements")
+    assert not missed
+    assert 20 < unstable < 180
+
+
+def test_mesh_convergence_of_the_leading_mode():
+    values = []
+    for around, along in ((14, 24), (28, 48), (56, 96)):
+        lin = linearised(model_of(around, along), [6e3])[0]
+        values.append(leading_modes(lin.pencil(LIGHT), 2, options()).eigenvalues[0])
+    coarse, middle, fine = values
+    order = np.log2(abs(coarse - middle) / abs(middle - fine))
+    print(f"\nleading mode {coarse:.3f}, {middle:.3f}, {fine:.3f} 1/s; observed order {order:.2f}")
+    assert abs(fine - middle) < 0.01 * abs(fine)
+    assert order > 1.8
