@@ -29,7 +29,7 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
     if not path.exists():
         raise CaseError(f"The result file {str(path)!r} does not exist.")
     try:
-        file = h5py.File(path, "r", locking=False)
+        file = _opened(path)
     except PermissionError:
         raise CaseError(f"The result file {str(path)!r} may not be read by this user.") from None
     except _BROKEN as error:
@@ -57,8 +57,23 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
             raise CaseError(f"The {kind} result {str(path)!r} is damaged or cut short ({type(error).__name__}: {detail}).") from error
 
 
-def create(path: str | Path) -> h5py.File:
+def _opened(path: Path) -> h5py.File:
+    """A file for reading; one in single-writer mode also while it is written, or after its writer was killed."""
+    try:
+        return h5py.File(path, "r", locking=False)
+    except OSError as error:
+        if "SWMR" not in str(error) and "already open for write" not in str(error):
+            raise
+        return h5py.File(path, "r", locking=False, libver="latest", swmr=True)
+
+
+def create(path: str | Path, single_writer: bool = False) -> h5py.File:
     """A new result file; an earlier result of the same name is replaced, any other file is left alone.
+
+    Parameters
+    ----------
+    single_writer : bool
+        Prepare the file for HDF5's single-writer mode, in which being killed never breaks it.
 
     Raises
     ------
@@ -71,13 +86,14 @@ def create(path: str | Path) -> h5py.File:
         raise CaseError(f"{str(path)!r} exists and is not a result of dbvfiv, so it is not overwritten; choose another name.")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = h5py.File(path, "w")
+        file = h5py.File(path, "w", libver="latest" if single_writer else None)
     except OSError as error:
         if "lock" in str(error):
             raise CaseError(f"{str(path)!r} is being written by another process; choose another name.") from None
         reason = (getattr(error, "strerror", None) or "the folder may not be written").split(" (", 1)[-1].strip("()")
         raise CaseError(f"The result file {str(path)!r} cannot be written ({_short(reason)}).") from None
-    _hold_back_metadata(file)
+    if not single_writer:
+        _hold_back_metadata(file)
     return file
 
 
@@ -85,7 +101,7 @@ def _replaceable(path: Path) -> bool:
     if not h5py.is_hdf5(path):
         return False
     try:
-        with h5py.File(path, "r", locking=False) as file:
+        with _opened(path) as file:
             return "dbvfiv_kind" in file.attrs
     except _BROKEN:
         return path.suffix in (".h5", ".hdf5")  # HDF5 cut short

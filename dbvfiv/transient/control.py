@@ -61,7 +61,7 @@ class FixedSteps:
                     raise
                 self.level, self.offset, self.successes = self.level + 1, 2 * self.offset, 0
                 self.halvings += 1
-                self.stepper.forget()
+                self.stepper.forget(all=False)
                 continue
             self._grow()
             return result
@@ -108,7 +108,7 @@ class AdaptiveSteps:
                 if 0.5 * h < smallest:
                     raise
                 self.h, self.halvings = 0.5 * h, self.halvings + 1
-                self.stepper.forget()
+                self.stepper.forget(all=False)
                 continue
             ratio = (self.options.error / max(result.error, 1e-30)) ** (1.0 / 3.0)
             if ratio < 0.7 and 0.5 * h >= smallest:

@@ -96,6 +96,7 @@ class ValveMotion:
         scale = np.ones(free.shape)
         scale[:, 3:] = 0.5 * float(np.mean(shell.geometry.thickness))
         self._scale = scale[free]
+        self._rotations = np.flatnonzero(np.broadcast_to(np.arange(5) >= 3, free.shape)[free])
 
     # -- forces ---------------------------------------------------------------------------------------------------------------------
 
@@ -165,6 +166,10 @@ class ValveMotion:
         """Largest displacement in a change (n,) of the unknowns, m; rotations count by the path of the wall's face."""
         return float(np.max(np.abs(dq * self._scale)))
 
+    def turn(self, dq: np.ndarray) -> float:
+        """Largest rotation in a change (n,) of the unknowns, rad."""
+        return float(np.max(np.abs(dq[self._rotations])))
+
     # -- linear algebra -------------------------------------------------------------------------------------------------------------
 
     def linearise(self, q, q_inertia, v, load: Load, weights: Weights) -> None:
@@ -199,6 +204,13 @@ class ValveMotion:
         """Changes of q (n,) and U that the last factored matrix gives for a force (n,) and an outlet pressure."""
         dq, du = self._factor.solve_with_inner(force, np.array([outlet]) if self.moving_fluid else np.zeros(0))
         return dq, float(du[0]) if self.moving_fluid else 0.0
+
+    def begin_step(self, state, h: float, inlet: float) -> None:
+        """A step starts from a state; nothing to prepare where wall and fluid are solved together."""
+
+    def drop_factors(self) -> None:
+        """Forget the factorisation with its analysis, so that later numbers do not depend on matrices seen before."""
+        self._factor = None
 
     @property
     def factorisations(self) -> int:

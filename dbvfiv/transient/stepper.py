@@ -35,6 +35,8 @@ class StepOptions:
         Growth of the corrections that ends an attempt.
     smallest_fraction : float
         Of a Newton correction in the line search.
+    largest_turn : float
+        Largest change of a rotation in a step, rad. Directors that turn further between two instants can gain energy from stiffness damping.
     """
 
     tolerance: float = 1e-5
@@ -43,6 +45,7 @@ class StepOptions:
     refactor_at: float = 0.3
     diverged: float = 100.0
     smallest_fraction: float = 1.0 / 16.0
+    largest_turn: float = 0.3
 
 
 @dataclass(frozen=True)
@@ -95,8 +98,10 @@ class Stepper:
         self.residuals = self.solves = self.factorisations = 0
         self.forget()
 
-    def forget(self) -> None:
-        """Drop the factors and the memory of the predictor, so that the next step depends on the state alone."""
+    def forget(self, all: bool = True) -> None:
+        """Drop factors and the memory of the predictor; with `all` the factorisation's analysis too, so that the next step depends on the state alone."""
+        if all:
+            self.motion.drop_factors()
         self._factored: float | None = None
         self._history: list[tuple[float, np.ndarray]] = []
 
@@ -110,11 +115,17 @@ class Stepper:
         StepFailure
         """
         before = (self.residuals, self.solves, self.factorisations)
-        trial = _Trial(self.motion, self.scheme, state, h, self.pressure(state.time + h))
+        inlet = self.pressure(state.time + h)
+        self.motion.begin_step(state, h, inlet)
+        trial = _Trial(self.motion, self.scheme, state, h, inlet)
         try:
             self._iterate(trial)
         except SingularMatrix as error:
             raise StepFailure(str(error)) from error
+        turn = self.motion.turn(trial.q - state.q)
+        if turn > self.options.largest_turn:
+            self._history = self._history[-1:]
+            raise StepFailure(f"A director turned by {turn:.2g} rad.")
         new = trial.state()
         past = self._history[-1] if self._history else None
         here = (state.time + (1.0 - self.scheme.alpha_m) * h, trial.a_mid)

@@ -1,0 +1,91 @@
+"""The verdict on a run: on its mass flow and its lip opening, with the equilibrium's residual at hand."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..verdict import JudgeOptions, Verdict, judge
+from .history import History
+
+#: Areas below this multiple of the lip gap at rest count as closed.
+CLOSED = 2.0
+
+
+@dataclass(frozen=True)
+class RunVerdict:
+    """Verdicts on the two signals and what they say together.
+
+    Attributes
+    ----------
+    mass_flow, lip_opening : Verdict
+    residual : float
+        Unbalanced force at the end over pressure force; not a number while the pressure changes.
+    steps : int
+    time : float, s
+    """
+
+    mass_flow: Verdict
+    lip_opening: Verdict
+    residual: float
+    steps: int
+    time: float
+
+    @property
+    def name(self) -> str:
+        """The livelier of the two: a flow can look settled while the lip still moves."""
+        names = (self.mass_flow.name, self.lip_opening.name)
+        return max(names, key=_LIVELINESS.index)
+
+    @property
+    def decided(self) -> bool:
+        """Whether both agree and more of the same would not change them."""
+        return self.mass_flow.decided and self.lip_opening.decided and self.mass_flow.name == self.lip_opening.name
+
+    @property
+    def governing(self) -> Verdict:
+        """The verdict that gives the name."""
+        return self.mass_flow if self.mass_flow.name == self.name else self.lip_opening
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON: name and numbers of the mass flow, then each signal by itself."""
+        flow, lip = self.mass_flow.summary(), self.lip_opening.summary()
+        top = {key: flow[key] for key in ("amplitude", "frequency", "mean", "cycles_observed", "periodicity_error")}
+        return {
+            "verdict": self.name,
+            "decided": self.decided,
+            "reason": self.governing.reason,
+            **top,
+            "steps": self.steps,
+            "time": self.time,
+            "residual": self.residual if np.isfinite(self.residual) else None,
+            "mass_flow": flow,
+            "lip_opening": lip,
+        }
+
+
+_LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undecided", "irregular")
+
+
+def assess(history: History, gap: float, residual: float = np.nan, options: JudgeOptions = JudgeOptions(), since: float = 0.0) -> RunVerdict:
+    """Verdict on a history.
+
+    Parameters
+    ----------
+    gap : float
+        Flow area of the whole valve at the lip at rest, m2.
+    residual : float
+        Of the equilibrium at the end; not a number if it is not known.
+    since : float
+        Time, s, before which the drive still changed.
+    """
+    time = history["time"]
+    chosen = time >= since
+    known = residual if np.isfinite(residual) else None
+    found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in ("mass_flow", "lip_opening")]
+    closed = judge(time[chosen], history["smallest_area"][chosen], options, closed_below=CLOSED * gap)
+    if closed.name == "closed":
+        reason = "The smallest flow area stays at that of the lip gap at rest."
+        found = [Verdict(**{**vars(v), "name": "closed", "decided": True, "reason": reason}) for v in found]
+    return RunVerdict(*found, residual, history.rows - 1, float(time[-1]))
