@@ -30,7 +30,7 @@ class Axis:
     Attributes
     ----------
     parameter : str
-        "pressure", "density", "alpha" or "beta"; ``key`` is its key in the case.
+        "pressure", "density", "alpha" or "beta", whose ``key`` is that of the case; studies of stability know more, see `stability_axis`.
     values : tuple of float
         SI values from start to stop.
     log : bool
@@ -46,8 +46,8 @@ class Axis:
         return KEYS[self.parameter]
 
 
-def parse_axis(text: str) -> Axis:
-    """Read ``PARAMETER=START:STOP:COUNT[:log]``.
+def parse_axis(text: str, quantities: dict[str, Quantity] = PARAMETERS) -> Axis:
+    """Read ``PARAMETER=START:STOP:COUNT[:log]`` for one of the parameters that have a quantity.
 
     Raises
     ------
@@ -58,12 +58,12 @@ def parse_axis(text: str) -> Axis:
         raise ValueError("which is not a text")
     name, equals, span = text.partition("=")
     name, parts = name.strip(), [part.strip() for part in span.split(":")]
-    if name not in PARAMETERS:
-        raise ValueError(f"whose parameter is none of {', '.join(PARAMETERS)}")
+    if name not in quantities:
+        raise ValueError(f"whose parameter is none of {', '.join(quantities)}")
     log = parts[-1] in ("log", "lin") and parts.pop() == "log"
     if not equals or len(parts) != 3:
         raise ValueError("which is not of that form")
-    start, stop = (_value(name, part) for part in parts[:2])
+    start, stop = (_value(quantities[name], part) for part in parts[:2])
     if not parts[2].isascii() or not parts[2].isdigit() or len(parts[2]) > 6 or not 2 <= int(parts[2]) <= _LARGEST:
         raise ValueError(f"whose count is not between 2 and {_LARGEST}")
     if start >= stop:
@@ -79,8 +79,8 @@ def parse_axis(text: str) -> Axis:
     return Axis(name, (*values[:-1], stop), log)
 
 
-def _value(name: str, text: str) -> float:
+def _value(quantity: Quantity, text: str) -> float:
     try:
-        return PARAMETERS[name].parse(float(text))
+        return quantity.parse(float(text))
     except ValueError:
-        return PARAMETERS[name].parse(text)
+        return quantity.parse(text)

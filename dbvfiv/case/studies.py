@@ -11,6 +11,7 @@ from .axis import Axis, parse_axis
 from .drive_table import read_drive_table
 from .quantity import Frequency, Length, Number, Pressure, Rate, Time
 from .section import BrokenRule, Section, key
+from .stability_axis import parse_stability_axis
 
 
 def _readable(text: str) -> str:
@@ -19,6 +20,14 @@ def _readable(text: str) -> str:
 
 
 Range = Annotated[StrictStr, AfterValidator(_readable)]
+
+
+def _readable_stability(text: str) -> str:
+    parse_stability_axis(text)
+    return text
+
+
+StabilityRange = Annotated[StrictStr, AfterValidator(_readable_stability)]
 LoadPressure = Annotated[Pressure, Field(gt=0, le=1e7)]
 
 
@@ -62,19 +71,38 @@ class Sweep(Section):
 class Onset(Section):
     """Where a state loses stability."""
 
-    over: Literal["pressure", "density", "alpha", "beta"] = key("density", "The parameter to move.")
+    over: StabilityRange = key(
+        "density",
+        "The parameter to move: pressure, density, alpha, beta, storage (blend of the continuity laws, 0 quasi-steady to 1 storage), thickness (wall "
+        "thickness factor), angle (of the plies, degrees) or strain (level of the rubbers); with =START:STOP:COUNT[:log] behind it for another range than "
+        "the usual one.",
+    )
+    tolerance: Number = key(1e-9, "Relative accuracy of a located onset on its mesh.", gt=0, le=1e-3)
+    normal_form: StrictBool = key(True, "Also the first Lyapunov coefficient, which tells whether cycles are attracting or repelling.")
+    coarse_mesh: Number = key(
+        0.5, "Elements of the second mesh over those of the first, for the uncertainty by Richardson's rule; 0 leaves it out.", ge=0, lt=1
+    )
+
+    @property
+    def axis(self) -> Axis:
+        """The parsed range."""
+        return parse_stability_axis(self.over)
 
 
 class StabilityMap(Section):
     """Stability over two parameters."""
 
-    x: Range = key("pressure=500:50000:64", "Horizontal range: PARAMETER=START:STOP:COUNT[:log].")
-    y: Range = key("density=1:1000:64:log", "Vertical range: PARAMETER=START:STOP:COUNT[:log].")
+    x: StabilityRange = key("pressure=500:50000:64", "Horizontal range: PARAMETER=START:STOP:COUNT[:log]; parameters as in onset.over.")
+    y: StabilityRange = key("density=1:1000:64:log", "Vertical range, likewise.")
+    continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
+    curve: StrictBool = key(True, "Follow the onset curves exactly, by continuation of Hopf points.")
+    checks: StrictInt = key(4, "Cells compared with the full pencil, spread over the map.", ge=0, le=1000)
+    workers: StrictInt = key(1, "Processes that share the columns.", ge=1, le=1024)
 
     @property
     def axes(self) -> tuple[Axis, Axis]:
         """The parsed ranges."""
-        return parse_axis(self.x), parse_axis(self.y)
+        return parse_stability_axis(self.x), parse_stability_axis(self.y)
 
 
 Verdict = Literal["steady", "decaying", "limit cycle", "growing", "closed", "irregular"]
