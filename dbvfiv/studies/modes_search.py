@@ -1,15 +1,14 @@
 """How leading modes of the valve are searched for: what the damping says about where they end."""
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from eigen import SearchOptions, TransferBasis
 
 from ..model.dynamics import Conditions
 
-#: beta times angular frequency from which the limit point -1/beta is among the leading modes.
-_NEAR = 0.3
+#: Share of the limit point right of which eigenvalues count as leading modes; the search of `eigen` takes the same.
+CLEAR = 0.8
 #: Room above the structural frequencies that a band is made of.
 _ROOM = 1.05
 
@@ -37,9 +36,9 @@ def suited(search: SearchOptions, conditions: Conditions, basis: TransferBasis, 
     """
     known = basis.structural_frequencies
     highest = float(known[min(count, len(known)) - 1])
-    if conditions.beta * 2 * math.pi * highest > _NEAR:
+    if conditions.beta > 0:
         return replace(search, limit_point=limit_point(conditions)), ()
-    if conditions.beta > 0 or search.max_frequency is not None:
+    if search.max_frequency is not None:
         return search, ()
     band = _ROOM * highest
     sentence = (

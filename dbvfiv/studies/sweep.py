@@ -1,0 +1,230 @@
+"""Modes tracked along one parameter: fluid density, damping, or inlet pressure."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from eigen import Branches, SearchOptions, Spectrum, TrackOptions, track
+
+from ..case.axis import Axis
+from ..errors import CaseError, SolveError
+from ..flow import Channel
+from ..model import ValveModel
+from ..model.dynamics import Conditions
+from .modes import require_equilibrium, solving
+from .modes_search import CLEAR, limit_point
+from .observer import Observer
+from .state import SteadyState
+from .sweep_family import Check, Family, FluidFamily, PressureFamily
+
+
+@dataclass(frozen=True)
+class SweepOptions:
+    """Options of `run_sweep`.
+
+    Attributes
+    ----------
+    count : int
+        Leading modes to follow.
+    margin : int
+        Further modes computed, so that a mode that changes its rank is not lost.
+    checks : int
+        Values at which the reduced basis is compared with the full pencil and the unstable eigenvalues are counted independently.
+    tolerance : float
+        Accepted relative error of eigenvalues on the reduced basis.
+    least_confidence : float
+        A step is halved while the match of a leading mode is less certain.
+    search : SearchOptions
+        For full solves.
+    """
+
+    count: int = 6
+    margin: int = 4
+    checks: int = 3
+    tolerance: float = 1e-6
+    least_confidence: float = 0.6
+    search: SearchOptions = field(default_factory=SearchOptions)
+
+    @classmethod
+    def of(cls, case) -> "SweepOptions":
+        """Options of a case file."""
+        sweep, modes = case.sweep, case.modes
+        search = SearchOptions(modes.max_frequency, tolerance=modes.tolerance)
+        return cls(sweep.count, checks=sweep.checks, tolerance=sweep.tolerance, least_confidence=sweep.least_confidence, search=search)
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """What is known at one value as soon as it is solved."""
+
+    value: float
+    eigenvalues: np.ndarray
+    unstable_count: int
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """Branches of modes along a parameter.
+
+    Attributes
+    ----------
+    model : ValveModel
+    axis : Axis
+    values : (p,) array
+        Values done, in SI units; fewer than asked for after an interrupt or a failure.
+    branches : Branches
+        Eigenvalues (k, p), NaN where a branch does not exist, and the confidence of each match.
+    unstable_count : (p,) int
+        Eigenvalues with positive growth rate among those found, both of a pair counted.
+    checks : tuple of Check
+    certified : bool
+        All checks held.
+    states : tuple of SteadyState
+        One for each value over pressure, a single one otherwise.
+    notes, failures : tuple of str
+    interrupted : bool
+    """
+
+    model: ValveModel
+    axis: Axis
+    values: np.ndarray
+    branches: Branches
+    unstable_count: np.ndarray
+    checks: tuple[Check, ...]
+    certified: bool
+    states: tuple[SteadyState, ...]
+    notes: tuple[str, ...] = ()
+    failures: tuple[str, ...] = ()
+    interrupted: bool = False
+
+
+def run_sweep(
+    model: ValveModel,
+    axis: Axis,
+    conditions: Conditions | None = None,
+    options: SweepOptions | None = None,
+    observer: Observer | None = None,
+    state: SteadyState | None = None,
+) -> SweepResult:
+    """Follow the leading modes along a parameter.
+
+    Over density, alpha or beta the state stays, so modes are found on a basis that is certified against full solves; over pressure every value has its own
+    equilibrium, found from the nearest one known, and its own full solve. An interrupt, or a pressure that is not reached, ends the sweep and keeps
+    what was found.
+
+    Parameters
+    ----------
+    model : ValveModel
+    axis : Axis
+        Parameter and values.
+    conditions : Conditions, optional
+        Density and damping where they are not swept; those of the case otherwise.
+    options : SweepOptions, optional
+    observer : Observer, optional
+        Gets a `SweepPoint` for every value.
+    state : SteadyState, optional
+        Equilibrium for density, alpha or beta; needed for those.
+
+    Raises
+    ------
+    CaseError
+        If the case has no flow and density is swept.
+    SolveError
+        If not even the first value was solved.
+    """
+    conditions = Conditions.of(model.case) if conditions is None else conditions
+    options = SweepOptions.of(model.case) if options is None else options
+    observer = Observer() if observer is None else observer
+    if axis.parameter == "density" and not isinstance(model.flow, Channel):
+        raise CaseError("sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose pressure, alpha or beta.")
+    if axis.parameter == "pressure":
+        family: Family = PressureFamily(model, conditions, options, observer)
+    else:
+        if state is None:
+            raise ValueError("A sweep over density, alpha or beta needs the state at which it is made.")
+        require_equilibrium(model, state)
+        family = FluidFamily(model, state, axis, conditions, options, observer)
+    observer.begin(f"sweep over {axis.parameter}", len(axis.values))
+    run = _Run(family, axis, options, observer)
+    interrupted, failures = False, ()
+    try:
+        with solving(family.pressure):
+            family.prepare(axis)
+            run.follow(axis.values)
+    except KeyboardInterrupt:
+        interrupted = True
+    except SolveError as error:
+        if not run.points:
+            observer.end(False)
+            raise
+        failures = (str(error),)
+        observer.warn(str(error))
+    result = run.result(model, interrupted, failures)
+    for note in result.notes:
+        observer.warn(note)
+    observer.end(interrupted)
+    return result
+
+
+class _Run:
+    """A walk along the values; spectra are kept, so that an interrupted one can be followed as far as it came."""
+
+    def __init__(self, family: Family, axis: Axis, options: SweepOptions, observer: Observer):
+        self.family, self.axis, self.observer = family, axis, observer
+        self.track = TrackOptions(options.count, options.margin, least_confidence=options.least_confidence)
+        self.pencils: dict[float, object] = {}
+        self.spectra: dict[int, Spectrum] = {}
+        self.points: list[SweepPoint] = []
+        self.branches: Branches | None = None
+
+    def follow(self, values) -> None:
+        self.branches = track(self._pencil, values, self.track, solver=self._solve, observer=self._done)
+
+    def _pencil(self, value: float):
+        value = float(value)
+        if value not in self.pencils:
+            self.pencils[value] = self.family.pencil(value)
+        return self.pencils[value]
+
+    def _solve(self, pencil) -> Spectrum:
+        if id(pencil) not in self.spectra:
+            self.spectra[id(pencil)] = self.family.solve(pencil, self.track.count + self.track.margin)
+        return self.spectra[id(pencil)]
+
+    def _done(self, value: float, _solves: int) -> None:
+        spectrum = self._solve(self._pencil(value))
+        point = SweepPoint(value, spectrum.eigenvalues, spectrum.unstable_count)
+        self.points.append(point)
+        self.observer.item(point)
+
+    def result(self, model: ValveModel, interrupted: bool, failures) -> SweepResult:
+        values = np.array([point.value for point in self.points])
+        points, solves = tuple(self.points), len(self.spectra)
+        if self.branches is None and len(values):
+            self.observer = Observer()
+            self.branches = track(self._pencil, values, self.track, solver=self._solve)
+        branches = _shown(self.branches, self.family, values) if len(values) else Branches(np.zeros(0, int), values, *np.zeros((2, 0, 0)), 0)
+        checks, notes = self.family.checks(values) if len(values) and not interrupted else (self.family.done, ())
+        certified = bool(checks) and not interrupted and all(check.holds for check in checks)
+        counts = np.array([point.unstable_count for point in points], int)
+        return SweepResult(
+            model, self.axis, values, Branches(branches.ids, values, branches.eigenvalues, branches.confidence, solves), counts, tuple(checks),
+            certified, self.family.states(values), tuple(notes), tuple(failures), interrupted,
+        )  # fmt: skip
+
+
+def _shown(branches: Branches, family: Family, values: np.ndarray) -> Branches:
+    """Branches clearly right of the limit point -1/beta, numbered from 1 by their largest growth rate."""
+    eigenvalues, confidence = branches.eigenvalues.copy(), branches.confidence.copy()
+    for column, value in enumerate(values):
+        limit = limit_point(family.conditions_at(value))
+        if limit is not None:
+            beyond = eigenvalues[:, column].real <= CLEAR * limit
+            eigenvalues[beyond, column] = np.nan
+            confidence[beyond, column] = np.nan
+    there = np.isfinite(eigenvalues.real)
+    kept = np.flatnonzero(there.any(axis=1))
+    highest = np.where(there[kept], eigenvalues[kept].real, -np.inf).max(axis=1, initial=-np.inf)
+    order = kept[np.argsort(-highest, kind="stable")]
+    return Branches(1 + np.arange(len(order)), values, eigenvalues[order], confidence[order], branches.solves)

@@ -1,0 +1,203 @@
+"""Pencils along a parameter: on one reduced basis where the state stays, in full where it moves."""
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+import eigen
+from eigen import CoupledPencil, SearchOptions, Spectrum, TransferBasis, Workspace, certified_spectrum, leading_modes, unstable_count
+
+from ..case.axis import Axis
+from ..model import ValveModel
+from ..model.dynamics import Conditions, linearise
+from .modes_search import suited
+from .observer import Observer
+from .state import SteadyState
+from .steady import LoadPath, SteadyOptions
+
+#: Further places at most at which an enlarged basis is checked.
+_FRESH = 4
+
+
+@dataclass(frozen=True)
+class Check:
+    """What was verified at one value.
+
+    Attributes
+    ----------
+    value : float
+    error : float
+        Largest relative difference of the leading eigenvalues between basis and full pencil; largest residual where every value is solved in full.
+    unstable_count, unstable_count_independent : int
+        Both eigenvalues of a pair count.
+    agrees : bool
+        The counts are equal and the independent one is certain.
+    accurate : bool
+        The error is within the tolerance.
+    """
+
+    value: float
+    error: float
+    unstable_count: int
+    unstable_count_independent: int
+    agrees: bool
+    accurate: bool
+
+    @property
+    def holds(self) -> bool:
+        return self.agrees and self.accurate
+
+
+class Family(Protocol):
+    """Pencils along a parameter."""
+
+    done: tuple[Check, ...]
+    pressure: float
+
+    def prepare(self, axis: Axis) -> None: ...
+
+    def conditions_at(self, value: float) -> Conditions: ...
+
+    def pencil(self, value: float) -> CoupledPencil: ...
+
+    def solve(self, pencil: CoupledPencil, count: int) -> Spectrum: ...
+
+    def checks(self, values: np.ndarray) -> tuple[tuple[Check, ...], tuple[str, ...]]: ...
+
+    def states(self, values: np.ndarray) -> tuple[SteadyState, ...]: ...
+
+
+class FluidFamily:
+    """One state; density, alpha or beta moves."""
+
+    def __init__(self, model: ValveModel, state: SteadyState, axis: Axis, conditions: Conditions, options, observer: Observer):
+        self.state, self.axis, self.conditions, self.options, self.observer = state, axis, conditions, options, observer
+        self.linear = linearise(model, state.q, state.pressure)
+        self.pressure = state.pressure
+        self.done: tuple[Check, ...] = ()
+        self.notes: tuple[str, ...] = ()
+        self.small = self.linear
+        self.search = options.search
+        self.errors: dict[float, float] = {}
+        self.workspace = Workspace()
+
+    def conditions_at(self, value: float) -> Conditions:
+        return replace(self.conditions, **{self.axis.parameter: float(value)})
+
+    def prepare(self, axis: Axis) -> None:
+        """Make the basis and enlarge it until full solves at some of the values confirm it."""
+        values = np.array(axis.values)
+        basis = TransferBasis(self._full(values[0]))
+        checked = min(self.options.checks, len(values))
+        places = [float(values[i]) for i in np.unique(np.linspace(0, len(values) - 1, checked).astype(int))]
+        fresh = 0
+        while places:
+            value = places.pop(0)
+            self.observer.progress(f"checking the basis at {self.axis.parameter} {value:.6g}")
+            if self._confirmed(value, basis) or fresh == _FRESH or len(self.errors) == len(values):
+                continue
+            # what was enlarged has to hold at a place it was not made for
+            places.append(_farthest(values, [*self.errors, *places]))
+            fresh += 1
+        linear = self.linear
+        self.small = replace(
+            linear, mass=basis.project(linear.mass), structure=basis.project(linear.structure), stiffness=basis.project(linear.stiffness),
+            forces=basis.V.T @ linear.forces, slope=linear.slope @ basis.V,
+        )  # fmt: skip
+
+    def _confirmed(self, value: float, basis: TransferBasis) -> bool:
+        """Compare with a full solve, and enlarge the basis where it misses the tolerance; whether it was good enough before."""
+        conditions = self.conditions_at(value)
+        search, self.notes = suited(self.options.search, conditions, basis, self.options.count)
+        found = eigen.sweep(
+            self._full, [value], self.options.count, search, basis=basis, checks=1, max_solves=3, tolerance=self.options.tolerance,
+            stiffness=self.linear.structure, damping_at=lambda _: (conditions.alpha, conditions.beta), workspace=self.workspace,
+        )  # fmt: skip
+        self.errors[value] = found.checks[-1][1]
+        self.search = replace(search, limit_point=None)
+        return len(found.checks) == 1
+
+    def _full(self, value: float) -> CoupledPencil:
+        return self.linear.pencil(self.conditions_at(value))
+
+    def pencil(self, value: float) -> CoupledPencil:
+        """On the basis."""
+        return self.small.pencil(self.conditions_at(value))
+
+    def solve(self, pencil: CoupledPencil, count: int) -> Spectrum:
+        return leading_modes(pencil, count, SearchOptions(self.search.max_frequency, tolerance=self.search.tolerance, method="dense", left=True))
+
+    def checks(self, values: np.ndarray) -> tuple[tuple[Check, ...], tuple[str, ...]]:
+        checks = []
+        for value, error in sorted(self.errors.items()):
+            pencil = self.pencil(value)
+            spectrum = self.solve(pencil, self.options.count)
+            count = unstable_count(pencil, hints=spectrum.eigenvalues)
+            listed = spectrum.count_right_of(count.line)
+            if listed < count.number:
+                listed = self.solve(pencil, pencil.n).count_right_of(count.line)
+            checks.append(Check(value, error, listed, count.number, count.certain and listed == count.number, error <= self.options.tolerance))
+        self.done = tuple(checks)
+        return self.done, self.notes
+
+    def states(self, values: np.ndarray) -> tuple[SteadyState, ...]:
+        return (self.state,)
+
+
+class PressureFamily:
+    """A state for every pressure, found from the nearest one known."""
+
+    def __init__(self, model: ValveModel, conditions: Conditions, options, observer: Observer):
+        self.model, self.conditions, self.options, self.observer = model, conditions, options, observer
+        self.path = LoadPath(model, SteadyOptions.of(model.case), observer=observer)
+        self.known: dict[float, SteadyState] = {}
+        self.workspace = Workspace()
+        self.done: tuple[Check, ...] = ()
+        self.notes: tuple[str, ...] = ()
+        self.pressure = 0.0
+        self.search: SearchOptions | None = None
+
+    def conditions_at(self, value: float) -> Conditions:
+        return self.conditions
+
+    def prepare(self, axis: Axis) -> None:
+        self.pressure = axis.values[0]
+
+    def pencil(self, value: float) -> CoupledPencil:
+        self.pressure = value
+        if value not in self.known:
+            if self.known:
+                near = self.known[min(self.known, key=lambda p: abs(p - value))]
+                if near.pressure != self.path.pressure:
+                    self.path.q, self.path.pressure, self.path.slope = near.q, near.pressure, None
+            self.known[value] = self.path.go_to(value)
+        state = self.known[value]
+        return linearise(self.model, state.q, value).pencil(self.conditions)
+
+    def solve(self, pencil: CoupledPencil, count: int) -> Spectrum:
+        if self.search is None:
+            self.search, self.notes = suited(self.options.search, self.conditions, TransferBasis(pencil), count)
+        return leading_modes(pencil, count, replace(self.search, left=True), workspace=self.workspace)
+
+    def checks(self, values: np.ndarray) -> tuple[tuple[Check, ...], tuple[str, ...]]:
+        checks = []
+        for index in np.unique(np.linspace(0, len(values) - 1, min(self.options.checks, len(values))).astype(int)):
+            value = float(values[index])
+            self.observer.progress(f"independent count at {value:.6g} Pa")
+            found = certified_spectrum(self.pencil(value), self.options.count, self.search, workspace=self.workspace)
+            error = float(found.spectrum.residual.max(initial=0.0))
+            accurate = error <= self.options.search.tolerance
+            checks.append(Check(value, error, found.unstable_count, found.unstable_count_independent, found.agrees, accurate))
+        self.done = tuple(checks)
+        return self.done, self.notes
+
+    def states(self, values: np.ndarray) -> tuple[SteadyState, ...]:
+        return tuple(self.known[float(value)] for value in values)
+
+
+def _farthest(values: np.ndarray, used: list[float]) -> float:
+    """The value whose place among all is farthest from those used."""
+    at = np.array([int(np.argmin(np.abs(values - u))) for u in used])
+    return float(values[int(np.argmax(np.abs(np.arange(len(values))[:, None] - at).min(axis=1)))])
