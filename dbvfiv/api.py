@@ -13,8 +13,10 @@ from .errors import CaseError, SolveError
 if TYPE_CHECKING:
     from .model import ValveModel
     from .results.closure import ClosureResults
+    from .results.modes import ModesResults
     from .results.state import State
     from .results.steady import SteadyResults
+    from .results.sweep import SweepResults
     from .studies.observer import Observer
 
 _PRESSURE = Quantity("Pa", "kPa")
@@ -106,6 +108,68 @@ class Valve:
         if not result.states:
             raise KeyboardInterrupt
         return result.states[0]
+
+    def modes(
+        self,
+        pressure: float | str | None = None,
+        *,
+        count: int | None = None,
+        output: str | Path | None = None,
+        observer: "Observer | None" = None,
+        **changes: Any,
+    ) -> "ModesResults":
+        """Leading modes of the coupled valve at one pressure: growth rates, frequencies, shapes, and whether the state is stable.
+
+        Parameters
+        ----------
+        pressure : number (Pa) or text with a unit, optional
+            drive.pressure of the case by default; 0 is the valve at rest, for modes in vacuo.
+        count : int, optional
+        output : path, optional
+            Result file.
+        observer : Observer, optional
+        changes
+            density, continuity, alpha, beta, in_vacuo, max_frequency in place of those of the case.
+
+        Raises
+        ------
+        CaseError
+            For something that cannot be used.
+        SolveError
+            If the equilibrium or its modes were not found.
+
+        Examples
+        --------
+        >>> found = dbvfiv.load().modes("6 kPa", density=10, alpha=0)     # doctest: +SKIP
+        >>> found.modes[0].growth_rate, found.stable                      # doctest: +SKIP
+        """
+        from .api_modes import changed, modes_of
+
+        return modes_of(changed(self, {"pressure": pressure} | changes, {"modes.count": count}), None, output, observer)
+
+    def sweep(
+        self,
+        over: str | None = None,
+        *,
+        count: int | None = None,
+        output: str | Path | None = None,
+        observer: "Observer | None" = None,
+        **changes: Any,
+    ) -> "SweepResults":
+        """Modes tracked along pressure, density, alpha or beta.
+
+        Parameters
+        ----------
+        over : str, optional
+            Parameter and values, "density=1:1000:40:log"; sweep.over of the case by default.
+        count : int, optional
+            Leading modes to follow.
+        output, observer, changes
+            As for `modes`; also pressure, for sweeps over something else.
+        """
+        from .api_modes import changed, sweep_of
+
+        return sweep_of(changed(self, changes, {"sweep.over": over, "sweep.count": count}), None, output, observer)
 
     def closure(
         self,

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 READERS: dict[str, str] = {
     "steady": "dbvfiv.results.steady:SteadyResults",
     "closure": "dbvfiv.results.closure:ClosureResults",
+    "modes": "dbvfiv.results.modes:ModesResults",
+    "sweep": "dbvfiv.results.sweep:SweepResults",
+    "transient": "dbvfiv.transient.result:TransientResults",
 }
 
 

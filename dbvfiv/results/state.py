@@ -13,7 +13,9 @@ from .layout import TEXT, Column
 if TYPE_CHECKING:
     from ..model import ValveModel
     from ..studies.state import SteadyState
+    from .modes import ModesResults
     from .steady import SteadyResults
+    from .sweep import SweepResults
 
 #: What a user reads off a state; the names are the keys of the JSON output.
 SUMMARY = (
@@ -147,6 +149,29 @@ class State:
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
         return {c.name: _plain(getattr(self, c.name)) for c in SUMMARY}
+
+    def modes(self, *, count: int | None = None, output: str | Path | None = None, observer: Any = None, **changes: Any) -> "ModesResults":
+        """Leading modes of this state; fluid and damping may differ from those it was found with, see `dbvfiv.api.Valve.modes`.
+
+        Examples
+        --------
+        >>> state.modes(density=1.2, alpha=0).plot("figures")     # doctest: +SKIP
+        """
+        from ..api_modes import changed, modes_of
+
+        return modes_of(changed(self._valve(), changes, {"modes.count": count}), self, output, observer)
+
+    def sweep(self, over: str | None = None, *, count: int | None = None, output: str | Path | None = None, observer: Any = None, **changes: Any) -> "SweepResults":
+        """Modes of this state tracked along density, alpha or beta, such as "density=1:1000:40:log"; see `dbvfiv.api.Valve.sweep`."""
+        from ..api_modes import changed, sweep_of
+
+        return sweep_of(changed(self._valve(), changes, {"sweep.over": over, "sweep.count": count}), self, output, observer)
+
+    def _valve(self):
+        from ..api import Valve
+
+        header = self.results.header
+        return Valve(header.rebuildable_case().replace({"drive.pressure": self.pressure}), header.name)
 
     def plot(self, folder: str | Path = ".", format: str = "png") -> list[Path]:
         """Write the figures of this state alone."""

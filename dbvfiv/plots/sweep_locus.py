@@ -1,0 +1,72 @@
+"""Root locus: eigenvalues in the complex plane as the parameter moves."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Callable, Iterator
+
+import matplotlib
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+
+from ..results.sweep_table import SHOWN
+from .modes_plane import DANGER, UNSTABLE
+from .style import MAGNITUDE, new_figure
+from .sweep_curves import surroundings_of
+
+if TYPE_CHECKING:
+    from ..results.sweep import SweepResults
+
+
+def draw(result: "SweepResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of a sweep, each with its name."""
+    if len(result.values) > 1 and result.branches:
+        yield "root-locus", lambda: root_locus(result)
+
+
+def root_locus(result: "SweepResults") -> Figure:
+    """Growth rate and frequency of each branch, coloured by the parameter; a ring where it begins, crossings of the axis marked."""
+    name, unit, factor = SHOWN[result.parameter]
+    figure = new_figure(7.6, 5.4)
+    axes = figure.add_subplot()
+    x = result.values * factor
+    colours = matplotlib.colors.ListedColormap(matplotlib.colormaps[MAGNITUDE](np.linspace(0.0, 0.9, 256)))
+    scale = LogNorm(x[0], x[-1]) if result.axis.log else Normalize(x[0], x[-1])
+    ends: dict[tuple[float, ...], list[int]] = {}
+    for branch in result.branches:
+        points = np.column_stack([branch.growth_rate, branch.frequency])
+        there = np.isfinite(points).all(axis=1)
+        if not there.any():
+            continue
+        joined = there[:-1] & there[1:]
+        pieces = np.stack([points[:-1], points[1:]], axis=1)[joined]
+        axes.add_collection(LineCollection(pieces, colors=colours(scale(0.5 * (x[:-1] + x[1:])[joined])), linewidths=1.8))
+        axes.scatter(*points[there].T, c=x[there], cmap=colours, norm=scale, s=13, zorder=3)
+        first, last = np.flatnonzero(there)[[0, -1]]
+        axes.plot(*points[first], "o", mfc="white", mec=colours(scale(x[first])), mew=1.6, ms=7, zorder=4)
+        ends.setdefault(tuple(points[last].round(6)), []).append(branch.id)
+    for place, ids in ends.items():
+        axes.annotate(", ".join(map(str, ids)), place, (6, 4), textcoords="offset points", fontsize=9.5, color="0.15")
+    for crossing in result.crossings():
+        axes.plot(0.0, crossing.frequency, "D", color=UNSTABLE, ms=6, zorder=5)
+        axes.annotate(
+            f"{factor * crossing.value:.4g} {unit}", (0.0, crossing.frequency), (9, 6), textcoords="offset points", fontsize=9, color=UNSTABLE
+        )
+    axes.margins(0.06)
+    axes.autoscale_view()
+    low, high = axes.get_xlim()
+    high = max(high, 0.08 * (high - low))
+    axes.axvspan(0.0, high, color=DANGER, lw=0, zorder=0)
+    axes.axvline(0.0, color="0.25", lw=1.1, zorder=1)
+    axes.set_xlim(low, high)
+    axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
+    axes.text(0.995, 0.015, "unstable", transform=axes.transAxes, ha="right", va="bottom", color=UNSTABLE, fontsize=9)
+    bar = figure.colorbar(ScalarMappable(scale, colours), ax=axes, pad=0.02, aspect=28)
+    bar.set_label(f"{name}, {unit}")
+    bar.outline.set_visible(False)
+    axes.set_xlabel("Growth rate, 1/s")
+    axes.set_ylabel("Frequency, Hz")
+    axes.set_title(f"Root locus, {surroundings_of(result)}", loc="left", fontweight="bold")
+    figure.supxlabel("Rings: where a branch begins; numbers: where it ends.", x=0.01, ha="left", fontsize=9)
+    return figure
