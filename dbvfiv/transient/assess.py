@@ -54,7 +54,7 @@ class RunVerdict:
         top = {key: flow[key] for key in ("amplitude", "frequency", "mean", "cycles_observed", "periodicity_error")}
         return {
             "verdict": self.name,
-            "decided": self.decided,
+            "decided": bool(self.decided),
             "reason": self.governing.reason,
             **top,
             "steps": self.steps,

@@ -122,6 +122,8 @@ def _oscillation(series: Series, options: JudgeOptions, size: float) -> Verdict 
     }
     small = 0.5 * (high - low) <= options.steady * size
     direction = _direction(cycles, options)
+    if direction in ("growing", "decaying"):
+        facts["mean"] = float(cycles.mean[-1])
     if small and direction != "growing":
         return None
     return _name(series, cycles, recent, facts, direction, options)

@@ -72,7 +72,7 @@ class Verdict:
         }  # fmt: skip
         return {
             "verdict": self.name,
-            "decided": self.decided,
+            "decided": bool(self.decided),
             "reason": self.reason,
             **{name: float(value) if np.isfinite(value) else None for name, value in numbers.items()},
             "cycles_observed": self.cycles,

@@ -1,0 +1,46 @@
+"""``dbvfiv resume``: continue an interrupted run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from ._options import AsJson, ResultFile
+from ._progress import Progress
+
+ORDER = 45
+
+
+def command(
+    file: ResultFile,
+    duration: Annotated[Optional[str], typer.Option("--duration", metavar="T", help="New end of the run, 2.0 (s) or '500 ms'.")] = None,
+    plots: Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")] = None,
+    animate: Annotated[Optional[Path], typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Continue a transient run that was interrupted or killed, or a finished one with a later --duration.
+
+    It goes on from the last restart point in the same file, with the same numbers as a run that was never interrupted.
+    """
+    from ..case.quantity import Quantity
+    from ..errors import CaseError
+    from ..transient.api import resume
+    from .transient import report
+
+    end = None
+    if duration is not None:
+        try:
+            end = Quantity("s", "s").parse(_number_or_text(duration))
+        except ValueError as error:
+            raise CaseError(f"--duration is given as {duration!r}, {error}.") from None
+    result = resume(file, end, Progress(quiet=as_json))
+    report(result, file, plots, animate, as_json)
+
+
+def _number_or_text(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
