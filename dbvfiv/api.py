@@ -175,6 +175,7 @@ class Valve:
         self,
         pressure: Iterable[float | str] | None = None,
         *,
+        in_time: bool = False,
         output: str | Path | None = None,
         observer: "Observer | None" = None,
     ) -> "ClosureResults":
@@ -184,6 +185,8 @@ class Valve:
         ----------
         pressure : several of numbers (Pa) or texts with a unit, optional
             Those of the case by default.
+        in_time : bool
+            Also turn the drive from flow to back pressure in time; see `dbvfiv.studies.closing`.
         output : path, optional
             Result file, written state by state.
         observer : Observer, optional
@@ -215,12 +218,24 @@ class Valve:
         except ValueError as error:  # what geometry, mesh and shell refuse
             raise CaseError(str(error)) from error
         header = Header.of("closure", case, self.name)
+
+        def follow(result):
+            if not in_time or result.interrupted:
+                return None
+            from .studies.closing import run_closing
+
+            return run_closing(case, observer)
+
         if output is None:
-            return ClosureResults.of(run_closure(case, pressures, observer=observer, model=model), header)
+            result = run_closure(case, pressures, observer=observer, model=model)
+            return ClosureResults.of(result, header, follow(result))
         with ClosureFile(output, model, header) as file:
             result = run_closure(case, pressures, observer=Observers(file, observer), model=model)
             file.conclude(result)
-        return ClosureResults.of(result, header)
+            closing = follow(result)
+            if closing is not None:
+                file.keep_closing(closing)
+        return ClosureResults.of(result, header, closing)
 
     def _run(self, pressures: Sequence[float], output: str | Path | None, observer: "Observer | None") -> "SteadyResults":
         from .results.header import Header

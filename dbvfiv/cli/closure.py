@@ -28,13 +28,17 @@ def command(
     compare: Annotated[
         bool, typer.Option("--compare", help="Do the same with the other kind of supports, and draw both in one figure.")
     ] = False,
+    in_time: Annotated[
+        bool, typer.Option("--in-time", help="Also turn the drive from closure.open_pressure to as much back pressure in time.")
+    ] = False,
     overrides: Override = None,
     as_json: AsJson = False,
 ) -> None:
     """Back pressure: does the valve shut, where and how firmly, what stays open, how far is the wall from buckling?
 
     The pressures are those of --pressure, else closure.pressures of the case; each state is found from the one before. closure.supports chooses
-    contact of the inner faces or the simplified supports of the thesis, closure.start = "open" turns a flow back first.
+    contact of the inner faces or the simplified supports of the thesis, closure.start = "open" turns a flow back first, slowly; --in-time does so with
+    the inertia of wall and fluid and tells the closing time.
 
     dbvfiv closure cases/closure.toml -o closure.h5 --plots figures
     """
@@ -59,7 +63,7 @@ def command(
             title = [f"Supports: {kind}"] if compare else []
             print("\n".join([*title, *HEAD]), flush=True)
         target = output if output is None or not number else output.with_name(f"{output.stem}-{kind}{output.suffix}")
-        result = valve.closure(wanted, output=target, observer=Progress(quiet=as_json, row=None if as_json else row_of))
+        result = valve.closure(wanted, in_time=in_time and not number, output=target, observer=Progress(quiet=as_json, row=None if as_json else row_of))
         if not as_json:
             print("\n".join([*result.verdict(), *([f"Kept in {target}."] if target else [])]))
         results.append(result)

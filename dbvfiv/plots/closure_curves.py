@@ -19,6 +19,8 @@ def draw(result: "ClosureResults") -> Iterator[tuple[str, Callable[[], Figure]]]
     yield "passage", lambda: passage(result)
     if result.opened:
         yield "reversal", lambda: reversal(result)
+    if result.closing is not None:
+        yield "reversal-in-time", lambda: in_time(result)
 
 
 def closure_curve(result: "ClosureResults") -> Figure:
@@ -94,6 +96,35 @@ def reversal(result: "ClosureResults") -> Figure:
     axes.invert_xaxis()
     axes.set_title(f"From open to shut, quasi-static, {_supports(result)}", loc="left", fontweight="bold")
     axes.legend()
+    return figure
+
+
+def in_time(result: "ClosureResults") -> Figure:
+    """Drive, lip, narrowest passage, flow and contact force while the drive turns round."""
+    closing = result.closing
+    figure = new_figure(8.4, 8.0)
+    panels = figure.subplots(5, 1, sharex=True)
+
+    def values(name, factor):
+        return factor * np.array([getattr(sample, name) for sample in closing.samples])
+
+    t = values("time", 1.0)
+    curves = (
+        ("inlet_pressure", 1e-3, "Drive, kPa"), ("lip_opening", 1e3, "Lip, mm"), ("least_opening", 1e6, "Passage, mm²"),
+        ("mass_flow", 1.0, "Flow, kg/s"), ("contact_force", 1.0, "Contact, N"),
+    )  # fmt: skip
+    for axes, (name, factor, label) in zip(panels, curves):
+        axes.plot(t, values(name, factor), color=COMPUTED, lw=1.4)
+        axes.set_ylabel(label)
+        axes.axvline(closing.turn.zero, color=REST, lw=0.9, ls=":")
+        if closing.closing_time is not None:
+            axes.axvline(closing.turn.start + closing.closing_time, color=PUBLISHED, lw=1.0, ls="--")
+    panels[2].set_yscale("log")
+    panels[2].set_ylim(bottom=0.1)
+    panels[2].axhline(closing.shut_below * 1e6, color=ACCENT, lw=1.0, ls=":")
+    panels[-1].set_xlabel("Time, s (dotted: the drive changes sign; dashed: shut for good)")
+    figure.suptitle("The drive turns round", fontweight="bold", fontsize=11)
+    figure.align_ylabels(panels)
     return figure
 
 

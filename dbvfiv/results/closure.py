@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Callable, Mapping, Sequence
 import h5py
 import numpy as np
 
-from .closure_table import BUCKLING, FIELDS, HEAD, OPENED, PATH, SUMMARY, row_of
+from .closure_table import BUCKLING, FIELDS, HEAD, OPENED, PATH, REVERSAL, SUMMARY, row_of
 from .files import reading
 from .header import Header, read_header
 from .layout import Table, read_texts
@@ -19,6 +19,7 @@ from .result import Result
 from .state import LAYERS, LayerData, layers_of
 
 if TYPE_CHECKING:
+    from ..studies.closing import ClosingResult
     from ..studies.closure import ClosureResult
     from ..studies.closure_model import ClosureModel
     from ..studies.closure_state import ClosureState
@@ -70,6 +71,8 @@ class ClosureResults(Result):
     ----------
     states : tuple of PressedState
     path, buckling, opened : tuples of objects with the columns of `closure_table.PATH`, `BUCKLING`, `OPENED`
+    closing : dbvfiv.studies.closing.ClosingResult or None
+        History of the valve while its drive turned round, where that was asked for.
     supports : str
         "contact" or "held-lips".
     reference_opening : float, m2
@@ -78,18 +81,19 @@ class ClosureResults(Result):
 
     kind = "closure"
 
-    def __init__(self, header, mesh, rows, read_layers, path_rows, buckling_rows, opened_rows, supports, reference_opening, **common):
+    def __init__(self, header, mesh, rows, read_layers, path_rows, buckling_rows, opened_rows, supports, reference_opening, closing=None, **common):
         super().__init__(header, mesh, **common)
         self.states = tuple(PressedState(self, row, lambda i=i: read_layers(i)) for i, row in enumerate(rows))
         self.walk = tuple(SimpleNamespace(**row) for row in path_rows)
         self.buckling = tuple(SimpleNamespace(**row) for row in buckling_rows)
         self.opened = tuple(SimpleNamespace(**row) for row in opened_rows)
+        self.closing = closing
         self.supports = supports
         self.reference_opening = float(reference_opening)
 
     @classmethod
-    def of(cls, result: "ClosureResult", header: Header | None = None) -> "ClosureResults":
-        """From a run that has just ended."""
+    def of(cls, result: "ClosureResult", header: Header | None = None, closing: "ClosingResult | None" = None) -> "ClosureResults":
+        """From a run that has just ended, and the turn of the drive if that was followed."""
         model = result.model
         header = header or Header.of("closure", model.case)
         return cls(
@@ -99,7 +103,7 @@ class ClosureResults(Result):
             lambda i: layers_of(model, result.states[i].q),
             path_rows(result), buckling_rows(result), opened_rows(result),
             model.supports, reference_opening(model),
-            warnings=result.warnings, failures=result.failures, model=model,
+            closing=closing, warnings=result.warnings, failures=result.failures, model=model,
         )  # fmt: skip
 
     @classmethod
@@ -114,7 +118,7 @@ class ClosureResults(Result):
         return cls(
             read_header(file), read_mesh(file), _rows(file["states"], (*SUMMARY, *FIELDS)), read_layers,
             _rows(file["path"], PATH), _rows(file["buckling"], BUCKLING), _rows(file["opened"], OPENED),
-            str(file.attrs["supports"]), float(file.attrs["reference_opening"]),
+            str(file.attrs["supports"]), float(file.attrs["reference_opening"]), _read_closing(file),
             warnings=read_texts(file, "messages/warnings"), failures=read_texts(file, "messages/failures"), path=path,
         )  # fmt: skip
 
@@ -134,6 +138,8 @@ class ClosureResults(Result):
                 file.keep(values, state.layers)
             rows = ([vars(row) for row in rows] for rows in (self.walk, self.buckling, self.opened))
             file.finish(*rows, self.warnings, self.failures, self.complete)
+            if self.closing is not None:
+                file.keep_closing(self.closing)
         return Path(path)
 
     def nearest(self, pressure: float) -> PressedState:
@@ -164,6 +170,7 @@ class ClosureResults(Result):
             "softest": {"pressure": softest.pressure, "lowest_stiffness_eigenvalue": softest.lowest_eigenvalue} if softest else None,
             "path": {c.name: [_plain(getattr(point, c.name)) for point in self.walk] for c in PATH},
             "opened": [vars(point) for point in self.opened],
+            "reversal": None if self.closing is None else self.closing.summary(),
             "reference_opening": self.reference_opening,
             "failures": list(self.failures),
             "warnings": list(self.warnings),
@@ -174,7 +181,22 @@ class ClosureResults(Result):
         return [*HEAD, *(row_of(state) for state in self.states), *self.verdict()]
 
     def verdict(self) -> list[str]:
-        """Sentences on buckling."""
+        """Sentences on buckling and on the turn of the drive."""
+        return [*self._buckling_verdict(), *self._closing_verdict()]
+
+    def _closing_verdict(self) -> list[str]:
+        if self.closing is None:
+            return []
+        told = self.closing.summary()
+        turn = f"Drive turned from {told['open_pressure'] / 1e3:g} to {-told['open_pressure'] / 1e3:g} kPa in {told['reversal_time']:g} s:"
+        if told["closing_time"] is None:
+            return [f"{turn} open at the end, {told['duration']:.4g} s."]
+        return [
+            f"{turn} shut for good {told['closing_time']:.4g} s after it began to turn ({told['closing_time_after_sign_change']:.4g} s after it changed "
+            f"sign), fluid pressure between {told['lowest_pressure'] / 1e3:.4g} and {told['highest_pressure'] / 1e3:.4g} kPa."
+        ]
+
+    def _buckling_verdict(self) -> list[str]:
         if self.buckling:
             return [f"Buckling ({b.kind}) at {b.pressure / 1e3:.6g} kPa." for b in self.buckling[:3]]
         followed = [point for point in self.walk if np.isfinite(point.lowest_eigenvalue)]
@@ -229,6 +251,20 @@ def _rows(group: h5py.Group, columns) -> list[dict[str, Any]]:
     table = Table(group, columns)
     data = {c.name: table.read(c.name) for c in columns}
     return [{name: _scalar(values[i]) for name, values in data.items()} for i in range(table.rows)]
+
+
+def _read_closing(file: h5py.File) -> "ClosingResult | None":
+    if "reversal" not in file:
+        return None
+    from ..studies.closing import ClosingResult, ClosingSample, Turn
+
+    group = file["reversal"]
+    facts = dict(group.attrs)
+    samples = tuple(ClosingSample(**row) for row in _rows(group, REVERSAL))
+    turn = Turn(*(float(facts[name]) for name in ("open_pressure", "turn_start", "turn_duration")))
+    return ClosingResult(
+        samples, turn, float(facts["shut_below"]), int(facts["halvings"]), str(facts["failure"]), bool(facts["interrupted"])
+    )
 
 
 def _scalar(value: Any) -> Any:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 from ..studies.observer import Observer
 from .closure import buckling_rows, opened_rows, path_rows, reference_opening, row_from
-from .closure_table import BUCKLING, FIELDS, OPENED, PATH, SUMMARY
+from .closure_table import BUCKLING, FIELDS, OPENED, PATH, REVERSAL, SUMMARY
 from .files import create
 from .header import Header, write_header
 from .layout import Table, replace_texts
@@ -14,6 +14,7 @@ from .mesh import MeshData, write_mesh
 from .state import LAYERS, LayerData, layers_of
 
 if TYPE_CHECKING:
+    from ..studies.closing import ClosingResult
     from ..studies.closure import ClosureResult
     from ..studies.closure_model import ClosureModel
 
@@ -82,6 +83,19 @@ class ClosureFile(Observer):
         replace_texts(self._messages, "warnings", [w for w in warnings if w not in failures])
         replace_texts(self._messages, "failures", failures)
         self._file.attrs["complete"] = bool(complete)
+        self._file.flush()
+
+    def keep_closing(self, closing: "ClosingResult") -> None:
+        """Write the history of the valve while its drive turned round."""
+        group = self._file.create_group("reversal")
+        table = Table.create(group, REVERSAL, {}, chunk=256)
+        for sample in closing.samples:
+            table.append(vars(sample))
+        turn = closing.turn
+        facts = {"open_pressure": turn.pressure, "turn_start": turn.start, "turn_duration": turn.duration, "shut_below": closing.shut_below}
+        facts |= {"halvings": closing.halvings, "failure": closing.failure, "interrupted": closing.interrupted}
+        for name, value in facts.items():
+            group.attrs[name] = value
         self._file.flush()
 
     def close(self) -> None:

@@ -72,6 +72,17 @@ OPENED = (
     Column("outlet_area", "m^2", "Flow area at the lip, whole valve"),
     Column("mass_flow", "kg/s", "Mass flow, whole valve"),
 )
+REVERSAL = (
+    Column("time", "s", "Time"),
+    Column("inlet_pressure", "Pa", "Pressure of the drive"),
+    Column("lip_opening", "m", "Displacement in y of the lip at x = z = 0"),
+    Column("least_opening", "m^2", "Narrowest passage between the inner faces, whole valve"),
+    Column("mass_flow", "kg/s", "Mass flow through the lip, whole valve; negative backwards"),
+    Column("lowest_pressure", "Pa", "Lowest pressure of the fluid in the valve"),
+    Column("highest_pressure", "Pa", "Highest pressure of the fluid in the valve"),
+    Column("contact_force", "N", "Force between the two walls, whole valve"),
+    Column("penetration", "m", "Deepest penetration"),
+)
 
 _COLUMNS = (
     ("pressure", "kPa", 9, lambda s: f"{s.pressure / 1e3:.6g}"),

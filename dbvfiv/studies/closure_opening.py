@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..contact import PlaneContact, nodal_thickness
+from ..geometry import ValveMesh
+from ..shell import Shell
 from .closure_model import ClosureModel
 
 #: The quarter model meets the closing plane once; the whole valve's walls meet each other over two such quarters.
@@ -62,14 +65,19 @@ class Opening:
 
 def opening(model: ClosureModel, q: np.ndarray) -> Opening:
     """Opening of a state (n,)."""
-    nodal = model.pressed.nodal(q)
-    shell, face, rows = model.pressed.shell, model.face, model.mesh.rows
-    gap, reach = _gaps(model, nodal, shell.directors(nodal)[0])
-    at_rest, rest_reach = _gaps(model, np.zeros_like(nodal), shell.mesh.directors)
+    return measure(model.mesh, model.pressed.shell, model.face, model.pressed.nodal(q), model.held)
+
+
+def measure(mesh: ValveMesh, shell: Shell, face: PlaneContact, nodal: np.ndarray, held: np.ndarray | None = None) -> Opening:
+    """Opening for nodal unknowns (nn, 5); `held` (rows,) are rows shut by their supports."""
+    rows = mesh.rows
+    gap, reach = _gaps(shell, face, nodal, shell.directors(nodal)[0])
+    at_rest, rest_reach = _gaps(shell, face, np.zeros_like(nodal), shell.mesh.directors)
     area = _area(gap[rows], reach[rows])
-    area[model.held] = 0.0
+    if held is not None:
+        area[held] = 0.0
     return Opening(
-        z=model.mesh.z,
+        z=mesh.z,
         area=area,
         reference=float(_area(at_rest[rows[:1]], rest_reach[rows[:1]])[0]),
         gap=gap[rows],
@@ -77,14 +85,12 @@ def opening(model: ClosureModel, q: np.ndarray) -> Opening:
     )
 
 
-def _gaps(model, nodal, directors) -> tuple[np.ndarray, np.ndarray]:
+def _gaps(shell: Shell, face: PlaneContact, nodal, directors) -> tuple[np.ndarray, np.ndarray]:
     """Gap (nn,) and x position (nn,) of the inner face at all nodes; the clamped flange is no contact node but has a face all the same."""
-    from ..contact import nodal_thickness
-
-    depth = 0.5 * nodal_thickness(model.pressed.shell)
-    point = model.pressed.mesh.nodes + nodal[:, :3] - depth[:, None] * directors
+    depth = 0.5 * nodal_thickness(shell)
+    point = shell.mesh.nodes + nodal[:, :3] - depth[:, None] * directors
     lift = np.zeros(len(depth))
-    lift[model.face.nodes] = model.face.lift
+    lift[face.nodes] = face.lift
     return point[:, 1] + lift, point[:, 0]
 
 

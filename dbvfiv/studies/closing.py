@@ -1,0 +1,197 @@
+"""From open to shut in time: the drive turns from flow to back pressure, and the valve follows with its inertia and that of the fluid."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case.model import Case
+from ..errors import SolveError
+from ..transient.control import ControlOptions, FixedSteps
+from ..transient.scheme import scheme
+from ..transient.start import steady_positions
+from ..transient.state import consistent_state
+from ..transient.stepper import Stepper, StepFailure
+from .closing_motion import ClosingMotion, ContactValve
+from .closure_opening import FACES, measure
+from .closure_state import QUARTERS
+from .observer import Observer
+
+#: Rest before the drive turns, over the time it takes to turn.
+LEAD = 0.1
+#: Least numerical damping: contact excites what the mesh cannot resolve.
+DAMPING = 0.2
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Drive that falls linearly from a pressure to its negative, Pa.
+
+    Attributes
+    ----------
+    pressure : float, Pa
+    start, duration : float, s
+    """
+
+    pressure: float
+    start: float
+    duration: float
+
+    def __call__(self, time: float) -> float:
+        return self.pressure * float(np.interp(time, (self.start, self.start + self.duration), (1.0, -1.0)))
+
+    @property
+    def zero(self) -> float:
+        """Time at which the drive changes sign, s."""
+        return self.start + 0.5 * self.duration
+
+
+@dataclass(frozen=True)
+class ClosingSample:
+    """One instant; areas, flow and forces of the whole valve.
+
+    Attributes
+    ----------
+    time : float, s
+    inlet_pressure : float, Pa
+    lip_opening : float, m
+        Displacement in y of the lip at x = z = 0.
+    least_opening : float, m2
+        Narrowest passage between the inner faces.
+    mass_flow : float, kg/s
+        Through the lip; negative when it runs backwards.
+    lowest_pressure, highest_pressure : float, Pa
+        Of the fluid in the valve.
+    contact_force : float, N
+    penetration : float, m
+    """
+
+    time: float
+    inlet_pressure: float
+    lip_opening: float
+    least_opening: float
+    mass_flow: float
+    lowest_pressure: float
+    highest_pressure: float
+    contact_force: float
+    penetration: float
+
+
+@dataclass(frozen=True)
+class ClosingResult:
+    """History of a valve whose drive turns round.
+
+    Attributes
+    ----------
+    samples : tuple of ClosingSample
+    turn : Turn
+    shut_below : float, m2
+        Passage that counts as shut.
+    halvings : int
+        Steps that had to be halved.
+    failure : str
+        Why the run ended early; empty if it did not.
+    interrupted : bool
+    """
+
+    samples: tuple[ClosingSample, ...]
+    turn: Turn
+    shut_below: float
+    halvings: int = 0
+    failure: str = ""
+    interrupted: bool = False
+
+    @property
+    def first_shut(self) -> float | None:
+        """Time from the start of the turn to the first shut instant, s; None if there is none."""
+        shut = [s.time for s in self.samples if s.least_opening <= self.shut_below]
+        return shut[0] - self.turn.start if shut else None
+
+    @property
+    def closing_time(self) -> float | None:
+        """Time from the start of the turn from which on the valve is shut to the end of the run, s; None if it ends open."""
+        last_open = [s.time for s in self.samples if s.least_opening > self.shut_below]
+        if not self.samples or self.samples[-1].least_opening > self.shut_below:
+            return None
+        return max(0.0, (last_open[-1] if last_open else self.turn.start) - self.turn.start)
+
+    def summary(self) -> dict:
+        """Plain SI numbers for JSON."""
+        first, closing = self.first_shut, self.closing_time
+        samples = self.samples
+        return {
+            "open_pressure": self.turn.pressure,
+            "reversal_time": self.turn.duration,
+            "duration": samples[-1].time if samples else 0.0,
+            "first_shut": first,
+            "closing_time": closing,
+            "closing_time_after_sign_change": None if closing is None else closing - 0.5 * self.turn.duration,
+            "stays_shut": closing is not None and not self.failure,
+            "lowest_pressure": min((s.lowest_pressure for s in samples), default=None),
+            "highest_pressure": max((s.highest_pressure for s in samples), default=None),
+            "largest_backflow": max(0.0, -min((s.mass_flow for s in samples), default=0.0)),
+            "largest_penetration": max((s.penetration for s in samples), default=0.0),
+            "steps": max(0, len(samples) - 1),
+            "halvings": self.halvings,
+            "failure": self.failure,
+        }
+
+
+def run_closing(case: Case, observer: Observer | None = None) -> ClosingResult:
+    """Turn the drive of a case from `closure.open_pressure` to as much back pressure and follow the valve.
+
+    Raises
+    ------
+    SolveError
+        If the open state was not found. A step that fails ends the run and is told in the result.
+    """
+    observer = Observer() if observer is None else observer
+    closure = case.closure
+    model = ContactValve(
+        case.replace({"drive.kind": "flow", "drive.side": "inside", "fluid.continuity": closure.reversal_continuity, "fluid.unsteady": True})
+    )
+    motion = ClosingMotion(model)
+    turn = Turn(closure.open_pressure, LEAD * closure.reversal_time, closure.reversal_time)
+    end = turn.start + turn.duration + closure.reversal_hold
+    rest = measure(model.mesh, model.shell, model.contact, np.zeros((len(model.mesh.nodes), 5)))
+    limit = QUARTERS * closure.shut_fraction * rest.reference
+    observer.progress(f"open state at {turn.pressure:.6g} Pa")
+    q = steady_positions(model, turn.pressure)
+    area = model.rows.areas(model.nodal(q))
+    speed = model.flow.inlet_velocity(area, turn.pressure, motion.conditions.density)
+    state = consistent_state(motion, 0.0, q, np.zeros(model.size), speed, turn.pressure)
+    stepper = Stepper(motion, scheme("generalised-alpha", max(DAMPING, case.transient.numerical_damping)), turn)
+    control = FixedSteps(stepper, ControlOptions(case.transient.step))
+    load = motion.load(state.q, state.v, turn.pressure, 0.0, state.psi_rate, state.speed)
+    samples, failure, interrupted = [_sample(model, motion, state, load)], "", False
+    try:
+        while state.time < end - 1e-9:
+            result = control.advance(state, end)
+            state = result.state
+            samples.append(_sample(model, motion, state, result.load))
+            observer.progress(f"{state.time:.4f} s of {end:.4g} s")
+    except StepFailure as error:
+        failure = f"No step was possible beyond {state.time:.6g} s: {error}"
+        observer.warn(failure)
+    except KeyboardInterrupt:
+        interrupted = True
+    return ClosingResult(tuple(samples), turn, limit, control.halvings, failure, interrupted)
+
+
+def _sample(model: ContactValve, motion: ClosingMotion, state, load) -> ClosingSample:
+    nodal, contact = model.nodal(state.q), model.contact_state(state.q)
+    if not (np.isfinite(state.q).all() and np.isfinite(load.pressure).all()):
+        raise SolveError(f"The state at {state.time:.6g} s is not finite.")
+    passage = measure(model.mesh, model.shell, model.contact, nodal)
+    open_area = motion.fluid.open_area(load.area)
+    return ClosingSample(
+        time=float(state.time),
+        inlet_pressure=float(load.inlet),
+        lip_opening=float(nodal[model.mesh.rows[0, 0], 1]),
+        least_opening=float(QUARTERS * passage.area.min()),
+        mass_flow=float(QUARTERS * motion.conditions.density * load.speed[0] * open_area[0]),
+        lowest_pressure=float(load.pressure.min()),
+        highest_pressure=float(load.pressure.max()),
+        contact_force=float(FACES * contact.total),
+        penetration=contact.penetration,
+    )
