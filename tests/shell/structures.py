@@ -141,14 +141,19 @@ def solve_path(shell: Shell, load, factors, start=None, tolerance: float = 1e-9,
 
 
 def _newton(shell, load, solver, q, factor, tolerance, iterations):
+    rounding = 0.0
     for iteration in range(iterations):
         force, data = shell.force_and_tangent(q)
+        if not rounding:  # what rounding of the positions alone leaves
+            place = shell.dofs.expand(np.abs(q))
+            place[:, :3] += np.abs(shell.mesh.nodes)
+            rounding = np.finfo(float).eps * np.linalg.norm(shell.dofs.matrix(np.abs(data)) @ shell.dofs.restrict(place))
         external, slope = load(q, factor)
         residual = force - external
         norm = np.linalg.norm(residual)
         if not np.isfinite(norm) or norm > 1e12 * np.linalg.norm(external):
             return None
-        if norm <= tolerance * np.linalg.norm(external):
+        if norm <= max(tolerance * np.linalg.norm(external), rounding):
             return iteration
         solver.values[:] = data if slope is None else data - slope
         solver.refactor()
@@ -156,8 +161,6 @@ def _newton(shell, load, solver, q, factor, tolerance, iterations):
         if not np.isfinite(step).all():
             return None
         q -= step
-        if np.linalg.norm(step) <= 1e-13 * np.linalg.norm(q):  # as far as rounding lets it go
-            return iteration
     return None
 
 
