@@ -210,3 +210,10 @@ class Closure(Section):
     )
     eigenvalues: StrictInt = key(4, "Lowest eigenvalues of the tangent stiffness to follow.", ge=1, le=100)
     arclength: StrictBool = key(True, "Go on along the equilibrium path by arclength when load steps end at a limit point.")
+    reversal_time: Time = key(0.2, "Time in which the drive turns from open_pressure to as much back pressure.", gt=0, le=1e3)
+    reversal_hold: Time = key(0.2, "Time for which the back pressure is then held.", ge=0, le=1e3)
+    reversal_continuity: Literal["storage", "quasi-steady"] = key(
+        "storage",
+        "Continuity law while the drive turns. Lips that meet push the fluid between them away with storage; quasi-steady they stop it at once, and the "
+        "pressure of the incompressible fluid knows no bounds.",
+    )
