@@ -33,6 +33,9 @@ def winding(result: "ModesResults") -> Figure:
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, -0.25), max(high, number + 0.25 * max(1.0, high - low)))
     _mark_modes(axes, result)
+    if np.isfinite(certificate.counted_up_to):
+        axes.axvspan(certificate.counted_up_to, axes.get_xlim()[1], color="0.93", lw=0, zorder=0)
+        axes.text(certificate.counted_up_to, 0.02, " to the right, at this frequency", transform=axes.get_xaxis_transform(), fontsize=8.5, color="0.35")
     axes.set_xlabel("Frequency on the imaginary axis, Hz")
     axes.set_ylabel("Winding of the determinant, half turns")
     axes.set_title(f"Independent count {conditions(result)}", loc="left", fontweight="bold")

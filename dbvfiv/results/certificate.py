@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ..studies.modes import ModesResult
 
 _ATTRIBUTES = (
-    "agrees", "unstable_count", "unstable_count_independent", "statement", "certain", "line", "distance", "response_error", "status", "asked",
+    "agrees", "unstable_count", "unstable_count_independent", "statement", "certain", "line", "counted_up_to", "distance", "response_error", "status", "asked",
     "complete_above", "band", "rejected",
 )  # fmt: skip
 _CURVE = (
@@ -39,6 +39,8 @@ class Certificate:
         Whether the phase of the determinant could be followed everywhere.
     line : float, 1/s
         Growth rate above which is counted: 0 but for undamped structures.
+    counted_up_to : float, Hz
+        Frequency at which the independent count ends; infinite but for searches in a band.
     distance : float
         Of the winding from a whole number.
     response_error : float
@@ -62,6 +64,7 @@ class Certificate:
     statement: str
     certain: bool
     line: float
+    counted_up_to: float
     distance: float
     response_error: float
     status: str
@@ -79,7 +82,7 @@ class Certificate:
         return cls(
             stable=result.stable, agrees=certified.agrees, unstable_count=certified.unstable_count,
             unstable_count_independent=certified.unstable_count_independent, statement=certified.statement, certain=count.certain,
-            line=float(count.line), distance=count.distance, response_error=float("nan") if error is None else float(error),
+            line=float(count.line), counted_up_to=float(count.band), distance=count.distance, response_error=float("nan") if error is None else float(error),
             status=spectrum.status, asked=spectrum.asked, complete_above=float(spectrum.complete_above), band=float(spectrum.band),
             rejected=spectrum.rejected, frequency=count.frequencies, phase=count.phase,
         )  # fmt: skip

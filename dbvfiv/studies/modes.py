@@ -91,9 +91,12 @@ class ModesResult:
     def stable(self) -> bool | None:
         """Whether all modes decay.
 
-        One unstable pair that satisfies the equations is proof that they do not. If none is listed and the independent count does not confirm it: None.
+        One unstable pair that satisfies the equations is proof that they do not. If none is listed and the independent count does not confirm it, or
+        only up to some frequency: None.
         """
-        return False if self.certified.unstable_count else self.certified.stable
+        if self.certified.unstable_count:
+            return False
+        return self.certified.stable if np.isinf(self.certified.count.band) else None
 
 
 def run_modes(
@@ -142,12 +145,15 @@ def run_modes(
         search, notes = suited(options.search, conditions, basis, options.count)
         certified = certified_spectrum(pencil, options.count, search, basis=basis)
     certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))
-    if search.max_frequency is not None and certified.unstable_count_independent > certified.unstable_count:
-        notes = (*notes, f"The independent count covers all frequencies, the search ends at {search.max_frequency:.4g} Hz.")
+    if np.isfinite(certified.count.band):
+        notes = (*notes, (
+            f"The independent count ends at {certified.count.band:.4g} Hz with the search; without that end it differs, so that "
+            "modes of higher frequency may be unstable: modes.max_frequency moves the end."
+        ))  # fmt: skip
     notes = (*notes, *certified.spectrum.notes)
     result = _described(model, state, conditions, without_fluid, certified, pencil, linear, notes)
     observer.item(result)
-    if not certified.agrees:
+    if result.stable is None:
         observer.warn(certified.statement)
     observer.end(False)
     return result

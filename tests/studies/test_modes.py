@@ -1,0 +1,192 @@
+"""Leading modes of a state: right numbers, a verdict that is proven or withheld, refusals in sentences."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+
+from dbvfiv.case.model import Case
+from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.model import ValveModel
+from dbvfiv.model.dynamics import Conditions, dynamic_residual, linearise
+from dbvfiv.studies.modes import ModesOptions, rest_state, run_modes
+from dbvfiv.studies.observer import Observer
+from dbvfiv.studies.steady import LoadPath
+from eigen import SearchOptions
+
+LIGHT = Conditions(10.0, 0.0, 0.003)
+WATER = Conditions(1000.0, 5.0, 0.003)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16}))
+
+
+@pytest.fixture(scope="module")
+def state(model):
+    return LoadPath(model).go_to(6e3)
+
+
+@pytest.fixture(scope="module")
+def flutter(model, state):
+    return run_modes(model, state, LIGHT)
+
+
+def test_a_light_fluid_flutters_at_a_small_opening(flutter):
+    """One pair to the right, found by both routes, near the thesis's flutter (Th. ch. 7; 36.3 Hz on the fine mesh)."""
+    assert flutter.stable is False and flutter.certified.agrees
+    assert flutter.certified.unstable_count == flutter.certified.unstable_count_independent == 2
+    first = flutter.eigenvalues[0]
+    assert first.real > 10 and 33 < first.imag / (2 * np.pi) < 39
+    assert (flutter.eigenvalues.real[1:] < 0).all()
+
+
+def test_water_is_damped(model):
+    path = LoadPath(model)
+    for pressure in (2e3, 6e3, 18e3, 50e3):
+        found = run_modes(model, path.go_to(pressure), WATER)
+        assert found.stable is True and found.certified.unstable_count_independent == 0, pressure
+
+
+def test_sorted_once_each_and_accurate(flutter):
+    values = flutter.eigenvalues
+    assert (np.diff(values.real) <= 0).all() and (values.imag >= 0).all()
+    assert flutter.spectrum.residual.max() < 1e-8
+    assert len(set(np.round(values, 6))) == len(values)
+
+
+def test_against_all_eigenvalues_of_a_small_valve():
+    """Dense QZ of the whole first-order pencil on a mesh that allows it, for both continuity laws."""
+    for continuity in ("quasi-steady", "storage"):
+        small = ValveModel(Case().replace({"mesh.around": 4, "mesh.along": 8, "fluid.continuity": continuity}))
+        at = LoadPath(small).go_to(4e3)
+        found = run_modes(small, at, LIGHT, ModesOptions(4))
+        every = la.eigvals(*linearise(small, at.q, 4e3).pencil(LIGHT).first_order())
+        every = every[np.isfinite(every) & (every.imag >= -1e-9)]
+        leading = every[np.argsort(-every.real)][: len(found.eigenvalues)]
+        assert np.allclose(found.eigenvalues, leading, rtol=1e-6), continuity
+
+
+def test_the_motion_satisfies_the_time_dependent_equations(model, state, flutter):
+    """The time-dependent residual along Re(shape exp(lambda t)) vanishes to first order in the amplitude."""
+    dofs = model.shell.dofs
+    value, shape, inlet = flutter.eigenvalues[0], flutter.shapes[0], flutter.inlet_velocities[0]
+    q = dofs.restrict(shape)
+    steady = model.flow.inlet_velocity(state.station_area, state.pressure, LIGHT.density)
+
+    def left(size):
+        moved = [size * (value**k * q).real for k in range(3)]
+        force, outlet = dynamic_residual(
+            model, LIGHT, state.pressure, state.q + moved[0], moved[1], moved[2], steady + size * inlet.real, size * (value * inlet).real
+        )
+        unit = np.linalg.norm(dofs.matrix(model.mass(state.q)) @ moved[2])
+        return np.linalg.norm(force) / unit, abs(outlet) / state.pressure
+
+    (force, outlet), (half_force, half_outlet) = left(1e-6), left(5e-7)
+    assert force < 5e-3 and outlet < 1e-5
+    assert half_force == pytest.approx(force / 2, rel=0.1) and half_outlet == pytest.approx(outlet / 4, rel=0.1)
+
+
+def test_pressures_and_areas_belong_to_the_mode(model, state, flutter):
+    """Areas by finite difference of the deformed rows; no pressure at the outlet."""
+    size = 1e-6
+    for shape, areas, pressures in zip(flutter.shapes, flutter.areas, flutter.pressures):
+        moved = model.rows.areas(model.nodal(state.q) + size * shape.real) - model.rows.areas(model.nodal(state.q) - size * shape.real)
+        assert np.allclose(moved / (2 * size), areas.real, atol=1e-6 * np.abs(areas).max())
+        assert abs(pressures[0]) < 1e-9 * np.abs(pressures).max()
+
+
+def test_shapes_are_scaled_to_their_largest_displacement(flutter):
+    for shape in flutter.shapes:
+        phases = np.exp(1j * np.linspace(0, 2 * np.pi, 721))
+        reach = max(np.linalg.norm((shape[:, :3] * phase).real, axis=1).max() for phase in phases)
+        assert reach == pytest.approx(1.0, abs=1e-6)
+        assert np.linalg.norm(shape[:, :3].real, axis=1).max() == pytest.approx(1.0, abs=1e-6)  # at phase zero
+
+
+@pytest.mark.parametrize("conditions", [LIGHT, WATER])
+def test_the_number_asked_for_changes_nothing(model, state, conditions):
+    few, many = (run_modes(model, state, conditions, ModesOptions(count)).eigenvalues for count in (3, 6))
+    assert np.allclose(few, many[: len(few)], rtol=1e-8)
+
+
+def test_another_shift_gives_the_same(model, state, flutter):
+    search = SearchOptions(shifts=(250.0 + 150.0j,))
+    assert np.allclose(run_modes(model, state, LIGHT, ModesOptions(4, search=search)).eigenvalues[:3], flutter.eigenvalues[:3], rtol=1e-8)
+
+
+def test_in_vacuo_at_rest(model):
+    """Undamped modes of the structure come by frequency, have no growth, and damp as beta omega^2 / 2 once damping is there."""
+    rest = rest_state(model)
+    free = run_modes(model, rest, Conditions(1000.0, 0.0, 0.0), ModesOptions(6, in_vacuo=True))
+    omega = free.eigenvalues.imag
+    assert (np.diff(omega) > 0).all() and np.abs(free.eigenvalues.real).max() < 1e-6 * omega[0]
+    assert 10 < omega[0] / (2 * np.pi) < 18 and free.stable is True
+    assert any("stiffness damping" in note for note in free.notes)
+    beta = 1e-4
+    damped = run_modes(model, rest, Conditions(1000.0, 0.0, beta), ModesOptions(3, in_vacuo=True))
+    expected = -beta * omega[:3] ** 2 / 2 + 1j * omega[:3] * np.sqrt(1 - (beta * omega[:3] / 2) ** 2)
+    assert np.allclose(damped.eigenvalues, expected, rtol=1e-6)
+
+
+def test_the_verdict_is_withheld_where_the_counts_disagree(model, state):
+    """A band that leaves the flutter out: nothing unstable is listed, the independent count sees it."""
+    told = []
+
+    class Listener(Observer):
+        def warn(self, sentence):
+            told.append(sentence)
+
+    options = ModesOptions(3, search=SearchOptions(max_frequency=25.0))
+    found = run_modes(model, state, LIGHT, options, Listener())
+    assert found.certified.unstable_count == 0 and found.stable is None
+    assert told and any("may be unstable" in note for note in found.notes)
+
+
+def test_an_unstable_pair_is_proof(model, state):
+    """Without stiffness damping the band holds some of the unstable modes: unstable, though the counts differ."""
+    found = run_modes(model, state, Conditions(10.0, 5.0, 0.0), ModesOptions(3))
+    assert found.certified.unstable_count > 0 and found.stable is False
+
+
+@pytest.mark.parametrize("density", [1e-3, 2e4])
+def test_extreme_densities(model, state, density):
+    found = run_modes(model, state, replace(LIGHT, density=density))
+    assert found.certified.agrees and found.spectrum.residual.max() < 1e-8
+    assert all(note.endswith(".") for note in found.notes)
+
+
+def test_a_uniform_pressure_has_no_fluid(state):
+    shut = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16, "drive.kind": "uniform"}))
+    found = run_modes(shut, LoadPath(shut).go_to(500.0), WATER, ModesOptions(2))
+    assert found.in_vacuo and found.pressures.shape[1] == 0 and found.stable is True
+
+
+def test_refusals(model, state, one_sentence):
+    with pytest.raises(SolveError) as caught:
+        run_modes(model, replace(state, converged=False), LIGHT)
+    assert one_sentence(str(caught.value)) and "has not converged" in str(caught.value)
+    with pytest.raises(SolveError) as caught:
+        run_modes(model, replace(state, q=1.01 * state.q), LIGHT)
+    assert one_sentence(str(caught.value)) and "no equilibrium of this model" in str(caught.value)
+    with pytest.raises(SolveError) as caught:
+        run_modes(model, replace(state, q=state.q[:-1]), LIGHT)
+    assert "another mesh" in str(caught.value)
+    with pytest.raises(CaseError) as caught:
+        run_modes(model, rest_state(model), LIGHT)
+    assert one_sentence(str(caught.value))
+
+
+@pytest.mark.slow
+def test_the_flutter_of_the_reference_mesh():
+    """28 x 48, 6 kPa, 10 kg/m3: about +27 1/s at 36.3 Hz, the next near -24 1/s at 16.8 Hz; a few per cent between two models."""
+    model = ValveModel(Case())
+    found = run_modes(model, LoadPath(model).go_to(6e3), LIGHT)
+    first, second = found.eigenvalues[:2]
+    assert first.real == pytest.approx(27, abs=3) and first.imag / (2 * np.pi) == pytest.approx(36.3, rel=0.03)
+    assert second.real == pytest.approx(-24, abs=3) and second.imag / (2 * np.pi) == pytest.approx(16.8, rel=0.05)
+    assert found.certified.agrees and found.spectrum.residual.max() < 1e-8
