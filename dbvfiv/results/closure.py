@@ -58,10 +58,24 @@ class PressedState:
         passage = Opening(results.mesh.z, self.opening, results.reference_opening / QUARTERS, self.gap, self.gap)
         return [list(pair) for pair in passage.shut_intervals(results.case.closure.shut_fraction)]
 
+    @property
+    def layer_extremes(self) -> list[dict[str, Any]]:
+        """Largest elongation or shortening and largest von Mises stress (Pa) of each layer, inside to outside."""
+        stretch, stress = self.layers.stretch, self.layers.von_mises
+        strain = np.maximum(stretch[:, :, 1] - 1, 1 - stretch[:, :, 0]).max(axis=0)
+        return [
+            {"layer": title, "largest_strain": float(e), "largest_stress": float(s)}
+            for title, e, s in zip(self.results.mesh.layer_titles(), strain, stress.max(axis=0))
+        ]
+
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
         found = {c.name: _plain(getattr(self, c.name)) for c in SUMMARY}
-        return found | {"sealed_intervals": self.sealed_intervals, "stiffness_eigenvalues": _plain(self.stiffness_eigenvalues)}
+        return found | {
+            "sealed_intervals": self.sealed_intervals,
+            "stiffness_eigenvalues": _plain(self.stiffness_eigenvalues),
+            "layers": self.layer_extremes,
+        }
 
 
 class ClosureResults(Result):

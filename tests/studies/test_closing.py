@@ -1,0 +1,119 @@
+"""The drive turns from flow to back pressure in time: the valve shuts, stays shut, and nothing runs away."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbvfiv.case.model import Case
+from dbvfiv.flow import Channel
+from dbvfiv.studies.closing import ClosingResult, ClosingSample, Turn, run_closing
+from dbvfiv.studies.closing_motion import ContactValve, ReversibleFluid
+from dbvfiv.transient.fluid import MovingFluid
+
+COARSE = {"mesh.around": 6, "mesh.along": 10, "closure.pressures": ["10 kPa"]}
+
+
+def _fluid(kind, storage=0.0):
+    return kind(Channel(np.linspace(0, 0.5, 8), 1e-6, storage), 1000.0)
+
+
+AREA = 1e-4 * np.array([1.0, 1.1, 1.5, 3.0, 6.0, 9.0, 12.0, 13.0])
+RATE = 1e-3 * np.array([0.0, -0.5, -1.0, 0.5, 1.0, 0.0, -0.3, 0.0])
+
+
+@pytest.mark.parametrize("storage", [0.0, 1.0])
+def test_a_forward_flow_is_that_of_the_ordinary_fluid(storage):
+    ours, theirs = _fluid(ReversibleFluid, storage), _fluid(MovingFluid, storage)
+    rate = np.zeros(8)
+    for inlet in (500.0, 2e4):
+        u = ours.velocity(AREA, rate, inlet, 50.0, -0.3)
+        assert u == pytest.approx(theirs.velocity(AREA, rate, inlet, 50.0, -0.3), rel=1e-12) and u > 0
+
+
+@pytest.mark.parametrize("storage", [0.0, 1.0])
+@pytest.mark.parametrize("inlet", [-3e4, -500.0, 0.0, 40.0, 2e4])
+@pytest.mark.parametrize("known", [-4.0, 0.0, 4.0])
+def test_there_is_one_velocity_at_every_drive_and_it_meets_the_outlet(storage, inlet, known):
+    fluid = _fluid(ReversibleFluid, storage)
+    u = fluid.velocity(AREA, RATE, inlet, 80.0, known)
+    flow = fluid.state(AREA, RATE, u)
+    outlet = fluid.pressure(flow, 80.0 * flow.psi + known, inlet)[0]
+    assert abs(outlet) <= 1e-9 * (abs(inlet) + 1000 * (abs(known) + 0.5 * flow.speed[0] ** 2 + 80 * abs(flow.psi[0])))
+    more = fluid.state(AREA, RATE, u + 1e-3)
+    assert fluid.pressure(more, 80.0 * more.psi + known, inlet)[0] < outlet
+
+
+def test_steady_flow_is_odd_in_the_drive():
+    fluid = _fluid(ReversibleFluid)
+    still = np.zeros(8)
+    assert fluid.velocity(AREA, still, -3e3, 0.0, 0.0) == pytest.approx(-fluid.velocity(AREA, still, 3e3, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("storage", [0.0, 1.0])
+@pytest.mark.parametrize("velocity", [-0.4, 0.3])
+def test_pressure_slopes_agree_with_differences(storage, velocity):
+    fluid = _fluid(ReversibleFluid, storage)
+    by_area, by_rate, by_speed = fluid.pressure_slopes(AREA, RATE, velocity, 60.0)
+
+    def pressure(area, rate, u):
+        flow = fluid.state(area, rate, u)
+        return fluid.pressure(flow, 60.0 * flow.psi, 1e3)
+
+    direction = np.linspace(0.3, 1.0, 8)
+    for slope, size, move in (
+        (by_area @ direction, 1e-9, lambda h: (AREA + h * direction, RATE, velocity)),
+        (by_rate @ direction, 1e-7, lambda h: (AREA, RATE + h * direction, velocity)),
+        (by_speed, 1e-6, lambda h: (AREA, RATE, velocity + h)),
+    ):
+        change = (pressure(*move(size)) - pressure(*move(-size))) / (2 * size)
+        assert np.ravel(slope) == pytest.approx(change, rel=1e-5, abs=1e-6 * max(1.0, np.abs(change).max()))
+
+
+def test_contact_of_the_coupled_valve_is_part_of_its_exact_tangent():
+    model = ContactValve(Case().replace(COARSE))
+    generator = np.random.default_rng(4)
+    nodal = 2e-4 * generator.standard_normal((len(model.mesh.nodes), 5))
+    nodal[:, 1] -= 3e-4
+    q = model.shell.dofs.restrict(nodal)
+    assert model.contact_state(q).touching.any()
+    direction = generator.standard_normal(model.size)
+    tangent = model.tangent(q, 2e3)
+    assert tangent.residual == pytest.approx(model.residual(q, 2e3), abs=1e-9 * np.abs(tangent.residual).max())
+    h = 1e-10
+    change = (model.residual(q + h * direction, 2e3) - model.residual(q - h * direction, 2e3)) / (2 * h)
+    assert model.apply(tangent, direction) == pytest.approx(change, rel=1e-3, abs=1e-4 * np.abs(change).max())
+
+
+def test_a_history_that_opens_again_is_not_shut_before_it_shuts_for_good():
+    turn = Turn(1e4, 0.1, 0.4)
+    assert [turn(t) for t in (0.0, 0.3, 0.5, 0.9)] == pytest.approx([1e4, 0.0, -1e4, -1e4], abs=1e-9) and turn.zero == pytest.approx(0.3)
+
+    def sample(time, passage):
+        return ClosingSample(time, turn(time), 0.0, passage, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    history = [sample(0.1 * i, passage) for i, passage in enumerate((9, 9, 9, 1, 5, 1, 1, 1))]
+    result = ClosingResult(tuple(history), turn, 2.0)
+    assert result.first_shut == pytest.approx(0.2) and result.closing_time == pytest.approx(0.3)
+    assert result.summary()["stays_shut"] is True
+    assert ClosingResult(tuple(history[:5]), turn, 2.0).closing_time is None
+
+
+@pytest.mark.slow
+def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
+    case = Case().replace(COARSE | {"closure.reversal_time": "0.2 s", "closure.reversal_hold": "0.2 s"})
+    result = run_closing(case)
+    told = result.summary()
+    assert not result.failure and told["stays_shut"]
+    assert result.samples[0].inlet_pressure == 10e3 and result.samples[-1].inlet_pressure == -10e3
+    assert result.samples[-1].time == pytest.approx(0.42)
+    assert 0.1 < told["closing_time"] < 0.4
+    for sample in result.samples:
+        assert np.isfinite(list(vars(sample).values())).all()
+        assert sample.least_opening >= 0.0 and sample.contact_force >= 0.0
+    assert told["largest_penetration"] < 1e-4
+    # shut, what still passes is a thousandth of the flow there was
+    late = [s.mass_flow for s in result.samples if s.time > 0.35]
+    assert max(np.abs(late)) < 2e-3 * result.samples[0].mass_flow
+    flat = max(s.lip_opening for s in result.samples if s.time > 0.35)
+    assert flat < 1e-6
