@@ -14,7 +14,7 @@ from typing import Callable
 import numpy as np
 
 from continuation import OutOfDomain, Spectrum, SystemBase
-from eigen import CoupledPencil, SearchOptions, Workspace, leading_modes
+from eigen import CoupledPencil, SearchOptions, SingularShiftError, Workspace, leading_modes
 from eigen.pencil import real_apply
 
 from .analytic import PARAMETERS, AnalyticResidual
@@ -253,12 +253,23 @@ class ValveLinearisation:
         return self._zero().solve_transpose(rhs)
 
 
+def _factored(pencil: CoupledPencil, shift: complex):
+    """LU at a shift, a hair beside it where an eigenvalue sits on it to rounding: products use the exact shift, so bordered solves refine themselves."""
+    size = max(abs(shift), 1.0)
+    for nudge in (0.0, 1e-9, -1e-8):
+        try:
+            return Workspace().shifted(pencil, shift + nudge * size)
+        except SingularShiftError as error:
+            refused = error
+    raise refused
+
+
 class _Shifted:
     """Solves with A - shift B by elimination of v: T(shift) (q, U) on the left."""
 
     def __init__(self, linear: ValveLinearisation, shift: complex):
         self.linear, self.shift = linear, shift
-        self._factor = Workspace().shifted(linear.pencil, shift)
+        self._factor = _factored(linear.pencil, shift)
 
     def matvec(self, x):
         return self.linear.matvec(x) - self.shift * self.linear.mass_matvec(x)

@@ -1,0 +1,106 @@
+"""Steady states and leading eigenvalues anywhere in the space of parameters, each state found from the nearest one known."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case.model import Case
+from ..errors import SolveError
+from ..model import ValveModel
+from ..model.dynamics import LinearisedState, linearise
+from .column import Column, ColumnSolver
+from .observer import Observer
+from .parameters import Place, rebuilder
+from .steady import LoadPath, SteadyOptions
+
+
+@dataclass
+class _Built:
+    """A model of one design with its load path and the states found so far."""
+
+    model: ValveModel
+    path: LoadPath
+    solver: ColumnSolver
+    known: dict[float, np.ndarray]
+
+
+class StabilityWalk:
+    """Answers for places of the parameter space.
+
+    Parameters
+    ----------
+    case : Case
+    observer : Observer, optional
+    """
+
+    def __init__(self, case: Case, observer: Observer | None = None, model: ValveModel | None = None):
+        self.case = case
+        self.observer = observer or Observer()
+        self._rebuild = rebuilder(case)
+        self._built: dict[tuple, _Built] = {}
+        self._last: tuple[tuple, LinearisedState] | None = None
+        if model is not None:
+            self._built[()] = self._new(model)
+
+    def _new(self, model: ValveModel) -> _Built:
+        path = LoadPath(model, SteadyOptions.of(self.case))
+        return _Built(model, path, ColumnSolver(), {})
+
+    def built(self, place: Place) -> _Built:
+        """Model and path of the design of a place."""
+        key = tuple(sorted(place.design.items()))
+        if key not in self._built:
+            if len(self._built) > 4:
+                self._built = {k: v for k, v in list(self._built.items())[-2:]}
+            self._built[key] = self._new(self._rebuild(place.design))
+        return self._built[key]
+
+    def equilibrium(self, place: Place) -> np.ndarray:
+        """Displacements q (n,) of the steady state.
+
+        Raises
+        ------
+        SolveError
+        """
+        built = self.built(place)
+        if place.pressure in built.known:
+            return built.known[place.pressure]
+        path = built.path
+        nearest = min([0.0, *built.known], key=lambda p: abs(p - place.pressure))
+        if nearest and abs(nearest - place.pressure) < abs(path.pressure - place.pressure):
+            path.pressure, path.q, path.slope = nearest, built.known[nearest], None
+        path.go_to(place.pressure)
+        if len(built.known) > 400:
+            built.known.clear()
+        built.known[place.pressure] = path.q
+        return path.q
+
+    def linear(self, place: Place) -> LinearisedState:
+        """The linearised state, without density, damping and continuity law.
+
+        Raises
+        ------
+        SolveError
+        """
+        key = (place.pressure, tuple(sorted(place.design.items())))
+        if self._last is None or self._last[0] != key:
+            self._last = (key, linearise(self.built(place).model, self.equilibrium(place), place.pressure))
+        return self._last[1]
+
+    def spectrum(self, place: Place, count: int = 6):
+        """Leading modes of the full pencil, an `eigen.Spectrum`.
+
+        Raises
+        ------
+        SolveError
+        """
+        linear = self.linear(place)
+        try:
+            return self.built(place).solver.direct(linear, place.condition, count)
+        except (ArithmeticError, ValueError) as error:
+            raise SolveError(f"The modes at {place.pressure:.6g} Pa were not found: {str(error).rstrip('.')}.") from error
+
+    def column(self, places: list[Place]) -> Column:
+        """Cells that share a steady state."""
+        return self.built(places[0]).solver.solve(self.linear(places[0]), [p.condition for p in places])
