@@ -52,6 +52,16 @@ class Workspace:
         SingularShiftError
             If the shift is an eigenvalue to working precision.
         """
+        return ShiftedPencil(pencil, self.structure(pencil), shift, self.factored(pencil, shift))
+
+    def factored(self, pencil: CoupledPencil, shift: complex):
+        """LU of the structure alone at a shift, shift^2 M + shift C + K.
+
+        Raises
+        ------
+        SingularShiftError
+            If a pivot is zero.
+        """
         structure = self.structure(pencil)
         if complex(shift).imag == 0.0:
             if self._real is None:
@@ -62,7 +72,7 @@ class Workspace:
         else:
             factor = SuperluFactorization(structure)
         factor.refactor(structure.values(shift))
-        return ShiftedPencil(pencil, structure, shift, factor)
+        return factor
 
 
 class ShiftedPencil:

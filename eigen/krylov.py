@@ -1,6 +1,7 @@
 """Eigenvalues of a pencil near one shift, by SLEPc's Krylov-Schur method."""
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,7 +106,8 @@ class _ShiftAndInvert:
 def near_shift(shifted: ShiftedPencil, wanted: int, *, tolerance: float = 1e-10,
                subspace: int | None = None,
                max_restarts: int = 60, patience: int = 3,
-               transposed: bool = False, limit_point: float | None = None) -> KrylovPairs:
+               transposed: bool = False, limit_point: float | None = None,
+               enough: Callable[[np.ndarray, float], bool] | None = None) -> KrylovPairs:
     """The eigenvalues nearest to the shift of a factored pencil.
 
     Parameters
@@ -125,6 +127,9 @@ def near_shift(shifted: ShiftedPencil, wanted: int, *, tolerance: float = 1e-10,
     limit_point : float, optional
         Real limit point of eigenvalues: the search ends when all that is left to converge lies as
         far from the shift as this, 3 per cent less.
+    enough : callable, optional
+        enough(eigenvalues, reach) is asked after each restart about those that have converged;
+        True ends the search. Not asked at a complex shift in real arithmetic.
 
     Returns
     -------
@@ -146,6 +151,9 @@ def near_shift(shifted: ShiftedPencil, wanted: int, *, tolerance: float = 1e-10,
     solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
     solver.setTolerances(tolerance, max_restarts)
     stopping = _Patience(patience, SLEPc.EPS.ConvergedReason, _limit_size(shifted, limit_point))
+    if enough is not None and not operator.paired:
+        stopping.enough = lambda theta: enough(shifted.shift + 1.0 / theta, 1.0 / np.abs(theta).min())
+        stopping.matrix = SLEPc.DS.MatType.A
     solver.setStoppingTest(stopping)
     if stopping.limit:
         solver.setMonitor(stopping.watch)
@@ -179,6 +187,8 @@ class _Patience:
         self.best, self.since = 0, 0
         self.ritz = np.zeros(0)
         self.at_limit = False
+        self.enough = None
+        self.matrix = None
 
     def watch(self, _solver, _restart, _converged, ritz, _errors):
         self.ritz = np.abs(np.array(ritz))
@@ -192,9 +202,20 @@ class _Patience:
             return self.reasons.CONVERGED_USER
         if converged > self.best:
             self.best, self.since = converged, restart
+            if self.enough is not None and self.enough(self._converged(_solver, converged)):
+                return self.reasons.CONVERGED_USER
         if restart >= max_restarts or restart - self.since >= self.patience:
             return self.reasons.DIVERGED_ITS
         return self.reasons.CONVERGED_ITERATING
+
+
+    def _converged(self, solver, number):
+        """Transformed eigenvalues converged so far, from the projected Schur form."""
+        projected = solver.getDS()
+        schur = projected.getMat(self.matrix)
+        values = np.linalg.eigvals(schur.getDenseArray()[:number, :number])
+        projected.restoreMat(self.matrix, schur)
+        return values
 
 
 def _collect(solver, shell, operator, size, limit=0.0) -> KrylovPairs:

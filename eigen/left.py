@@ -19,7 +19,7 @@ def attach_left(pencil, shifted: ShiftedPencil, batch, wanted, tolerance, found,
     batch.left_q = np.zeros((pencil.n, k), complex)
     batch.left_u = np.zeros((pencil.b, k), complex)
     pairs = near_shift(shifted, wanted, tolerance=tolerance, transposed=True,
-                       limit_point=limit_point)
+                       limit_point=limit_point, enough=lambda values, _: _all_there(batch, values))
     found.applications += pairs.applications
     free = np.ones(pairs.eigenvalues.size, bool)
     workspace = Workspace()
@@ -33,6 +33,14 @@ def attach_left(pencil, shifted: ShiftedPencil, batch, wanted, tolerance, found,
             w, W = left_by_inverse_iteration(pencil, value, workspace)
         # the transposed problem gives w^T T = 0
         batch.left_q[:, i], batch.left_u[:, i] = w.conj(), W.conj()
+
+
+def _all_there(batch, values) -> bool:
+    """Whether each eigenvalue of the right vectors has turned up."""
+    if values.size < batch.values.size:
+        return False
+    gaps = np.abs(values[:, None] - batch.values).min(axis=0)
+    return bool((gaps <= 0.01 * SAME * np.abs(batch.values)).all())
 
 
 def left_by_inverse_iteration(pencil, value, workspace):

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .condensation import Workspace
-from .pencil import CoupledPencil
 from .region import Oval
 from .residual import (Residuals, acceptable, balanced, derivative_times, newton, preferable)
 

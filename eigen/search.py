@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from .condensation import Workspace
+from .coverage import (CLEAR, apart_from_limit, band_sought, is_covered, leading_band,
+                       number_in_band, would_do)
 from .dense import all_pairs
 from .factorization import SingularShiftError, petsc_is_complex
 from .krylov import near_shift
@@ -14,10 +16,8 @@ from .options import SearchOptions
 from .pairs import Found, empty, merge, polish, refine, upper_half, verified
 from .pencil import CoupledPencil
 from .region import Oval, SearchedRegion
+from .shifts import next_shift, plan_shifts
 from .spectrum import Spectrum
-
-CLEAR = 0.8  # what counts as clearly right of a limit point of eigenvalues, as a fraction of it
-DEPTH = 0.4  # growth rate over angular frequency, down to which a band is searched at most
 
 
 def leading_modes(pencil: CoupledPencil, count: int, options: SearchOptions | None = None,
@@ -64,21 +64,8 @@ def leading_modes(pencil: CoupledPencil, count: int, options: SearchOptions | No
                                           and pencil.order <= options.dense_below)
     if dense:
         return _result(pencil, _dense(pencil, count, options, workspace), count, options)
-    options, first = _plan(pencil, count, options, workspace)
+    options, first = plan_shifts(pencil, count, options, workspace)
     return _result(pencil, _search(pencil, count, options, workspace, first), count, options)
-
-
-def _plan(pencil, count, options, workspace):
-    """First shift, and whether a limit point of eigenvalues is near enough to matter."""
-    if options.shifts is not None:
-        return options, None
-    first = _first_shift(pencil, max(count, options.least), options, workspace)
-    if options.limit_point is None:
-        return options, first
-    beside = 1.5 * abs(options.limit_point)
-    if beside < first:
-        return options, beside
-    return replace(options, limit_point=None), first
 
 
 def _search(pencil, count, options, workspace, first) -> Found:
@@ -90,44 +77,39 @@ def _search(pencil, count, options, workspace, first) -> Found:
     while queue:
         shift = queue.pop(0)
         wanted = pairs
-        before = _in_band(found, options)
+        before = number_in_band(found, options)
         while True:
             got = _at_shift(pencil, shift, wanted, aim, options, workspace, found)
-            if found.everything or queue or _is_covered(found, aim, options):
+            if found.everything or queue or is_covered(found, aim, options):
                 break
             # no more converge, or a pair that was rejected closes the region
             if got < wanted or found.limited or wanted >= min(options.max_pairs, pencil.order):
                 break
             wanted = min(int(1.6 * wanted) + 2, options.max_pairs)
-        fresh = _in_band(found, options) - before
-        if found.everything or (_is_covered(found, aim, options) and not given):
+        fresh = number_in_band(found, options) - before
+        if found.everything or (is_covered(found, aim, options) and not given):
             break
         if not queue and not given and len(found.shifts) < options.max_shifts:
             if options.max_frequency is not None and fresh == 0 and len(found.shifts) > 1:
                 break  # the band holds no more within reach
-            queue = [_next_shift(pencil, found, aim, options, workspace)]
+            queue = [next_shift(pencil, found, aim, options, workspace)]
     return found
-
-
-def _band(options) -> float:
-    """Upper end of the band sought, rad/s."""
-    return np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
-
-
-def _in_band(found, options) -> int:
-    return int(np.sum(found.values.imag <= _band(options)))
 
 
 def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
     """Search near one shift and merge; returns the number of eigenvalues that converged."""
-    shift, shifted, pairs = _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found)
+    def enough(values, reach):
+        return not found.shifts and would_do(values, shift, reach, aim, options)
+
+    shift, shifted, pairs = _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found,
+                                                  None if options.shifts else enough)
     found.shifts.append(shift)
     found.applications += pairs.applications
-    apart = _apart_from_limit(pairs.eigenvalues, options)
+    apart = apart_from_limit(pairs.eigenvalues, options)
     batch = verified(pencil, *upper_half(pairs.eigenvalues[apart], pairs.vectors_q[:, apart],
                                          pairs.vectors_u[:, apart]))
     polish(pencil, shifted, batch, options.tolerance)
-    dropped = refine(pencil, batch, aim, _band(options), options.tolerance, found)
+    dropped = refine(pencil, batch, aim, band_sought(options), options.tolerance, found)
     if options.left:
         attach_left(pencil, shifted, batch, wanted, options.krylov_tolerance, found,
                     options.limit_point)
@@ -143,14 +125,7 @@ def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
     return pairs.eigenvalues.size
 
 
-def _apart_from_limit(values, options) -> np.ndarray:
-    """Which eigenvalues do not belong to those that crowd around the limit point."""
-    if options.limit_point is None:
-        return np.ones(values.size, bool)
-    return np.abs(values - options.limit_point) > 0.05 * abs(options.limit_point)
-
-
-def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found):
+def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found, enough):
     """Factor at the shift, moved aside if it sits on an eigenvalue."""
     shift = complex(shift)
     shift = shift.real if shift.imag == 0.0 else shift
@@ -162,7 +137,7 @@ def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found):
         except SingularShiftError:
             continue
         pairs = near_shift(shifted, wanted, tolerance=options.krylov_tolerance,
-                           limit_point=options.limit_point)
+                           limit_point=options.limit_point, enough=enough)
         nearest = np.abs(pairs.eigenvalues - moved).min(initial=np.inf)
         if nearest > 1e-9 * unit:
             if attempt:
@@ -173,105 +148,6 @@ def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found):
                              "there, and perhaps everywhere.")
 
 
-def _first_shift(pencil, aim, options, workspace) -> float:
-    """A positive real shift of the size of the frequencies sought."""
-    if options.max_frequency is not None:
-        return 1.5 * 2 * np.pi * options.max_frequency
-    stiffness, inertia = np.abs(pencil.K.diagonal()), np.abs(pencil.M.diagonal())
-    typical = np.sqrt(np.median(stiffness + 1e-300) / np.median(inertia + 1e-300))
-    probe = 1e-3 * typical if np.isfinite(typical) and typical > 0 else 1.0
-    lowest = probe
-    for _ in range(3):  # inverse power iteration on the structure with M at the shift
-        try:
-            shifted = workspace.shifted(pencil, probe)
-        except SingularShiftError:
-            probe *= 1.37
-            continue
-        x = np.random.default_rng(3).standard_normal(pencil.n)
-        for _ in range(6):
-            x = shifted.factor.solve(pencil.M @ x).real
-            size = np.linalg.norm(x)
-            if not (np.isfinite(size) and size > 0):
-                return probe
-            x /= size
-        lowest = size ** -0.5
-        # with the shift small against the frequency the estimate holds
-        if lowest > 2 * probe or probe < 1e-6 * typical:
-            break
-        probe *= 0.05
-    return max(lowest, probe) * max(3.0, 1.0 * aim)
-
-
-def _next_shift(pencil, found, aim, options, workspace) -> complex:
-    """The natural real shift where the band was far off, then complex ones up the band."""
-    if options.limit_point is not None:  # a larger disc hugs the line through the limit point
-        return 3.0 * max(abs(s) for s in found.shifts)
-    if options.max_frequency is not None and len(found.shifts) == 1:
-        natural = _first_shift(pencil, aim, replace(options, max_frequency=None), workspace)
-        if natural < 0.5 * found.shifts[0].real:
-            return natural
-    if options.max_frequency is not None:
-        band = 2 * np.pi * options.max_frequency
-    else:
-        band = max(_leading(found, aim, options)[1], abs(found.shifts[0]))
-    step = len([s for s in found.shifts if isinstance(s, complex)])
-    height = band * (1.0, 0.5, 0.75, 0.25)[step % 4]
-    return complex(0.3 * band, height)
-
-
-def _leading(found, aim, options) -> tuple[float, float]:
-    """Growth rate of the last of the leading modes, and the band that holds them, rad/s."""
-    values = found.values
-    if options.limit_point is not None:
-        floor = CLEAR * options.limit_point
-        values = values[values.real > floor]
-        growth = np.sort(values.real)[::-1]
-        band = min(_band(options), float(values.imag.max(initial=0.0)))
-        return float(growth[aim - 1]) if growth.size >= aim else floor, band
-    if options.max_frequency is not None:
-        band = 2 * np.pi * options.max_frequency
-        values = values[values.imag <= band * (1 + 1e-12)]
-        growth = np.sort(values.real)[::-1]
-        return (growth[min(aim, growth.size) - 1] if growth.size else -np.inf), band
-    if not values.size:
-        return -np.inf, np.inf
-    if not found.everything:
-        covered = _widest_band(found, aim)
-        if covered is not None:
-            return covered
-    order = np.argsort(-values.real)[:aim]
-    return float(values.real[order].min()), float(values.imag[order].max())
-
-
-def _widest_band(found, aim) -> tuple[float, float] | None:
-    """The widest band whose leading modes the region covers, with the growth rate of the last."""
-    region = SearchedRegion(tuple(found.ovals.values()))
-    tops = np.unique(found.values.imag)[::-1]
-    for band in tops[::max(1, tops.size // 60)]:
-        growth = np.sort(found.values.real[found.values.imag <= band])[::-1]
-        if growth.size < aim:
-            return None
-        low, high = region.complete_between(float(band), samples=100)
-        if low <= growth[aim - 1] and high > 0:
-            return float(growth[aim - 1]), float(band)
-    return None
-
-
-def _is_covered(found, aim, options) -> bool:
-    if found.everything:
-        return True
-    growth, band = _leading(found, aim, options)
-    if options.limit_point is not None:
-        low, high = SearchedRegion(tuple(found.ovals.values())).complete_between(band)
-        return low <= growth and high > 0
-    inside = found.values.imag <= band * (1 + 1e-12)
-    low, high = SearchedRegion(tuple(found.ovals.values())).complete_between(band)
-    if inside.sum() < aim:
-        # a band may hold fewer: enough if it is searched down to strongly damped modes
-        return options.max_frequency is not None and low <= -DEPTH * band and high > 0
-    return low <= growth and high > 0
-
-
 def _dense(pencil, count, options, workspace) -> Found:
     """Every eigenvalue at once, verified and refined like any other."""
     values, q, u, w, W = all_pairs(pencil, left=options.left)
@@ -280,7 +156,7 @@ def _dense(pencil, count, options, workspace) -> Found:
     if options.left:
         batch.left_q, batch.left_u = w, W
     # only pairs that may be asked for are worth a Newton step
-    dropped = refine(pencil, batch, max(count, options.least), _band(options), options.tolerance, found)
+    dropped = refine(pencil, batch, max(count, options.least), band_sought(options), options.tolerance, found)
     merge(found, batch)
     found.everything = not dropped.size
     if dropped.size:
@@ -291,7 +167,7 @@ def _dense(pencil, count, options, workspace) -> Found:
 def _result(pencil, found: Found, count, options) -> Spectrum:
     """Sort, cut to the number asked for, and say what is certified."""
     region = SearchedRegion(tuple(found.ovals.values()), found.everything)
-    _, band = _leading(found, max(count, options.least), options)
+    _, band = leading_band(found, max(count, options.least), options)
     order = np.lexsort((found.values.imag, -found.values.real))
     order = order[found.values.imag[order] <= band * (1 + 1e-12)]
     if options.limit_point is not None:

@@ -63,6 +63,7 @@ def test_cantilever_pipe_to_flutter():
     assert np.nanmax(branches.growth_rate[:, 0]) < 0
 
 
+@pytest.mark.slow
 def test_plate_over_density():
     matrices = plate_over_channel(5, 10)
 
