@@ -1,0 +1,187 @@
+"""Result files, ParaView files and figures of modes and sweeps."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+from PIL import Image
+
+import dbvfiv
+from dbvfiv.errors import CaseError
+from dbvfiv.plots import figures_of
+
+FLUTTER = {"density": 10, "alpha": 0}
+
+
+@pytest.fixture(scope="module")
+def modes(coarse_run):
+    return coarse_run.states[0].modes(count=5, **FLUTTER)
+
+
+@pytest.fixture(scope="module")
+def stored(modes, tmp_path_factory):
+    return dbvfiv.load_result(modes.save(tmp_path_factory.mktemp("modes") / "modes.h5"))
+
+
+@pytest.fixture(scope="module")
+def sweep(coarse_run):
+    return coarse_run.states[0].sweep("density=1:1000:7:log", count=4, alpha=0)
+
+
+@pytest.fixture(scope="module")
+def stored_sweep(sweep, tmp_path_factory):
+    return dbvfiv.load_result(sweep.save(tmp_path_factory.mktemp("sweep") / "sweep.h5"))
+
+
+def test_modes_come_back(modes, stored):
+    assert stored.summary() == modes.summary() and stored.lines() == modes.lines()
+    assert stored.complete and stored.stable is False and stored.notes == modes.notes
+    for ours, theirs in zip(stored.modes, modes.modes, strict=True):
+        for name in ("shape", "area", "pressure", "inlet_velocity"):
+            assert np.array_equal(getattr(ours, name), getattr(theirs, name)), name
+    assert np.array_equal(stored.certificate.phase, modes.certificate.phase)
+    assert np.array_equal(stored.state.nodal, modes.state.nodal)
+
+
+def test_the_case_of_the_file_gives_the_modes_again(stored):
+    assert stored.case.fluid.density == 10 and stored.case.damping.alpha == 0 and stored.case.drive.pressure == 6e3
+    again = dbvfiv.load(stored.case).modes(count=2)
+    assert again.modes[0].eigenvalue == pytest.approx(stored.modes[0].eigenvalue, rel=1e-6)
+
+
+def test_numbers_carry_units(stored):
+    with h5py.File(stored.path) as file:
+        assert file["modes/growth_rate"].attrs["units"] == "1/s" and file["modes/shape"].attrs["description"]
+        assert file["state/pressure"].attrs["units"] == "Pa" and file["certificate/frequency"].attrs["units"] == "Hz"
+
+
+def test_state_and_valve_say_the_same(coarse_valve, modes):
+    other = coarse_valve.modes("6 kPa", count=5, **FLUTTER)
+    assert [m.growth_rate for m in other.modes] == pytest.approx([m.growth_rate for m in modes.modes], rel=1e-6)
+    assert other.state.mass_flow == pytest.approx(modes.state.mass_flow, rel=1e-6)  # of the lighter fluid, not of the state's
+    storage = coarse_valve.modes("6 kPa", count=2, continuity="storage", **FLUTTER)
+    assert abs(storage.modes[0].eigenvalue - modes.modes[0].eigenvalue) > 1
+
+
+def test_what_cannot_be_chosen_is_told(coarse_valve, coarse_run, one_sentence):
+    for call in (
+        lambda: coarse_valve.modes(rho=3),
+        lambda: coarse_valve.modes(density=-1),
+        lambda: coarse_valve.sweep("density=5:1:3"),
+        lambda: coarse_run.states[0].modes(continuity="none"),
+        lambda: coarse_run.export("x.vtkhdf", mode=1),
+    ):
+        with pytest.raises(CaseError) as caught:
+            call()
+        assert one_sentence(str(caught.value)), str(caught.value)
+
+
+def vtk_steps(path, numbers=None):
+    """Times of a file, and (points, point data, cell data) of some steps, as VTK's own reader gives them."""
+    vtk = pytest.importorskip("vtk")
+    from vtk.util.numpy_support import vtk_to_numpy
+
+    reader = vtk.vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(vtk.vtkStreamingDemandDrivenPipeline.TIME_STEPS())
+    steps = []
+    for number in range(len(times)) if numbers is None else numbers:
+        reader.SetStep(number)
+        reader.Update()
+        grid = reader.GetOutput()
+        data = [{d.GetArrayName(i): vtk_to_numpy(d.GetArray(i)).copy() for i in range(d.GetNumberOfArrays())} for d in (grid.GetPointData(), grid.GetCellData())]
+        steps.append((vtk_to_numpy(grid.GetPoints().GetData()).copy(), *data))
+    return times, steps
+
+
+def test_vtk_reads_the_modes(stored, tmp_path):
+    times, steps = vtk_steps(stored.export(tmp_path / "modes.vtkhdf"))
+    assert times == (1, 2, 3, 4, 5)
+    for mode, (points, fields, cells) in zip(stored.modes, steps, strict=True):
+        shape = fields["mode_real"] + 1j * fields["mode_imag"]
+        assert fields["mode_amplitude"].max() == pytest.approx(1) and np.linalg.norm(shape.real, axis=1).max() == pytest.approx(1)
+        lip = np.isclose(points[:, 2], 0) & np.isclose(points[:, 0], 0)
+        up, down = shape[lip & (points[:, 1] > 0)][0], shape[lip & (points[:, 1] < 0)][0]
+        assert np.allclose(up * [1, -1, 1], down)  # all quarters, mirrored
+        assert np.allclose(up, mode.shape[stored.mesh.rows[0, 0], :3])
+        assert cells["growth_rate"][0] == pytest.approx(mode.growth_rate)
+        assert np.abs(fields["displacement"]).max() == pytest.approx(stored.state.max_displacement, rel=0.2)
+
+
+def test_vtk_reads_one_cycle(stored, tmp_path):
+    mode = stored.modes[0]
+    times, steps = vtk_steps(stored.export(tmp_path, mode=1, deformed=True), (0, 12, 24))
+    assert len(times) == 25 and times[-1] == pytest.approx(1 / mode.frequency)
+    swing = [fields["oscillation"] for _, fields, _ in steps]
+    amplitude = mode.drawn_amplitude(stored.state)
+    assert np.linalg.norm(swing[0], axis=1).max() == pytest.approx(amplitude, rel=1e-6)
+    assert np.allclose(swing[0], swing[2], atol=1e-9) and np.allclose(swing[0], -swing[1], atol=1e-9)
+    assert np.allclose(steps[0][0] - steps[1][0], swing[0] - swing[1], atol=1e-6)
+    with pytest.raises(CaseError):
+        stored.export(tmp_path, mode=9)
+
+
+def test_sweep_comes_back(sweep, stored_sweep):
+    assert stored_sweep.summary() == sweep.summary() and stored_sweep.lines() == sweep.lines()
+    assert stored_sweep.complete and stored_sweep.certified
+    assert stored_sweep.case.sweep.over == "density=1:1000:7:log" and stored_sweep.case.damping.alpha == 0
+
+
+def test_crossing_is_where_growth_vanishes(coarse_run, sweep):
+    (crossing,) = sweep.crossings()
+    assert not crossing.to_unstable and crossing.branch == 1
+    found = coarse_run.states[0].modes(count=2, density=crossing.value, alpha=0)
+    flutter = max(found.modes, key=lambda m: m.growth_rate)
+    assert abs(flutter.growth_rate) < 2 and flutter.frequency == pytest.approx(crossing.frequency, rel=0.02)
+
+
+def test_a_missing_branch_is_null(sweep):
+    summary = sweep.summary()
+    assert set(summary["branches"][0]) == {"id", "growth_rate", "frequency", "confidence"}
+    missing = [branch for branch in summary["branches"] if None in branch["growth_rate"]]
+    assert missing
+    for branch in missing:
+        places = [i for i, v in enumerate(branch["growth_rate"]) if v is None]
+        assert all(branch[name][i] is None for name in ("frequency", "confidence") for i in places)
+
+
+def test_figures(stored, stored_sweep):
+    assert set(figures_of(stored, only=["eigenvalues", "winding", "centre-line-1"])) == {"eigenvalues", "winding", "centre-line-1"}
+    assert set(figures_of(stored, mode=2, only=["mode-shape-2", "centre-line-2"])) == {"mode-shape-2", "centre-line-2"}
+    assert set(figures_of(stored_sweep)) == {"sweep", "root-locus"}
+    with pytest.raises(CaseError):
+        figures_of(stored, mode=17)
+
+
+def test_centre_line_shows_the_cycle(stored):
+    """Ten phases about the steady state, each of them the equilibrium plus the swing of the mode."""
+    figure = figures_of(stored, only=["centre-line-1"])["centre-line-1"]
+    lines = figure.axes[0].get_lines()
+    state, mode = stored.state, stored.modes[0]
+    row = stored.mesh.rows[:, 0]
+    expected = stored.mesh.nodes[row] + state.nodal[row, :3] + mode.drawn_amplitude(state) * mode.shape[row, :3].real
+    assert np.allclose(lines[0].get_ydata(), 1e3 * expected[:, 1]) and np.allclose(lines[0].get_xdata(), 1e3 * expected[:, 2])
+    assert all(line.get_ydata().min() > 0 for line in lines[:10])  # drawn without crossing the closing plane
+
+
+def test_animation(stored, tmp_path):
+    path = stored.animate(tmp_path / "a" / "mode.gif", mode=1, frames=3)
+    with Image.open(path) as picture:
+        assert picture.n_frames == 3
+    with pytest.raises(CaseError):
+        stored.animate(tmp_path / "mode.gif", frames=1)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CaseError):
+        stored.animate(tmp_path / "file" / "mode.gif", frames=2)
+
+
+def test_a_damaged_file_is_told(stored, tmp_path, one_sentence):
+    path = tmp_path / "broken.h5"
+    path.write_bytes(stored.path.read_bytes())
+    with h5py.File(path, "a") as file:
+        del file["modes/shape"]
+    with pytest.raises(CaseError) as caught:
+        dbvfiv.load_result(path)
+    assert one_sentence(str(caught.value))
