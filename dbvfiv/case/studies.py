@@ -96,6 +96,7 @@ class StabilityMap(Section):
     y: StabilityRange = key("density=1:1000:64:log", "Vertical range, likewise.")
     continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
     curve: StrictBool = key(True, "Follow the onset curves exactly, by continuation of Hopf points.")
+    refine: StrictInt = key(2, "How often columns are put in between neighbours with different numbers of onsets.", ge=0, le=6)
     checks: StrictInt = key(4, "Cells compared with the full pencil, spread over the map.", ge=0, le=1000)
     workers: StrictInt = key(1, "Processes that share the columns.", ge=1, le=1024)
 

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Callable
 
 import numpy as np
 
@@ -17,7 +18,6 @@ CLEAR = 0.8
 TOLERANCE = 1e-6
 #: How a cell was found.
 REDUCED, DIRECT, MISSING = 0, 1, 2
-_STEPS = np.array([REDUCED, DIRECT], np.int8)
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,8 @@ class Column:
         Largest estimated relative error of leading eigenvalues among the checked cells.
     how : (cells,) int array
         `REDUCED` or `DIRECT`.
+    eigenvalues : callable or None
+        From any condition (density, alpha, beta, storage) at the same state to its leading eigenvalues on the small model, sorted by growth rate.
     """
 
     growth_rate: np.ndarray
@@ -50,6 +52,7 @@ class Column:
     certain: np.ndarray
     error: float
     how: np.ndarray
+    eigenvalues: Callable[[tuple], np.ndarray] | None = None
 
     @property
     def certified(self) -> np.ndarray:
@@ -92,6 +95,7 @@ class ColumnSolver:
         error = self._error(family, fine, conditions, floor, _between(places))
         column = _column(leading, values, counts, error)
         doubtful = np.flatnonzero(~column.certified)
+        column = replace(column, eigenvalues=lambda condition: _leading(fine.eigenvalues([condition])[0], floor_of(condition[2]))[:8])
         return self._repaired(column, linear, conditions, doubtful) if doubtful.size else column
 
     def _error(self, family, fine, conditions, floor, places) -> float:
