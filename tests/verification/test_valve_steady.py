@@ -137,7 +137,7 @@ def test_grids(level):
     """Measured wall: the flow changes by 0.3 % from 28 x 48 to 56 x 96, at a low order.
 
     The thickness is taken at element centres, and its step at z = 0.30 m falls between rows of these grids, at another share of an element on each:
-    an error of first order and changing sign. The averaged wall below shows the order of everything else.
+    an error of first order and changing sign. The walls below show the order of everything else.
     """
     print(f"\n{level} set")
     found = grid_study(PRESSURES, materials__strain_level=level)
@@ -145,12 +145,21 @@ def test_grids(level):
     assert np.all(np.abs(found[2] / found[0] - 1) < 0.02)
 
 
+STEP_ON_A_ROW = [
+    {"to": 0.21, "thickness": 0.012},
+    {"to": 0.28, "thickness": 0.015},  # instead of 0.30 m
+    {"to": 0.49, "thickness": 0.019},
+    {"to": 0.56, "thickness": 0.016},
+]
+
+
 @pytest.mark.slow
-def test_grids_without_steps_in_the_wall():
-    """Averaged wall: second order, with the fold of the side edge and the kinks of the ruled saddle in place."""
-    print("\naveraged wall")
-    found = grid_study((18e3, 36e3), valve__wall="uniform")
-    for column in found.T:
+@pytest.mark.parametrize("wall", ["averaged", "step on a row"])
+def test_grids_without_a_step_inside_elements(wall):
+    """Averaged wall, or the step moved to 0.28 m: second order or better, with the fold of the side edge and the kinks of the saddle in place."""
+    print(f"\n{wall}")
+    changes = {"valve__wall": "uniform"} if wall == "averaged" else {"valve__wall_map": STEP_ON_A_ROW}
+    for column in grid_study((18e3, 36e3), **changes).T:
         order, limit = richardson(column)
-        assert order == pytest.approx(2.0, abs=0.4)
+        assert order > 1.6
         assert column[1] == pytest.approx(limit, rel=0.01)
