@@ -18,17 +18,26 @@ def command(
     duration: Annotated[Optional[str], typer.Option("--duration", metavar="T", help="New end of the run, 2.0 (s) or '500 ms'.")] = None,
     plots: Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")] = None,
     animate: Annotated[Optional[Path], typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")] = None,
+    workers: Annotated[Optional[int], typer.Option("--workers", "-w", metavar="N", min=1, help="Of a map: processes that share the columns.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Continue a transient run that was interrupted or killed, or a finished one with a later --duration.
+    """Continue a transient run or a stability map that was interrupted or killed, or a finished transient run with a later --duration.
 
-    It goes on from the last restart point in the same file, with the same numbers as a run that was never interrupted.
+    A transient run goes on from the last restart point in the same file, with the same numbers as a run that was never interrupted; a map solves the
+    columns that are missing in it.
     """
     from ..case.quantity import Quantity
     from ..errors import CaseError
     from ..transient.api import resume
     from .transient import report
 
+    if _kind(file) == "map":
+        from ..stability import resume_map
+        from .map import report as report_map
+
+        if duration is not None or animate is not None:
+            raise CaseError("--duration and --animate belong to transient runs; this is a map.")
+        return report_map(resume_map(file, Progress(quiet=as_json), workers), file, plots, as_json)
     end = None
     if duration is not None:
         try:
@@ -37,6 +46,13 @@ def command(
             raise CaseError(f"--duration is given as {duration!r}, {error}.") from None
     result = resume(file, end, Progress(quiet=as_json))
     report(result, file, plots, animate, as_json)
+
+
+def _kind(path: Path) -> str:
+    from ..results.files import reading
+
+    with reading(path) as file:
+        return str(file.attrs["dbvfiv_kind"])
 
 
 def _number_or_text(text: str) -> float | str:

@@ -1,0 +1,63 @@
+"""``dbvfiv onset``: where a state loses stability."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from ._options import AsJson, CaseFile, Output, Override, read_case
+from ._output import print_json
+from ._progress import Progress
+
+ORDER = 28
+
+PlotFolder = Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")]
+
+
+def command(
+    case_file: CaseFile = None,
+    over: Annotated[
+        Optional[str],
+        typer.Option(
+            "--over",
+            metavar="PARAMETER",
+            help="pressure, density, alpha, beta, storage, thickness, angle or strain, with =START:STOP:COUNT[:log] for a range of one's own; "
+            "onset.over without it.",
+        ),
+    ] = None,
+    output: Output = None,
+    plots: PlotFolder = None,
+    overrides: Override = None,
+    as_json: AsJson = False,
+) -> None:
+    """Every onset along one parameter: value, frequency, super- or subcritical, uncertainty of the mesh.
+
+    All crossings of the range are looked for, also tongues of instability that close again. Each is located with the full matrices, confirmed by direct
+    eigenvalues and independent counts on both sides, described by its first Lyapunov coefficient (onset.normal_form), and found again on a coarser
+    mesh for an uncertainty (onset.coarse_mesh).
+
+    dbvfiv onset cases/dbv12.toml --over density --set drive.pressure="6 kPa"
+    """
+    from ..errors import CaseError, SolveError
+    from ..stability import onset
+
+    case = read_case(case_file, overrides)
+    if plots is not None and plots.exists() and not plots.is_dir():
+        raise CaseError(f"--plots {str(plots)!r} is a file and not a folder.")
+    if over is not None:
+        case = case.replace({"onset.over": over})
+    result = onset(case, case_file.stem if case_file else "dbv12", output, Progress(quiet=as_json))
+    figures = result.plot(plots) if plots is not None and len(result.values) else []
+    if as_json:
+        print_json(result.summary() | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
+    else:
+        print("\n".join(result.lines()))
+        for text in (f"Kept in {output}." if output else "", f"{len(figures)} figures in {plots}." if figures else ""):
+            if text:
+                print(text)
+    if not result.complete:
+        raise KeyboardInterrupt
+    if result.failures:
+        raise SolveError(f"Parts of the range were not reached: {len(result.failures)} states failed.")  # why was said when it happened

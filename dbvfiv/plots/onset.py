@@ -1,0 +1,101 @@
+"""Growth rates along one parameter and where they vanish."""
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Callable, Iterator
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator
+
+from ..studies.parameters import LABELS, SCALES
+from .style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure
+
+if TYPE_CHECKING:
+    from ..results.onset import OnsetResults
+
+_UNSTABLE = "#f6ddcf"
+
+
+def draw(result: "OnsetResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of an onset result, each with its name."""
+    if len(result.values):
+        yield "onset", lambda: onset(result)
+
+
+def onset(result: "OnsetResults") -> Figure:
+    """Growth rate and frequency of the leading modes, unstable ranges shaded, onsets marked."""
+    axis = result.case.onset.axis
+    scale = SCALES.get(axis.parameter, 1.0)
+    values = result.values / scale
+    figure = new_figure(7.2, 5.6)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    for axes in (top, bottom):
+        if axis.log:
+            axes.set_xscale("log")
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+            decades = np.log10(values[-1] / values[0]) if len(values) > 1 else 1.0
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.6 else (1.0,), numticks=12))
+        for a, b in unstable_ranges(result):
+            axes.axvspan(a / scale, b / scale, color=_UNSTABLE, lw=0, zorder=0)
+    growth, frequency = result.growth_rates, result.frequencies
+    low = _floor(growth)
+    for k in range(1, growth.shape[1]):
+        top.plot(values, np.where(growth[:, k] > low, growth[:, k], np.nan), ".", color=REST, ms=3.5, label="further modes" if k == 1 else None)
+        bottom.plot(values, np.where(growth[:, k] > low, frequency[:, k], np.nan), ".", color=REST, ms=3.5)
+    top.plot(values, growth[:, 0], "-", color=COMPUTED, label="leading mode")
+    bottom.plot(values, np.where(_jumps(frequency[:, 0]), np.nan, frequency[:, 0]), "-", color=COMPUTED)
+    top.axhline(0.0, color="0.25", lw=1.0)
+    for row in result.points:
+        x = row["value"] / scale
+        hollow = row["criticality"] == "sub"
+        style = {"marker": "o", "ms": 7, "color": PUBLISHED, "mfc": "white" if hollow else PUBLISHED, "ls": "none", "zorder": 5}
+        top.plot(x, 0.0, **style)
+        bottom.plot(x, row["frequency"], **style)
+        if math.isfinite(row["uncertainty"]):
+            top.plot([x - row["uncertainty"] / scale, x + row["uncertainty"] / scale], [0, 0], color=ACCENT, lw=3.5, alpha=0.75, zorder=4, solid_capstyle="butt")
+        kind = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], "")
+        words = f"{x:.4g}\n{row['frequency']:.3g} Hz" + (f"\n{kind}" if kind else "")
+        top.annotate(words, (x, 0.0), xytext=(6, 8), textcoords="offset points", fontsize=8.5, color=PUBLISHED)
+    top.set_ylim(bottom=low)
+    top.set_ylabel("Growth rate, 1/s")
+    bottom.set_ylabel("Frequency, Hz")
+    bottom.set_ylim(bottom=0)
+    bottom.set_xlabel(LABELS[axis.parameter])
+    top.set_title(_title(result), loc="left", fontweight="bold")
+    top.legend(loc="lower left", ncols=2)
+    if len(values) > 1:
+        bottom.set_xlim(values[0], values[-1])
+    return figure
+
+
+def unstable_ranges(result: "OnsetResults") -> list[tuple[float, float]]:
+    """Ranges of the parameter within which some mode grows."""
+    marks = sorted(row["value"] for row in result.points if row["edge"])
+    marks = [result.values[0], *marks, result.values[-1]]
+    found = []
+    for a, b in zip(marks[:-1], marks[1:]):
+        inside = (result.values >= a) & (result.values <= b)
+        strict = (result.values > a) & (result.values < b)
+        chosen = strict if strict.any() else inside
+        if chosen.any() and np.median(result.growth_rates[chosen, 0]) > 0:
+            found.append((a, b))
+    return found
+
+
+def _floor(growth: np.ndarray) -> float:
+    leading = growth[:, 0]
+    return float(min(-5.0, 1.25 * np.nanmin(leading), -0.6 * np.nanmax(np.abs(leading))))
+
+
+def _jumps(frequency: np.ndarray) -> np.ndarray:
+    """Where another mode has taken the lead."""
+    step = np.abs(np.diff(frequency, prepend=frequency[:1]))
+    return step > 0.25 * np.maximum(frequency, 1.0)
+
+
+def _title(result: "OnsetResults") -> str:
+    case, parameter = result.case, result.parameter
+    shown = {"pressure": f"{case.drive.pressure / 1e3:g} kPa", "density": f"{case.fluid.density:g} kg/m³", "storage": case.fluid.continuity}
+    fixed = ", ".join(text for name, text in shown.items() if name != parameter)
+    return f"Onset in {LABELS[parameter].split(',')[0].split(' (')[0].lower()}: {result.header.name}, {fixed}"

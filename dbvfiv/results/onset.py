@@ -1,0 +1,117 @@
+"""Onsets along one parameter: the result, in memory or in a file."""
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from .header import Header, read_header
+from .layout import Table, read_texts
+from .mesh import MeshData, read_mesh
+from .onset_file import OnsetFile, row_of_point, scan_rows
+from .result import Result
+from .stability_tables import ONSETS, SCAN
+
+if TYPE_CHECKING:
+    from ..model import ValveModel
+    from ..studies.onset import OnsetResult
+
+_UNITS = {"pressure": ("kPa", 1e3), "density": ("kg/m3", 1.0), "alpha": ("1/s", 1.0), "beta": ("s", 1.0), "angle": ("deg", 1.0)}
+
+
+class OnsetResults(Result):
+    """Onsets in ascending order of the parameter, and the scan that found them.
+
+    Attributes
+    ----------
+    points : tuple of dict
+        One for each onset, see `stability_tables.ONSETS`.
+    values, growth_rates, frequencies : (s,), (s, 4), (s, 4) arrays
+        The scan.
+    parameter : str
+    """
+
+    kind = "onset"
+
+    def __init__(self, header: Header, mesh: MeshData, points, scan, **common):
+        super().__init__(header, mesh, **common)
+        self.points = tuple(dict(row) for row in points)
+        scan = sorted(scan, key=lambda row: row["value"])
+        self.values = np.array([row["value"] for row in scan])
+        self.growth_rates = np.array([row["growth_rates"] for row in scan]).reshape(-1, 4)
+        self.frequencies = np.array([row["frequencies"] for row in scan]).reshape(-1, 4)
+        self.parameter = self.case.onset.axis.parameter
+
+    @classmethod
+    def of(cls, result: "OnsetResult", header: Header, model: "ValveModel") -> "OnsetResults":
+        """From a run that has just ended."""
+        points = [row_of_point(p) for p in result.points]
+        header = replace(header, complete=not result.interrupted)
+        return cls(header, MeshData.of(model), points, scan_rows(result), warnings=result.warnings, failures=result.failures, model=model)
+
+    @classmethod
+    def read(cls, file: h5py.File, path: Path) -> "OnsetResults":
+        return cls(
+            read_header(file), read_mesh(file), _rows(file["onsets"], ONSETS), _rows(file["scan"], SCAN),
+            warnings=read_texts(file, "messages/warnings"), failures=read_texts(file, "messages/failures"), path=path,
+        )  # fmt: skip
+
+    def save(self, path: str | Path) -> Path:
+        scan = [{"value": v, "growth_rates": g, "frequencies": f} for v, g, f in zip(self.values, self.growth_rates, self.frequencies)]
+        with OnsetFile(path, self.header, self.mesh) as file:
+            file.finish(self.points, scan, self.warnings, self.failures, self.complete)
+        return Path(path)
+
+    def summary(self) -> dict[str, Any]:
+        return {
+            "parameter": self.parameter,
+            "points": [self._point(row) for row in self.points],
+            "scan": {"values": self.values.tolist(), "growth_rate": self.growth_rates[:, 0].tolist(), "frequency": self.frequencies[:, 0].tolist()},
+            "failures": list(self.failures),
+            "warnings": list(self.warnings),
+            "interrupted": not self.complete,
+        }
+
+    def _point(self, row: dict[str, Any]) -> dict[str, Any]:
+        found: dict[str, Any] = {"parameter": self.parameter}
+        for name, value in row.items():
+            if not name.startswith("sides/"):
+                found[name] = _plain(value)
+        names = [name for name in row if name.startswith("sides/")]
+        for i, side in enumerate(("below", "above")):
+            found[side] = {name.split("/")[1]: _plain(row[name][i]) for name in names}
+        return found
+
+    def lines(self) -> list[str]:
+        unit, scale = _UNITS.get(self.parameter, ("", 1.0))
+        if not self.points:
+            low, high = (self.values[[0, -1]] / scale) if len(self.values) else (math.nan, math.nan)
+            state = "unstable" if len(self.values) and self.growth_rates[0, 0] > 0 else "stable"
+            return [f"No onset: the valve is {state} from {low:.6g} to {high:.6g} {unit}."]
+        lines = [f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  {'':<28}{'below, 1/s':>11}{'above, 1/s':>11}"]
+        for row in self.points:
+            becomes = "unstable above" if row["gains"] else "stable above"
+            which = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], row["criticality"])
+            words = becomes + (f", {which}" if which else "") if row["edge"] else f"a further mode {becomes}"
+            spread = f"{row['uncertainty'] / scale:9.2g}" if math.isfinite(row["uncertainty"]) else " " * 9
+            below, above = row["sides/growth_rate"]
+            mark = "" if row["confirmed"] else "  not confirmed"
+            lines.append(f"{row['value'] / scale:16.8g} {spread} {row['frequency']:8.3f}  {words:<28}{below:11.4g}{above:11.4g}{mark}")
+        return lines
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (str, np.str_)):
+        return str(value) or None
+    value = value.item() if hasattr(value, "item") else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _rows(group: h5py.Group, columns) -> list[dict[str, Any]]:
+    table = Table(group, columns)
+    data = {c.name: table.read(c.name) for c in columns}
+    return [{name: values[i] for name, values in data.items()} for i in range(table.rows)]
