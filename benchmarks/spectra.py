@@ -52,12 +52,10 @@ def density_sweep():
     model = model_of(28, 48)
     state = linearise(model, run_steady(model, [6e3]).states[0].q, 6e3)
     options = SearchOptions(limit_point=-1 / REFERENCE.beta)
-    base = state.pencil(REFERENCE)
     workspace = Workspace()
 
     def at(density):
-        pencil = state.pencil(Conditions(density, REFERENCE.alpha, REFERENCE.beta))
-        return pencil.replace(M=base.M, C=base.C, K=base.K, G=base.G, J=base.J)
+        return state.pencil(Conditions(density, REFERENCE.alpha, REFERENCE.beta))
 
     single = medians({"one": lambda: leading_modes(at(10.0), 6, options, workspace=workspace)}, 5)["one"]
     densities = np.geomspace(1.0, 1000.0, 100)

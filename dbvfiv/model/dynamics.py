@@ -7,7 +7,7 @@ through the areas A(q) with rates A' = J v and A'' = J a + d2A[v, v]. The unknow
 """
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -103,6 +103,14 @@ class LinearisedState:
     forces: object
     slope: object
     area: np.ndarray
+    _damping: dict = field(default_factory=dict, repr=False, compare=False)
+
+    def damping(self, alpha: float, beta: float):
+        """(n, n) sparse matrix alpha M + beta K_s; the last one is kept, so a sweep over the fluid reuses it."""
+        if (alpha, beta) not in self._damping:
+            self._damping.clear()
+            self._damping[alpha, beta] = alpha * self.mass + beta * self.structure
+        return self._damping[alpha, beta]
 
     def pencil(self, conditions: Conditions, fluid: bool = True, storage: float | None = None) -> CoupledPencil:
         """Quadratic pencil of small motions.
@@ -115,7 +123,7 @@ class LinearisedState:
         storage : float, optional
             Blend of the continuity laws, 0 quasi-steady to 1 storage; the model's own by default.
         """
-        damping = conditions.alpha * self.mass + conditions.beta * self.structure
+        damping = self.damping(conditions.alpha, conditions.beta)
         flow = self.model.flow
         if not fluid or not isinstance(flow, Channel):
             return CoupledPencil(self.mass, damping, self.stiffness)
