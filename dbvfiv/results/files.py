@@ -80,10 +80,7 @@ def create(path: str | Path, single_writer: bool = False) -> h5py.File:
     CaseError
     """
     path = Path(path)
-    if path.is_dir():
-        raise CaseError(f"{str(path)!r} is a folder; the result needs the name of a file.")
-    if path.exists() and path.stat().st_size and not _replaceable(path):
-        raise CaseError(f"{str(path)!r} exists and is not a result of dbvfiv, so it is not overwritten; choose another name.")
+    refuse_foreign(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = h5py.File(path, "w", libver="latest" if single_writer else None)
@@ -95,6 +92,20 @@ def create(path: str | Path, single_writer: bool = False) -> h5py.File:
     if not single_writer:
         _hold_back_metadata(file)
     return file
+
+
+def refuse_foreign(path: Path) -> None:
+    """Check that a result may take this name.
+
+    Raises
+    ------
+    CaseError
+        If it is the name of a folder or of a file that is no result.
+    """
+    if path.is_dir():
+        raise CaseError(f"{str(path)!r} is a folder; the result needs the name of a file.")
+    if path.exists() and path.stat().st_size and not _replaceable(path):
+        raise CaseError(f"{str(path)!r} exists and is not a result of dbvfiv, so it is not overwritten; choose another name.")
 
 
 def _replaceable(path: Path) -> bool:

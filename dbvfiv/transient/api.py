@@ -57,7 +57,7 @@ def resume(path: str | Path, duration: float | None = None, observer: Observer |
     Raises
     ------
     CaseError
-        If the file is no transient run, has no restart point, or has nothing left to do.
+        If the file is no transient run or has nothing left to do.
     """
     from ..model import ValveModel
 
@@ -65,6 +65,9 @@ def resume(path: str | Path, duration: float | None = None, observer: Observer |
     restart = read_restart(path)
     with reading(path) as file:
         header = read_header(file)
+        if restart is None:  # killed before its first step was safe
+            case = header.rebuildable_case()
+            return transient(ValveModel(case if duration is None else case.replace({"transient.duration": duration})), header.name, path, observer)
         columns = {c.name: file["history"][c.name][: restart.rows] for c in (*SCALARS, *PROFILES)}
     case = header.rebuildable_case()
     if duration is not None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import CaseError
 from ..model import ValveModel
-from ..results.files import create, reading
+from ..results.files import create, reading, refuse_foreign
 from ..results.header import Header, write_header
 from ..results.layout import Column, read_texts, replace_texts
 from ..results.mesh import MeshData, write_mesh
@@ -65,13 +65,24 @@ class TransientFile(Observer):
         header = header or Header.of("transient", model.case)
         if header.kind != "transient":
             raise ValueError("A transient file needs a header of kind 'transient'.")
-        self._file = create(path, single_writer=True)
-        _write_empty(self._file, model, replace(header, complete=False))
-        self._start()
+        refuse_foreign(self.path)
+        # under another name until all datasets are there: before that, being killed would leave half a file
+        new = self._beside(self.path, "new")
+        try:
+            with create(new, single_writer=True) as file:
+                _write_empty(file, model, replace(header, complete=False))
+            os.replace(new, self.path)
+        finally:
+            new.unlink(missing_ok=True)
+        self._open()
 
-    def _start(self) -> None:
+    @staticmethod
+    def _beside(path: Path, use: str) -> Path:
+        return path.with_name(f".{path.name}.{os.getpid()}.{use}")
+
+    def _open(self) -> None:
         self._written = monotonic()
-        self._file.flush()
+        self._file = h5py.File(self.path, "r+", libver="latest")
         self._file.swmr_mode = True
         self._history, self._states = self._file["history"], self._file["states"]
 
@@ -141,14 +152,11 @@ class TransientFile(Observer):
 
         The file is copied up to there and then replaced, so that being killed meanwhile does no harm either.
 
-        Raises
-        ------
-        CaseError
-            If the file has no restart point.
+        The file must have a restart point.
         """
         path = Path(path)
         restart = read_restart(path)
-        copy = path.with_name(f".{path.name}.{os.getpid()}.resuming")
+        copy = cls._beside(path, "resuming")
         try:
             with reading(path) as old, h5py.File(copy, "w", libver="latest") as new:
                 _write_empty(new, model, replace(header, complete=False))
@@ -163,8 +171,7 @@ class TransientFile(Observer):
         self = cls.__new__(cls)
         self.model, self.path, self.seconds = model, path, seconds
         self._warnings, self._slot = list(warnings), restart.sequence
-        self._file = h5py.File(path, "r+", libver="latest")
-        self._start()
+        self._open()
         return self, restart
 
 
@@ -186,22 +193,20 @@ class Restart:
         self.numbers = np.array(sealed[4:])
 
 
-def read_restart(path: str | Path) -> Restart:
-    """Last whole restart point of a file.
+def read_restart(path: str | Path) -> Restart | None:
+    """Last whole restart point of a file; None if the run was killed before its first.
 
     Raises
     ------
     CaseError
-        If there is none.
+        If the file is no transient run.
     """
     with reading(path) as file:
         if str(file.attrs["dbvfiv_kind"]) != "transient":
             raise CaseError(f"{str(path)!r} holds a result of kind {str(file.attrs['dbvfiv_kind'])!r}; only transient runs can be resumed.")
         slots = [file[f"restart/{slot}"][:] for slot in ("0", "1")]
     whole = [slot for slot in slots if _whole(slot)]
-    if not whole:
-        raise CaseError(f"{str(path)!r} ended before its first restart point, so it cannot be resumed; start it again.")
-    return Restart(max(whole, key=lambda slot: slot[0]))
+    return Restart(max(whole, key=lambda slot: slot[0])) if whole else None
 
 
 def _sealed(numbers: np.ndarray, *head: int) -> np.ndarray:

@@ -79,7 +79,7 @@ class TransientResults(Result):
     history : dict of str to array
         Columns of `dbvfiv.transient.history`, one row for each step.
     states : sequence of TransientState
-        Full states, if the run was kept in a file.
+        Full states if the run was kept in a file, the last one otherwise.
     verdict : dict
         What `RunVerdict.summary` gives.
     stopped : bool
@@ -103,7 +103,8 @@ class TransientResults(Result):
         header = header or Header.of("transient", run.model.case)
         return cls(
             replace(header, complete=not run.interrupted and not run.failures), MeshData.of(run.model),
-            {c.name: run.history[c.name].copy() for c in (*SCALARS, *PROFILES)}, StateList(path, run.progress.saved if path else 0),
+            {c.name: run.history[c.name].copy() for c in (*SCALARS, *PROFILES)},
+            StateList(path, run.progress.saved) if path else (_last_state(run),),
             run.verdict.summary(), warnings=run.warnings, failures=run.failures, path=path, model=run.model,
         )  # fmt: skip
 
@@ -111,6 +112,8 @@ class TransientResults(Result):
     def read(cls, file: h5py.File, path: Path) -> "TransientResults":
         history = file["history"]
         rows = len(history["time"])
+        if rows == 0:
+            raise CaseError(f"{str(path)!r} holds no steps yet: the run has just begun, or was killed before anything was written.")
         columns = {c.name: history[c.name][:rows] for c in (*SCALARS, *PROFILES)}
         verdict = json.loads(bytes(file["verdict"][()]) or b"{}")
         result = cls(
@@ -188,6 +191,15 @@ class TransientResults(Result):
         from ..plots.transient_motion import animate
 
         return animate(self, Path(path), frames, duration)
+
+
+def _last_state(run: "TransientRun") -> TransientState:
+    """The state that a run ended in, which is all that is kept without a file."""
+    model, state, h = run.model, run.progress.state, run.history
+    velocity = np.full(model.stations, np.nan)
+    velocity[-1] = state.speed
+    pressure, area = h["station_pressure"][-1].astype(float), h["station_area"][-1].astype(float)
+    return TransientState(state.time, model.nodal(state.q), model.nodal(state.v), pressure, area, velocity)
 
 
 class _TransientSteps(Sequence):

@@ -140,8 +140,8 @@ class Runner:
         self.control = step_control(self.stepper, self.options.control)
         self.gap = QUARTERS * float(model.mesh.rest_area[0] - model.mesh.wall_deduction[0])
 
-    def start(self) -> TransientRun:
-        """Run from the case's first state.
+    def start(self, first: MotionState | None = None) -> TransientRun:
+        """Run from the case's first state, or from a given one.
 
         Raises
         ------
@@ -150,7 +150,7 @@ class Runner:
         """
         self._begin(0)
         inlet = self.drive(0.0)
-        state, kick = first_state(self.motion, self.model.case, inlet, self.observer)
+        state, kick = (first, None) if first is not None else first_state(self.motion, self.model.case, inlet, self.observer)
         progress = Progress(state, energy=sum(self.motion.energies(state.q, state.v)), control=tuple(self.control.pack()))
         if kick is not None:
             progress.eigenvalue = kick.eigenvalue
