@@ -1,0 +1,16 @@
+import pytest
+
+from dbvfiv.case import load_case
+from dbvfiv.studies.stability_walk import StabilityWalk
+
+COARSE = ["mesh.around=8", "mesh.along=16", "damping.alpha=0", "damping.beta=0.003", "fluid.density=10", "drive.pressure=6000"]
+
+
+@pytest.fixture(scope="session")
+def coarse_case():
+    return load_case(None, COARSE)
+
+
+@pytest.fixture(scope="session")
+def walk(coarse_case):
+    return StabilityWalk(coarse_case)

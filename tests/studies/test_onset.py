@@ -1,0 +1,75 @@
+"""Onsets of the valve on a coarse mesh."""
+import numpy as np
+import pytest
+
+from dbvfiv.errors import SolveError
+from dbvfiv.studies.onset import OnsetOptions, run_onset
+from dbvfiv.studies.parameters import Place
+
+
+@pytest.fixture(scope="module")
+def over_density(coarse_case):
+    options = OnsetOptions("density", tuple(np.geomspace(1, 1000, 21)), True, normal_form=False, coarse_mesh=0)
+    return run_onset(coarse_case, options)
+
+
+def test_the_onset_is_neutral_and_confirmed_on_both_sides(over_density):
+    (point,) = over_density.points
+    assert abs(point.growth_rate) < 1e-6
+    assert point.confirmed and point.edge and not point.gains
+    assert point.below.eigenvalue.real > 0 > point.above.eigenvalue.real
+    assert (point.below.unstable, point.above.unstable) == (2, 0) == (point.below.counted, point.above.counted)
+
+
+def test_onset_over_pressure_meets_onset_over_density(over_density, coarse_case):
+    (point,) = over_density.points
+    case = coarse_case.replace({"fluid.density": point.value})
+    options = OnsetOptions("pressure", (5500.0, 6200.0, 7000.0), False, normal_form=False, coarse_mesh=0)
+    (other,) = run_onset(case, options).points
+    assert other.value == pytest.approx(6000.0, rel=1e-6)
+    assert other.frequency == pytest.approx(point.frequency, rel=1e-6)
+
+
+def test_unstable_intervals(over_density):
+    (interval,) = over_density.unstable_intervals
+    assert interval == (pytest.approx(1.0), pytest.approx(over_density.points[0].value))
+
+
+def test_no_flow_no_onset(coarse_case):
+    with pytest.raises(SolveError, match="flow"):
+        run_onset(coarse_case.replace({"drive.kind": "uniform"}))
+
+
+@pytest.mark.parametrize("parameter, values", [("alpha", (0.0, 40.0, 120.0)), ("beta", (0.002, 0.004, 0.008)), ("storage", (0.0, 0.5, 1.0))])
+def test_onset_over_other_parameters(coarse_case, parameter, values):
+    options = OnsetOptions(parameter, values, normal_form=False, coarse_mesh=0)
+    result = run_onset(coarse_case.replace({"fluid.density": 20}), options)
+    for point in result.points:
+        assert point.confirmed and not point.gains
+    assert (result.growth_rates[0, 0] > 0) != (result.growth_rates[-1, 0] > 0) or not len(result.points)
+
+
+def test_onset_over_wall_thickness(coarse_case):
+    options = OnsetOptions("thickness", (0.9, 1.1, 1.4), normal_form=False, coarse_mesh=0, tolerance=1e-5)
+    result = run_onset(coarse_case, options)
+    assert len(result.values) >= 3 and not result.failures
+    for point in result.points:
+        assert point.confirmed
+
+
+@pytest.mark.slow
+def test_criticality_and_uncertainty(coarse_case):
+    case = coarse_case.replace({"mesh.around": 12, "mesh.along": 24})
+    options = OnsetOptions("density", tuple(np.geomspace(1, 1000, 21)), True, coarse_mesh=0.5)
+    (point,) = run_onset(case, options).points
+    assert point.criticality == "super" and point.first_lyapunov_coefficient < 0
+    width = point.above.value - point.below.value
+    speed = (point.above.eigenvalue.real - point.below.eigenvalue.real) / width
+    assert point.crossing_speed == pytest.approx(speed, rel=1e-3)
+    assert point.uncertainty == pytest.approx(abs(point.value - point.coarse_value) / 3, rel=0.05)
+
+
+def test_a_place_changes_what_it_is_told(coarse_case):
+    place = Place.of(coarse_case).at(density=3.0, thickness=0.9)
+    assert place.condition == (3.0, 0.0, 0.003, 0.0) and place.design == {"thickness": 0.9}
+    assert place.mu()["inlet"] == 6000.0 and place.mu()["thickness"] == 0.9
