@@ -239,6 +239,6 @@ class solving:
         return None
 
     def __exit__(self, kind, error, _trace) -> None:
-        if isinstance(error, (SingularShiftError, ValueError, np.linalg.LinAlgError)):
+        if isinstance(error, (SingularShiftError, np.linalg.LinAlgError)):
             said = str(error).rstrip(".")
             raise SolveError(f"The modes at {self.pressure:.6g} Pa were not found: {said}.") from error
