@@ -18,6 +18,8 @@ from .state import SteadyState, describe_state
 
 #: Unbalanced force over pressure force above which a state is no equilibrium of its model.
 _UNBALANCED = 1e-4
+#: Structural modes in the basis behind the independent count.
+_BASIS = 24
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,8 @@ def run_modes(
     pencil = linear.pencil(conditions, fluid=not without_fluid)
     observer.progress("searching")
     with solving(state.pressure):
-        basis = TransferBasis(pencil)
+        # without stiffness damping the band follows from the structural frequencies
+        basis = TransferBasis(pencil, modes=_BASIS if conditions.beta > 0 else max(_BASIS, options.count))
         search, notes = suited(options.search, conditions, basis, options.count)
         certified = certified_spectrum(pencil, options.count, search, basis=basis)
     certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))
