@@ -12,7 +12,7 @@ from ..errors import CaseError, SolveError
 from .map_column import MapColumn, MapPlan
 from .observer import Observer
 from .onset import system_of
-from .plane_system import PlaneSystem
+from .plane_system import RATE, PlaneSystem
 from .stability_walk import StabilityWalk
 
 #: Distance in the unit square, frequencies counted relatively, up to which onsets of neighbouring columns belong together.
@@ -20,7 +20,7 @@ NEIGHBOURS = 0.7
 #: Distance from a curve, in the unit square, up to which an onset of a column counts as on it.
 ON_CURVE = 2e-3
 #: First, smallest and largest step along a curve, in the unit square.
-STEPS = (0.01, 1e-5, 0.035)
+STEPS = (0.02, 1e-5, 0.07)
 
 
 @dataclass(frozen=True)
@@ -154,10 +154,10 @@ def follow(plan: MapPlan, walk: StabilityWalk, curve: OnsetCurve) -> OnsetCurve:
     for direction in (1, -1):
         options = ContinuationOptions(
             step=STEPS[0], min_step=STEPS[1], max_step=STEPS[2], max_points=400, limits={"x": (0.0, 1.0), "y": (0.0, 1.0)}, direction=direction,
-            location_tolerance=1e-7, newton=NewtonOptions(tolerance=1e-4, max_iterations=10), state_scale=10.0,
+            location_tolerance=2e-5, newton=NewtonOptions(tolerance=1e-4, max_iterations=10), state_scale=10.0,
         )  # fmt: skip
         branch = continue_hopf(system, special, ("x", "y"), options, lyapunov=False)
-        part = np.column_stack([branch.values("x"), branch.values("y"), np.abs(branch.values("omega")) / (2 * np.pi)])
+        part = np.column_stack([branch.values("x"), branch.values("y"), RATE * np.abs(branch.values("omega")) / (2 * np.pi)])
         parts.append(part)
         reasons.append(branch.reason)
         if "closed" in branch.reason:
@@ -184,11 +184,11 @@ def hopf_at(plan: MapPlan, walk: StabilityWalk, law: float, x: float, y: float, 
     omega, q = abs(value.imag), spectrum.q[:, nearest]
     vector = np.concatenate([q, 1j * omega * q, spectrum.u[:, nearest]])
     linear = system.linear(u, plane)
-    left, right = hopf_borders(linear, omega, vector / np.linalg.norm(vector))
+    left, right = hopf_borders(linear, omega / RATE, vector / np.linalg.norm(vector))
     slope = -linear.solve(system.d_parameter(u, plane, "x"))
     tangent = np.append(slope, 1.0)
     z = np.append(u, plane["x"])
-    special = SpecialPoint("hopf", 0, u, plane, z, tangent, True, "", {"omega": omega}, {"right": right, "left": left})
+    special = SpecialPoint("hopf", 0, u, plane, z, tangent, True, "", {"omega": omega / RATE}, {"right": right, "left": left})
     return special, system
 
 

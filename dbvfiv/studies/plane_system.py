@@ -1,4 +1,7 @@
-"""The valve as a System whose two parameters are the coordinates of a stability map, 0..1 along each axis, logarithmic where the axis is."""
+"""The valve as a System whose two parameters are the coordinates of a stability map, 0..1 along each axis, logarithmic where the axis is.
+
+Time is counted in units of 1/`RATE`, so that angular frequencies are of the size of the coordinates and arclength weighs them alike.
+"""
 from __future__ import annotations
 
 import math
@@ -10,6 +13,29 @@ from continuation import SystemBase
 from ..model.system import ValveSystem
 from .map_column import MapPlan
 from .parameters import DESIGN, SYSTEM_NAMES
+
+
+#: Angular frequency that counts as 1, rad/s.
+RATE = 2 * math.pi * 100.0
+
+
+class _Slowed:
+    """A linearisation with its mass times `RATE`: eigenvalues are divided by it."""
+
+    def __init__(self, inner):
+        self._inner = inner
+        self.size = inner.size
+        for name in ("matvec", "rmatvec", "solve", "solve_transpose"):
+            setattr(self, name, getattr(inner, name))
+
+    def mass_matvec(self, x):
+        return RATE * self._inner.mass_matvec(x)
+
+    def mass_rmatvec(self, x):
+        return RATE * self._inner.mass_rmatvec(x)
+
+    def shifted(self, shift: complex):
+        return self._inner.shifted(RATE * shift)
 
 
 class PlaneSystem(SystemBase):
@@ -55,7 +81,7 @@ class PlaneSystem(SystemBase):
         return self.valve.residual(u, self.mu(mu))
 
     def linear(self, u, mu):
-        return self.valve.linear(u, self.mu(mu))
+        return _Slowed(self.valve.linear(u, self.mu(mu)))
 
     def d_parameter(self, u, mu, name):
         inner, rate = self._rate(mu, name)
@@ -72,17 +98,14 @@ class PlaneSystem(SystemBase):
         return super().d2_parameter(u, mu, name, a) if inner in DESIGN else rate * self.valve.d2_parameter(u, self.mu(mu), inner, a)
 
     def mass_d(self, u, mu, c, a):
-        return self.valve.mass_d(u, self.mu(mu), c, a)
+        return RATE * self.valve.mass_d(u, self.mu(mu), c, a)
 
     def mass_d2(self, u, mu, c, a, b):
-        return self.valve.mass_d2(u, self.mu(mu), c, a, b)
+        return RATE * self.valve.mass_d2(u, self.mu(mu), c, a, b)
 
     def mass_parameter(self, u, mu, name, c):
         inner, rate = self._rate(mu, name)
         if inner not in DESIGN:
-            return rate * self.valve.mass_parameter(u, self.mu(mu), inner, c)
+            return RATE * rate * self.valve.mass_parameter(u, self.mu(mu), inner, c)
         up, down, width = self._sides(mu, name)
         return (self.linear(u, up).mass_matvec(c) - self.linear(u, down).mass_matvec(c)) / width
-
-    def spectrum(self, u, mu, count, near=None):
-        return self.valve.spectrum(u, self.mu(mu), count, near)
