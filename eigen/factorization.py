@@ -226,10 +226,42 @@ class SuperluFactorization:
 
     def log_determinant(self) -> complex:
         """log |det| + i arg det; the argument lies in (-pi, pi]."""
-        return log_determinant(self._lu)
+        return self._lu.log_determinant()
 
 
-def superlu(matrix: sp.csc_matrix):
+class ScaledLU:
+    """SuperLU of D A D with D = |diag A|^(-1/2).
+
+    Unknowns of different kinds (metres, radians) differ by powers of ten; unscaled, SuperLU leaves
+    the diagonal for its pivots and fills in without need.
+    """
+
+    def __init__(self, matrix: sp.csc_matrix):
+        size = np.abs(matrix.diagonal())
+        typical = size.max(initial=0.0) or 1.0
+        self._scale = 1.0 / np.sqrt(np.where(size > 1e-12 * typical, size, typical))
+        D = sp.diags(self._scale)
+        try:
+            self._lu = spla.splu((D @ matrix @ D).tocsc(), permc_spec="MMD_AT_PLUS_A",
+                                 diag_pivot_thresh=0.01, options={"SymmetricMode": True})
+        except RuntimeError as error:
+            raise SingularShiftError(f"SuperLU could not factor the matrix ({error}).") from error
+
+    def solve(self, b: np.ndarray, mode: str = "N") -> np.ndarray:
+        """Solution for one right-hand side or a block; mode "T" with the transpose."""
+        scale = self._scale if b.ndim == 1 else self._scale[:, None]
+        return scale * self._lu.solve(scale * b, mode)
+
+    def log_determinant(self) -> complex:
+        """log |det A| + i arg det A."""
+        diagonal = self._lu.U.diagonal()
+        sign = _permutation_sign(self._lu.perm_r) * _permutation_sign(self._lu.perm_c)
+        phase = float(np.angle(diagonal).sum()) + (np.pi if sign < 0 else 0.0)
+        size = float(np.log(np.abs(diagonal)).sum()) - 2.0 * float(np.log(self._scale).sum())
+        return complex(size, np.angle(np.exp(1j * phase)))
+
+
+def superlu(matrix: sp.csc_matrix) -> ScaledLU:
     """SuperLU for a nearly symmetric pattern.
 
     Raises
@@ -237,19 +269,7 @@ def superlu(matrix: sp.csc_matrix):
     SingularShiftError
         If a pivot is exactly zero.
     """
-    try:
-        return spla.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01,
-                         options={"SymmetricMode": True})
-    except RuntimeError as error:
-        raise SingularShiftError(f"SuperLU could not factor the matrix ({error}).") from error
-
-
-def log_determinant(lu) -> complex:
-    """log |det| + i arg det of a SuperLU factorisation."""
-    diagonal = lu.U.diagonal()
-    sign = _permutation_sign(lu.perm_r) * _permutation_sign(lu.perm_c)
-    phase = float(np.angle(diagonal).sum()) + (np.pi if sign < 0 else 0.0)
-    return complex(float(np.log(np.abs(diagonal)).sum()), np.angle(np.exp(1j * phase)))
+    return ScaledLU(sp.csc_matrix(matrix))
 
 
 def is_positive_definite(matrix: sp.spmatrix) -> bool:
