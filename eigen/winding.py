@@ -131,6 +131,7 @@ class _Walk:
 
     def start(self, scale, hints):
         self._add(0.0)
+        self.smallest = 1e-9 * scale
         self.values.setdefault(0.0, 0j)  # kept as a place even where the value is lost
         steps = scale * 10.0 ** np.arange(-3, 1.01, 0.25)
         for omega in steps:
@@ -178,7 +179,7 @@ class _Walk:
             for i in wanted:
                 a, b = omegas[i], omegas[i + 1]
                 where = f"{b / (2 * np.pi):.6g} Hz"
-                if b - a <= 1e-11 * b:
+                if b - a <= 1e-11 * b or b <= self.smallest:
                     self.notes.append(f"An eigenvalue lies on the line, near {where}.")
                     return
                 if len(self.values) >= self.max_points:

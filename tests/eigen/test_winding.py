@@ -134,3 +134,13 @@ def test_reduced_basis_has_the_transfer_function():
     D = (s * s * pencil.M + s * pencil.C + pencil.K).toarray()
     exact = pencil.J @ np.linalg.solve(D, pencil.G.toarray())
     assert np.abs(basis.transfer(pencil, s) - exact).max() < 1e-6 * np.abs(exact).max()
+
+
+def test_an_eigenvalue_at_zero_is_said_and_ends_the_refinement():
+    """A coupling that leaves a constant free: the count cannot be certain, and must not go on for ever."""
+    pencil = CoupledPencil(M=np.eye(2), C=0.1 * np.eye(2), K=np.diag([1.0, 4.0]), G=np.ones((2, 1)), J=np.ones((1, 2)),
+                           B0=[[1.0]], S1=[[1.0]])  # fmt: skip
+    count = unstable_count(pencil)
+    assert not count.certain
+    assert count.evaluations < 500
+    assert any("on the line" in note for note in count.notes)
