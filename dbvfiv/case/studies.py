@@ -134,7 +134,7 @@ class Transient(Section):
     local_error: Length = key(1e-6, "Local error of the displacements that adaptive steps aim at.", gt=0, le=1)
     smallest_step: Number = key(1 / 4096, "Smallest step before giving up, as a fraction of step.", gt=0, le=1)
     tolerance: Number = key(
-        1e-5, "Correction left in a step, relative to what the accelerations move the wall in it, at which iterations stop.", gt=0, le=0.1
+        1e-4, "Correction left in a step, relative to what the accelerations move the wall in it, at which iterations stop.", gt=0, le=0.1
     )
     kick_mode: StrictInt = key(1, "Which oscillating mode the push follows, counted by growth rate from 1.", ge=1, le=100)
     kick_opening: Length = key(1e-4, "Lip opening of the push.", gt=0, le=1)

@@ -1,0 +1,109 @@
+"""The equations of a step against the time-dependent residual of the model, and their iteration matrix against differences."""
+
+import numpy as np
+import pytest
+
+from dbvfiv.model.dynamics import dynamic_residual
+from dbvfiv.transient.equations import ValveMotion
+from dbvfiv.transient.fluid import MovingFluid
+from dbvfiv.transient.scheme import scheme
+from dbvfiv.transient.state import MotionState, consistent_state
+from dbvfiv.transient.stepper import _Trial
+
+LAWS = [{"fluid.continuity": "quasi-steady"}, {"fluid.continuity": "storage"}]
+
+
+@pytest.mark.parametrize("law", LAWS + [{"fluid.unsteady": False}])
+def test_consistent_accelerations_meet_the_model(valve, open_state, law):
+    model = valve({"fluid.density": 50.0} | law)
+    motion = ValveMotion(model)
+    v = 0.05 * open_state / np.abs(open_state).max()
+    state = consistent_state(motion, 0.0, open_state, v, 0.4, 9e3)
+    rate = 0.0
+    if motion.moving_fluid:  # psi = U times an integral, at the areas' rates; only the outlet's equation fixes the rate of U
+        rates = [dynamic_residual(model, motion.conditions, 9e3, open_state, v, state.a, state.speed, r)[1] for r in (0.0, 1.0)]
+        rate = -rates[0] / (rates[1] - rates[0])
+    force, outlet = dynamic_residual(model, motion.conditions, 9e3, open_state, v, state.a, state.speed, rate)
+    scale = np.abs(state.load).max()
+    assert np.abs(force).max() < 1e-9 * scale
+    if motion.moving_fluid:
+        assert abs(outlet) < 1e-6
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_flow_is_that_of_the_channel(valve, law):
+    model = valve({"fluid.density": 50.0} | law)
+    channel, fluid = model.flow, MovingFluid(model.flow, 50.0)
+    rng = np.random.default_rng(0)
+    area = model.rows.areas(model.nodal(model.rest())) + 1e-3 * rng.random(model.stations)
+    rate, acceleration, h = 1e-2 * rng.standard_normal(model.stations), rng.standard_normal(model.stations), 1e-6
+    psi_rate = (
+        fluid.state(area + h * rate, rate + h * acceleration, 0.3 + 2 * h).psi - fluid.state(area - h * rate, rate - h * acceleration, 0.3 - 2 * h).psi
+    ) / (2 * h)
+    p = fluid.pressure(fluid.state(area, rate, 0.3), psi_rate, 6e3)
+    assert p == pytest.approx(channel.pressure(area, rate, acceleration, 0.3, 2.0, 6e3, 50.0), rel=1e-6, abs=1e-3)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_slopes_of_the_flow(valve, law):
+    model = valve({"fluid.density": 50.0} | law)
+    fluid = MovingFluid(model.flow, 50.0)
+    rng = np.random.default_rng(1)
+    area = model.rows.areas(model.nodal(model.rest())) + 1e-5 * rng.random(model.stations)
+    rate = 1e-2 * rng.standard_normal(model.stations)
+    found = fluid.slopes(area, rate, 0.3)
+    steps = [(1e-9 * rng.standard_normal(model.stations), 0, 0), (0, 1e-6 * rng.standard_normal(model.stations), 0), (0, 0, 1e-4)]
+    for slope, (da, dr, du) in zip(found, steps):
+        change = fluid.state(area + da, rate + dr, 0.3 + du).speed - fluid.state(area - da, rate - dr, 0.3 - du).speed
+        direction = da if np.ndim(da) else dr if np.ndim(dr) else du
+        expected = slope @ direction if np.ndim(direction) else slope * direction
+        assert 0.5 * change == pytest.approx(expected, rel=2e-4, abs=1e-6 * np.abs(change).max())
+
+
+def test_the_inlet_velocity_is_the_root_without_reversal(valve):
+    fluid = MovingFluid(valve({"fluid.density": 1.2}).flow, 1.2)
+    area, still = np.linspace(1e-4, 0.0135, fluid.channel.count), np.zeros(fluid.channel.count)
+    # a passage that has closed a thousandfold within a step: psi was 30, the new velocity must be small and positive
+    area[0] = 1e-7
+    u = fluid.velocity(area, still, 6e3, 1e4, -1e4 * 30.0)
+    flow = fluid.state(area, still, u)
+    assert u > 0
+    assert fluid.pressure(flow, 1e4 * (flow.psi - 30.0), 6e3)[0] == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("law", LAWS + [{"fluid.unsteady": False}])
+@pytest.mark.parametrize("h", [1e-3, 1e-4])
+def test_iteration_matrix_against_differences(valve, open_state, law, h):
+    motion = ValveMotion(valve({"fluid.density": 200.0} | law))
+    state = consistent_state(motion, 0.0, open_state, 0.02 * open_state / np.abs(open_state).max(), 0.3, 12e3)
+    trial = _Trial(motion, scheme("generalised-alpha", 0.1), state, h, 12e3)
+    trial.set(0.5 * state.a)
+    trial.evaluate()
+    trial.linearise()
+    direction = 1e-6 * np.random.default_rng(3).standard_normal(motion.size) * motion._scale
+    residuals = []
+    for sign in (1, -2):
+        trial.move(sign * 1e-2, direction)
+        trial.evaluate()
+        residuals.append(trial.residual.copy())
+    back, _ = motion.solve((residuals[0] - residuals[1]) / 2e-2, 0.0)
+    # what is left out: rotary inertia's change, the second derivative of areas times the rates
+    assert np.abs(back - direction).max() < 5e-3 * np.abs(direction).max()
+
+
+def test_energies_against_their_definition(valve, open_state):
+    model = valve()
+    motion = ValveMotion(model)
+    v = np.random.default_rng(4).standard_normal(model.size)
+    kinetic, strain, stop = motion.energies(open_state, v)
+    assert kinetic == pytest.approx(0.5 * v @ (model.shell.dofs.matrix(model.mass(open_state)) @ v), rel=1e-12)
+    assert strain == pytest.approx(model.shell.energy(open_state), rel=1e-12)
+    assert stop == model.stops.energy(open_state)
+
+
+def test_a_state_goes_through_a_file_unchanged():
+    rng = np.random.default_rng(5)
+    parts = [rng.standard_normal(7) for _ in range(6)] + [rng.standard_normal(3) for _ in range(2)]
+    state = MotionState(0.1, 0.2, *parts)
+    again = MotionState.unpack(state.pack(), 3)
+    assert all(np.array_equal(a, b) for a, b in zip(vars(state).values(), vars(again).values()))

@@ -1,0 +1,158 @@
+"""Steps of the coupled valve: order, energy, contact, slamming, step control."""
+
+import numpy as np
+import pytest
+
+from dbvfiv.transient.control import ControlOptions, FixedSteps, step_control
+from dbvfiv.transient.equations import ValveMotion
+from dbvfiv.transient.scheme import scheme
+from dbvfiv.transient.state import consistent_state
+from dbvfiv.transient.stepper import Stepper, StepFailure, StepOptions
+
+TIGHT = StepOptions(tolerance=1e-9, floor=1e-13)
+
+
+def advance(motion, state, h, steps, pressure, name="generalised-alpha", nd=0.0, options=TIGHT, adaptive=False):
+    stepper = Stepper(motion, scheme(name, nd), pressure if callable(pressure) else lambda t: pressure, options)
+    control = step_control(stepper, ControlOptions(h, adaptive))
+    results = []
+    for _ in range(steps):
+        results.append(control.advance(state, 1e9))
+        state = results[-1].state
+    return state, results, stepper, control
+
+
+@pytest.mark.parametrize(
+    "law, name, nd, order",
+    [
+        ("quasi-steady", "generalised-alpha", 0.0, 2),
+        ("storage", "generalised-alpha", 0.0, 2),
+        ("quasi-steady", "generalised-alpha", 0.2, 2),
+        ("storage", "hht", 0.1, 2),
+        ("quasi-steady", "newmark", 0.2, 1),
+    ],
+)
+def test_order_of_accuracy(valve, open_state, law, name, nd, order):
+    """Step refinement of a smooth motion: the open valve after the pressure has changed gently."""
+    model = valve({"fluid.density": 300.0, "fluid.continuity": law})
+    motion = ValveMotion(model)
+    speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(open_state)), 12e3, 300.0)
+    state = consistent_state(motion, 0.0, open_state, 0 * open_state, speed, 12e3)
+    pressure = lambda t: 12e3 + 4e3 * (1 - np.cos(60 * t))  # noqa: E731
+    lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
+    ends = []
+    for steps in (10, 20, 40):
+        end, *_ = advance(motion, state, 0.02 / steps, steps, pressure, name, nd)
+        ends.append(np.array([end.q[lip], end.v[lip] * 0.01, end.speed * 0.01]))
+    first, second = np.abs(ends[0] - ends[1]), np.abs(ends[1] - ends[2])
+    assert np.log2(first.max() / second.max()) > order - 0.35
+
+
+def test_work_and_damping_account_for_the_energy(valve):
+    motion = ValveMotion(valve({"fluid.density": 300.0}))
+    rest = np.zeros(motion.size)
+    state = consistent_state(motion, 0.0, rest, rest, 0.0, 6e3)
+    defects = []
+    for h in (1e-3, 5e-4):
+        end, results, *_ = advance(motion, state, h, int(0.03 / h), lambda t: 6e3 * min(1.0, t / 0.01))
+        work, lost = sum(r.work for r in results), sum(r.dissipation for r in results)
+        assert lost > 0
+        defects.append(abs(sum(motion.energies(end.q, end.v)) - work + lost) / work)
+    assert defects[0] < 5e-3 and defects[1] < 0.5 * defects[0]
+
+
+def test_a_free_swing_keeps_its_energy(valve, open_state):
+    from dbvfiv.transient.start import steady_positions
+
+    start = steady_positions(valve(), 2e3)
+    model = valve({"drive.kind": "uniform", "drive.pressure": 0.0, "supports.lip_stop": False, "damping.alpha": 0.0, "damping.beta": 0.0})
+    motion = ValveMotion(model)
+    state = consistent_state(motion, 0.0, start, 0 * start, 0.0, 0.0)
+    energy = sum(motion.energies(state.q, state.v))
+    swings = []
+    for _ in range(4):
+        state, results, *_ = advance(motion, state, 5e-4, 50, 0.0)
+        swings.append(sum(motion.energies(state.q, state.v)) / energy - 1.0)
+        assert sum(r.work for r in results) == 0.0
+    assert np.abs(swings).max() < 1e-3
+    damped, *_ = advance(motion, consistent_state(motion, 0.0, start, 0 * start, 0.0, 0.0), 2e-3, 100, 0.0, nd=0.3)
+    assert sum(motion.energies(damped.q, damped.v)) < 0.97 * energy
+
+
+def test_slamming_lips_are_survived(valve):
+    """Light fluid at 6 kPa, suddenly applied: lips shut and pressures spike within steps."""
+    motion = ValveMotion(valve({"fluid.density": 1.2, "damping.alpha": 0.0}))
+    rest = np.zeros(motion.size)
+    state = consistent_state(motion, 0.0, rest, rest, 0.0, 6e3)
+    state, results, stepper, control = advance(motion, state, 5e-4, 200, 6e3, nd=0.1, options=StepOptions())
+    assert state.time > 0.05
+    touching = [motion.model.stops.touching(r.state.q) for r in results]
+    assert max(touching) > 0
+    assert min(r.load.speed[-1] for r in results) > 0, "the flow must not reverse"
+    assert np.abs(state.q).max() < 1.0
+
+
+def test_factors_are_kept(valve, open_state):
+    motion = ValveMotion(valve({"fluid.density": 300.0}))
+    speed = motion.model.flow.inlet_velocity(motion.model.rows.areas(motion.model.nodal(open_state)), 12e3, 300.0)
+    state = consistent_state(motion, 0.0, open_state, 0 * open_state, speed, 12e3)
+    _, results, stepper, _ = advance(motion, state, 1e-4, 100, lambda t: 12e3 + 50 * np.sin(200 * t), options=StepOptions())
+    assert stepper.factorisations < 10
+    assert stepper.residuals < 350
+
+
+class Fails:
+    """A stepper that refuses steps over a stretch of time longer than a limit."""
+
+    def __init__(self, bad, limit):
+        self.bad, self.limit, self.taken = bad, limit, []
+
+    def step(self, state, h):
+        if state.time + h > self.bad[0] and state.time < self.bad[1] and h > self.limit:
+            raise StepFailure("no")
+        self.taken.append(h)
+        from types import SimpleNamespace
+
+        return SimpleNamespace(state=SimpleNamespace(time=state.time + h), error=0.0)
+
+    def forget(self, all=True):
+        pass
+
+
+def test_halved_steps_come_back_to_the_grid():
+    from types import SimpleNamespace
+
+    stepper = Fails((0.0101, 0.0125), 1.3e-4)
+    control = FixedSteps(stepper, ControlOptions(1e-3))
+    state = SimpleNamespace(time=0.0)
+    while state.time < 0.02 - 1e-12:
+        state = control.advance(state, 1.0).state
+    assert state.time == pytest.approx(0.02, abs=1e-15)
+    assert min(stepper.taken) == pytest.approx(1.25e-4)
+    assert control.level == 0 and stepper.taken[-1] == 1e-3
+    assert control.halvings >= 3
+
+
+def test_steps_are_not_halved_for_ever():
+    from types import SimpleNamespace
+
+    control = FixedSteps(Fails((0.0, 1.0), 0.0), ControlOptions(1e-3, smallest=1 / 64))
+    with pytest.raises(StepFailure):
+        control.advance(SimpleNamespace(time=0.0), 1.0)
+    assert control.level == 6
+
+
+def test_adaptive_steps_follow_the_error(valve, open_state):
+    model = valve({"fluid.density": 300.0})
+    motion = ValveMotion(model)
+    speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(open_state)), 12e3, 300.0)
+    state = consistent_state(motion, 0.0, open_state, 0 * open_state, speed, 12e3)
+    pressure = lambda t: 12e3 + 2e3 * np.exp(-(((t - 0.05) / 0.002) ** 2))  # noqa: E731
+    stepper = Stepper(motion, scheme("generalised-alpha", 0.1), pressure)
+    control = step_control(stepper, ControlOptions(2e-3, True, 2e-8))
+    lengths = []
+    while state.time < 0.1:
+        old, state = state, control.advance(state, 0.1 if state.time < 0.1 - 1e-9 else 1.0).state
+        lengths.append((old.time, state.time - old.time))
+    during = [h for t, h in lengths if 0.047 < t < 0.053]
+    assert max(during) < 0.6 * max(h for t, h in lengths)
