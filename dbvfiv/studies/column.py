@@ -42,6 +42,8 @@ class Column:
         `REDUCED` or `DIRECT`.
     eigenvalues : callable or None
         From any condition (density, alpha, beta, storage) at the same state to its leading eigenvalues on the small model, sorted by growth rate.
+    leading : tuple of arrays
+        Those of the cells.
     """
 
     growth_rate: np.ndarray
@@ -53,6 +55,7 @@ class Column:
     error: float
     how: np.ndarray
     eigenvalues: Callable[[tuple], np.ndarray] | None = None
+    leading: tuple[np.ndarray, ...] = ()
 
     @property
     def certified(self) -> np.ndarray:
@@ -95,7 +98,9 @@ class ColumnSolver:
         error = self._error(family, fine, conditions, floor, _between(places))
         column = _column(leading, values, counts, error)
         doubtful = np.flatnonzero(~column.certified)
-        column = replace(column, eigenvalues=lambda condition: _leading(fine.eigenvalues([condition])[0], floor_of(condition[2]))[:8])
+        column = replace(
+            column, leading=tuple(row[:8] for row in leading), eigenvalues=lambda c: _leading(fine.eigenvalues([c])[0], floor_of(c[2]))[:8]
+        )
         return self._repaired(column, linear, conditions, doubtful) if doubtful.size else column
 
     def _error(self, family, fine, conditions, floor, places) -> float:
@@ -144,11 +149,10 @@ def newton_correction(family: StateFamily, pairs, condition) -> np.ndarray:
     right, left = family.corrected(pairs, condition)
     force, inner = family.residual(pairs.values, right, pairs.u, condition)
     top = np.einsum("ij,ij->j", left.conj(), force) + np.einsum("ij,ij->j", pairs.c.conj(), inner)
-    # T' by a difference quotient along the eigenvalue: T is quadratic in it
-    step = 1e-4 * np.maximum(np.abs(pairs.values), 1.0)
+    # T' by a difference quotient, good enough for the size of a correction
+    step = 1e-3 * np.maximum(np.abs(pairs.values), 1.0)
     ahead = family.residual(pairs.values + step, right, pairs.u, condition)
-    behind = family.residual(pairs.values - step, right, pairs.u, condition)
-    slope = (np.einsum("ij,ij->j", left.conj(), ahead[0] - behind[0]) + np.einsum("ij,ij->j", pairs.c.conj(), ahead[1] - behind[1])) / (2 * step)
+    slope = (np.einsum("ij,ij->j", left.conj(), ahead[0] - force) + np.einsum("ij,ij->j", pairs.c.conj(), ahead[1] - inner)) / step
     return np.abs(top / slope) / np.maximum(np.abs(pairs.values), 1.0)
 
 
@@ -185,8 +189,8 @@ def _spread(conditions, number: int) -> list[int]:
 
 
 def _between(places: list[int]) -> list[int]:
-    """The middle of the widest gap between places, and of the first."""
+    """The middle of the widest gap between places, the first of several."""
     if len(places) < 2:
         return places
-    gaps = [(b - a, (a + b) // 2) for a, b in zip(places[:-1], places[1:])]
-    return sorted({max(gaps)[1], gaps[0][1]})
+    gaps = [(b - a, -a, (a + b) // 2) for a, b in zip(places[:-1], places[1:])]
+    return [max(gaps)[2]]

@@ -12,7 +12,7 @@ from ..case.axis import Axis
 from ..case.model import Case
 from ..errors import CaseError, SolveError
 from .column import MISSING, Column
-from .crossings import Scan, locate
+from .crossings import Sample, Scan, locate
 from .parameters import Place, is_surrounding
 from .stability_walk import StabilityWalk
 
@@ -149,6 +149,8 @@ def _law(plan: MapPlan, walk: StabilityWalk, value: float, law: float) -> tuple[
     column = walk.column(places)
     sample = column.eigenvalues or (lambda condition: walk.spectrum(places[0].at(**dict(zip(("density", "alpha", "beta", "storage"), condition)))).eigenvalues)
     scan = Scan(lambda other: sample(plan.place(value, other, law).condition), along.log)
+    # what the cells know need not be found again
+    scan.samples.update({float(v): Sample(float(v), row) for v, row in zip(along.values, column.leading)})
     return column, _onsets(scan, along)
 
 

@@ -191,7 +191,7 @@ class _Walk:
     def start(self, hints):
         scale = self.response.scale
         poles = self.response.poles
-        base = [0.0, *np.geomspace(0.05 * scale, self.response.top, 22)]
+        base = [0.0, *np.geomspace(0.1 * scale, self.response.top, 17)]
         near = poles[(poles.imag > 0) & (np.abs(poles.real) < 0.2 * poles.imag)]
         base += list(near.imag)
         cells, omega = [], []
@@ -199,7 +199,7 @@ class _Walk:
             own = list(base)
             for value in np.asarray(hint, complex):
                 width, middle = max(abs(value.real), 1e-6 * abs(value)), abs(value.imag)
-                own += [middle + f * width for f in (-1.0, 0.0, 1.0) if middle + f * width > 0]
+                own += [_shared(middle + f * width, 0.3 * width) for f in (-1.0, 0.0, 1.0) if middle + f * width > 0.3 * width]
             cells += [i] * len(own)
             omega += own
         self._add(cells, omega)
@@ -240,6 +240,12 @@ class _Walk:
             number.append(int(round(found)))
             certain.append(bool(abs(found - round(found)) < CERTAIN and abs(gap) < 2 * LATE and np.abs(steps).max() <= LARGEST_STEP + 1e-9 and not self._cut[i]))
         return np.array(number), np.array(certain)
+
+
+def _shared(omega: float, play: float) -> float:
+    """A frequency near one given, from a grid that neighbouring cells share, so that they share responses too."""
+    step = 2.0 ** np.floor(np.log2(play))
+    return float(np.round(omega / step) * step)
 
 
 def principal(angle):

@@ -132,10 +132,10 @@ class Reduced:
 
     def __init__(self, linear: LinearisedState, fluid: UnitFluid, space: np.ndarray, compression: float = 1e-9):
         self.linear, self.fluid = linear, fluid
-        self.V = V = orthonormal(linear.mass, space, compression)
+        self.V, MV = V, MV = orthonormal(linear.mass, space, compression)
         self.K = V.T @ (linear.stiffness @ V)
         self.Ks = V.T @ (linear.structure @ V)
-        self.M = V.T @ (linear.mass @ V)
+        self.M = V.T @ MV
         self.G = linear.forces.T.dot(V).T
         self.J = linear.slope @ V
         self._fluid: dict[float, dict[str, np.ndarray]] = {}
@@ -204,17 +204,19 @@ class Reduced:
         return Pairs(values[keep], self.V @ right[:k, keep], right[2 * k :, keep], self.V @ under[:k], under[k:])
 
 
-def orthonormal(mass, X: np.ndarray, compression: float, passes: int = 2) -> np.ndarray:
-    """Mass-orthonormal basis of the span of columns, directions weaker than `compression` left out; each column counts alike."""
-    size = np.sqrt(np.einsum("ij,ij->j", X, mass @ X))
-    X = X[:, size > 0] / size[size > 0]
-    # a second pass removes what rounding left in the first
+def orthonormal(mass, X: np.ndarray, compression: float, passes: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """Mass-orthonormal basis of the span of columns, and mass times it; directions weaker than `compression` left out, each column counts alike."""
+    MX = mass @ X
+    size = np.sqrt(np.einsum("ij,ij->j", X, MX))
+    X, MX = X[:, size > 0] / size[size > 0], MX[:, size > 0] / size[size > 0]
+    # a second pass removes what rounding left in the first; the mass goes along, which spares a product
     for threshold in (max(compression**2, 1e-14), 1e-14)[:passes]:
-        gram = X.T @ (mass @ X)
+        gram = X.T @ MX
         weight, turn = np.linalg.eigh(0.5 * (gram + gram.T))
         keep = weight > threshold * weight[-1]
-        X = (X @ turn[:, keep][:, ::-1]) / np.sqrt(weight[keep][::-1])
-    return X
+        turn = turn[:, keep][:, ::-1] / np.sqrt(weight[keep][::-1])
+        X, MX = X @ turn, MX @ turn
+    return X, MX
 
 
 class StateFamily:
@@ -238,11 +240,11 @@ class StateFamily:
         """First stage."""
         linear = self.linear
         still = [self.solver.solve(linear.forces.toarray()), self.solver.solve_transposed(linear.slope.toarray().T.copy())]
-        first = orthonormal(linear.mass, np.hstack(still), COMPRESSION, passes=1)
+        first, inertia = orthonormal(linear.mass, np.hstack(still), COMPRESSION, passes=1)
         # one step of subspace iteration on the lowest motions found there
         stiffness = first.T @ (linear.stiffness @ first)
-        lowest = first @ la.eigh(0.5 * (stiffness + stiffness.T), subset_by_index=(0, min(MOTIONS, first.shape[1]) - 1))[1]
-        moving = self.solver.solve(linear.mass @ lowest)
+        lowest = la.eigh(0.5 * (stiffness + stiffness.T), subset_by_index=(0, min(MOTIONS, first.shape[1]) - 1))[1]
+        moving = self.solver.solve(inertia @ lowest)
         return Reduced(linear, self.fluid, np.hstack([first, moving]), COMPRESSION)
 
     def residual(self, values, q, u, condition, left: bool = False):
@@ -251,11 +253,11 @@ class StateFamily:
         lin, s = self.linear, np.conj(values) if left else values
         turn = (lambda a: a.T) if left else (lambda a: a)
         q = np.asarray(q, complex)
-        mq, kq = real_times(lin.mass, q), real_times(turn(lin.stiffness).tocsr(), q)
+        mq, kq = real_times(lin.mass, q), real_times(turn(lin.stiffness), q)
         force = mq * (s * s + alpha * s) + kq
         if beta:
             force += real_times(lin.structure, q) * (beta * s)
-        y = real_times(lin.forces.T.tocsr() if left else lin.slope, q)
+        y = real_times(lin.forces.T if left else lin.slope, q)
         inner = np.zeros((u.shape[0], len(values)), complex)
         pressure = np.zeros_like(y)
         for i, value in enumerate(s):
@@ -266,7 +268,7 @@ class StateFamily:
             else:
                 pressure[:, i] = A @ y[:, i] + B @ u[:, i]
                 inner[:, i] = R @ y[:, i] + S @ u[:, i]
-        force -= real_times(lin.slope.T.tocsr() if left else lin.forces, pressure)
+        force -= real_times(lin.slope.T if left else lin.forces, pressure)
         return force, inner
 
     def corrected(self, pairs: Pairs, condition) -> tuple[np.ndarray, np.ndarray]:
@@ -278,13 +280,13 @@ class StateFamily:
         scale = 1.0 / (1.0 + pairs.values * beta)
         return pairs.q - self.solver.solve(force) * scale, pairs.w - self.solver.solve_transposed(back) * np.conj(scale)
 
-    def fine(self, conditions, floor: float, most: int = 6) -> Reduced:
+    def fine(self, conditions, floor: float, most: int = 5) -> Reduced:
         """Second stage: a space made of corrected leading vectors at some conditions."""
         columns = []
         for condition in conditions:
             right, left = self.corrected(self.coarse.pairs(condition, floor, most), condition)
             columns += [right.real, right.imag, left.real, left.imag]
-        return Reduced(self.linear, self.fluid, np.hstack(columns), 1e-7)
+        return Reduced(self.linear, self.fluid, np.hstack(columns), 3e-7)
 
 
 def real_times(matrix, x: np.ndarray) -> np.ndarray:

@@ -66,7 +66,7 @@ def test_the_error_estimate_sees_a_poor_space(linear):
     condition = (10.0, 0.0, 0.003, 0.0)
     good = newton_correction(family, family.fine([condition], -300.0).pairs(condition, -300.0, 1), condition)
     poor = newton_correction(family, family.coarse.pairs(condition, -300.0, 1), condition)
-    assert good[0] < 1e-9 < poor[0]
+    assert good[0] < 1e-8 and good[0] < 0.05 * poor[0]
 
 
 def test_damping_may_change_within_a_column(linear):

@@ -1,0 +1,56 @@
+"""A map of 64 x 64 cells over pressure and density at 28 x 48, every cell with its certificate, against that many independent eigenvalue solves."""
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from dbvfiv.case import load_case
+from dbvfiv.studies.column import search_options
+from dbvfiv.studies.map import run_map
+from dbvfiv.studies.map_column import MapPlan
+from dbvfiv.studies.stability_walk import StabilityWalk
+from eigen import leading_modes
+
+from .registry import Row, benchmark
+
+CELLS = 64
+SAMPLE = 20
+
+
+@benchmark("map")
+def stability_map():
+    """Two processes, their start included; the direct way on a sample of cells of the same map, steady states and linearisations left out of its time."""
+    case = load_case(
+        None,
+        ["mesh.around=28", "mesh.along=48", "damping.alpha=0", "damping.beta=0.003", f"map.x=pressure=500:50000:{CELLS}", f"map.y=density=1:1000:{CELLS}:log",
+         "map.curve=false", "map.refine=0", "map.checks=0"],
+    )  # fmt: skip
+    plan, walk = MapPlan.of(case), StabilityWalk(case)
+    random = np.random.default_rng(1)
+    picks = sorted((int(i), int(j)) for i, j in random.integers(0, CELLS, (SAMPLE, 2)))
+    direct = []
+    for part in (picks[: SAMPLE // 2], None, picks[SAMPLE // 2 :]):
+        if part is None:  # in the middle, so that a slow spell of the machine meets both
+            started = time.perf_counter()
+            result = run_map(case, workers=2)
+            taken = time.perf_counter() - started
+            continue
+        for i, j in part:
+            place = plan.place(plan.x.values[i], plan.y.values[j], plan.laws[0])
+            linear = walk.linear(place)
+            begun = time.perf_counter()
+            spectrum = leading_modes(linear.pencil(place.conditions, storage=place.storage), 6, search_options(place.beta))
+            direct.append((time.perf_counter() - begun, i, j, complex(spectrum.eigenvalues[0]), spectrum.unstable_count))
+    one = float(np.median([d[0] for d in direct]))
+    growth, frequency, unstable = (result.grid(name)[0] for name in ("growth_rate", "frequency", "unstable"))
+    error = max(abs(complex(growth[j, i], 2 * np.pi * frequency[j, i]) - value) / abs(value) for _, i, j, value, _ in direct)
+    processor = sum(column.seconds for column in result.columns)
+    yield Row(
+        f"map of {CELLS} x {CELLS} cells, 2 workers, over {CELLS**2} independent solves", taken / (CELLS**2 * one), target=1 / 60,
+        note=f"1/{CELLS**2 * one / taken:.0f}; {taken:.0f} s, {processor / CELLS:.2f} s of one core a column, one solve {one:.2f} s",
+    )  # fmt: skip
+    yield Row(f"largest relative difference of {SAMPLE} sampled cells from the full pencil", float(error), unit="", target=1e-6)
+    wrong = sum(int(unstable[j, i] != count) for _, i, j, _, count in direct)
+    yield Row("sampled cells with another number of unstable eigenvalues", wrong, unit="", target=0)
+    yield Row("cells without a certificate", int((~result.grid("certified")[0]).sum()), unit="", target=0, note=f"{int((result.grid('how') == 1).sum())} solved directly")
