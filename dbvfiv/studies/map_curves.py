@@ -4,6 +4,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from continuation import ContinuationError, ContinuationOptions, NewtonOptions, SpecialPoint, continue_hopf
 from continuation.hopf import hopf_borders
@@ -163,10 +164,28 @@ def follow(plan: MapPlan, walk: StabilityWalk, curve: OnsetCurve) -> OnsetCurve:
         if "closed" in branch.reason:
             break
     whole = parts[0] if len(parts) == 1 else np.vstack([parts[1][::-1], parts[0][1:]])
+    onsets = np.column_stack([_unit(plan, curve.x, curve.y), curve.frequency])
+    whole, mismatch = merged(whole, onsets)
     x = np.array([plan.value(plan.x, c) for c in np.clip(whole[:, 0], 0, 1)])
     y = np.array([plan.value(plan.y, c) for c in np.clip(whole[:, 1], 0, 1)])
-    mismatch = float(_distances(_unit(plan, curve.x, curve.y), whole[:, :2]).max())
     return OnsetCurve(curve.law, x, y, whole[:, 2], True, mismatch, "; ".join(dict.fromkeys(reasons)))
+
+
+def merged(curve: np.ndarray, onsets: np.ndarray) -> tuple[np.ndarray, float]:
+    """Points (k, 3) of a continued curve and onsets (p, 3) of columns on it, in order; and the largest distance of the latter from a spline through the former."""
+    points = curve[np.concatenate([[True], np.linalg.norm(np.diff(curve[:, :2], axis=0), axis=1) > 1e-9])]
+    if len(points) < 4:
+        return curve, float(_distances(onsets[:, :2], curve[:, :2]).max())
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
+    fine = np.linspace(0.0, length[-1], 60 * len(points))
+    line = CubicSpline(length, points)(fine)
+    distance = _distances(onsets[:, :2], line[:, :2])
+    where = fine[np.argmin(np.linalg.norm(onsets[:, None, :2] - line[None, :, :2], axis=2), axis=1)]
+    on = distance < ON_CURVE
+    # no two points closer than what the order along the curve can resolve
+    on &= np.min(np.abs(where[:, None] - length[None]), axis=1) > fine[1]
+    order = np.argsort(np.concatenate([length, where[on]]), kind="stable")
+    return np.vstack([points, onsets[on]])[order], float(distance.max())
 
 
 def hopf_at(plan: MapPlan, walk: StabilityWalk, law: float, x: float, y: float, frequency: float):

@@ -210,3 +210,23 @@ def test_without_mpiexec_there_is_one_process(monkeypatch):
     assert map_pool.mpi_size() == 1
     monkeypatch.setenv("PMI_SIZE", "4")
     assert map_pool.mpi_size() == 4
+
+
+def test_onsets_of_columns_merge_into_a_curve_in_order():
+    from dbvfiv.studies.map_curves import merged
+
+    def at(t):
+        return np.column_stack([0.5 + 0.4 * np.cos(t), 0.5 + 0.4 * np.sin(t), 30 + t])
+
+    points, distance = merged(at(np.linspace(0, 3, 13)), at(np.array([0.4, 1.9, 2.2])))
+    assert len(points) == 16 and (np.diff(points[:, 2]) > 0).all()
+    assert distance < 2e-4
+    _, far = merged(at(np.linspace(0, 3, 13)), at(np.array([0.4])) + [[0.1, 0.0, 0.0]])
+    assert far == pytest.approx(0.1 * np.cos(0.4), rel=0.1)
+
+
+@pytest.mark.slow
+def test_the_continued_curve_goes_through_the_onsets_of_all_columns(case):
+    result = run_map(case.replace({"map.curve": True, "map.x": "pressure=5000:8000:4", "map.refine": 0}))
+    (curve,) = result.curves
+    assert curve.exact and curve.mismatch < 1e-3
