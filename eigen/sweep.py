@@ -79,7 +79,8 @@ def sweep(pencil_at: Callable[[float], CoupledPencil], values, count: int,
     values = np.asarray(values, float)
     options = options or SearchOptions()
     workspace = workspace or Workspace()
-    basis = basis or TransferBasis(pencil_at(float(values[0])))
+    # small to begin with: what it lacks comes from the first full solve
+    basis = basis or TransferBasis(pencil_at(float(values[0])), modes=12, compression=1e-4)
     band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
 
     def reduced(value):
@@ -93,7 +94,8 @@ def sweep(pencil_at: Callable[[float], CoupledPencil], values, count: int,
 
     done: list[tuple[float, float]] = []
     places = np.unique(np.linspace(0, values.size - 1, max(1, checks)).astype(int))
-    queue = [int(i) for i in places]
+    # the one in the middle goes first and feeds the basis, the others judge it
+    queue = sorted((int(i) for i in places), key=lambda i: abs(i - 0.5 * (values.size - 1)))
     certified = False
     while len(done) < max_solves:
         if not queue:
@@ -102,10 +104,13 @@ def sweep(pencil_at: Callable[[float], CoupledPencil], values, count: int,
         index = queue.pop(0)
         value = float(values[index])
         pencil = pencil_at(value)
-        full = leading_modes(pencil, count, options, workspace=workspace)
+        feeds = not done and bool(queue)
+        full = leading_modes(pencil, count, replace(options, left=options.left or feeds), workspace=workspace)
         error = _difference(full, all_eigenvalues(reduced(value)))
         done.append((value, error))
-        if error > tolerance:
+        if feeds:
+            basis.enlarge(full.q, full.left_q)
+        elif error > tolerance:
             if full.left_q is None:
                 full = leading_modes(pencil, count, replace(options, left=True), workspace=workspace)
             basis.enlarge(full.q, full.left_q)
