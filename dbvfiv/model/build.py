@@ -20,8 +20,8 @@ def build_section(case: Case) -> Section:
     return Section(tuple(layers), case.mesh.layer_points)
 
 
-def build_shell(case: Case) -> tuple[ValveMesh, Shell]:
-    """Mesh and shell of a case."""
+def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, Shell]:
+    """Mesh and shell of a case; `section` in place of the case's own wall."""
     mesh = valve_mesh(case.valve, case.mesh)
     surface = ShellMesh.build(
         mesh.nodes,
@@ -30,4 +30,4 @@ def build_shell(case: Case) -> tuple[ValveMesh, Shell]:
         material_axis=(0.0, 0.0, 1.0),
         planes=[(mesh.rows[:, 0], 0), (mesh.rows[:, -1], 1)],
     )
-    return mesh, Shell(surface, build_section(case), free_unknowns(mesh), case.shell.metric)
+    return mesh, Shell(surface, section or build_section(case), free_unknowns(mesh), case.shell.metric)

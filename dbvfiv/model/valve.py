@@ -17,6 +17,7 @@ import scipy.sparse as sp
 
 from ..case.model import Case
 from ..flow import Channel, RowAreas, UniformLoad
+from ..shell import Section
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_shell
 from .linear import CoupledFactor
@@ -56,6 +57,8 @@ class ValveModel:
     Parameters
     ----------
     case : Case
+    section : Section, optional
+        Wall in place of the one the case describes.
 
     Raises
     ------
@@ -63,9 +66,9 @@ class ValveModel:
         If the case's geometry cannot be meshed or its shell metric is not valid on it.
     """
 
-    def __init__(self, case: Case):
+    def __init__(self, case: Case, section: Section | None = None):
         self.case = case
-        self.mesh, self.shell = build_shell(case)
+        self.mesh, self.shell = build_shell(case, section)
         dofs = self.shell.dofs
         self.rows = RowAreas(self.mesh, dofs.index)
         self.stops = lip_stops(self.mesh, dofs.index, case.supports, case.valve.duckbill_length)
