@@ -2,8 +2,8 @@
 
     M(q) a + h(q, v) + alpha M v + beta w + F - G(q) p = 0,     p_outlet = 0
 
-F is the internal force of shell and stops and w its rate. F, the load G p and the flow's psi (see `fluid`) are kept in the state as quantities of first
-order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent with the tangent without an evaluation of it.
+F is the internal force of shell and stops and w its rate. F and the flow's psi (see `fluid`) are kept in the state as quantities of first order, so that
+stiffness damping beta K_s(q) v = beta dF/dt is consistent with the tangent without an evaluation of it.
 """
 from __future__ import annotations
 
@@ -21,44 +21,73 @@ from .kernels import inertia_force, kinetic_energy, strain_energy
 
 @dataclass(frozen=True)
 class Weights:
-    """Derivatives of the equations' parts with respect to the new positions.
+    """How the parts of the equations depend on what is new in a step.
 
     Attributes
     ----------
+    theta : float
+        Where in the step the fluid's equations are met: the share of the new state there.
     inertia : float
         Factor of M, 1/s2; mass damping included.
     force : float
         Factor of the tangent of F.
-    load : float
-        Factor of the derivative of G p.
     velocity : float
-        Derivative of the new velocities, 1/s.
+        Derivative of the new velocities with respect to the new positions, 1/s.
     psi : float
-        Derivative of the rate of psi with respect to psi, 1/s.
+        Derivative of the rate of psi with respect to the new psi, 1/s.
     """
 
+    theta: float
     inertia: float
     force: float
-    load: float
     velocity: float
     psi: float
 
 
+@dataclass(frozen=True)
+class Step:
+    """What the fluid of a step starts from.
+
+    Attributes
+    ----------
+    theta : float
+        See `Weights`.
+    speed : float
+        Inlet velocity at the start, m/s.
+    psi_weight : float
+    psi_known : (m,) array
+        The rate of psi is psi_weight psi + psi_known, with the new psi.
+    inlet : float
+        Inlet pressure where the equations are met, Pa.
+    """
+
+    theta: float
+    speed: float
+    psi_weight: float
+    psi_known: np.ndarray
+    inlet: float
+
+
 @dataclass
 class Load:
-    """Fluid and its force on the wall at one instant.
+    """Fluid of a step and its force on the wall.
 
     Attributes
     ----------
     force : (n,) array
-        G p.
+        G p, where the equations are met.
     outlet : float
         Pressure at the outlet, Pa, to vanish; zero where U is no unknown.
-    pressure, area, speed : (m,) arrays
-        Pa, m2 of a quarter, m/s.
-    psi, psi_rate : (m,) arrays
+    pressure : (m,) array
+        Pa, where the equations are met.
+    area, speed, psi : (m,) arrays
+        At the end of the step: m2 of a quarter, m/s, m2/s.
+    psi_rate : (m,) array
+        Where the equations are met, m2/s2.
     inlet : float
-        Inlet pressure, Pa.
+        Inlet pressure there, Pa.
+    mid_speed : float
+        Inlet velocity there, m/s.
     """
 
     force: np.ndarray
@@ -69,6 +98,7 @@ class Load:
     psi: np.ndarray
     psi_rate: np.ndarray
     inlet: float
+    mid_speed: float
 
 
 class ValveMotion:
@@ -125,33 +155,39 @@ class ValveMotion:
         """M(q) v, (n,)."""
         return self.inertia(q, np.zeros_like(v), v)
 
-    def load(self, q, v, inlet: float, psi_weight: float, psi_known: np.ndarray, speed: float | None = None) -> Load:
-        """Fluid at positions and velocities (n,) for an inlet pressure, Pa.
+    def load(self, q, v, q_new, v_new, step: Step, speed: float | None = None) -> Load:
+        """Fluid of a step and its force.
 
         Parameters
         ----------
-        psi_weight : float
-        psi_known : (m,) array
-            The rate of psi is psi_weight psi + psi_known.
+        q, v : (n,) arrays
+            Positions and velocities where the equations are met.
+        q_new, v_new : (n,) arrays
+            Those at the end of the step.
+        step : Step
         speed : float, optional
-            Inlet velocity, m/s; by default the one at which the outlet pressure vanishes.
+            Inlet velocity at the end, m/s; by default the one at which the outlet pressure vanishes.
         """
         model = self.model
         nodal = model.nodal(q)
-        area = model.rows.areas(nodal)
+        nodal_new = nodal if q_new is q else model.nodal(q_new)
+        area_new = model.rows.areas(nodal_new)
+        area = area_new if q_new is q else model.rows.areas(nodal)
+        inlet = step.inlet
         if self.moving_fluid:
-            rate = self._area_rate(nodal, v)
+            mid, new = (area, self._area_rate(nodal, v)), (area_new, self._area_rate(nodal_new, v_new))
             if speed is None:
-                speed = self.fluid.velocity(area, rate, inlet, psi_weight, float(psi_known[0]))
-            flow = self.fluid.state(area, rate, speed)
-            psi_rate = psi_weight * flow.psi + psi_known
-            p = self.fluid.pressure(flow, psi_rate, inlet)
+                speed = self.fluid.velocity(mid, new, inlet, step.speed, step.theta, step.psi_weight, float(step.psi_known[0]))
+            mid_speed = step.speed + step.theta * (speed - step.speed)
+            flow = self.fluid.state(*new, speed)
+            psi_rate = step.psi_weight * flow.psi + step.psi_known
+            p = self.fluid.pressure(self.fluid.state(*mid, mid_speed), psi_rate, inlet)
             outlet, p[0] = float(p[0]), 0.0
-            return Load(model.pressure_force(nodal, p), outlet, p, area, flow.speed, flow.psi, psi_rate, inlet)
+            return Load(model.pressure_force(nodal, p), outlet, p, area_new, flow.speed, flow.psi, psi_rate, inlet, mid_speed)
         p = model.flow.steady_pressure(area, inlet)
-        speed = model.flow.inlet_velocity(area, inlet, self.conditions.density) if inlet > 0 else 0.0
+        speed = model.flow.inlet_velocity(area_new, inlet, self.conditions.density) if inlet > 0 else 0.0
         zero = np.zeros(self.stations)
-        return Load(model.pressure_force(nodal, p), 0.0, p, area, model.flow.velocities(area, speed), zero, zero, inlet)
+        return Load(model.pressure_force(nodal, p), 0.0, p, area_new, model.flow.velocities(area_new, speed), zero, zero, inlet, speed)
 
     def _area_rate(self, nodal: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Rates (m,) of the areas, which are quadratic in the deformed positions."""
@@ -172,28 +208,40 @@ class ValveMotion:
 
     # -- linear algebra -------------------------------------------------------------------------------------------------------------
 
-    def linearise(self, q, q_inertia, v, load: Load, weights: Weights) -> None:
-        """Factor the iteration matrix at new positions and velocities, with the inertia taken at its own positions.
+    def linearise(self, q_new, v_new, q, v, load: Load, weights: Weights, q_load=None, v_load=None) -> None:
+        """Factor the iteration matrix.
+
+        Parameters
+        ----------
+        q_new, v_new : (n,) arrays
+            New positions and velocities.
+        q, v : (n,) arrays
+            Those that inertia is taken at.
+        q_load, v_load : (n,) arrays, optional
+            Those that the fluid's equations are met at, if others.
 
         Raises
         ------
         SingularMatrix
         """
         model = self.model
-        nodal = model.nodal(q)
-        _, structure = model.structure(q)
+        q_load, v_load = (q, v) if q_load is None else (q_load, v_load)
+        nodal = model.nodal(q_load)
+        _, structure = model.structure(q_new)
         values = weights.force * structure
-        values += weights.inertia * model.mass(q_inertia)
-        values = model.follower_stiffness(nodal, weights.load * load.pressure, values)
-        forces = weights.load * model.station_forces(nodal).data
+        values += weights.inertia * model.mass(q)
+        values = model.follower_stiffness(nodal, weights.theta * load.pressure, values)
+        forces = model.station_forces(nodal).data
         slope = model.rows.jacobian(nodal).data
+        area = model.rows.areas(nodal)
         if not self.moving_fluid:
-            _, gradient = model.flow.steady_operator(load.area, load.inlet)
-            self._solver(0).refactor(values, forces, slope, gradient)
+            _, gradient = model.flow.steady_operator(area, load.inlet)
+            self._solver(0).refactor(values, forces, slope, weights.theta * gradient)
             return
-        rate = self._area_rate(nodal, v)
-        by_area, by_rate, by_speed = self.fluid.pressure_slopes(load.area, rate, load.speed[-1], weights.psi)
-        self._refactor_moving(values, forces, slope, by_area + weights.velocity * by_rate, by_speed)
+        nodal_new = model.nodal(q_new)
+        mid, new = (area, self._area_rate(nodal, v_load)), (load.area, self._area_rate(nodal_new, v_new))
+        found = self.fluid.pressure_slopes(mid, new, load.mid_speed, load.speed[-1], weights.theta, weights.velocity, weights.psi)
+        self._refactor_moving(values, forces, slope, *found)
 
     def _refactor_moving(self, values, forces, slope, by_area, by_speed):
         row, corner = by_area[0].copy(), by_speed[0]
@@ -235,7 +283,7 @@ class ValveMotion:
         forces = self.internal_force(q) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
         mass = model.mass(q)
         if not self.moving_fluid:
-            load = self.load(q, v, inlet, 0.0, np.zeros(self.stations))
+            load = self.load(q, v, q, v, self._instant(speed, np.zeros(self.stations), inlet))
             none = np.zeros((self.stations, self.stations))
             self._solver(0).refactor(mass, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
             return self.solve(load.force - forces, 0.0)[0], load
@@ -244,14 +292,19 @@ class ValveMotion:
         by_area, by_rate, by_speed = (fluid.integrate(slope) for slope in fluid.slopes(area, rate, speed))
         bend = rows.second(model.nodal(v), model.nodal(v))
         known = by_area @ rate + by_rate @ bend
-        load = self.load(q, v, inlet, 0.0, known, speed)
+        load = self.load(q, v, q, v, self._instant(speed, known, inlet), speed)
         density = self.conditions.density
         self._refactor_moving(
             mass, model.station_forces(nodal).data, rows.jacobian(nodal).data, -density * by_rate, -density * by_speed
         )
         a, speed_rate = self.solve(load.force - forces, -load.outlet)
         psi_rate = known + by_rate @ rows.second(self._position(nodal), model.nodal(a)) + by_speed * speed_rate
-        return a, self.load(q, v, inlet, 0.0, psi_rate, speed)
+        return a, self.load(q, v, q, v, self._instant(speed, psi_rate, inlet), speed)
+
+    @staticmethod
+    def _instant(speed: float, psi_rate: np.ndarray, inlet: float) -> Step:
+        """A step of no length, with a given rate of psi."""
+        return Step(1.0, speed, 0.0, psi_rate, inlet)
 
     # -- energies -------------------------------------------------------------------------------------------------------------------
 

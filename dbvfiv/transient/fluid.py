@@ -57,22 +57,43 @@ class MovingFluid:
         speed = discharge / open_
         return FlowState(speed, self._upstream @ speed)
 
-    def velocity(self, area: np.ndarray, rate: np.ndarray, inlet: float, psi_weight: float, psi_known: float) -> float:
-        """Inlet velocity at which the outlet pressure vanishes if d psi/dt = psi_weight psi + psi_known at the outlet.
+    def velocity(self, mid: tuple, new: tuple, inlet: float, old: float, theta: float, psi_weight: float, psi_known: float) -> float:
+        """New inlet velocity at which the outlet pressure vanishes.
 
         Quadratic in the velocity; the root is taken at which more velocity means less pressure. The other one is a reversed jet, which would run away.
         Not a number if there is none.
+
+        Parameters
+        ----------
+        mid, new : pairs of (m,) arrays
+            Areas and their rates where the equations are met and at the end of the step.
+        old : float
+            Inlet velocity at the start of the step.
+        theta : float
+            Where in the step the equations are met.
+        psi_weight, psi_known : float
+            There, d psi/dt = psi_weight psi + psi_known at the outlet, psi at the end of the step.
         """
-        still, moving = self.state(area, rate, 0.0), self.state(area, rate, 1.0)
-        s0, s1 = still.speed[0], moving.speed[0] - still.speed[0]
-        a = 0.5 * (s1 * s1 - 1.0)
-        b = s0 * s1 + psi_weight * (moving.psi[0] - still.psi[0])
-        c = 0.5 * s0 * s0 + psi_weight * still.psi[0] + psi_known - inlet / self.density
+        s0, s1 = self._affine(*mid)
+        p0, p1 = (self._upstream[0] @ part for part in self._affine(*new))
+        start = (1.0 - theta) * old
+        a = 0.5 * (s1[0] * s1[0] - 1.0)
+        b = s0[0] * s1[0] + psi_weight * p1 / theta
+        c = 0.5 * s0[0] * s0[0] + psi_weight * (p0 - p1 * start / theta) + psi_known - inlet / self.density
         square = b * b - 4.0 * a * c
-        if square < 0.0:
+        if not square >= 0.0:
             return np.nan
         root = np.sqrt(square)
-        return -2.0 * c / (b + root) if b >= 0.0 else (root - b) / (2.0 * a)
+        mean = -2.0 * c / (b + root) if b >= 0.0 else (root - b) / (2.0 * a)
+        return float((mean - start) / theta)
+
+    def _affine(self, area: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Speeds at rest and per unit of inlet velocity (m,)."""
+        open_, slope, _ = self._open(area)
+        still = np.zeros_like(area)
+        if self.channel.storage:
+            still = -self.channel.storage * (self._upstream @ (slope * rate)) / open_
+        return still, open_[-1] / open_
 
     def pressure(self, flow: FlowState, psi_rate: np.ndarray, inlet: float) -> np.ndarray:
         """Pressures (m,), Pa; the first, at the outlet, is to vanish."""
@@ -96,12 +117,25 @@ class MovingFluid:
         """Integral from the inlet to each station of values (m,) or of each column (m, l)."""
         return self._upstream @ values
 
-    def pressure_slopes(self, area, rate, velocity: float, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Derivatives of the pressures where the rate of psi depends on psi by `weight`, 1/s."""
-        speed = self.state(area, rate, velocity).speed
-        found = []
-        for slope, own in zip(self.slopes(area, rate, velocity), (0.0, 0.0, 1.0)):
-            column = slope.reshape(len(speed), -1)
-            change = speed[:, None] * column - speed[-1] * column[-1] + weight * self.integrate(column)
-            found.append(-self.density * change.reshape(slope.shape))
-        return tuple(found)
+    def pressure_slopes(self, mid: tuple, new: tuple, speed: float, new_speed: float, theta: float, velocity: float, psi_weight: float):
+        """Derivatives of the pressures with respect to the new areas (m, m) and the new inlet velocity (m,).
+
+        Parameters
+        ----------
+        mid, new, theta, psi_weight
+            As `velocity` has them.
+        speed, new_speed : float
+            Inlet velocities where the equations are met and at the end of the step.
+        velocity : float
+            Derivative of the area rates with respect to the areas at the end of the step, 1/s.
+        """
+        here = self.state(*mid, speed).speed[:, None]
+        area, rate, own = self.slopes(*mid, speed)
+        slope = theta * (area + velocity * rate)
+        by_area = here * slope
+        by_speed = theta * (here[:, 0] * own - speed)
+        area, rate, own = self.slopes(*new, new_speed)
+        by_area += psi_weight * self.integrate(area + velocity * rate)
+        by_speed += psi_weight * self.integrate(own)
+        # the inlet's own speed is the unknown itself
+        return -self.density * by_area, -self.density * by_speed

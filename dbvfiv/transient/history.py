@@ -7,7 +7,7 @@ import numpy as np
 
 from ..model.valve import QUARTERS
 from ..results.layout import Column
-from .equations import ValveMotion
+from .equations import Step, ValveMotion
 from .stepper import StepResult
 
 #: One number a step; of the whole valve.
@@ -35,7 +35,7 @@ SCALARS = (
 )
 #: One number a row of the mesh and step; of a quarter.
 PROFILES = (
-    Column("station_pressure", "Pa", "Pressure at each row, lip first", "f4"),
+    Column("station_pressure", "Pa", "Pressure at each row, lip first, where the step meets the equations: halfway through it without numerical damping", "f4"),
     Column("station_area", "m^2", "Flow area at each row", "f4"),
     Column("centre_line", "m", "Displacement in y of the line x = 0 at each row", "f4"),
 )
@@ -63,7 +63,7 @@ class Reader:
     def first(self, state, inlet: float) -> dict[str, Any]:
         """Row of the start."""
         motion = self.motion
-        load = motion.load(state.q, state.v, inlet, 0.0, state.psi_rate, state.speed)
+        load = motion.load(state.q, state.v, state.q, state.v, Step(1.0, state.speed, 0.0, state.psi_rate, inlet), state.speed)
         return self._row(state, load, 0.0, 0)
 
     def row(self, result: StepResult, h: float) -> dict[str, Any]:

@@ -1,9 +1,11 @@
 """The thesis's coupling (App. A), for comparison: the fluid first, in the passage of the last state, then the wall under its pressures."""
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from .equations import Load, ValveMotion
+from .equations import Load, Step, ValveMotion
 
 
 class StaggeredMotion(ValveMotion):
@@ -18,27 +20,24 @@ class StaggeredMotion(ValveMotion):
         self._frozen: Load | None = None
 
     def begin_step(self, state, h: float, inlet: float) -> None:
-        """Advance the fluid through the passage of a state."""
-        if not self.coupled_fluid:
-            self._frozen = super().load(state.q, state.v, inlet, 0.0, np.zeros(self.stations))
-            return
-        self.moving_fluid = True
-        self._frozen = super().load(state.q, state.v, inlet, 1.0 / h, -state.psi / h)
+        """Advance the fluid through the passage of a state by a backward difference."""
+        self.moving_fluid = self.coupled_fluid
+        step = Step(1.0, state.speed, 1.0 / h, -state.psi / h, inlet)
+        self._frozen = super().load(state.q, state.v, state.q, state.v, step)
         self.moving_fluid = False
 
-    def load(self, q, v, inlet, psi_weight, psi_known, speed=None) -> Load:
+    def load(self, q, v, q_new, v_new, step: Step, speed=None) -> Load:
         if self._frozen is None:
-            return super().load(q, v, inlet, psi_weight, psi_known, speed)
+            return super().load(q, v, q_new, v_new, step, speed)
         kept = self._frozen
-        force = self.model.pressure_force(self.model.nodal(q), kept.pressure)
-        return Load(force, 0.0, kept.pressure, kept.area, kept.speed, kept.psi, kept.psi_rate, inlet)
+        return replace(kept, force=self.model.pressure_force(self.model.nodal(q), kept.pressure), outlet=0.0, inlet=step.inlet)
 
-    def linearise(self, q, q_inertia, v, load, weights) -> None:
+    def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None) -> None:
         model = self.model
-        nodal = model.nodal(q)
-        _, structure = model.structure(q)
-        values = weights.force * structure + weights.inertia * model.mass(q_inertia)
-        values = model.follower_stiffness(nodal, weights.load * load.pressure, values)
+        nodal = model.nodal(q if q_load is None else q_load)
+        _, structure = model.structure(q_new)
+        values = weights.force * structure + weights.inertia * model.mass(q)
+        values = model.follower_stiffness(nodal, weights.theta * load.pressure, values)
         none = np.zeros((self.stations, self.stations))
         self._solver(0).refactor(values, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
 

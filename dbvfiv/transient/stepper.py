@@ -12,7 +12,7 @@ from typing import Callable
 import numpy as np
 
 from ..model.linear import SingularMatrix
-from .equations import Load, Weights
+from .equations import Load, Step, Weights
 from .scheme import Scheme
 from .state import MotionState
 
@@ -102,7 +102,7 @@ class Stepper:
         """Drop factors and the memory of the predictor; with `all` the factorisation's analysis too, so that the next step depends on the state alone."""
         if all:
             self.motion.drop_factors()
-        self._factored: float | None = None
+        self._factored: tuple[float, bool] | None = None
         self._history: list[tuple[float, np.ndarray]] = []
 
     # -- the step -------------------------------------------------------------------------------------------------------------------
@@ -115,13 +115,16 @@ class Stepper:
         StepFailure
         """
         before = (self.residuals, self.solves, self.factorisations)
-        inlet = self.pressure(state.time + h)
-        self.motion.begin_step(state, h, inlet)
-        trial = _Trial(self.motion, self.scheme, state, h, inlet)
-        try:
-            self._iterate(trial)
-        except SingularMatrix as error:
-            raise StepFailure(str(error)) from error
+        for robust in (not self._smooth(state, h), True):
+            trial = _Trial(self.motion, self.scheme, state, h, self.pressure, robust)
+            self.motion.begin_step(state, h, trial.fluid.inlet)
+            try:
+                self._iterate(trial)
+            except SingularMatrix as error:
+                raise StepFailure(str(error)) from error
+            if robust or self._kept_momentum(trial):
+                break
+            self._factored = None
         turn = self.motion.turn(trial.q - state.q)
         if turn > self.options.largest_turn:
             self._history = self._history[-1:]
@@ -134,6 +137,16 @@ class Stepper:
         jump = 0.0 if past is None else self.motion.length(here[1] - past[1]) * h / (here[0] - past[0])
         return StepResult(new, trial.load, *self._works(trial), *work, self.scheme.error_constant * h * h * jump)
 
+    @staticmethod
+    def _smooth(state: MotionState, h: float) -> bool:
+        """Whether the fluid's momentum changed little in the step before."""
+        return bool(abs(h * state.psi_rate[0]) <= 0.34 * abs(state.psi[0]))
+
+    @staticmethod
+    def _kept_momentum(trial: "_Trial") -> bool:
+        """Whether the fluid kept most of its momentum in a step; if it did not, its equations are better met at the end of the step."""
+        return bool(trial.load.psi[0] >= 0.5 * trial.old.psi[0])
+
     def _works(self, trial: "_Trial") -> tuple[float, float]:
         """Work of the pressure and dissipation of a step, by the scheme's own weights."""
         way = trial.q - trial.old.q
@@ -141,7 +154,7 @@ class Stepper:
         lost = trial.damping @ way
         if alpha:
             lost += alpha * (self.motion.momentum(trial.q_mid, trial.v_mid) @ way)
-        return float(trial.push @ way), float(lost)
+        return float(trial.load.force @ way), float(lost)
 
     # -- the iteration --------------------------------------------------------------------------------------------------------------
 
@@ -152,7 +165,7 @@ class Stepper:
         serve shells best, as membrane forces that follow bending make residuals rise before they fall; and from the prediction again, a line search.
         """
         norm = self._start(trial)
-        if self._factored == trial.h and self._full(trial, norm, renew=False):
+        if self._factored == trial.kind and self._full(trial, norm, renew=False):
             return
         if self._full(trial, self._start(trial), renew=True):
             return
@@ -258,7 +271,7 @@ class Stepper:
         self.factorisations += 1
         self._factored = None
         trial.linearise()
-        self._factored = trial.h
+        self._factored = trial.kind
 
     def _solve(self, trial: "_Trial") -> np.ndarray:
         self.solves += 1
@@ -266,25 +279,25 @@ class Stepper:
 
 
 class _Trial:
-    """A candidate for the new state; its unknowns are the accelerations. The inlet velocity follows from them."""
+    """A candidate for the new state; its unknowns are the accelerations. The inlet velocity follows from them.
 
-    def __init__(self, motion, scheme: Scheme, old: MotionState, h: float, inlet: float):
-        self.motion, self.scheme, self.old, self.h, self.inlet = motion, scheme, old, h, inlet
+    With `robust` the fluid's equations are met at the end of the step, psi by a backward difference: of first order, but momentum that is lost within a
+    step, when lips slam, does not come back with the opposite sign.
+    """
+
+    def __init__(self, motion, scheme: Scheme, old: MotionState, h: float, pressure: Callable[[float], float], robust: bool):
+        self.motion, self.scheme, self.old, self.h = motion, scheme, old, h
         s, now = scheme, scheme.now
-        weight = 1.5 if self._smooth() else 1.0
-        self.psi_known = (1.0 - weight) * old.psi_rate - (weight / h) * old.psi
+        theta, rate = (1.0, 1.0) if robust else (now, s.rate)
+        self.kind = (h, robust)
         self.weights = Weights(
+            theta=theta,
             inertia=(1.0 - s.alpha_m) / (s.beta * h * h) + motion.conditions.alpha * now * s.gamma / (s.beta * h),
             force=now + motion.conditions.beta * s.rate / h,
-            load=now,
             velocity=s.gamma / (s.beta * h),
-            psi=weight / h,
+            psi=rate / h,
         )
-
-    def _smooth(self) -> bool:
-        """Whether the second backward difference serves psi; a fall of the momentum to less than half calls for the first one."""
-        psi, change = self.old.psi[:1], self.h * self.old.psi_rate[:1]
-        return bool(np.all(psi + change > 0.0))
+        self.fluid = Step(theta, old.speed, rate / h, (1.0 - rate) * old.psi_rate - (rate / h) * old.psi, pressure(old.time + theta * h))
 
     def set(self, a: np.ndarray) -> None:
         """Start from new accelerations."""
@@ -305,20 +318,20 @@ class _Trial:
         s, now, old, motion = self.scheme, self.scheme.now, self.old, self.motion
         self.force = motion.internal_force(self.q)
         self.force_rate = (self.force - old.force) / self.h
-        self.load = motion.load(self.q, self.v, self.inlet, self.weights.psi, self.psi_known)
         self.q_mid = old.q + now * (self.q - old.q)
         self.v_mid = old.v + now * (self.v - old.v)
         self.a_mid = old.a + (1.0 - s.alpha_m) * (self.a - old.a)
+        self.at_load = (self.q, self.v) if self.fluid.theta == 1.0 else (self.q_mid, self.v_mid)
+        self.load = motion.load(*self.at_load, self.q, self.v, self.fluid)
         alpha, beta = motion.conditions.alpha, motion.conditions.beta
         self.damping = beta * (old.force_rate + s.rate * (self.force_rate - old.force_rate))
-        self.elastic = old.force + now * (self.force - old.force)
-        self.push = old.load + now * (self.load.force - old.load)
+        elastic = old.force + now * (self.force - old.force)
         inertia = motion.inertia(self.q_mid, self.v_mid, self.a_mid + alpha * self.v_mid if alpha else self.a_mid)
-        self.residual = inertia + self.damping + self.elastic - self.push
+        self.residual = inertia + self.damping + elastic - self.load.force
         return float(np.linalg.norm(self.residual))
 
     def linearise(self) -> None:
-        self.motion.linearise(self.q, self.q_mid, self.v, self.load, self.weights)
+        self.motion.linearise(self.q, self.v, self.q_mid, self.v_mid, self.load, self.weights, *self.at_load)
 
     def allowed(self, options: StepOptions) -> float:
         """Largest correction that may be left, m."""
@@ -330,6 +343,4 @@ class _Trial:
     def state(self) -> MotionState:
         old, load = self.old, self.load
         rate = (load.psi - old.psi) / self.h if self.motion.moving_fluid else load.psi_rate
-        return MotionState(
-            old.time + self.h, float(load.speed[-1]), self.q, self.v, self.a, self.force, self.force_rate, load.force, load.psi, rate
-        )  # fmt: skip
+        return MotionState(old.time + self.h, float(load.speed[-1]), self.q, self.v, self.a, self.force, self.force_rate, load.psi, rate)

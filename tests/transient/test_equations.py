@@ -24,7 +24,7 @@ def test_consistent_accelerations_meet_the_model(valve, open_state, law):
         rates = [dynamic_residual(model, motion.conditions, 9e3, open_state, v, state.a, state.speed, r)[1] for r in (0.0, 1.0)]
         rate = -rates[0] / (rates[1] - rates[0])
     force, outlet = dynamic_residual(model, motion.conditions, 9e3, open_state, v, state.a, state.speed, rate)
-    scale = np.abs(state.load).max()
+    scale = np.abs(state.force).max()
     assert np.abs(force).max() < 1e-9 * scale
     if motion.moving_fluid:
         assert abs(outlet) < 1e-6
@@ -60,23 +60,30 @@ def test_slopes_of_the_flow(valve, law):
         assert 0.5 * change == pytest.approx(expected, rel=2e-4, abs=1e-6 * np.abs(change).max())
 
 
-def test_the_inlet_velocity_is_the_root_without_reversal(valve):
-    fluid = MovingFluid(valve({"fluid.density": 1.2}).flow, 1.2)
-    area, still = np.linspace(1e-4, 0.0135, fluid.channel.count), np.zeros(fluid.channel.count)
-    # a passage that has closed a thousandfold within a step: psi was 30, the new velocity must be small and positive
-    area[0] = 1e-7
-    u = fluid.velocity(area, still, 6e3, 1e4, -1e4 * 30.0)
-    flow = fluid.state(area, still, u)
-    assert u > 0
-    assert fluid.pressure(flow, 1e4 * (flow.psi - 30.0), 6e3)[0] == pytest.approx(0.0, abs=1e-5)
+@pytest.mark.parametrize("theta", [0.5, 1.0])
+@pytest.mark.parametrize("law", LAWS)
+def test_the_inlet_velocity_is_the_root_without_reversal(valve, law, theta):
+    fluid = MovingFluid(valve({"fluid.density": 1.2} | law).flow, 1.2)
+    area, rate = np.linspace(1e-4, 0.0135, fluid.channel.count), np.full(fluid.channel.count, -1e-3)
+    old = 10.0
+    psi = fluid.state(area, rate, old).psi
+    # a passage that closes a hundredfold within a step
+    shut = area.copy()
+    shut[0] = 1e-6
+    mid = (area + theta * (shut - area), rate)
+    weight, known = 1e4, -1e4 * psi
+    u = fluid.velocity(mid, (shut, rate), 6e3, old, theta, weight, float(known[0]))
+    flow = fluid.state(*mid, old + theta * (u - old))
+    assert old + theta * (u - old) > 0
+    assert fluid.pressure(flow, weight * fluid.state(shut, rate, u).psi + known, 6e3)[0] == pytest.approx(0.0, abs=1e-4)
 
 
 @pytest.mark.parametrize("law", LAWS + [{"fluid.unsteady": False}])
-@pytest.mark.parametrize("h", [1e-3, 1e-4])
-def test_iteration_matrix_against_differences(valve, open_state, law, h):
+@pytest.mark.parametrize("h, robust", [(1e-3, False), (1e-4, False), (5e-4, True)])
+def test_iteration_matrix_against_differences(valve, open_state, law, h, robust):
     motion = ValveMotion(valve({"fluid.density": 200.0} | law))
     state = consistent_state(motion, 0.0, open_state, 0.02 * open_state / np.abs(open_state).max(), 0.3, 12e3)
-    trial = _Trial(motion, scheme("generalised-alpha", 0.1), state, h, 12e3)
+    trial = _Trial(motion, scheme("generalised-alpha", 0.1), state, h, lambda t: 12e3, robust)
     trial.set(0.5 * state.a)
     trial.evaluate()
     trial.linearise()
@@ -103,7 +110,7 @@ def test_energies_against_their_definition(valve, open_state):
 
 def test_a_state_goes_through_a_file_unchanged():
     rng = np.random.default_rng(5)
-    parts = [rng.standard_normal(7) for _ in range(6)] + [rng.standard_normal(3) for _ in range(2)]
+    parts = [rng.standard_normal(7) for _ in range(5)] + [rng.standard_normal(3) for _ in range(2)]
     state = MotionState(0.1, 0.2, *parts)
     again = MotionState.unpack(state.pack(), 3)
     assert all(np.array_equal(a, b) for a, b in zip(vars(state).values(), vars(again).values()))

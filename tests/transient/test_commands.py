@@ -1,0 +1,79 @@
+"""The commands transient, resume, verdict and compare."""
+
+import json
+
+import numpy as np
+import pytest
+
+SMALL = [
+    w
+    for key in ("mesh.around=6", "mesh.along=8", "transient.duration=0.02", "transient.save_every=0.005")
+    for w in ("--set", key)
+]
+
+
+def test_transient_and_what_reads_it(command_line, tmp_path):
+    path, figures = tmp_path / "run.h5", tmp_path / "figures"
+    outcome = command_line("transient", *SMALL, "-o", path, "--plots", figures, "--animate", figures / "run.gif", "--json")
+    assert outcome.status == 0, outcome.err
+    document = json.loads(outcome.out)
+    for key in ("verdict", "amplitude", "frequency", "mean", "cycles_observed", "periodicity_error", "steps", "time"):
+        assert key in document
+        assert key in document["mass_flow"] or key in ("steps", "time")
+        assert key in document["lip_opening"] or key in ("steps", "time")
+    assert document["steps"] == 20 and document["time"] == pytest.approx(0.02)
+    drawn = {p.name for p in figures.iterdir()}
+    assert {"history.png", "phase-portrait.png", "spectrum.png", "centre-line-cycle.png", "energies.png", "lip-wave.png", "run.gif"} <= drawn
+    assert (figures / "run.gif").read_bytes()[:3] == b"GIF"
+    assert command_line("info", path).status == 0
+    outcome = command_line("resume", path, "--duration", "25 ms", "--json")
+    assert json.loads(outcome.out)["steps"] == 25
+    outcome = command_line("compare", path, path, "-o", tmp_path / "both.png")
+    assert outcome.status == 0 and (tmp_path / "both.png").exists()
+    outcome = command_line("verdict", path, "--json")
+    assert [s["name"] for s in json.loads(outcome.out)["signals"]] == ["mass_flow", "lip_opening"]
+
+
+def test_resume_refuses_in_one_sentence(command_line, tmp_path, one_sentence):
+    for arguments in (["resume", tmp_path / "none.h5"], ["transient", "--set", "transient.numerical_damping=0.7"], ["verdict", tmp_path / "none.csv"]):
+        outcome = command_line(*arguments)
+        assert outcome.status == 2 and one_sentence(outcome.err), outcome.err
+
+
+def write(path, t, *columns, header=""):
+    np.savetxt(path, np.column_stack([t, *columns]), delimiter=",", header=header, comments="")
+    return path
+
+
+def test_verdict_of_csv(command_line, tmp_path):
+    t = np.linspace(0, 10, 5001)
+    file = write(tmp_path / "a.csv", t, 2 + np.sin(20 * t), np.exp(-0.5 * t) * np.cos(20 * t), header="t,lift,drag")
+    outcome = command_line("verdict", file, "--json", "--plots", tmp_path / "figures")
+    lift, drag = json.loads(outcome.out)["signals"]
+    assert (lift["name"], lift["verdict"]) == ("lift", "limit cycle")
+    assert lift["frequency"] == pytest.approx(20 / (2 * np.pi), rel=1e-6)
+    assert (lift["mean"], lift["amplitude"], lift["rms"]) == pytest.approx((2, 1, np.sqrt(0.5)), rel=1e-3)
+    assert (lift["smallest"], lift["largest"]) == pytest.approx((1, 3), abs=1e-3)
+    assert lift["peaks"][0]["frequency"] == pytest.approx(20 / (2 * np.pi), abs=0.1)
+    assert drag["verdict"] == "decaying"
+    assert {p.name for p in (tmp_path / "figures").iterdir()} == {"lift.png", "drag.png"}
+    outcome = command_line("verdict", file, "-c", "drag")
+    assert outcome.out.startswith("drag: decaying")
+
+
+def test_verdict_without_times(command_line, tmp_path):
+    file = tmp_path / "one.txt"
+    np.savetxt(file, np.sin(2 * np.pi * 5 * np.arange(4000) / 500))
+    outcome = command_line("verdict", file, "--rate", 500, "--json")
+    assert json.loads(outcome.out)["signals"][0]["frequency"] == pytest.approx(5, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [("", "no numbers"), ("1,2\n3\n", "line 2"), ("t,x\n1,a\n", "line 2"), ("0,1\n0,2\n1,3\n", "do not increase"), ("1\n2\n3\n", "--rate")],
+)
+def test_verdict_refuses_in_one_sentence(command_line, tmp_path, one_sentence, text, words):
+    file = tmp_path / "bad.csv"
+    file.write_text(text)
+    outcome = command_line("verdict", file)
+    assert outcome.status == 2 and words in outcome.err and one_sentence(outcome.err), outcome.err

@@ -1,0 +1,282 @@
+"""Whole runs: starts, drives, files, resuming, being killed, verdicts."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+
+from dbvfiv.case import CaseError
+from dbvfiv.errors import SolveError
+from dbvfiv.results import load_result
+from dbvfiv.transient.api import resume, transient
+from dbvfiv.transient.drive import Drive
+from dbvfiv.transient.file import read_restart
+from dbvfiv.transient.history import History
+from dbvfiv.transient.options import RunOptions
+from dbvfiv.transient.run import Progress, Runner, run_transient
+
+SHORT = {"transient.duration": 0.02, "transient.restart_every": 7, "transient.save_every": 0.005}
+
+
+def test_rest_start_opens_the_valve(valve):
+    run = run_transient(valve({"transient.duration": 0.05}))
+    h = run.history
+    assert h["time"] == pytest.approx(np.arange(51) * 1e-3)
+    assert h["mass_flow"][0] == 0 and h["mass_flow"][-1] > 5
+    assert h["lip_opening"][-1] > 5e-3
+    assert h["inlet_pressure"] == pytest.approx(18e3)
+    assert h["mass_flow"] == pytest.approx(h["inlet_mass_flow"], rel=1e-9)  # quasi-steady continuity
+    assert np.abs(h["balance"]).max() < 0.02 * h["pressure_work"].max()
+    assert h["station_pressure"][:, 0] == pytest.approx(0, abs=1e-3)
+    assert not run.failures and not run.interrupted
+
+
+def test_steady_start_stays(valve):
+    run = run_transient(valve({"transient.start": "steady", "transient.duration": 0.05, "drive.pressure": 6e3}))
+    assert run.verdict.name == "steady" and run.verdict.decided
+    assert run.verdict.residual < 1e-8
+    assert np.ptp(run.history["lip_opening"]) < 1e-9
+
+
+def test_kick_rings_at_the_eigenvalue(valve):
+    run = run_transient(valve({"transient.start": "kick", "transient.duration": 0.02, "transient.step": 2e-4, "transient.kick_opening": 1e-5,
+                               "drive.pressure": 6e3, "fluid.density": 10.0, "damping.alpha": 0.0}))  # fmt: skip
+    value = run.progress.eigenvalue
+    h = run.history
+    from dbvfiv.transient.start import steady_positions
+
+    still = steady_positions(run.model, 6e3)[run.model.shell.dofs.index[run.model.mesh.rows[0, 0], 1]]
+    expected = 1e-5 * np.exp(value * h["time"]).real
+    assert h["lip_opening"][0] - still == pytest.approx(1e-5, rel=1e-6)
+    assert np.abs(h["lip_opening"] - still - expected).max() < 0.02 * np.abs(expected).max()
+
+
+def test_storage_law_lets_the_wall_displace_fluid(valve):
+    changes = {"transient.start": "kick", "transient.kick_opening": 3e-3, "drive.pressure": 12e3, "transient.duration": 0.03, "transient.step": 5e-4}
+    h = run_transient(valve({"fluid.continuity": "storage"} | changes)).history
+    assert np.abs(h["mass_flow"] - h["inlet_mass_flow"]).max() > 0.5
+    volume = np.trapezoid if hasattr(np, "trapezoid") else np.trapz
+    z = np.array(valve({}).mesh.z)
+    stored = 4 * volume(h["station_area"], z, axis=1)
+    gained = volume(h["inlet_mass_flow"] - h["mass_flow"], h["time"]) / 1000.0
+    assert stored[-1] - stored[0] == pytest.approx(gained, rel=0.01)
+
+
+def test_drives(tmp_path, valve):
+    assert Drive.of(valve({"transient.ramp": 0.1}).case)(0.025) == pytest.approx(4500)
+    table = tmp_path / "drive.csv"
+    table.write_text("# made up\ntime [ms], pressure [kPa]\n0, 0\n10, 6\n20, 0.006 MPa\n")
+    case = valve().case.replace({"transient.drive_table": str(table)})
+    drive = Drive.of(case)
+    assert (drive(0.005), drive(0.01), drive(1.0)) == pytest.approx((3e3, 6e3, 6e3))
+    assert drive.constant_after(0.01) and not drive.constant_after(0.005)
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("0, 1\n0, 2\n", "do not increase"),
+        ("0, 1, 2\n", "not a time and a pressure"),
+        ("time [kg], pressure [Pa]\n0, 1\n", "unit 'kg'"),
+        ("0, -5\n", "must not be negative"),
+        ("", "no rows"),
+        ("0 s, 5 m\n", "5 m"),
+    ],
+)
+def test_bad_drive_tables(tmp_path, valve, text, words):
+    table = tmp_path / "drive.csv"
+    table.write_text(text)
+    with pytest.raises(CaseError, match=words):
+        valve().case.replace({"transient.drive_table": str(table)})
+        from dbvfiv.case import load_case
+
+        load_case(None, [f"transient.drive_table={table}"])
+
+
+def test_a_file_holds_the_run(tmp_path, valve):
+    model = valve(SHORT)
+    kept = transient(model, "small", tmp_path / "run.h5")
+    result = load_result(tmp_path / "run.h5")
+    assert result.complete and result.kind == "transient" and result.case == model.case
+    assert all(np.array_equal(result.history[name], kept.history[name]) for name in kept.history)
+    assert [state.time for state in result.states] == pytest.approx([0, 0.005, 0.01, 0.015, 0.02])
+    lip = result.mesh.rows[0, 0]
+    assert result.states[-1].nodal[lip, 1] == result.history["lip_opening"][-1]
+    assert result.states[2].nodal_rate[lip, 1] == result.history["lip_velocity"][10]
+    assert result.summary()["steps"] == 20 and result.summary()["decided"] is False
+    assert "lip opening" in "\n".join(result.lines())
+    export = result.export(tmp_path / "run.vtkhdf")
+    with h5py.File(export) as file:
+        assert file["VTKHDF/Steps/Values"][:] == pytest.approx([0, 0.005, 0.01, 0.015, 0.02])
+    # a state of it starts another run
+    again = run_transient(type(model)(model.case.replace({"transient.start": "state", "transient.start_file": str(tmp_path / "run.h5"),
+                                                           "transient.start_state": 2, "transient.duration": 0.002})))  # fmt: skip
+    assert again.history["lip_opening"][0] == result.history["lip_opening"][10]
+    assert again.history["mass_flow"][0] == pytest.approx(result.history["mass_flow"][10], rel=1e-6)
+
+
+class Stop:
+    """An observer that interrupts after some steps."""
+
+    def __init__(self, after):
+        self.left = after
+
+    def item(self, row):
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+    def __getattr__(self, name):
+        return lambda *arguments: None
+
+
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive):
+    # light fluid: the lips are slamming when it is interrupted
+    changes = SHORT | {"transient.duration": 0.045, "fluid.density": 1.2, "damping.alpha": 0.0, "drive.pressure": 6e3, "transient.adaptive": adaptive,
+                       "transient.step": 5e-4, "transient.numerical_damping": 0.1, "transient.local_error": 1e-4}  # fmt: skip
+    model = valve(changes)
+    whole = transient(model, output=tmp_path / "whole.h5")
+    assert whole.history["stops"].max() > 0
+    for after in (1, 66):
+        stopped = transient(model, output=tmp_path / "parts.h5", observer=Stop(after))
+        assert not stopped.complete and len(stopped.history["time"]) == after + 1
+        resumed = resume(tmp_path / "parts.h5")
+        assert resumed.complete
+        for name in whole.history:
+            assert np.array_equal(resumed.history[name], whole.history[name]), name
+        assert [s.time for s in resumed.states] == [s.time for s in whole.states]
+        assert np.array_equal(resumed.states[-1].nodal, whole.states[-1].nodal)
+
+
+def test_a_finished_run_goes_on_to_a_later_end(tmp_path, valve):
+    path = tmp_path / "run.h5"
+    transient(valve(SHORT), output=path)
+    with pytest.raises(CaseError, match="has reached its end"):
+        resume(path)
+    longer = resume(path, 0.03)
+    assert longer.history["time"][-1] == pytest.approx(0.03) and longer.case.transient.duration == 0.03
+    assert load_result(path).complete
+
+
+def test_torn_restart_points_are_passed_over(tmp_path, valve):
+    path = tmp_path / "run.h5"
+    transient(valve(SHORT), output=path)
+    last = read_restart(path)
+    with h5py.File(path, "r+") as file:
+        file[f"restart/{(last.sequence - 1) % 2}"][40] += 1.0
+    assert read_restart(path).sequence == last.sequence - 1
+    assert read_restart(path).rows < last.rows
+
+
+def test_only_transient_runs_are_resumed(tmp_path):
+    import dbvfiv
+
+    dbvfiv.load().replace({"mesh.around": 4, "mesh.along": 6}).steady([6e3], output=tmp_path / "steady.h5")
+    with pytest.raises(CaseError, match="only transient runs"):
+        resume(tmp_path / "steady.h5")
+
+
+def test_a_run_that_fails_keeps_everything_and_says_where(tmp_path, valve, monkeypatch):
+    from dbvfiv.transient import stepper
+
+    step = stepper.Stepper.step
+
+    def refuse(self, state, h):
+        if state.time > 0.0105:
+            raise stepper.StepFailure("Nothing helps.")
+        return step(self, state, h)
+
+    monkeypatch.setattr(stepper.Stepper, "step", refuse)
+    result = transient(valve(SHORT), output=tmp_path / "run.h5")
+    assert len(result.failures) == 1
+    assert "No step was found from 0.011 s on, after 11 steps" in result.failures[0]
+    kept = load_result(tmp_path / "run.h5")
+    assert kept.failures == result.failures and not kept.complete
+    assert kept.history["time"][-1] == pytest.approx(0.011)
+    monkeypatch.undo()
+    assert resume(tmp_path / "run.h5").complete  # with better luck
+
+
+def test_the_verdict_ends_the_run(valve):
+    model = valve({"transient.duration": 5.0, "transient.stop_when": ["steady"], "transient.numerical_damping": 0.1, "drive.pressure": 6e3,
+                   "transient.start": "kick", "damping.alpha": 5.0, "transient.kick_opening": 1e-4})  # fmt: skip
+    run = run_transient(model)
+    assert run.stopped and run.verdict.name == "steady" and run.progress.state.time < 4.0
+
+
+def test_staggered_coupling_reaches_the_same_state(valve):
+    changes = {"transient.start": "kick", "transient.kick_opening": 1e-3, "transient.duration": 0.3, "transient.step": 5e-4, "transient.numerical_damping": 0.1}
+    one, other = (run_transient(valve(changes | {"transient.coupling": c})) for c in ("monolithic", "staggered"))
+    assert other.history["lip_opening"][-1] == pytest.approx(one.history["lip_opening"][-1], rel=1e-3)
+    assert np.abs(other.history["lip_opening"] - one.history["lip_opening"])[5:50].max() > 1e-7  # not the same path
+
+
+def test_no_flow_and_steady_law(valve):
+    run = run_transient(valve({"drive.kind": "uniform", "drive.pressure": 5e3, "transient.duration": 0.01}))
+    assert np.all(run.history["mass_flow"] == 0) and run.history["lip_opening"][-1] != 0
+    steady = run_transient(valve({"fluid.unsteady": False, "transient.duration": 0.01}))
+    assert steady.history["mass_flow"][-1] > 0
+
+
+def test_impossible_starts(tmp_path, valve):
+    with pytest.raises(SolveError, match="no mode 90"):
+        run_transient(valve({"transient.start": "kick", "transient.kick_mode": 90, "mesh.around": 4, "mesh.along": 6}))
+    path = tmp_path / "run.h5"
+    transient(valve(SHORT), output=path)
+    case = valve().case.replace({"transient.start": "state", "transient.start_file": str(path)})
+    other = type(valve())(case.replace({"mesh.around": 4}))
+    with pytest.raises(CaseError, match="mesh of 63 nodes and this case's has 45"):
+        run_transient(other)
+    with pytest.raises(CaseError, match="no state 77"):
+        run_transient(type(valve())(case.replace({"transient.start_state": 77})))
+
+
+def test_progress_and_history_survive_packing(valve):
+    runner = Runner(valve(), replace(RunOptions.of(valve().case), duration=0.003))
+    run = runner.start()
+    again = Progress.unpack(run.progress.pack(), run.model.stations)
+    assert (again.steps, again.saved, again.work) == (run.progress.steps, run.progress.saved, run.progress.work)
+    assert np.array_equal(again.state.q, run.progress.state.q)
+    history = History(run.model.stations)
+    history.restore({name: run.history[name].copy() for name in run.history._columns})
+    assert history.rows == run.history.rows and np.array_equal(history["station_area"], run.history["station_area"])
+
+
+@pytest.mark.slow
+def test_killed_with_signal_9_at_any_moment(tmp_path, valve):
+    """The file can be read and resumed whenever its writer dies, and loses no more than the steps since the last restart point."""
+    changes = ["mesh.around=6", "mesh.along=8", "transient.duration=0.3", "transient.step=5e-4", "transient.save_every=0.002", "transient.restart_every=7"]
+    case = valve({"transient.duration": 0.3, "transient.step": 5e-4, "transient.save_every": 0.002, "transient.restart_every": 7})
+    whole = transient(case)
+    path = tmp_path / "killed.h5"
+    command = [sys.executable, "-m", "dbvfiv", "transient", "-o", str(path)] + [w for c in changes for w in ("--set", c)]
+    rng = np.random.default_rng(0)
+    found = []
+    for wait in [0.0, 0.02, *rng.uniform(0.1, 6.0, 5)]:
+        path.unlink(missing_ok=True)
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while not path.exists():
+            assert process.poll() is None
+            time.sleep(0.005)
+        time.sleep(wait)
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        restart = read_restart(path)  # None if it died before the first
+        rows = restart.rows if restart else 0
+        if rows:
+            read = load_result(path)
+            assert len(read.history["time"]) >= rows
+            assert np.array_equal(read.history["lip_opening"][:rows], whole.history["lip_opening"][:rows])
+        found.append(rows)
+        if rows < 601:
+            resumed = resume(path)
+            assert all(np.array_equal(resumed.history[name], whole.history[name]) for name in whole.history)
+    assert len(set(found)) >= 3
+    assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
