@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from .model import ValveModel
     from .results.closure import ClosureResults
     from .results.modes import ModesResults
+    from .results.map import MapResults
+    from .results.onset import OnsetResults
     from .results.state import State
     from .results.steady import SteadyResults
     from .results.sweep import SweepResults
@@ -236,6 +238,35 @@ class Valve:
             if closing is not None:
                 file.keep_closing(closing)
         return ClosureResults.of(result, header, closing)
+
+    def onset(self, over: str | None = None, *, output: str | Path | None = None, observer: "Observer | None" = None) -> "OnsetResults":
+        """Every onset along one parameter; see `dbvfiv.stability.onset`.
+
+        Parameters
+        ----------
+        over : str, optional
+            Parameter, or PARAMETER=START:STOP:COUNT[:log]; that of the case by default.
+        """
+        from .stability import onset
+
+        return onset(self.case if over is None else self.case.replace({"onset.over": over}), self.name, output, observer)
+
+    def map(
+        self, x: str | None = None, y: str | None = None, *, workers: int | None = None, output: str | Path | None = None, observer: "Observer | None" = None
+    ) -> "MapResults":
+        """Stability over two parameters; see `dbvfiv.stability.stability_map`.
+
+        Parameters
+        ----------
+        x, y : str, optional
+            PARAMETER=START:STOP:COUNT[:log]; those of the case by default.
+        workers : int, optional
+            Processes that share the columns.
+        """
+        from .stability import stability_map
+
+        changes = {key: value for key, value in (("map.x", x), ("map.y", y)) if value is not None}
+        return stability_map(self.case.replace(changes) if changes else self.case, self.name, output, observer, workers)
 
     def _run(self, pressures: Sequence[float], output: str | Path | None, observer: "Observer | None") -> "SteadyResults":
         from .results.header import Header
