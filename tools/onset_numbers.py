@@ -1,7 +1,8 @@
-"""Onsets of the 12-inch valve at 28 x 48, for docs/stability.md: python tools/onset_numbers.py [FILE.json]
+"""Onsets of the 12-inch valve at 28 x 48, for docs/stability.md: python tools/onset_numbers.py [FILE.json] [MAP.h5]
 
 Densities at 1, 2, 4 and 6 kPa, and all pressures from 0.3 to 36 kPa at 1.2, 10 and 30 kg/m3, under both continuity laws (alpha 0, beta 0.003), each with
-direct eigenvalues and independent counts on both sides. Takes about ten minutes on one core. An interrupted run goes on.
+direct eigenvalues and independent counts on both sides. Takes about ten minutes on one core. An interrupted run goes on. With the result of
+`dbvfiv map --both` for the same damping it also measures how far the onsets lie from the map's curves, and whether the signs of its cells agree with them.
 """
 import json
 import sys
@@ -47,5 +48,58 @@ def main(path: Path) -> None:
             search(f"pressure {density:g} {law:g}", "pressure", np.geomspace(300, 36000, 49), density=density, storage=law)
 
 
+    for key, entry in done.items():
+        for p in entry["points"]:
+            below, above = p["below"], p["above"]
+            counts = f"{below['unstable_count']}/{below['unstable_count_independent']}, {above['unstable_count']}/{above['unstable_count_independent']}"
+            print(f"| {key} | {p['value']:.6g} | {p['frequency']:.3f} | {below['growth_rate']:+.4f} | {above['growth_rate']:+.4f} | {counts} |")
+
+
+def compare(numbers: Path, map_file: Path) -> None:
+    """Distances of onsets from the curves of a map, and cells whose sign the curves contradict."""
+    from dbvfiv.results.registry import load_result
+
+    result = load_result(map_file)
+    plan = result.plan
+    lines = [(c.law, np.array([[plan.coordinate(plan.x, x), plan.coordinate(plan.y, y)] for x, y in zip(c.x, c.y)])) for c in result.curves]
+    for c in result.curves:
+        print(f"curve of law {plan.laws[c.law]:g}: {len(c.x)} points, exact {c.exact}, largest distance of {c.mismatch:.1e} from the columns' onsets")
+    for key, entry in json.loads(numbers.read_text()).items():
+        fixed = entry["fixed"]
+        for p in entry["points"]:
+            place = {"pressure": fixed.get("pressure", p["value"]), "density": fixed.get("density", p["value"])}
+            point = np.array([plan.coordinate(plan.x, place["pressure"]), plan.coordinate(plan.y, place["density"])])
+            mine = [line for law, line in lines if plan.laws[law] == fixed["storage"]]
+            print(f"{key}: {p['value']:.6g}, {min(_distance(point, line) for line in mine):.1e} of the map's width from the curve")
+    for number, law in enumerate(plan.laws):
+        unstable = result.grid("unstable")[number] > 0
+        wrong = 0
+        for i, x in enumerate(plan.x.values):
+            at = plan.coordinate(plan.x, x)
+            cuts = sorted(cut for k, line in lines if k == number for cut in _cuts(line, at))
+            for j, y in enumerate(plan.y.values):
+                above = sum(cut > plan.coordinate(plan.y, y) for cut in cuts)
+                wrong += bool(above % 2) != bool(unstable[j, i])
+        print(f"law {law:g}: {wrong} of {unstable.size} cells have another sign than the curves say (stable at the upper edge)")
+
+
+def _distance(point: np.ndarray, line: np.ndarray) -> float:
+    from dbvfiv.studies.map_curves import merged
+
+    return merged(np.column_stack([line, line[:, :1]]), np.append(point, 0.0)[None])[1]
+
+
+def _cuts(line: np.ndarray, x: float) -> list[float]:
+    """Heights at which a polyline crosses a vertical line; an end on it counts."""
+    found = []
+    for (x0, y0), (x1, y1) in zip(line[:-1], line[1:]):
+        if min(x0, x1) <= x < max(x0, x1) or (x == 1.0 and max(x0, x1) == 1.0 and x0 != x1):
+            found.append(y0 + (x - x0) / (x1 - x0) * (y1 - y0))
+    return found
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "onset-28x48.json"))
+    numbers = Path(sys.argv[1] if len(sys.argv) > 1 else "onset-28x48.json")
+    main(numbers)
+    if len(sys.argv) > 2:
+        compare(numbers, Path(sys.argv[2]))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Callable, Iterator
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from ..studies.parameters import LABELS, SCALES
@@ -55,15 +56,17 @@ def onset(result: "OnsetResults") -> Figure:
         if math.isfinite(row["uncertainty"]):
             top.plot([x - row["uncertainty"] / scale, x + row["uncertainty"] / scale], [0, 0], color=ACCENT, lw=3.5, alpha=0.75, zorder=4, solid_capstyle="butt")
         kind = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], "")
-        words = f"{x:.4g}\n{row['frequency']:.3g} Hz" + (f"\n{kind}" if kind else "")
-        top.annotate(words, (x, 0.0), xytext=(6, 8), textcoords="offset points", fontsize=8.5, color=PUBLISHED)
+        words = f"{x:.4g}{_unit(axis.parameter)}\n{row['frequency']:.3g} Hz" + (f"\n{kind}" if kind else "")
+        # on the side of the mark that the curve leaves free
+        place = {"xytext": (9, -8), "va": "top"} if row["gains"] else {"xytext": (9, 8), "va": "bottom"}
+        top.annotate(words, (x, 0.0), textcoords="offset points", fontsize=8.5, color=PUBLISHED, path_effects=[withStroke(linewidth=3, foreground="white")], **place)
     top.set_ylim(bottom=low)
     top.set_ylabel("Growth rate, 1/s")
     bottom.set_ylabel("Frequency, Hz")
     bottom.set_ylim(bottom=0)
     bottom.set_xlabel(LABELS[axis.parameter])
     top.set_title(_title(result), loc="left", fontweight="bold")
-    top.legend(loc="lower left", ncols=2)
+    top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
     if len(values) > 1:
         bottom.set_xlim(values[0], values[-1])
     return figure
@@ -83,6 +86,11 @@ def unstable_ranges(result: "OnsetResults") -> list[tuple[float, float]]:
     return found
 
 
+def _unit(parameter: str) -> str:
+    unit = LABELS[parameter].rpartition(", ")[2] if ", " in LABELS[parameter] else ""
+    return f" {unit}" if unit else ""
+
+
 def _floor(growth: np.ndarray) -> float:
     leading = growth[:, 0]
     return float(min(-5.0, 1.25 * np.nanmin(leading), -0.6 * np.nanmax(np.abs(leading))))
@@ -98,4 +106,4 @@ def _title(result: "OnsetResults") -> str:
     case, parameter = result.case, result.parameter
     shown = {"pressure": f"{case.drive.pressure / 1e3:g} kPa", "density": f"{case.fluid.density:g} kg/m³", "storage": case.fluid.continuity}
     fixed = ", ".join(text for name, text in shown.items() if name != parameter)
-    return f"Onset in {LABELS[parameter].split(',')[0].split(' (')[0].lower()}: {result.header.name}, {fixed}"
+    return f"{result.header.name}, {fixed}"
