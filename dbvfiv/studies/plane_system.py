@@ -4,6 +4,7 @@ Time is counted in units of 1/`RATE`, so that angular frequencies are of the siz
 """
 from __future__ import annotations
 
+import gc
 import math
 
 import numpy as np
@@ -81,6 +82,8 @@ class PlaneSystem(SystemBase):
         return self.valve.residual(u, self.mu(mu))
 
     def linear(self, u, mu):
+        # factorisations hold each other in cycles and are large: free those of earlier points before the next
+        gc.collect()
         return _Slowed(self.valve.linear(u, self.mu(mu)))
 
     def d_parameter(self, u, mu, name):
