@@ -68,12 +68,14 @@ class ReversibleFluid(MovingFluid):
         """Areas (m,) that the fluid sees: they stay above the channel's floor."""
         return self._open(area)[0]
 
-    def velocity(self, area, rate, inlet, psi_weight, psi_known) -> float:
-        """Inlet velocity at which the outlet pressure vanishes; more velocity always means less pressure, so there is one."""
-        still, moving = self.state(area, rate, 0.0), self.state(area, rate, 1.0)
+    def velocity(self, mid, new, inlet, old, theta, psi_weight, psi_known) -> float:
+        """New inlet velocity at which the outlet pressure vanishes; more velocity always means less pressure, so there is one."""
+        still, moving = self.state(*mid, 0.0), self.state(*mid, 1.0)
+        first, second = (self.state(*new, speed).psi[0] for speed in (0.0, 1.0))
+        start = (1.0 - theta) * old  # the velocity where the equations are met is start + theta times the new one
         s0, s1 = still.speed[0], moving.speed[0] - still.speed[0]
-        b = psi_weight * (moving.psi[0] - still.psi[0])
-        c = psi_weight * still.psi[0] + psi_known - inlet / self.density
+        b = psi_weight * (second - first) / theta
+        c = psi_weight * (first - (second - first) * start / theta) + psi_known - inlet / self.density
         # between the zeros of the two speeds the equation is a quadratic; the signs on the piece that holds its root are found first
         for low, high in _pieces(-s0 / s1):
             inside = high - 1.0 if low == -np.inf else low + 1.0 if high == np.inf else 0.5 * (low + high)
@@ -81,7 +83,7 @@ class ReversibleFluid(MovingFluid):
             roots = _roots(0.5 * (outer * s1 * s1 - inner), outer * s0 * s1 + b, 0.5 * outer * s0 * s0 + c)
             for root in roots:
                 if low - 1e-12 <= root <= high + 1e-12:
-                    return float(root)
+                    return float((root - start) / theta)
         return np.nan
 
     def pressure(self, flow, psi_rate, inlet):

@@ -27,8 +27,8 @@ def test_a_forward_flow_is_that_of_the_ordinary_fluid(storage):
     ours, theirs = _fluid(ReversibleFluid, storage), _fluid(MovingFluid, storage)
     rate = np.zeros(8)
     for inlet in (500.0, 2e4):
-        u = ours.velocity(AREA, rate, inlet, 50.0, -0.3)
-        assert u == pytest.approx(theirs.velocity(AREA, rate, inlet, 50.0, -0.3), rel=1e-12) and u > 0
+        u = ours.velocity((AREA, rate), (1.1 * AREA, rate), inlet, 0.0, 0.6, 50.0, -0.3)
+        assert u == pytest.approx(theirs.velocity((AREA, rate), (1.1 * AREA, rate), inlet, 0.0, 0.6, 50.0, -0.3), rel=1e-12) and u > 0
 
 
 @pytest.mark.parametrize("storage", [0.0, 1.0])
@@ -36,7 +36,7 @@ def test_a_forward_flow_is_that_of_the_ordinary_fluid(storage):
 @pytest.mark.parametrize("known", [-4.0, 0.0, 4.0])
 def test_there_is_one_velocity_at_every_drive_and_it_meets_the_outlet(storage, inlet, known):
     fluid = _fluid(ReversibleFluid, storage)
-    u = fluid.velocity(AREA, RATE, inlet, 80.0, known)
+    u = fluid.velocity((AREA, RATE), (AREA, RATE), inlet, 0.0, 1.0, 80.0, known)
     flow = fluid.state(AREA, RATE, u)
     outlet = fluid.pressure(flow, 80.0 * flow.psi + known, inlet)[0]
     assert abs(outlet) <= 1e-9 * (abs(inlet) + 1000 * (abs(known) + 0.5 * flow.speed[0] ** 2 + 80 * abs(flow.psi[0])))
