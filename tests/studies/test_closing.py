@@ -47,7 +47,8 @@ def test_there_is_one_velocity_at_every_drive_and_it_meets_the_outlet(storage, i
 def test_steady_flow_is_odd_in_the_drive():
     fluid = _fluid(ReversibleFluid)
     still = np.zeros(8)
-    assert fluid.velocity(AREA, still, -3e3, 0.0, 0.0) == pytest.approx(-fluid.velocity(AREA, still, 3e3, 0.0, 0.0))
+    at = (AREA, still)
+    assert fluid.velocity(at, at, -3e3, 0.0, 1.0, 0.0, 0.0) == pytest.approx(-fluid.velocity(at, at, 3e3, 0.0, 1.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("storage", [0.0, 1.0])
