@@ -162,7 +162,8 @@ def run_closing(case: Case, observer: Observer | None = None) -> ClosingResult:
     state = consistent_state(motion, 0.0, q, np.zeros(model.size), speed, turn.pressure)
     stepper = Stepper(motion, scheme("generalised-alpha", max(DAMPING, case.transient.numerical_damping)), turn)
     control = FixedSteps(stepper, ControlOptions(case.transient.step))
-    load = motion.load(state.q, state.v, turn.pressure, 0.0, state.psi_rate, state.speed)
+    still = motion._instant(state.speed, state.psi_rate, turn.pressure)
+    load = motion.load(state.q, state.v, state.q, state.v, still, state.speed)
     samples, failure, interrupted = [_sample(model, motion, state, load)], "", False
     try:
         while state.time < end - 1e-9:
