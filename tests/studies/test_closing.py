@@ -101,6 +101,7 @@ def test_a_history_that_opens_again_is_not_shut_before_it_shuts_for_good():
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
     case = Case().replace(COARSE | {"closure.reversal_time": "0.2 s", "closure.reversal_hold": "0.2 s"})
     result = run_closing(case)
