@@ -27,6 +27,8 @@ class Weights:
     ----------
     theta : float
         Where in the step the fluid's equations are met: the share of the new state there.
+    load : float
+        Factor of G p there.
     inertia : float
         Factor of M, 1/s2; mass damping included.
     force : float
@@ -38,6 +40,7 @@ class Weights:
     """
 
     theta: float
+    load: float
     inertia: float
     force: float
     velocity: float
@@ -230,8 +233,8 @@ class ValveMotion:
         _, structure = model.structure(q_new)
         values = weights.force * structure
         values += weights.inertia * model.mass(q)
-        values = model.follower_stiffness(nodal, weights.theta * load.pressure, values)
-        forces = model.station_forces(nodal).data
+        values = model.follower_stiffness(nodal, weights.load * weights.theta * load.pressure, values)
+        forces = weights.load * model.station_forces(nodal).data
         slope = model.rows.jacobian(nodal).data
         area = model.rows.areas(nodal)
         if not self.moving_fluid:

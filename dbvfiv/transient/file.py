@@ -237,7 +237,7 @@ def _write_empty(file: h5py.File, model: ValveModel, header: Header) -> None:
     for column in STATES:
         _empty(states, column, shapes.get(column.name, ()), 1 if column.name.startswith("nodal") else 64)
     zero = np.zeros(model.size)
-    still = MotionState(0.0, 0.0, zero, zero, zero, zero, zero, np.zeros(stations), np.zeros(stations))
+    still = MotionState(0.0, 0.0, zero, zero, zero, zero, zero, zero, np.zeros(stations), np.zeros(stations))
     length = len(_sealed(Progress(still).pack(), 0, 0, 0))
     for slot in ("0", "1"):
         file.create_dataset(f"restart/{slot}", data=np.zeros(length))

@@ -37,7 +37,7 @@ class StaggeredMotion(ValveMotion):
         nodal = model.nodal(q if q_load is None else q_load)
         _, structure = model.structure(q_new)
         values = weights.force * structure + weights.inertia * model.mass(q)
-        values = model.follower_stiffness(nodal, weights.theta * load.pressure, values)
+        values = model.follower_stiffness(nodal, weights.load * weights.theta * load.pressure, values)
         none = np.zeros((self.stations, self.stations))
         self._solver(0).refactor(values, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
 

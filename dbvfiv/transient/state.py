@@ -19,6 +19,8 @@ class MotionState:
         Unknowns (m, rad), velocities and accelerations.
     force, force_rate : (n,) arrays
         Internal force F and the scheme's value of its rate.
+    load : (n,) array
+        Force G p of the fluid where the equations were last met.
     psi, psi_rate : (m,) arrays
         Integral of the flow's speed from the inlet, m2/s, and the scheme's value of its rate.
     """
@@ -30,19 +32,20 @@ class MotionState:
     a: np.ndarray
     force: np.ndarray
     force_rate: np.ndarray
+    load: np.ndarray
     psi: np.ndarray
     psi_rate: np.ndarray
 
     def pack(self) -> np.ndarray:
-        """One vector (5 n + 2 m + 2,) for a file."""
-        parts = [[self.time, self.speed], self.q, self.v, self.a, self.force, self.force_rate, self.psi, self.psi_rate]
+        """One vector (6 n + 2 m + 2,) for a file."""
+        parts = [[self.time, self.speed], self.q, self.v, self.a, self.force, self.force_rate, self.load, self.psi, self.psi_rate]
         return np.concatenate(parts)
 
     @classmethod
     def unpack(cls, packed: np.ndarray, stations: int) -> "MotionState":
         """Undo `pack` for a number m of stations."""
         wall, fluid = np.split(np.array(packed[2:], float), [len(packed) - 2 - 2 * stations])
-        return cls(float(packed[0]), float(packed[1]), *np.split(wall, 5), *np.split(fluid, 2))
+        return cls(float(packed[0]), float(packed[1]), *np.split(wall, 6), *np.split(fluid, 2))
 
 
 def consistent_state(motion, time: float, q, v, speed: float, inlet: float) -> MotionState:
@@ -50,5 +53,5 @@ def consistent_state(motion, time: float, q, v, speed: float, inlet: float) -> M
     q, v = np.asarray(q, float), np.asarray(v, float)
     a, load = motion.accelerations(q, v, speed, inlet)
     return MotionState(
-        float(time), float(load.speed[-1]), q, v, a, motion.internal_force(q), motion.force_rate(q, v), load.psi, load.psi_rate
+        float(time), float(load.speed[-1]), q, v, a, motion.internal_force(q), motion.force_rate(q, v), load.force, load.psi, load.psi_rate
     )  # fmt: skip

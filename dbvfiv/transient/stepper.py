@@ -154,7 +154,7 @@ class Stepper:
         lost = trial.damping @ way
         if alpha:
             lost += alpha * (self.motion.momentum(trial.q_mid, trial.v_mid) @ way)
-        return float(trial.load.force @ way), float(lost)
+        return float(trial.push @ way), float(lost)
 
     # -- the iteration --------------------------------------------------------------------------------------------------------------
 
@@ -282,7 +282,8 @@ class _Trial:
     """A candidate for the new state; its unknowns are the accelerations. The inlet velocity follows from them.
 
     With `robust` the fluid's equations are met at the end of the step, psi by a backward difference: of first order, but momentum that is lost within a
-    step, when lips slam, does not come back with the opposite sign.
+    step, when lips slam, does not come back with the opposite sign. Its force is then the weighted mean of this and the last one, as spikes that change
+    their sign from step to step would otherwise do work on stops that ring.
     """
 
     def __init__(self, motion, scheme: Scheme, old: MotionState, h: float, pressure: Callable[[float], float], robust: bool):
@@ -292,6 +293,7 @@ class _Trial:
         self.kind = (h, robust)
         self.weights = Weights(
             theta=theta,
+            load=now if robust else 1.0,
             inertia=(1.0 - s.alpha_m) / (s.beta * h * h) + motion.conditions.alpha * now * s.gamma / (s.beta * h),
             force=now + motion.conditions.beta * s.rate / h,
             velocity=s.gamma / (s.beta * h),
@@ -327,7 +329,9 @@ class _Trial:
         self.damping = beta * (old.force_rate + s.rate * (self.force_rate - old.force_rate))
         elastic = old.force + now * (self.force - old.force)
         inertia = motion.inertia(self.q_mid, self.v_mid, self.a_mid + alpha * self.v_mid if alpha else self.a_mid)
-        self.residual = inertia + self.damping + elastic - self.load.force
+        share = self.weights.load
+        self.push = self.load.force if share == 1.0 else old.load + share * (self.load.force - old.load)
+        self.residual = inertia + self.damping + elastic - self.push
         return float(np.linalg.norm(self.residual))
 
     def linearise(self) -> None:
@@ -343,4 +347,4 @@ class _Trial:
     def state(self) -> MotionState:
         old, load = self.old, self.load
         rate = (load.psi - old.psi) / self.h if self.motion.moving_fluid else load.psi_rate
-        return MotionState(old.time + self.h, float(load.speed[-1]), self.q, self.v, self.a, self.force, self.force_rate, load.psi, rate)
+        return MotionState(old.time + self.h, float(load.speed[-1]), self.q, self.v, self.a, self.force, self.force_rate, load.force, load.psi, rate)

@@ -110,7 +110,7 @@ def test_energies_against_their_definition(valve, open_state):
 
 def test_a_state_goes_through_a_file_unchanged():
     rng = np.random.default_rng(5)
-    parts = [rng.standard_normal(7) for _ in range(5)] + [rng.standard_normal(3) for _ in range(2)]
+    parts = [rng.standard_normal(7) for _ in range(6)] + [rng.standard_normal(3) for _ in range(2)]
     state = MotionState(0.1, 0.2, *parts)
     again = MotionState.unpack(state.pack(), 3)
     assert all(np.array_equal(a, b) for a, b in zip(vars(state).values(), vars(again).values()))
