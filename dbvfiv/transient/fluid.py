@@ -97,8 +97,18 @@ class MovingFluid:
 
     def pressure(self, flow: FlowState, psi_rate: np.ndarray, inlet: float) -> np.ndarray:
         """Pressures (m,), Pa; the first, at the outlet, is to vanish."""
-        speed = flow.speed
-        return inlet - self.density * (0.5 * (speed * speed - speed[-1] ** 2) + psi_rate)
+        head = self.head(flow.speed)
+        return inlet - self.density * (head - head[-1] + psi_rate)
+
+    @staticmethod
+    def head(speed):
+        """Velocity head over density, m2/s2, that a speed, m/s, costs."""
+        return 0.5 * speed * speed
+
+    @staticmethod
+    def head_slope(speed):
+        """Its derivative, m/s."""
+        return speed
 
     def slopes(self, area: np.ndarray, rate: np.ndarray, velocity: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Derivatives of the speeds with respect to areas (m, m), area rates (m, m) and inlet velocity (m,)."""
@@ -129,11 +139,10 @@ class MovingFluid:
         velocity : float
             Derivative of the area rates with respect to the areas at the end of the step, 1/s.
         """
-        here = self.state(*mid, speed).speed[:, None]
+        here = self.head_slope(self.state(*mid, speed).speed)
         area, rate, own = self.slopes(*mid, speed)
-        slope = theta * (area + velocity * rate)
-        by_area = here * slope
-        by_speed = theta * (here[:, 0] * own - speed)
+        by_area = theta * here[:, None] * (area + velocity * rate)
+        by_speed = theta * (here * own - self.head_slope(speed))
         area, rate, own = self.slopes(*new, new_speed)
         by_area += psi_weight * self.integrate(area + velocity * rate)
         by_speed += psi_weight * self.integrate(own)

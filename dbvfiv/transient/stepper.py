@@ -144,8 +144,9 @@ class Stepper:
 
     @staticmethod
     def _kept_momentum(trial: "_Trial") -> bool:
-        """Whether the fluid kept most of its momentum in a step; if it did not, its equations are better met at the end of the step."""
-        return bool(trial.load.psi[0] >= 0.5 * trial.old.psi[0])
+        """Whether the fluid kept most of its momentum in a step, whichever way it flows; if it did not, its equations are better met at the end."""
+        new, old = trial.load.psi[0], trial.old.psi[0]
+        return bool(new * np.sign(old) >= 0.5 * abs(old))
 
     def _works(self, trial: "_Trial") -> tuple[float, float]:
         """Work of the pressure and dissipation of a step, by the scheme's own weights."""
