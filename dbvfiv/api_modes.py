@@ -97,8 +97,12 @@ def sweep_of(valve: "Valve", start: "State | None", output: str | Path | None, o
     observer = observer or Observer()
     axis = valve.case.sweep.axis
     state, warnings = (None, ()) if axis.parameter == "pressure" else state_of(valve, start, observer)
-    found = run_sweep(valve.model, axis, state=state, observer=observer)
-    result = SweepResults.of(found, Header.of("sweep", valve.case, valve.name), warnings)
-    if output is not None:
-        result.save(output)
-    return result
+    header = Header.of("sweep", valve.case, valve.name)
+
+    def keep(found):
+        result = SweepResults.of(found, header, warnings)
+        if output is not None:
+            result.save(output)
+        return result
+
+    return keep(run_sweep(valve.model, axis, state=state, observer=observer, keep=keep if output is not None else None))

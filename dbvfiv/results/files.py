@@ -1,6 +1,7 @@
 """Opening result files, for writing and for reading; whatever is wrong with one is told in a sentence."""
 from __future__ import annotations
 
+import os
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Iterator
@@ -91,6 +92,45 @@ def create(path: str | Path, single_writer: bool = False) -> h5py.File:
         raise CaseError(f"The result file {str(path)!r} cannot be written ({_short(reason)}).") from None
     if not single_writer:
         _hold_back_metadata(file)
+    return file
+
+
+@contextmanager
+def writing(path: str | Path) -> Iterator[h5py.File]:
+    """A result file that takes its name when it is complete; whoever is killed before leaves what was there.
+
+    Raises
+    ------
+    CaseError
+        As `create`.
+    """
+    path = Path(path)
+    refuse_foreign(path)
+    new = path.with_name(f".{path.name}.new")
+    try:
+        try:
+            file = create(new)
+        except CaseError as error:
+            raise CaseError(str(error).replace(str(new), str(path))) from error.__cause__
+        with file:
+            yield file
+        os.replace(new, path)
+    finally:
+        new.unlink(missing_ok=True)
+
+
+def reopen(path: str | Path) -> h5py.File:
+    """The result file of an interrupted run, to go on writing into it.
+
+    Raises
+    ------
+    CaseError
+    """
+    try:
+        file = h5py.File(path, "r+")
+    except OSError as error:
+        raise CaseError(f"The result file {str(path)!r} cannot be opened for writing ({error.strerror or error}).") from error
+    _hold_back_metadata(file)
     return file
 
 

@@ -10,7 +10,7 @@ import h5py
 
 from ..errors import CaseError
 from .certificate import Certificate
-from .files import create
+from .files import writing
 from .header import Header, read_header, write_header
 from .layout import Table, read_texts, replace_texts
 from .mesh import MeshData, read_mesh, write_mesh
@@ -124,7 +124,7 @@ class ModesResults(Result):
         )  # fmt: skip
 
     def save(self, path: str | Path) -> Path:
-        with create(path) as file:
+        with writing(path) as file:
             write_header(file, self.header)
             write_mesh(file, self.mesh)
             stations, nodes = len(self.mesh.z), len(self.mesh.nodes)

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from ..case.axis import KEYS
-from .files import create
+from .files import writing
 from .header import Header, read_header, write_header
 from .layout import TEXT, Column, Table, read_array, read_texts, replace_texts, write_array
 from .mesh import MeshData, read_mesh, write_mesh
@@ -171,7 +171,7 @@ class SweepResults(Result):
         )  # fmt: skip
 
     def save(self, path: str | Path) -> Path:
-        with create(path) as file:
+        with writing(path) as file:
             write_header(file, self.header)
             write_mesh(file, self.mesh)
             group = file.create_group("sweep")

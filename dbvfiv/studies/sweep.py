@@ -1,7 +1,9 @@
 """Modes tracked along one parameter: fluid density, damping, or inlet pressure."""
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
+from typing import Callable
 
 import numpy as np
 
@@ -17,6 +19,11 @@ from .modes_search import CLEAR, limit_point
 from .observer import Observer
 from .state import SteadyState
 from .sweep_family import Check, Family, FluidFamily, PressureFamily
+
+
+#: Writing what is done may take this share of the time; a sweep of small cost is written once.
+_KEEPING = 0.05
+_KEEP_AFTER = 2.0
 
 
 @dataclass(frozen=True)
@@ -106,6 +113,7 @@ def run_sweep(
     options: SweepOptions | None = None,
     observer: Observer | None = None,
     state: SteadyState | None = None,
+    keep: Callable[[SweepResult], None] | None = None,
 ) -> SweepResult:
     """Follow the leading modes along a parameter.
 
@@ -125,6 +133,8 @@ def run_sweep(
         Gets a `SweepPoint` for every value.
     state : SteadyState, optional
         Equilibrium for density, alpha or beta; needed for those.
+    keep : callable, optional
+        Gets what is done so far, marked as interrupted, every few seconds, so that a sweep that is killed is not lost.
 
     Raises
     ------
@@ -146,7 +156,7 @@ def run_sweep(
         require_equilibrium(model, state)
         family = FluidFamily(model, state, axis, conditions, options, observer)
     observer.begin(f"sweep over {axis.parameter}", len(axis.values))
-    run = _Run(family, axis, options, observer)
+    run = _Run(model, family, axis, options, observer, keep)
     interrupted, failures = False, ()
     try:
         with solving(family.pressure):
@@ -160,7 +170,7 @@ def run_sweep(
             raise
         failures = (str(error),)
         observer.warn(str(error))
-    result = run.result(model, interrupted, failures)
+    result = run.result(interrupted, failures)
     for note in result.notes:
         observer.warn(note)
     observer.end(interrupted)
@@ -170,8 +180,9 @@ def run_sweep(
 class _Run:
     """A walk along the values; spectra are kept, so that an interrupted one can be followed as far as it came."""
 
-    def __init__(self, family: Family, axis: Axis, options: SweepOptions, observer: Observer):
-        self.family, self.axis, self.observer = family, axis, observer
+    def __init__(self, model: ValveModel, family: Family, axis: Axis, options: SweepOptions, observer: Observer, keep):
+        self.model, self.family, self.axis, self.observer, self.keep = model, family, axis, observer, keep
+        self.keep_at = time.monotonic() + _KEEP_AFTER
         self.track = TrackOptions(options.count, options.margin, least_confidence=options.least_confidence)
         self.pencils: dict[float, object] = {}
         self.spectra: dict[int, Spectrum] = {}
@@ -197,19 +208,23 @@ class _Run:
         point = SweepPoint(value, spectrum.eigenvalues, spectrum.unstable_count)
         self.points.append(point)
         self.observer.item(point)
+        start = time.monotonic()
+        if self.keep is not None and start >= self.keep_at:
+            self.keep(self.result(True, ()))
+            now = time.monotonic()
+            self.keep_at = now + max(_KEEP_AFTER, (now - start) / _KEEPING)
 
-    def result(self, model: ValveModel, interrupted: bool, failures) -> SweepResult:
+    def result(self, interrupted: bool, failures) -> SweepResult:
         values = np.array([point.value for point in self.points])
-        points, solves = tuple(self.points), len(self.spectra)
-        if self.branches is None and len(values):
-            self.observer = Observer()
-            self.branches = track(self._pencil, values, self.track, solver=self._solve)
-        branches = _shown(self.branches, self.family, values) if len(values) else Branches(np.zeros(0, int), values, *np.zeros((2, 0, 0)), 0)
+        points, solves, found = tuple(self.points), len(self.spectra), self.branches
+        if found is None and len(values):  # as far as it came, from the spectra kept
+            found = track(self._pencil, values, self.track, solver=self._solve)
+        branches = _shown(found, self.family, values) if len(values) else Branches(np.zeros(0, int), values, *np.zeros((2, 0, 0)), 0)
         checks, notes = self.family.checks(values) if len(values) and not interrupted else (self.family.done, ())
         certified = bool(checks) and not interrupted and all(check.holds for check in checks)
         counts = np.array([point.unstable_count for point in points], int)
         return SweepResult(
-            model, self.axis, values, Branches(branches.ids, values, branches.eigenvalues, branches.confidence, solves), counts, tuple(checks),
+            self.model, self.axis, values, Branches(branches.ids, values, branches.eigenvalues, branches.confidence, solves), counts, tuple(checks),
             certified, self.family.states(values), tuple(notes), tuple(failures), interrupted,
         )  # fmt: skip
 

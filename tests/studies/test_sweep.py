@@ -156,3 +156,18 @@ def test_refusals(model, state, one_sentence):
     assert one_sentence(str(caught.value))
     with pytest.raises(SolveError):
         run_sweep(model, DENSITY, LIGHT, OPTIONS, state=replace(state, converged=False))
+
+
+def test_what_is_done_is_kept_on_the_way(model, state, over_density, monkeypatch):
+    """A sweep that is killed leaves the values up to the last time it was kept, with the branches of the whole."""
+    from dbvfiv.studies import sweep
+
+    monkeypatch.setattr(sweep, "_KEEP_AFTER", 0.0)
+    monkeypatch.setattr(sweep, "_KEEPING", 1e9)
+    kept = []
+    whole = run_sweep(model, DENSITY, LIGHT, OPTIONS, state=state, keep=kept.append)
+    assert [len(part.values) for part in kept] == list(range(1, len(DENSITY.values) + 1))
+    assert all(part.interrupted for part in kept) and not whole.interrupted
+    part = kept[6]
+    assert part.branches.eigenvalues[0] == pytest.approx(whole.branches.eigenvalues[0, :7], rel=1e-10)
+    assert np.array_equal(whole.branches.eigenvalues, over_density.branches.eigenvalues, equal_nan=True)
