@@ -37,6 +37,9 @@ class StepOptions:
         Of a Newton correction in the line search.
     largest_turn : float
         Largest change of a rotation in a step, rad. Directors that turn further between two instants can gain energy from stiffness damping.
+    backward : bool
+        Meet the fluid's equations at the end of every step, not of those alone in which momentum is lost: for walls that shut in several places, where
+        the momentum of a part is lost while that of the whole is kept.
     """
 
     tolerance: float = 1e-4
@@ -46,6 +49,7 @@ class StepOptions:
     diverged: float = 100.0
     smallest_fraction: float = 1.0 / 16.0
     largest_turn: float = 0.3
+    backward: bool = False
 
 
 @dataclass(frozen=True)
@@ -115,7 +119,7 @@ class Stepper:
         StepFailure
         """
         before = (self.residuals, self.solves, self.factorisations)
-        for robust in (not self._smooth(state, h), True):
+        for robust in (self.options.backward or not self._smooth(state, h), True):
             trial = _Trial(self.motion, self.scheme, state, h, self.pressure, robust)
             self.motion.begin_step(state, h, trial.fluid.inlet)
             try:
