@@ -11,7 +11,7 @@ from ..transient.control import ControlOptions, FixedSteps
 from ..transient.scheme import scheme
 from ..transient.start import steady_positions
 from ..transient.state import consistent_state
-from ..transient.stepper import Stepper, StepFailure
+from ..transient.stepper import Stepper, StepFailure, StepOptions
 from .closing_motion import ClosingMotion, ContactValve
 from .closure_opening import FACES, measure
 from .closure_state import QUARTERS
@@ -160,7 +160,7 @@ def run_closing(case: Case, observer: Observer | None = None) -> ClosingResult:
     area = model.rows.areas(model.nodal(q))
     speed = model.flow.inlet_velocity(area, turn.pressure, motion.conditions.density)
     state = consistent_state(motion, 0.0, q, np.zeros(model.size), speed, turn.pressure)
-    stepper = Stepper(motion, scheme("generalised-alpha", max(DAMPING, case.transient.numerical_damping)), turn)
+    stepper = Stepper(motion, scheme("generalised-alpha", max(DAMPING, case.transient.numerical_damping)), turn, StepOptions(backward=True))
     control = FixedSteps(stepper, ControlOptions(case.transient.step))
     still = motion._instant(state.speed, state.psi_rate, turn.pressure)
     load = motion.load(state.q, state.v, state.q, state.v, still, state.speed)

@@ -70,12 +70,11 @@ class ReversibleFluid(MovingFluid):
 
     def velocity(self, mid, new, inlet, old, theta, psi_weight, psi_known) -> float:
         """New inlet velocity at which the outlet pressure vanishes; more velocity always means less pressure, so there is one."""
-        still, moving = self.state(*mid, 0.0), self.state(*mid, 1.0)
-        first, second = (self.state(*new, speed).psi[0] for speed in (0.0, 1.0))
+        s0, s1 = (float(part[0]) for part in self._affine(*mid))
+        p0, p1 = (float(part) for part in self.integrate(np.stack(self._affine(*new), axis=1))[0])
         start = (1.0 - theta) * old  # the velocity where the equations are met is start + theta times the new one
-        s0, s1 = still.speed[0], moving.speed[0] - still.speed[0]
-        b = psi_weight * (second - first) / theta
-        c = psi_weight * (first - (second - first) * start / theta) + psi_known - inlet / self.density
+        b = psi_weight * p1 / theta
+        c = psi_weight * (p0 - p1 * start / theta) + psi_known - inlet / self.density
         # between the zeros of the two speeds the equation is a quadratic; the signs on the piece that holds its root are found first
         for low, high in _pieces(-s0 / s1):
             inside = high - 1.0 if low == -np.inf else low + 1.0 if high == np.inf else 0.5 * (low + high)
@@ -86,18 +85,13 @@ class ReversibleFluid(MovingFluid):
                     return float((root - start) / theta)
         return np.nan
 
-    def pressure(self, flow, psi_rate, inlet):
-        speed = flow.speed
-        return inlet - self.density * (0.5 * (speed * np.abs(speed) - speed[-1] * abs(speed[-1])) + psi_rate)
+    @staticmethod
+    def head(speed):
+        return 0.5 * speed * np.abs(speed)
 
-    def pressure_slopes(self, area, rate, velocity, weight):
-        speed = np.abs(self.state(area, rate, velocity).speed)
-        found = []
-        for slope in self.slopes(area, rate, velocity):
-            column = slope.reshape(len(speed), -1)
-            change = speed[:, None] * column - speed[-1] * column[-1] + weight * self.integrate(column)
-            found.append(-self.density * change.reshape(slope.shape))
-        return tuple(found)
+    @staticmethod
+    def head_slope(speed):
+        return np.abs(speed)
 
 
 def _pieces(zero: float) -> list[tuple[float, float]]:

@@ -51,21 +51,29 @@ def test_steady_flow_is_odd_in_the_drive():
     assert fluid.velocity(at, at, -3e3, 0.0, 1.0, 0.0, 0.0) == pytest.approx(-fluid.velocity(at, at, 3e3, 0.0, 1.0, 0.0, 0.0))
 
 
+@pytest.mark.parametrize("kind", [MovingFluid, ReversibleFluid])
 @pytest.mark.parametrize("storage", [0.0, 1.0])
-@pytest.mark.parametrize("velocity", [-0.4, 0.3])
-def test_pressure_slopes_agree_with_differences(storage, velocity):
-    fluid = _fluid(ReversibleFluid, storage)
-    by_area, by_rate, by_speed = fluid.pressure_slopes(AREA, RATE, velocity, 60.0)
+@pytest.mark.parametrize("new_speed", [-0.4, 0.3])
+@pytest.mark.parametrize("theta", [0.6, 1.0])
+def test_pressure_slopes_agree_with_differences(kind, storage, new_speed, theta):
+    """Equations met within a step from a still state at (AREA, RATE, 0.1 m/s), unknown what holds at its end."""
+    fluid, old, weight, per_step = _fluid(kind, storage), 0.1, 60.0, 80.0
 
-    def pressure(area, rate, u):
-        flow = fluid.state(area, rate, u)
-        return fluid.pressure(flow, 60.0 * flow.psi, 1e3)
+    def ends(area, u):
+        new = (area, RATE + per_step * (area - AREA))
+        mid = ((1 - theta) * AREA + theta * area, RATE + theta * per_step * (area - AREA))
+        return mid, new, old + theta * (u - old)
 
-    direction = np.linspace(0.3, 1.0, 8)
+    def pressure(area, u):
+        mid, new, speed = ends(area, u)
+        return fluid.pressure(fluid.state(*mid, speed), weight * fluid.state(*new, u).psi, 1e3)
+
+    area, direction = 1.05 * AREA, np.linspace(0.3, 1.0, 8)
+    mid, new, speed = ends(area, new_speed)
+    by_area, by_speed = fluid.pressure_slopes(mid, new, speed, new_speed, theta, per_step, weight)
     for slope, size, move in (
-        (by_area @ direction, 1e-9, lambda h: (AREA + h * direction, RATE, velocity)),
-        (by_rate @ direction, 1e-7, lambda h: (AREA, RATE + h * direction, velocity)),
-        (by_speed, 1e-6, lambda h: (AREA, RATE, velocity + h)),
+        (by_area @ direction, 1e-9, lambda h: (area + h * direction, new_speed)),
+        (by_speed, 1e-6, lambda h: (area, new_speed + h)),
     ):
         change = (pressure(*move(size)) - pressure(*move(-size))) / (2 * size)
         assert np.ravel(slope) == pytest.approx(change, rel=1e-5, abs=1e-6 * max(1.0, np.abs(change).max()))
@@ -100,8 +108,6 @@ def test_a_history_that_opens_again_is_not_shut_before_it_shuts_for_good():
     assert ClosingResult(tuple(history[:5]), turn, 2.0).closing_time is None
 
 
-@pytest.mark.slow
-@pytest.mark.slow
 def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
     case = Case().replace(COARSE | {"closure.reversal_time": "0.2 s", "closure.reversal_hold": "0.2 s"})
     result = run_closing(case)
@@ -114,6 +120,8 @@ def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
         assert np.isfinite(list(vars(sample).values())).all()
         assert sample.least_opening >= 0.0 and sample.contact_force >= 0.0
     assert told["largest_penetration"] < 1e-4
+    # no spikes: several times the drive is what it takes to stop the water
+    assert -5e4 < told["lowest_pressure"] and told["highest_pressure"] < 5e4
     # shut, what still passes is a thousandth of the flow there was
     late = [s.mass_flow for s in result.samples if s.time > 0.35]
     assert max(np.abs(late)) < 2e-3 * result.samples[0].mass_flow
