@@ -1,4 +1,4 @@
-"""Onsets and stability maps of a valve, with or without a result file, and maps that go on."""
+"""Onsets and stability maps of a valve, with or without a result file, and runs that go on."""
 from __future__ import annotations
 
 from pathlib import Path
@@ -22,7 +22,7 @@ def onset(case: Case, name: str = "case", output: str | Path | None = None, obse
     name : str
         For titles.
     output : path, optional
-        Result file, written point by point.
+        Result file, written sample by sample.
     observer : Observer, optional
 
     Raises
@@ -49,6 +49,32 @@ def onset(case: Case, name: str = "case", output: str | Path | None = None, obse
         return OnsetResults.of(run_onset(case, observer=observer), header, model)
     with OnsetFile(output, header, MeshData.of(model)) as file:
         result = run_onset(case, observer=Observers(file, observer))
+        file.conclude(result)
+    return OnsetResults.of(result, header, model)
+
+
+def resume_onset(path: str | Path, observer: Observer | None = None) -> "OnsetResults":
+    """Go on with an interrupted or killed onset run; samples and points in its file are not solved again.
+
+    Raises
+    ------
+    CaseError
+        If the file holds no onset run, or one that had gone to its end.
+    """
+    from .api import Valve
+    from .results.mesh import MeshData
+    from .results.onset import OnsetResults
+    from .results.onset_file import OnsetFile, known_items
+    from .studies.onset import run_onset
+
+    observer = observer or Observer()
+    known, header, complete = known_items(path)
+    if complete:
+        raise CaseError(f"The onset run in {str(path)!r} had gone to its end; there is nothing to resume.")
+    case = header.rebuildable_case()
+    model = Valve(case, header.name).model
+    with OnsetFile(path, header, MeshData.of(model), again=True) as file:
+        result = run_onset(case, observer=Observers(file, observer), known=known)
         file.conclude(result)
     return OnsetResults.of(result, header, model)
 

@@ -1,8 +1,9 @@
 """Onsets of the 12-inch valve at 28 x 48, for docs/stability.md: python tools/onset_numbers.py [FILE.json] [MAP.h5]
 
 Densities at 1, 2, 4 and 6 kPa, and all pressures from 0.3 to 36 kPa at 1.2, 10 and 30 kg/m3, under both continuity laws (alpha 0, beta 0.003), each with
-direct eigenvalues and independent counts on both sides. Takes about ten minutes on one core. An interrupted run goes on. With the result of
-`dbvfiv map --both` for the same damping it also measures how far the onsets lie from the map's curves, and whether the signs of its cells agree with them.
+direct eigenvalues and independent counts on both sides, criticality, and uncertainty from a mesh of half as many elements each way. Takes some tens of
+minutes on one core. An interrupted run goes on with the searches that are missing. With the result of `dbvfiv map --both` for the same damping it also
+measures how far the onsets lie from the map's curves, and whether the signs of its cells agree with them.
 """
 import json
 import sys
@@ -15,44 +16,54 @@ prepare()
 import numpy as np  # noqa: E402
 
 from dbvfiv.case import load_case  # noqa: E402
-from dbvfiv.studies.onset import OnsetOptions, OnsetSearch  # noqa: E402
-from dbvfiv.studies.parameters import Place  # noqa: E402
+from dbvfiv.studies.onset import OnsetOptions, run_onset  # noqa: E402
 from dbvfiv.studies.stability_walk import StabilityWalk  # noqa: E402
 
 MESH = (28, 48)
+LAWS = ("quasi-steady", "storage")
 
 
 def main(path: Path) -> None:
     case = load_case(None, [f"mesh.around={MESH[0]}", f"mesh.along={MESH[1]}", "damping.alpha=0", "damping.beta=0.003"])
     walk = StabilityWalk(case)
-    base = Place.of(case)
     done = json.loads(path.read_text()) if path.exists() else {}
 
-    def search(key: str, parameter: str, values, **fixed) -> None:
+    def search(law: str, parameter: str, values, fixed: str, value: float) -> None:
+        key = f"{parameter} {law} {value:g}"
         if key in done:
             return
-        options = OnsetOptions(parameter, tuple(values), True, normal_form=False, coarse_mesh=0)
-        found = OnsetSearch(case, options, walk=walk, place=base.at(**fixed))
-        points = [found.point(crossing).summary() for crossing in found.scan.run(values)]
-        leading = [found.scan.samples[v].growth[0] for v in sorted(found.scan.samples)]
-        done[key] = {"parameter": parameter, "fixed": fixed, "points": points, "scanned": len(leading), "largest_growth_rate": float(max(leading)),
-                     "failures": list(found.scan.failures.values())}
+        here = case.replace({fixed: value, "fluid.continuity": law})
+        found = run_onset(here, OnsetOptions(parameter, tuple(map(float, values)), True), walk=walk)
+        leading = found.growth_rates[:, 0]
+        done[key] = {"parameter": parameter, "law": law, "fixed": {fixed.split(".")[1]: value}, "points": [p.summary() for p in found.points],
+                     "scanned": len(leading), "largest_growth_rate": float(max(leading)), "failures": list(found.failures)}  # fmt: skip
         path.write_text(json.dumps(done, indent=1) + "\n")
-        print(key, [(round(p["value"], 6), round(p["frequency"], 4), p["confirmed"]) for p in points], flush=True)
+        for line in rows(done[key]):
+            print(line, flush=True)
 
-    for law in (0.0, 1.0):
+    for law in LAWS:
         for pressure in (1e3, 2e3, 4e3, 6e3):
-            search(f"density {pressure:g} {law:g}", "density", np.geomspace(0.5, 2000, 61), pressure=pressure, storage=law)
-    for law in (0.0, 1.0):
+            search(law, "density", np.geomspace(0.5, 2000, 61), "drive.pressure", pressure)
+    for law in LAWS:
         for density in (1.2, 10.0, 30.0):
-            search(f"pressure {density:g} {law:g}", "pressure", np.geomspace(300, 36000, 49), density=density, storage=law)
+            search(law, "pressure", np.geomspace(300, 36000, 49), "fluid.density", density)
 
 
-    for key, entry in done.items():
-        for p in entry["points"]:
-            below, above = p["below"], p["above"]
-            counts = f"{below['unstable_count']}/{below['unstable_count_independent']}, {above['unstable_count']}/{above['unstable_count_independent']}"
-            print(f"| {key} | {p['value']:.6g} | {p['frequency']:.3f} | {below['growth_rate']:+.4f} | {above['growth_rate']:+.4f} | {counts} |")
+def rows(entry: dict) -> list[str]:
+    """Lines of the tables in docs/stability.md."""
+    (fixed,) = entry["fixed"].values()
+    scale = 1e3 if entry["parameter"] == "pressure" else 1.0
+    start = f"| {fixed if scale > 1 else fixed / 1e3:g} | {entry['law']} |"
+    lines = []
+    for p in entry["points"]:
+        below, above = p["below"], p["above"]
+        counts = ", ".join(f"{side['unstable_count']}/{side['unstable_count_independent']}" for side in (below, above))
+        spread = "" if p["uncertainty"] is None else f"{p['uncertainty'] / scale:.2g}"
+        lines.append(
+            f"{start} {p['value'] / scale:.6f} | {spread} | {p['frequency']:.3f} | {below['growth_rate']:+.4f} | {above['growth_rate']:+.4f} | {counts} | "
+            f"{'above' if p['gains'] else 'below'} | {p['criticality']} | {p['first_lyapunov_coefficient']:+.3g} |{'' if p['confirmed'] else ' NOT CONFIRMED'}"
+        )
+    return lines or [f"{start} none, largest growth rate {entry['largest_growth_rate']:.3f} 1/s |"]
 
 
 def compare(numbers: Path, map_file: Path) -> None:
@@ -65,11 +76,11 @@ def compare(numbers: Path, map_file: Path) -> None:
     for c in result.curves:
         print(f"curve of law {plan.laws[c.law]:g}: {len(c.x)} points, exact {c.exact}, largest distance of {c.mismatch:.1e} from the columns' onsets")
     for key, entry in json.loads(numbers.read_text()).items():
-        fixed = entry["fixed"]
+        fixed, law = entry["fixed"], LAWS.index(entry["law"])
         for p in entry["points"]:
             place = {"pressure": fixed.get("pressure", p["value"]), "density": fixed.get("density", p["value"])}
             point = np.array([plan.coordinate(plan.x, place["pressure"]), plan.coordinate(plan.y, place["density"])])
-            mine = [line for law, line in lines if plan.laws[law] == fixed["storage"]]
+            mine = [line for number, line in lines if plan.laws[number] == law]
             print(f"{key}: {p['value']:.6g}, {min(_distance(point, line) for line in mine):.1e} of the map's width from the curve")
     for number, law in enumerate(plan.laws):
         unstable = result.grid("unstable")[number] > 0

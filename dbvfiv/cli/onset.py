@@ -38,9 +38,11 @@ def command(
     eigenvalues and independent counts on both sides, described by its first Lyapunov coefficient (onset.normal_form), and found again on a coarser
     mesh for an uncertainty (onset.coarse_mesh).
 
+    With -o every value of the scan and every onset is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash.
+
     dbvfiv onset cases/dbv12.toml --over density --set drive.pressure="6 kPa"
     """
-    from ..errors import CaseError, SolveError
+    from ..errors import CaseError
     from ..stability import onset
 
     case = read_case(case_file, overrides)
@@ -49,6 +51,13 @@ def command(
     if over is not None:
         case = case.replace({"onset.over": over})
     result = onset(case, case_file.stem if case_file else "dbv12", output, Progress(quiet=as_json))
+    report(result, output, plots, as_json)
+
+
+def report(result, output: Path | None, plots: Path | None, as_json: bool) -> None:
+    """Print finished onsets, draw them, and leave with the exit status they deserve."""
+    from ..errors import SolveError
+
     figures = result.plot(plots) if plots is not None and len(result.values) else []
     if as_json:
         print_json(result.summary() | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})

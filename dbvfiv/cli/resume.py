@@ -21,22 +21,28 @@ def command(
     workers: Annotated[Optional[int], typer.Option("--workers", "-w", metavar="N", min=1, help="Of a map: processes that share the columns.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Continue a transient run or a stability map that was interrupted or killed, or a finished transient run with a later --duration.
+    """Continue a transient run, a stability map or an onset run that was interrupted or killed, or a finished transient run with a later --duration.
 
     A transient run goes on from the last restart point in the same file, with the same numbers as a run that was never interrupted; a map solves the
-    columns that are missing in it.
+    columns that are missing in it, an onset run the values.
     """
     from ..case.quantity import Quantity
     from ..errors import CaseError
     from ..transient.api import resume
     from .transient import report
 
-    if _kind(file) == "map":
+    kind = _kind(file)
+    if kind in ("map", "onset") and (duration is not None or animate is not None):
+        raise CaseError(f"--duration and --animate belong to transient runs; this is {'a map' if kind == 'map' else 'an onset run'}.")
+    if kind == "onset":
+        from ..stability import resume_onset
+        from .onset import report as report_onset
+
+        return report_onset(resume_onset(file, Progress(quiet=as_json)), file, plots, as_json)
+    if kind == "map":
         from ..stability import resume_map
         from .map import report as report_map
 
-        if duration is not None or animate is not None:
-            raise CaseError("--duration and --animate belong to transient runs; this is a map.")
         return report_map(resume_map(file, Progress(quiet=as_json), workers), file, plots, as_json)
     end = None
     if duration is not None:

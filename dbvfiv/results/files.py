@@ -95,6 +95,24 @@ def create(path: str | Path, single_writer: bool = False) -> h5py.File:
     return file
 
 
+def check_writable(path: str | Path) -> None:
+    """Make sure that a result may take this name, before anything is computed.
+
+    Raises
+    ------
+    CaseError
+        As `create`.
+    """
+    path = Path(path)
+    refuse_foreign(path)
+    trial = path.with_name(f".{path.name}.trial")
+    try:
+        _create_beside(trial, path).close()
+    finally:
+        if trial.parent.is_dir():
+            trial.unlink(missing_ok=True)
+
+
 @contextmanager
 def writing(path: str | Path) -> Iterator[h5py.File]:
     """A result file that takes its name when it is complete; whoever is killed before leaves what was there.
@@ -108,15 +126,19 @@ def writing(path: str | Path) -> Iterator[h5py.File]:
     refuse_foreign(path)
     new = path.with_name(f".{path.name}.new")
     try:
-        try:
-            file = create(new)
-        except CaseError as error:
-            raise CaseError(str(error).replace(str(new), str(path))) from error.__cause__
-        with file:
+        with _create_beside(new, path) as file:
             yield file
         os.replace(new, path)
     finally:
         new.unlink(missing_ok=True)
+
+
+def _create_beside(new: Path, path: Path) -> h5py.File:
+    """A file under another name, with errors that speak of the name it is to have."""
+    try:
+        return create(new)
+    except CaseError as error:
+        raise CaseError(str(error).replace(str(new), str(path))) from None
 
 
 def reopen(path: str | Path) -> h5py.File:

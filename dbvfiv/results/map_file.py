@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import CaseError
 from ..studies.map_column import CELLS, MapColumn, MapPlan
 from ..studies.observer import Observer
-from .files import create, reading
+from .files import create, reading, reopen
 from .header import Header, write_header
 from .layout import Table, read_texts, replace_texts
 from .mesh import MeshData, write_mesh
@@ -45,10 +45,7 @@ class MapFile(Observer):
         self.path = Path(path)
         self._warnings: list[str] = []
         if again:
-            try:
-                self._file = h5py.File(self.path, "r+")
-            except OSError as error:
-                raise CaseError(f"The result file {str(path)!r} cannot be opened for writing ({error.strerror or error}).") from error
+            self._file = reopen(self.path)
             self._columns, self._onsets = Table(self._file["columns"], MAP), Table(self._file["onsets"], MAP_ONSETS)
             self._messages = self._file["messages"]
             return

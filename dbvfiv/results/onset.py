@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from ..studies.onset_point import FINE
 from .header import Header, read_header
-from .layout import Table, read_texts
+from .layout import read_texts
 from .mesh import MeshData, read_mesh
-from .onset_file import OnsetFile, row_of_point, scan_rows
+from .onset_file import OnsetFile, latest_points, read_rows, row_of_point
 from .result import Result
-from .stability_tables import ONSETS, SCAN
+from .stability_tables import SCAN
 
 if TYPE_CHECKING:
     from ..model import ValveModel
@@ -51,19 +52,24 @@ class OnsetResults(Result):
         """From a run that has just ended."""
         points = [row_of_point(p) for p in result.points]
         header = replace(header, complete=not result.interrupted)
-        return cls(header, MeshData.of(model), points, scan_rows(result), warnings=result.warnings, failures=result.failures, model=model)
+        rows = zip(result.values, result.growth_rates, result.frequencies)
+        scan = [{"value": float(v), "growth_rates": g, "frequencies": f} for v, g, f in rows]
+        return cls(header, MeshData.of(model), points, scan, warnings=result.warnings, failures=result.failures, model=model)
 
     @classmethod
     def read(cls, file: h5py.File, path: Path) -> "OnsetResults":
+        # the second mesh and values without a state belong to the run and not to its result
+        scan = {row["value"]: row for row in read_rows(file["scan"], SCAN) if row["mesh"] == FINE and not row["failure"]}
         return cls(
-            read_header(file), read_mesh(file), _rows(file["onsets"], ONSETS), _rows(file["scan"], SCAN),
+            read_header(file), read_mesh(file), latest_points(file), scan.values(),
             warnings=read_texts(file, "messages/warnings"), failures=read_texts(file, "messages/failures"), path=path,
         )  # fmt: skip
 
     def save(self, path: str | Path) -> Path:
-        scan = [{"value": v, "growth_rates": g, "frequencies": f} for v, g, f in zip(self.values, self.growth_rates, self.frequencies)]
+        rows = zip(self.values, self.growth_rates, self.frequencies)
+        scan = [{"value": v, "growth_rates": g, "frequencies": f, "mesh": FINE, "failure": ""} for v, g, f in rows]
         with OnsetFile(path, self.header, self.mesh) as file:
-            file.finish(self.points, scan, self.warnings, self.failures, self.complete)
+            file.finish(self.warnings, self.failures, self.complete, self.points, scan)
         return Path(path)
 
     def summary(self) -> dict[str, Any]:
@@ -107,11 +113,7 @@ class OnsetResults(Result):
 def _plain(value: Any) -> Any:
     if isinstance(value, (str, np.str_)):
         return str(value) or None
+    if isinstance(value, np.ndarray):
+        return value.tolist()
     value = value.item() if hasattr(value, "item") else value
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _rows(group: h5py.Group, columns) -> list[dict[str, Any]]:
-    table = Table(group, columns)
-    data = {c.name: table.read(c.name) for c in columns}
-    return [{name: values[i] for name, values in data.items()} for i in range(table.rows)]

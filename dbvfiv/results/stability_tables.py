@@ -22,11 +22,15 @@ ONSETS = (
     Column("sides/unstable_count", "", "Unstable eigenvalues there, by the spectrum.", "i4"),
     Column("sides/unstable_count_independent", "", "The same by the argument principle.", "i4"),
     Column("note", "", "What else there is to say.", TEXT),
+    Column("bracket", "of the parameter", "Neighbouring values of the scan that it lies between."),
+    Column("ahead", "", "Modes that grow faster there.", "i4"),
 )
 SCAN = (
-    Column("value", "of the parameter", "Values of the scan, those of narrow tongues included."),
+    Column("value", "of the parameter", "Values of the scan, those of narrow tongues and of the search for onsets included."),
     Column("growth_rates", "1/s", "Of the leading modes."),
     Column("frequencies", "Hz", "Of the leading modes."),
+    Column("mesh", "", "0 for the mesh of the case, 1 for the coarser one.", "i4"),
+    Column("failure", "", "Why there is no state; empty if there is one.", TEXT),
 )
 MAP = (
     Column("value", "of the parameter across", "Value that the cells of this row of the table share."),

@@ -12,7 +12,7 @@ from continuation.hopf import hopf_borders
 from ..errors import CaseError, SolveError
 from .map_column import MapColumn, MapPlan
 from .observer import Observer
-from .onset import system_of
+from .onset_normal_form import system_of
 from .plane_system import RATE, PlaneSystem
 from .stability_walk import StabilityWalk
 

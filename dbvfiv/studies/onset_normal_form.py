@@ -1,0 +1,54 @@
+"""Super- or subcritical: the Hopf normal form of a located onset."""
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from continuation import ContinuationError
+from continuation.hopf import hopf_borders
+from continuation.normal_form import hopf_normal_form
+
+from ..case.model import Case
+from ..errors import SolveError
+from ..model.system import ValveSystem
+from .column import search_options
+from .onset_point import OnsetPoint
+from .parameters import DESIGN, SYSTEM_NAMES, Place, rebuilder
+from .stability_walk import StabilityWalk
+
+#: What the note of a point begins with where its normal form was not found.
+MISSING = "No normal form:"
+
+
+def described(point: OnsetPoint, case: Case, walk: StabilityWalk, mode) -> OnsetPoint:
+    """A point with its criticality, by the multilinear forms of the coupled residual; with the reason in its note where there is none."""
+    try:
+        form = normal_form(case, walk, point.place, mode, point.parameter)
+    except (ContinuationError, SolveError, ArithmeticError, ValueError) as error:
+        return replace(point, note=f"{point.note} {MISSING} {error}".strip())
+    speed = form.crossing.real if form.crossing is not None else None
+    return replace(point, criticality=form.criticality, first_lyapunov_coefficient=form.l1, crossing_speed=speed)
+
+
+def system_of(case: Case, walk: StabilityWalk, place: Place) -> ValveSystem:
+    """The valve as a System of `continuation` at a place."""
+    return ValveSystem(walk.built(replace(place, design={})).model, rebuilder(case), search_options(place.beta))
+
+
+def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: str | None = None):
+    """Hopf normal form at a located onset, a `continuation.HopfNormalForm`.
+
+    Raises
+    ------
+    ContinuationError
+        If the eigenvalue is not simple.
+    """
+    system = system_of(case, walk, place)
+    mu = place.mu()
+    u = system.state(walk.equilibrium(place), mu)
+    omega = abs(complex(mode.eigenvalue).imag)
+    vector = np.concatenate([mode.q, 1j * omega * mode.q, mode.u])
+    left, right = hopf_borders(system.linear(u, mu), omega, vector / np.linalg.norm(vector))
+    name = None if parameter in DESIGN else SYSTEM_NAMES.get(parameter, parameter)
+    return hopf_normal_form(system, u, mu, omega, right, left, name)

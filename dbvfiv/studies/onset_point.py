@@ -1,0 +1,146 @@
+"""What a run over one parameter finds: samples of its scan, and crossings of the imaginary axis."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .parameters import Place
+
+#: Meshes of a run: that of the case, and the coarser one for the uncertainty.
+FINE, COARSE = 0, 1
+
+
+@dataclass(frozen=True)
+class OnsetSample:
+    """Leading eigenvalues at one value, or why there are none.
+
+    Attributes
+    ----------
+    value : float
+    eigenvalues : (k,) complex array, 1/s
+        Sorted by growth rate, a conjugate pair given once.
+    mesh : int
+        `FINE` or `COARSE`.
+    failure : str
+        Empty if there is a state.
+    """
+
+    value: float
+    eigenvalues: np.ndarray
+    mesh: int = FINE
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class Side:
+    """What the full pencil says a little beside an onset.
+
+    Attributes
+    ----------
+    value : float
+    eigenvalue : complex, 1/s
+        Of the crossing mode.
+    leading : float, 1/s
+        Growth rate of the leading mode.
+    unstable, counted : int
+        Unstable eigenvalues by the spectrum and by the argument principle.
+    """
+
+    value: float
+    eigenvalue: complex
+    leading: float
+    unstable: int
+    counted: int
+
+    def summary(self) -> dict:
+        """Plain numbers for JSON, frequencies in Hz."""
+        return {
+            "value": self.value, "growth_rate": self.eigenvalue.real, "frequency": self.eigenvalue.imag / (2 * np.pi),
+            "leading_growth_rate": self.leading, "unstable_count": self.unstable, "unstable_count_independent": self.counted,
+        }  # fmt: skip
+
+    @classmethod
+    def of(cls, summary) -> "Side":
+        """From what `summary` gave."""
+        eigenvalue = complex(summary["growth_rate"], 2 * np.pi * summary["frequency"])
+        counts = (int(summary[name]) for name in ("unstable_count", "unstable_count_independent"))
+        return cls(float(summary["value"]), eigenvalue, float(summary["leading_growth_rate"]), *counts)
+
+
+@dataclass(frozen=True)
+class OnsetPoint:
+    """One crossing of the imaginary axis.
+
+    Attributes
+    ----------
+    parameter : str
+    value : float
+    frequency : float, Hz
+        0 for a real eigenvalue (divergence).
+    growth_rate : float, 1/s
+        Left over at the value: how well it is located.
+    gains : bool
+        True if the mode becomes unstable as the parameter grows.
+    edge : bool
+        True if no other mode is unstable there, so that the state itself changes between stable and unstable.
+    below, above : Side
+        Direct eigenvalues on both sides.
+    confirmed : bool
+        Both sides agree with the crossing, and both counts agree on each side.
+    place : Place
+    bracket : (2,) tuple of float
+        Neighbouring values of the scan that it lies between.
+    ahead : int
+        Modes that grow faster there.
+    criticality : str or None
+        "super", "sub" or "degenerate"; None for a real eigenvalue or where it was not asked for.
+    first_lyapunov_coefficient : float or None
+        Scaled for eigenvectors of unit norm in (q, v, U), 1/s; only its sign carries over to other scalings.
+    crossing_speed : float or None
+        Derivative of the growth rate with respect to the parameter.
+    uncertainty : float or None
+        By Richardson's rule from a second mesh, in units of the parameter.
+    coarse_value : float or None
+        The onset on the second mesh.
+    note : str
+    """
+
+    parameter: str
+    value: float
+    frequency: float
+    growth_rate: float
+    gains: bool
+    edge: bool
+    below: Side
+    above: Side
+    confirmed: bool
+    place: Place
+    bracket: tuple[float, float]
+    ahead: int = 0
+    criticality: str | None = None
+    first_lyapunov_coefficient: float | None = None
+    crossing_speed: float | None = None
+    uncertainty: float | None = None
+    coarse_value: float | None = None
+    note: str = ""
+
+    @property
+    def kind(self) -> str:
+        """"Hopf" or "divergence"."""
+        return "Hopf" if self.frequency > 0 else "divergence"
+
+    @property
+    def key(self) -> tuple[float, float, int]:
+        """What tells it from other crossings of the same scan."""
+        return (*self.bracket, self.ahead)
+
+    def summary(self) -> dict:
+        """Plain SI numbers for JSON."""
+        return {
+            "parameter": self.parameter, "value": self.value, "frequency": self.frequency, "growth_rate": self.growth_rate,
+            "criticality": self.criticality, "first_lyapunov_coefficient": self.first_lyapunov_coefficient, "uncertainty": self.uncertainty,
+            "kind": self.kind, "gains": self.gains, "edge": self.edge, "confirmed": self.confirmed, "crossing_speed": self.crossing_speed,
+            "coarse_value": self.coarse_value, "below": self.below.summary(), "above": self.above.summary(), "note": self.note,
+            "bracket": list(self.bracket), "ahead": self.ahead,
+        }  # fmt: skip
