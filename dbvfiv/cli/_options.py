@@ -10,6 +10,17 @@ import typer
 if TYPE_CHECKING:
     from ..case import Case
 
+
+
+def _writable(path: Path | None) -> Path | None:
+    """Refuse a name that cannot be written before anything is computed."""
+    if path is not None:
+        from ..results.files import check_writable
+
+        check_writable(path)
+    return path
+
+
 CaseFile = Annotated[Optional[Path], typer.Argument(metavar="[CASE]", help="Case file; the 12-inch valve without one.")]
 ResultFile = Annotated[Path, typer.Argument(metavar="RESULT.h5", help="Result file of an earlier command.")]
 Override = Annotated[
@@ -18,7 +29,8 @@ Override = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")]
 Output = Annotated[
-    Optional[Path], typer.Option("-o", "--output", metavar="RESULT.h5", help="Keep everything in this HDF5 file.")
+    Optional[Path],
+    typer.Option("-o", "--output", metavar="RESULT.h5", help="Keep everything in this HDF5 file.", callback=_writable),
 ]
 
 
