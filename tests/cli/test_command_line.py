@@ -167,9 +167,9 @@ def test_json_of_arrays_and_of_what_is_not_finite(capsys):
 def test_a_result_that_cannot_be_written_is_refused_before_the_work(tmp_path, capsys):
     notes = tmp_path / "notes.md"
     notes.write_text("not a result")
-    assert run(["sweep", "--over", "density=1:1000:9", "-o", str(notes)]) == 2
+    assert _run.run(["sweep", "--over", "density=1:1000:9", "-o", str(notes)]) == 2
     said = capsys.readouterr()
     assert "notes.md" in said.err and "not overwritten" in said.err and said.out == ""
-    assert run(["modes", "-o", str(notes / "a.h5")]) == 2
+    assert _run.run(["modes", "-o", str(notes / "a.h5")]) == 2
     assert "a.h5" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["notes.md"]
