@@ -53,6 +53,13 @@ class Cycles:
         count = min(count, len(self))
         return Cycles(self.period, self.shape[-count:], self.spread[-count:], self.mean[-count:], self.error[len(self.error) - count + 1 :])
 
+    def pace(self) -> np.ndarray:
+        """(k - 1,) frequency from each cycle to the next over that of the period, by the phase of the strongest multiple."""
+        lines = np.fft.rfft(self.shape, axis=1)[:, 1:]
+        number = int(np.argmax(np.sum(np.abs(lines) ** 2, axis=0)))
+        turn = np.angle(lines[1:, number] * np.conj(lines[:-1, number]))
+        return 1.0 + turn / (2.0 * np.pi * (number + 1))
+
 
 def extremes(series: Series, period: float) -> tuple[float, float]:
     """Smallest and largest value over the last cycle, between samples too."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from .cycles import Cycles, extremes, harmonics
 from .period import find_period, refine
-from .series import Series
+from .series import Series, undersampled
 from .trend import comes_and_goes, remaining, settled, trend_of
 from .verdict import Verdict
 
@@ -89,6 +89,10 @@ def _judge(series: Series, options: JudgeOptions, residual: float | None, closed
         return Verdict("closed", True, "The signal stays below the level of a closed valve.", **at_end)
     size = max(abs(at_end["mean"]), float(np.ptp(series.values)))
     if at_end["amplitude"] > 1e-9 * size:
+        fast = undersampled(series)
+        if fast:
+            words = f"It swings at {fast:.4g} Hz, and {1.0 / (fast * series.step):.2g} samples a cycle are too few to judge by."
+            return Verdict("undecided", False, words, **at_end)
         found = _oscillation(series, options, size)
         if found is not None:
             return found
@@ -138,6 +142,8 @@ def _name(series: Series, cycles: Cycles, recent: Cycles, facts: dict, direction
         words = f"The amplitude changes by {100 * facts['amplitude_trend']:+.2g} % a cycle"
         if comes_and_goes(cycles.spread, 2.5 * options.band):
             return Verdict("irregular", count >= 2 * options.cycles, words + " after having come and gone before.", **facts)
+        if _slackens(recent.spread):
+            return Verdict(direction, False, words + ", less and less: it may be on its way to another amplitude.", **facts)
         doubled = abs(np.log(cycles.spread[-1] / cycles.spread[max(0, count - options.cycles)])) > 0.3
         return Verdict(direction, count >= options.cycles or (count >= 5 and doubled), words + ".", **facts)
     if count < options.cycles and error > options.periodic and _swings(series) > 4 * options.cycles:
@@ -157,6 +163,9 @@ def _name(series: Series, cycles: Cycles, recent: Cycles, facts: dict, direction
         return Verdict("undecided", False, f"The amplitude has been settled for {still} cycles only.", **facts)
     if direction == "settling":
         return Verdict("undecided", False, "The amplitude still settles.", **facts)
+    pace = cycles.pace()
+    if len(pace) >= 6 and trend_of(pace).significant and abs(trend_of(pace).change) > options.drift:
+        return Verdict("undecided", False, f"The period still changes by {100 * trend_of(pace).slope:+.2g} % a cycle.", **facts)
     means = cycles.last(options.cycles).mean
     if np.ptp(means) > max(10 * options.drift, 0.5 * error) * recent.spread.mean():
         if trend_of(np.exp((means - means.mean()) / np.ptp(means))).significant:
@@ -205,8 +214,22 @@ def _direction(cycles: Cycles, options: JudgeOptions) -> str:
             if abs(left) > 2.5 * options.drift and length == options.cycles:
                 name = "settling"
         if length >= count // 2:
-            return name
+            break
         length = min(2 * length, max(options.cycles, count // 2))
+    # slow growth under noise shows over all cycles first; the later half must not speak against it
+    whole, late = trend_of(spread), trend_of(spread[-(count // 2) :])
+    goes_on = late.slope / whole.slope > 0.5 and abs(late.slope) > 2.0 * late.error if whole.slope else False
+    hidden = not whole.smooth and abs(late.slope - whole.slope) <= 3.0 * late.error
+    if whole.significant and abs(whole.change) > options.drift and (goes_on or hidden):
+        return "growing" if whole.slope > 0 else "decaying"
+    return name
+
+
+def _slackens(spread: np.ndarray) -> bool:
+    """Whether amplitudes change less and less, in proportion: as they do on the way to a cycle, and not in exponential growth or decay."""
+    half = len(spread) // 2
+    first, last = trend_of(spread[: half + 1]), trend_of(spread[-half - 1 :])
+    return bool(abs(last.slope) + 2.0 * last.error < 0.9 * abs(first.slope))
 
 
 def _swings(series: Series) -> int:
@@ -223,9 +246,11 @@ def _noise_on_cycle(cycles: Cycles, options: JudgeOptions) -> bool:
     power = np.mean(left**2)
     if power == 0:
         return True
-    within = np.mean(left[:, :-8] * left[:, 8:]) / power  # an eighth of a radian times pi: a sixteenth of a cycle
+    within = np.mean(left[:, :-8] * left[:, 8:]) / power  # a sixteenth of a cycle
     across = np.mean(left[:-1] * left[1:]) / power
-    return bool(within < 0.5 and across < 0.35)
+    # noise averages out over a cycle; amplitudes that scatter as much as the signal does belong to cycles that are not equal
+    unequal = trend_of(kept.spread).scatter > 0.4 * np.sqrt(np.mean(kept.error**2))
+    return bool(within < 0.5 and across < 0.35 and not unequal)
 
 
 def _factor(error: np.ndarray) -> float:

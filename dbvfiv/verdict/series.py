@@ -88,3 +88,13 @@ def spectrum(series: Series) -> tuple[np.ndarray, np.ndarray]:
     window = np.hanning(len(values) + 2)[1:-1]
     amplitude = 2.0 * np.abs(np.fft.rfft(values * window)) / window.sum()
     return np.fft.rfftfreq(len(values), series.step), amplitude
+
+
+def undersampled(series: Series) -> float:
+    """Frequency, Hz, of a line that holds most of the signal's power and is sampled fewer than four times a cycle; zero without one."""
+    frequency, amplitude = spectrum(series)
+    power = amplitude**2
+    at = int(np.argmax(power))
+    if 4.0 * frequency[at] * series.step <= 1.0:
+        return 0.0
+    return float(frequency[at]) if power[max(at - 3, 0) : at + 4].sum() > 0.5 * power.sum() else 0.0

@@ -15,6 +15,28 @@ def noise(seed=1, count=T.size):
     return np.random.default_rng(seed).standard_normal(count)
 
 
+def relaxing(rate, start):
+    """Cycle whose amplitude goes from `start` to 1 as next to a Hopf point: dA/dt = rate (A - A^3)."""
+    return 3 + np.sin(W * T) / np.sqrt(1 + (start**-2 - 1) * np.exp(-2 * rate * T))
+
+
+def bursts(gap, strength):
+    """Rings of 40 Hz that die in 50 ms, `gap` apart on average, as lips do that slam: arrays of times between them and of their strengths."""
+    out = np.zeros_like(T)
+    for begin, size in zip(np.cumsum(gap), strength):
+        after = np.maximum(T - begin, 0.0)
+        out += size * np.exp(-after / 0.05) * np.sin(2 * np.pi * 40 * after)
+    return out
+
+
+def mapped(a):
+    """Amplitudes of swings by the logistic map: period 2 at a = 3.2, chaos at 3.9."""
+    x = [0.4]
+    for _ in range(260):
+        x.append(a * x[-1] * (1 - x[-1]))
+    return np.array(x[200:])[np.minimum((3 * T).astype(int), 59)] * np.sin(W * T)
+
+
 def narrow_band():
     return lfilter(*butter(2, [2.7 / 500, 3.3 / 500], "band"), noise(2, 2 * T.size))[T.size :]
 
@@ -37,6 +59,12 @@ CYCLES = {
     "second harmonic stronger than the first": (0.4 * np.sin(W * T) + np.sin(2 * W * T + 1), 1 / 3, None),
     "reached fast": (3 + np.tanh(2 * T) * np.sin(W * T), 1 / 3, 1.0),
     "mean settled": (np.sin(W * T) + 5 * np.exp(-T), 1 / 3, 1.0),
+    "relaxed from above": (relaxing(1.0, 3.0), 1 / 3, 1.0),
+    "died down to a small cycle": (3 + (0.05 + np.exp(-1.5 * T)) * np.sin(W * T), 1 / 3, 0.05),
+    "two tones, 2:3": (np.sin(W * T) + 0.7 * np.sin(1.5 * W * T), 2 / 3, None),
+    "unequal swings in pairs": (mapped(3.2), 2 / 3, None),
+    "bursts, all alike": (bursts(np.full(40, 0.5), np.ones(40)), 0.5, None),
+    "recorder of four bits": (np.round(7 * np.sin(W * T)) / 7, 1 / 3, None),
     "overshot amplitude": ((1 + np.exp(-1.5 * T) * np.sin(3 * T)) * np.sin(W * T), 1 / 3, 1.0),
 }
 NOISY_CYCLES = {
@@ -50,6 +78,8 @@ GROWING = {
     "growing by a factor 23 a cycle": 3 + 1e-7 * np.exp(1.5 * T) * np.sin(3 * T),
     "0.1 % a cycle": 3 + np.exp(0.003 * T) * np.sin(W * T),
     "0.03 % a cycle": 3 + np.exp(0.001 * T) * np.sin(W * T),
+    "0.1 % a cycle under noise": np.exp(0.003 * T) * np.sin(W * T) + 0.05 * noise(),
+    "out of noise": 3 + 1e-3 * np.exp(0.6 * T) * np.sin(W * T) + 0.01 * noise(),
     "running away": np.exp(0.5 * T),
     "ramp": T,
 }
@@ -65,11 +95,25 @@ IRREGULAR = {
     "noise": 5 + noise(),
     "noise in a narrow band": narrow_band(),
     "random walk": np.cumsum(noise(3)),
+    "a second frequency of 3 %": np.sin(W * T) + 0.03 * np.sin(np.sqrt(2) * W * T),
+    "amplitude that breathes by 1 %": (1 + 0.01 * np.sin(np.pi * T)) * np.sin(W * T),
+    "phase that wanders": np.sin(W * T + 0.02 * np.cumsum(noise(4))),
+    "frequency that runs away": np.sin(W * T * (1 + 0.05 * T)),
+    "bursts at uneven times": bursts(0.5 + 0.1 * noise(3, 40), np.ones(40)),
+    "bursts of uneven strength": bursts(np.full(40, 0.5), 1 + 0.3 * noise(5, 40)),
+    "chaotic swings": mapped(3.9),
+    "outbursts between quiet cycles": np.sin(W * T) * (1 + 0.6 * ((T % 3.7) > 3.3)),
+    "decayed into noise": 3 + np.exp(-T) * np.sin(W * T) + 0.01 * noise(),
+    "amplitude doubled near the end": np.sin(W * T) * (1 + (T > 9)),
 }
 UNDECIDED = {
     "four cycles": np.sin(2 * np.pi * 0.4 * T),
     "cycle on a ramp": np.sin(W * T) + T,
     "still settling": 3 + np.tanh(0.2 * T) * np.sin(W * T),
+    "on the way to a cycle": relaxing(0.3, 0.4),
+    "period that creeps": np.sin(W * (T + 5e-4 * T**2)),
+    "mean that creeps": 5 + 0.1 * T + np.sin(W * T),
+    "2.3 samples a cycle": np.sin(2 * np.pi * 430 * T),
     "less than one beat": np.sin(W * T) + 0.3 * np.sin(1.02 * W * T),
 }
 
@@ -124,6 +168,13 @@ def test_irregular(name):
 def test_not_decided_too_early(name):
     verdict = judge(T, UNDECIDED[name])
     assert not verdict.decided and verdict.name in ("undecided", "growing"), verdict.reason
+
+
+@pytest.mark.parametrize("rate, start, name", [(0.3, 0.05, "growing"), (0.1, 2.0, "decaying")])
+def test_slow_ways_to_a_cycle_are_not_certain_growth_or_decay(rate, start, name):
+    verdict = judge(T, relaxing(rate, start))
+    assert (verdict.name, verdict.decided) == (name, False) and "less and less" in verdict.reason
+    assert judge(T, GROWING["growing"]).decided and judge(T, DECAYING["decaying"]).decided
 
 
 def test_rates_of_growth_a_cycle():
