@@ -55,3 +55,23 @@ def prepare() -> None:
         config = sys.modules["jax"].config
         config.update("jax_enable_x64", True)
         config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
+    if mpi_size() > 1:
+        _petsc_of_its_own()
+
+
+def mpi_size() -> int:
+    """Processes started by ``mpiexec``, 1 without it."""
+    for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"):
+        if os.environ.get(name, "").isdigit():
+            return int(os.environ[name])
+    return 1
+
+
+def _petsc_of_its_own() -> None:
+    """Start PETSc for this process alone: by itself it would wait for the others, which wait for columns of a map."""
+    try:
+        import petsc4py
+        from mpi4py import MPI
+    except ImportError:
+        return
+    petsc4py.init(comm=MPI.COMM_SELF)

@@ -8,6 +8,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Callable, Iterable, Iterator
 
 from ..case.model import Case
+from ..runtime import mpi_size
 from .map_column import MapColumn, MapPlan, solve_column
 from .stability_walk import StabilityWalk
 
@@ -16,14 +17,6 @@ TRIES = 3
 
 _walk: StabilityWalk | None = None
 _plan: MapPlan | None = None
-
-
-def mpi_size() -> int:
-    """Processes started by ``mpiexec``, 1 without it."""
-    for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"):
-        if os.environ.get(name, "").isdigit():
-            return int(os.environ[name])
-    return 1
 
 
 def columns(plan: MapPlan, wanted: Iterable[tuple[float, int]], workers: int, warn: Callable[[str], None], walk: StabilityWalk | None = None) -> Iterator[MapColumn]:

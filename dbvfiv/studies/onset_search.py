@@ -141,6 +141,8 @@ class OnsetSearch:
         if point is None:
             point, mode = self._located(crossing)
             self._keep(point)
+        else:
+            locate(self.scan, crossing, self.options.tolerance)  # only repeats known samples, which belong to the scan
         if self.options.normal_form and point.frequency > 0 and point.criticality is None and MISSING not in point.note:
             self.observer.progress(f"normal form at {point.value:.6g}")
             self.points[key] = point  # an interruption does not take away what is known
