@@ -138,6 +138,8 @@ def _name(series: Series, cycles: Cycles, recent: Cycles, facts: dict, direction
     rate = abs(facts["amplitude_trend"])
     if error > options.noisy and direction in ("growing", "decaying") and rate < 0.5 * error:
         direction = ""  # the amplitudes wander because nothing repeats
+    if direction in ("growing", "decaying") and error > options.periodic and rate < 0.2 * error and not _noise_on_cycle(cycles, options):
+        direction = ""  # growth as slow as that does not make cycles so different
     if direction in ("growing", "decaying"):
         words = f"The amplitude changes by {100 * facts['amplitude_trend']:+.2g} % a cycle"
         if comes_and_goes(cycles.spread, 2.5 * options.band):
@@ -167,7 +169,7 @@ def _name(series: Series, cycles: Cycles, recent: Cycles, facts: dict, direction
     if len(pace) >= 6 and trend_of(pace).significant and abs(trend_of(pace).change) > options.drift:
         return Verdict("undecided", False, f"The period still changes by {100 * trend_of(pace).slope:+.2g} % a cycle.", **facts)
     means = cycles.last(options.cycles).mean
-    if np.ptp(means) > max(10 * options.drift, 0.5 * error) * recent.spread.mean():
+    if np.ptp(means) > max(10 * options.drift, (1.5 if noisy else 0.5) * error) * recent.spread.mean():
         if trend_of(np.exp((means - means.mean()) / np.ptp(means))).significant:
             return Verdict("undecided", False, "The mean of the cycles still moves.", **facts)
         return Verdict("irregular", True, "The mean of the cycles comes and goes.", **facts)

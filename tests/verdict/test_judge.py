@@ -182,6 +182,18 @@ def test_rates_of_growth_a_cycle():
     assert judge(T, GROWING["growing"]).amplitude_trend == pytest.approx(0.5 / 3, rel=0.01)
 
 
+def test_coarse_samples_of_a_noisy_cycle():
+    for seed in range(4):
+        values = np.sin(W * T) + 0.05 * noise(seed)
+        assert judge(T[::16], values[::16]).name == "limit cycle"
+
+
+@pytest.mark.parametrize("share, ratio", [(0.4536, 1.45745), (0.4752, 1.52306)])
+def test_two_frequencies_near_a_simple_ratio_are_not_growth(share, ratio):
+    verdict = judge(T, np.sin(W * T) + share * np.sin(ratio * W * T + 1))
+    assert verdict.name == "irregular", verdict.reason
+
+
 def test_sampling_at_the_period_is_not_steady_while_the_system_moves():
     strobed = 3 + np.sin(2 * np.pi * 1000 * T)
     assert judge(T, strobed).name == "steady"  # a bare series cannot tell
