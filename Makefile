@@ -1,5 +1,6 @@
 # Two commands matter: `make demo` and `make test`; each sets up what is missing first.
 PYTHON = $(shell cat build/setup/python 2>/dev/null)
+JOBS ?= 2
 
 .PHONY: setup test verify bench demo docs clean
 .DEFAULT_GOAL := demo
@@ -8,10 +9,11 @@ setup:
 	@tools/setup
 
 test: setup
-	@$(PYTHON) -m pytest -m "not slow"
+	@$(PYTHON) -m pytest -n $(JOBS) --dist loadscope -m "not slow"
 
 verify: setup
 	@$(PYTHON) -m pytest -s tests/verification
+	@$(PYTHON) -m pytest -m slow --ignore=tests/verification
 
 bench: setup
 	@$(PYTHON) -m benchmarks
