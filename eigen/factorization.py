@@ -7,6 +7,8 @@ real MUMPS refactorisation, the equivalent real form of twice the size 6 times.
 """
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
@@ -112,6 +114,9 @@ class MumpsFactorization:
         self._out_array = np.zeros(n, self.dtype)
         self._rhs = PETSc.Vec().createWithArray(self._rhs_array, comm=PETSc.COMM_SELF)
         self._out = PETSc.Vec().createWithArray(self._out_array, comm=PETSc.COMM_SELF)
+        # PETSc keeps what Python lets go of, factors included, until it is told
+        release = weakref.finalize(self, _release, pc, self._solver, self._matrix, self._rhs, self._out)
+        release.atexit = False
 
     def refactor(self, values: np.ndarray) -> None:
         """Factor the matrix with these entries on the pattern.
@@ -184,6 +189,11 @@ class MumpsFactorization:
         for w in wrapped:
             w.destroy()
         return out
+
+
+def _release(*objects):
+    for item in objects:
+        item.destroy()
 
 
 class SuperluFactorization:

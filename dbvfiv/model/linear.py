@@ -11,6 +11,7 @@ gives the same q with a sparse matrix hardly larger than K. The last row and col
 """
 from __future__ import annotations
 
+import weakref
 from functools import cache
 
 import numpy as np
@@ -60,6 +61,9 @@ class DirectFactor:
         self._pc.setFactorSolverType(direct_solver())
         self._rhs, self._solution = self._matrix.createVecs()
         self.factorisations = 0
+        # PETSc keeps what Python lets go of, factors included, until it is told; runs that start afresh often would fill the memory
+        release = weakref.finalize(self, _release, self._pc, self._solver, self._matrix, self._rhs, self._solution)
+        release.atexit = False
 
     @property
     def values(self) -> np.ndarray:
@@ -98,6 +102,11 @@ class DirectFactor:
         self._rhs.setArray(rhs)
         self._pc.applyTranspose(self._rhs, self._solution)
         return np.array(self._solution.getArray().real)
+
+
+def _release(*objects: PETSc.Object) -> None:
+    for item in objects:
+        item.destroy()
 
 
 class SingularMatrix(ArithmeticError):

@@ -1,6 +1,7 @@
 """Equilibrium at one pressure: globalised Newton by PETSc's SNES on the coupled residual, solved directly."""
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,17 +93,18 @@ class EquilibriumSolver:
         self._snes = snes = PETSc.SNES().create(PETSc.COMM_SELF)
         self._vector = PETSc.Vec().createSeq(n)
         self._residual = PETSc.Vec().createSeq(n)
-        jacobian = PETSc.Mat().createPython((n, n), context=_CoupledTangent(self), comm=PETSc.COMM_SELF)
+        me = weakref.proxy(self)  # PETSc would keep solver, model and factors alive for ever
+        jacobian = PETSc.Mat().createPython((n, n), context=_CoupledTangent(me), comm=PETSc.COMM_SELF)
         jacobian.setUp()
-        snes.setFunction(self._evaluate, self._residual)
-        snes.setJacobian(self._linearise, jacobian, jacobian)
-        snes.setConvergenceTest(self._test)
+        snes.setFunction(lambda *given: me._evaluate(*given), self._residual)
+        snes.setJacobian(lambda *given: me._linearise(*given), jacobian, jacobian)
+        snes.setConvergenceTest(lambda *given: me._test(*given))
         snes.setMaxFunctionEvaluations(1000)
         ksp = snes.getKSP()
         ksp.setType("preonly")
         pc = ksp.getPC()
         pc.setType("python")
-        pc.setPythonContext(_DirectPC(self))
+        pc.setPythonContext(_DirectPC(me))
         prefix = f"dbvfiv_equilibrium_{id(self)}_"
         snes.setOptionsPrefix(prefix)
         settings = PETSc.Options(prefix)
