@@ -36,6 +36,7 @@ def animate(result: "TransientResults", path: Path, frames: int = 48, duration: 
     times = np.linspace(start, end, frames, endpoint=False)
     rows = np.searchsorted(t, times).clip(0, len(t) - 1)
     z = 1e3 * result.mesh.z
+    moving = _moving(h["centre_line"][rows])
     rest = 1e3 * result.mesh.nodes[result.mesh.rows[:, 0], 1]
     line = 1e3 * h["centre_line"]
     area = 1e4 * 4.0 * h["station_area"]
@@ -46,11 +47,14 @@ def animate(result: "TransientResults", path: Path, frames: int = 48, duration: 
         upper.plot(z, rest, color=REST, lw=1.0, ls="--")
         upper.plot(z, -rest, color=REST, lw=1.0, ls="--")
         walls = [upper.plot(z, sign * rest, color=COMPUTED)[0] for sign in (1, -1)]
-        top = 1.1 * (rest + line[rows]).max()
-        upper.set(xlim=(0, z[-1]), ylim=(-top, top), xlabel="Distance from the lip z, mm", ylabel="y, mm")
-        upper.set_title("Centre line, x = 0", loc="left", fontweight="bold")
+        top = 1.1 * (rest + line[rows])[:, moving].max()
+        upper.set(xlim=(0, z[moving][-1]), ylim=(-top, top), ylabel="y, mm")
+        upper.set_title("Centre line, x = 0, where the valve moves", loc="left", fontweight="bold")
         bar = middle.plot(z, area[rows[0]], color=COMPUTED)[0]
-        middle.set(xlim=(0, z[-1]), ylim=(min(0.0, 1.1 * area[rows].min()), 1.05 * area[rows].max()), xlabel="Distance from the lip z, mm", ylabel="Area, cm²")
+        low, high = area[rows][:, moving].min(), area[rows][:, moving].max()
+        middle.axhline(0.0, color=REST, lw=0.8)
+        middle.set(xlim=(0, z[moving][-1]), ylim=(min(0.0, 1.1 * low), 1.05 * high), xlabel="Distance from the lip z, mm", ylabel="Flow area, cm²")
+        lower.set_xlim(t[shown][0], t[shown][-1])
         lower.plot(t[shown], 1e3 * h["lip_opening"][shown], color=COMPUTED, lw=1.2)
         dot = lower.plot([], [], "o", color=ACCENT)[0]
         lower.set(xlabel="Time, s", ylabel="Lip opening, mm")
@@ -69,3 +73,10 @@ def animate(result: "TransientResults", path: Path, frames: int = 48, duration: 
         except OSError as error:
             raise CaseError(f"{str(path)!r} cannot be written ({error.strerror or error}).") from error
     return path
+
+
+def _moving(line: np.ndarray) -> slice:
+    """Rows from the lip to the last one that swings by more than a seventh of the largest swing, of the times (k, m) shown."""
+    swing = np.ptp(line, axis=0)
+    reach = np.flatnonzero(swing > 0.15 * swing.max()) if swing.max() > 0 else np.arange(line.shape[1])
+    return slice(0, max(int(reach[-1]) + 1, 2))

@@ -1,0 +1,35 @@
+"""Transient runs kept in files, so that a study that is started again goes on where it was."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import dbvfiv
+from dbvfiv.errors import CaseError
+from dbvfiv.transient.api import resume, transient
+
+
+def kept_run(case, path: Path, observer=None):
+    """Result of a case's run from its file, after finishing the run or making it where need be.
+
+    Raises
+    ------
+    SystemExit
+        If the file holds a run of another case.
+    """
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return transient(dbvfiv.load(case).model, path.stem, path, observer)
+    try:
+        result = dbvfiv.load_result(path)
+    except CaseError:  # killed before its first step was safe
+        return resume(path, observer=observer)
+    kept, wanted = result.case.to_dict(), case.to_dict()
+    longer = case.transient.duration > result.case.transient.duration
+    for one in (kept, wanted):
+        for name in ("start_file", "duration"):  # paths may be written relative to another folder; runs may be carried on
+            one["transient"].pop(name, None)
+    if kept != wanted:
+        raise SystemExit(f"{path} holds a run of another case; move it away or choose another folder.")
+    ended = result.complete and not (longer and result.verdict["verdict"] not in case.transient.stop_when)
+    return result if ended or result.failures else resume(path, max(case.transient.duration, result.case.transient.duration), observer)
