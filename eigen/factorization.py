@@ -115,7 +115,8 @@ class MumpsFactorization:
         self._rhs = PETSc.Vec().createWithArray(self._rhs_array, comm=PETSc.COMM_SELF)
         self._out = PETSc.Vec().createWithArray(self._out_array, comm=PETSc.COMM_SELF)
         # PETSc keeps what Python lets go of, factors included, until it is told
-        release = weakref.finalize(self, _release, pc, self._solver, self._matrix, self._rhs, self._out)
+        self._held = [pc, self._solver, self._matrix, self._rhs, self._out]
+        release = weakref.finalize(self, _release, self._held)
         release.atexit = False
 
     def refactor(self, values: np.ndarray) -> None:
@@ -132,6 +133,7 @@ class MumpsFactorization:
         if self._factor is None:
             pc.setFactorSetUpSolverType()
             self._factor = pc.getFactorMatrix()
+            self._held.append(self._factor)
             self._factor.setMumpsIcntl(14, 50)
         self._solver.setOperators(self._matrix)
         self._solver.setUp()
@@ -191,7 +193,7 @@ class MumpsFactorization:
         return out
 
 
-def _release(*objects):
+def _release(objects):
     for item in objects:
         item.destroy()
 

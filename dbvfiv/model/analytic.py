@@ -66,9 +66,9 @@ class AnalyticResidual:
         self._check_at_rest(motion)
         out = np.array(_second(self._static, motion, parameters, a, b, self._arrays))
         form = partial(_form, self.model.shell.second, motion[0])
-        # the bilinear form of the force, once: beta enters through mixed pairs of displacements and velocities
+        # form(a0, b0) + beta (form(a0, b1) + form(a1, b0)), in one evaluation where one of the motions has no velocity
         beta = parameters["beta"]
-        out[:-1] += form(a[0], b[0] + beta * b[1]) + beta * form(a[1], b[0])
+        out[:-1] += form(a[0] + beta * a[1], b[0] + beta * b[1]) - beta**2 * form(a[1], b[1])
         return out
 
     def third(self, motion, parameters, a, b, c) -> np.ndarray:
