@@ -54,8 +54,10 @@ def main() -> None:
         for density in sorted(given.densities, reverse=way == "down"):
             case = base.replace({"fluid.density": density})
             if theory:  # next to the onset everything is slow
-                rate = abs(np.interp(density, theory["densities"], theory["growth"]))
-                case = case.replace({"transient.duration": min(max(case.transient.duration, 3.0 / rate), given.longest)})
+                rate = np.interp(density, theory["densities"], theory["growth"])
+                case = case.replace({"transient.duration": min(max(case.transient.duration, 3.0 / rate if rate > 1e-6 else 0.0), given.longest)})
+            if way != given.ways.split(",")[0] and not _moving(case, last):
+                break  # at rest again: from here on it would be the first way's kicks once more
             last = _run(case, given.folder / f"{way}-{density:g}.h5", last)
             rows.append(_row(way, last))
             print(", ".join(f"{key} {_text(rows[-1][key])}" for key in COLUMNS[:9]), flush=True)
@@ -65,9 +67,12 @@ def main() -> None:
 
 def _run(case, path: Path, last):
     """Result of a run from the state that the last one ended in, or from a kick where that was at rest."""
-    moving = last is not None and last.verdict["lip_opening"]["amplitude"] > 0.5 * case.transient.kick_opening
-    start = {"transient.start": "state", "transient.start_file": str(last.path)} if moving else {"transient.start": "kick"}
+    start = {"transient.start": "state", "transient.start_file": str(last.path)} if _moving(case, last) else {"transient.start": "kick"}
     return kept_run(case.replace(start), path)
+
+
+def _moving(case, last) -> bool:
+    return last is not None and last.verdict["lip_opening"]["amplitude"] > 0.5 * case.transient.kick_opening
 
 
 def _row(way: str, result) -> dict:
