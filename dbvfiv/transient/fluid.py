@@ -97,18 +97,16 @@ class MovingFluid:
 
     def pressure(self, flow: FlowState, psi_rate: np.ndarray, inlet: float) -> np.ndarray:
         """Pressures (m,), Pa; the first, at the outlet, is to vanish."""
-        head = self.head(flow.speed)
-        return inlet - self.density * (head - head[-1] + psi_rate)
+        return inlet - self.density * (self.head(flow.speed) + psi_rate)
 
-    @staticmethod
-    def head(speed):
-        """Velocity head over density, m2/s2, that a speed, m/s, costs."""
-        return 0.5 * speed * speed
+    def head(self, speed: np.ndarray) -> np.ndarray:
+        """What speeds (m,) cost on the way from the inlet to each station: pressure over density (m,), m2/s2."""
+        return 0.5 * (speed * speed - speed[-1] ** 2)
 
-    @staticmethod
-    def head_slope(speed):
-        """Its derivative, m/s."""
-        return speed
+    def head_slope(self, speed: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Its derivative along changes (m,) or (m, l) of the speeds."""
+        products = (speed * change.T).T
+        return products - products[-1]
 
     def slopes(self, area: np.ndarray, rate: np.ndarray, velocity: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Derivatives of the speeds with respect to areas (m, m), area rates (m, m) and inlet velocity (m,)."""
@@ -139,12 +137,11 @@ class MovingFluid:
         velocity : float
             Derivative of the area rates with respect to the areas at the end of the step, 1/s.
         """
-        here = self.head_slope(self.state(*mid, speed).speed)
+        here = self.state(*mid, speed).speed
         area, rate, own = self.slopes(*mid, speed)
-        by_area = theta * here[:, None] * (area + velocity * rate)
-        by_speed = theta * (here * own - self.head_slope(speed))
+        by_area = theta * self.head_slope(here, area + velocity * rate)
+        by_speed = theta * self.head_slope(here, own)
         area, rate, own = self.slopes(*new, new_speed)
         by_area += psi_weight * self.integrate(area + velocity * rate)
         by_speed += psi_weight * self.integrate(own)
-        # the inlet's own speed is the unknown itself
         return -self.density * by_area, -self.density * by_speed
