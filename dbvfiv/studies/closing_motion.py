@@ -58,56 +58,80 @@ class ContactValve(ValveModel):
 
 
 class ReversibleFluid(MovingFluid):
-    """Flow that resists in both directions: U |U| in place of U^2.
+    """Flow that may run backwards.
 
-    A jet leaves the lips with its velocity head and that is lost; flow drawn in through the lips loses it behind them as well. With U^2 a reversed flow
-    would gain pressure where it should lose it, and run away.
+    Outwards it is that of the ordinary fluid. Drawn in through the lips, it starts from rest outside, where the pressure vanishes, gains speed at the cost
+    of pressure as far as sections get narrower, and wherever they widen it goes on as a jet whose velocity head is lost. The ordinary law would give that
+    head back at the inlet, so that a reversed flow gained pressure where it should lose it, and ran away.
     """
 
     def open_area(self, area: np.ndarray) -> np.ndarray:
         """Areas (m,) that the fluid sees: they stay above the channel's floor."""
         return self._open(area)[0]
 
+    def head(self, speed):
+        out, back = np.maximum(speed, 0.0), np.minimum(speed, 0.0)
+        head = 0.5 * (out * out - out[-1] ** 2)
+        head[:-1] -= 0.5 * _upstream(np.maximum(np.diff(back * back), 0.0))
+        head[0] -= 0.5 * back[0] ** 2  # what stands for the outlet is the still water outside
+        return head
+
+    def head_slope(self, speed, change):
+        out, back = np.maximum(speed, 0.0), np.minimum(speed, 0.0)
+        slope = (out * change.T).T
+        slope -= slope[-1]
+        gains = ((np.diff(back * back) > 0.0) * np.diff(back * change.T)).T
+        slope[:-1] -= _upstream(gains)
+        slope[0] -= back[0] * change[0]
+        return slope
+
     def velocity(self, mid, new, inlet, old, theta, psi_weight, psi_known) -> float:
-        """New inlet velocity at which the outlet pressure vanishes; more velocity always means less pressure, so there is one."""
-        s0, s1 = (float(part[0]) for part in self._affine(*mid))
+        """New inlet velocity at which the pressure outside vanishes: the one next to the old one, in the direction in which that misses it."""
+        still, unit = self._affine(*mid)
         p0, p1 = (float(part) for part in self.integrate(np.stack(self._affine(*new), axis=1))[0])
         start = (1.0 - theta) * old  # the velocity where the equations are met is start + theta times the new one
-        b = psi_weight * p1 / theta
-        c = psi_weight * (p0 - p1 * start / theta) + psi_known - inlet / self.density
-        # between the zeros of the two speeds the equation is a quadratic; the signs on the piece that holds its root are found first
-        for low, high in _pieces(-s0 / s1):
-            inside = high - 1.0 if low == -np.inf else low + 1.0 if high == np.inf else 0.5 * (low + high)
-            outer, inner = np.sign(s0 + s1 * inside), np.sign(inside)
-            roots = _roots(0.5 * (outer * s1 * s1 - inner), outer * s0 * s1 + b, 0.5 * outer * s0 * s0 + c)
-            for root in roots:
-                if low - 1e-12 <= root <= high + 1e-12:
-                    return float((root - start) / theta)
-        return np.nan
+        rise = psi_weight * p1 / theta
+        known = psi_weight * (p0 - p1 * start / theta) + psi_known - inlet / self.density
 
-    @staticmethod
-    def head(speed):
-        return 0.5 * speed * np.abs(speed)
+        def missing(u: float) -> tuple[float, float]:
+            speed = still + u * unit
+            return float(self.head(speed)[0]) + rise * u + known, float(self.head_slope(speed, unit)[0]) + rise
 
-    @staticmethod
-    def head_slope(speed):
-        return np.abs(speed)
+        return (_zero(missing, old) - start) / theta
 
 
-def _pieces(zero: float) -> list[tuple[float, float]]:
-    low, high = min(zero, 0.0), max(zero, 0.0)
-    return [(-np.inf, low), (low, high), (high, np.inf)] if high > low else [(-np.inf, low), (low, np.inf)]
+def _upstream(values: np.ndarray) -> np.ndarray:
+    """Sums of values (m, ...) from each station to the inlet."""
+    return np.cumsum(values[::-1], axis=0)[::-1]
 
 
-def _roots(a: float, b: float, c: float) -> list[float]:
-    """Real zeros of a x^2 + b x + c without cancellation."""
-    if a == 0.0:
-        return [-c / b] if b else []
-    square = b * b - 4.0 * a * c
-    if square < 0.0:
-        return []
-    half = -0.5 * (b + np.copysign(np.sqrt(square), b if b else 1.0))
-    return [half / a, c / half] if half else [0.0]
+def _zero(function, start: float) -> float:
+    """Zero of a function that grows from minus to plus infinity, next to a start; `function` returns value and slope. Not a number if there is none.
+
+    Newton's method within a bracket, bisection where it leaves it or slackens.
+    """
+    value, _ = function(start)
+    if value == 0.0 or not np.isfinite(value):
+        return start if value == 0.0 else np.nan
+    far, reach = start, -np.sign(value) * max(1e-3, 0.1 * abs(start))
+    while function(far)[0] * value > 0.0:
+        far, reach = far + reach, 2.0 * reach
+        if not np.isfinite(far):
+            return np.nan
+    low, high = (far, start) if value > 0.0 else (start, far)
+    u, last = start, high - low
+    for _ in range(200):
+        value, slope = function(u)
+        if value == 0.0:
+            return u
+        low, high = (low, u) if value > 0.0 else (u, high)
+        step = -value / slope if slope else np.inf
+        if not (low <= u + step <= high and abs(step) <= 0.5 * abs(last)):
+            step = 0.5 * (low + high) - u
+        if u + step == u:
+            break
+        u, last = u + step, step
+    return u
 
 
 class ClosingMotion(ValveMotion):
