@@ -210,6 +210,13 @@ class Closure(Section):
         0.2, "A section counts as shut when less than this fraction of the lip's opening at rest is left.", ge=0, lt=1
     )
     eigenvalues: StrictInt = key(4, "Lowest eigenvalues of the tangent stiffness to follow.", ge=1, le=100)
+    balance_tolerance: Number = key(
+        0.0,
+        "Largest error of the energy balance over the work; load steps that miss it are halved as often as it takes, for the balance alone. 0 reports the "
+        "balance of the load steps as they are.",
+        ge=0,
+        le=1,
+    )
     arclength: StrictBool = key(True, "Go on along the equilibrium path by arclength when load steps end at a limit point.")
     reversal_time: Time = key(0.2, "Time in which the drive turns from open_pressure to as much back pressure.", gt=0, le=1e3)
     reversal_hold: Time = key(0.2, "Time for which the back pressure is then held.", ge=0, le=1e3)

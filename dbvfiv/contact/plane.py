@@ -120,6 +120,12 @@ class PlaneContact:
         _, pressure, _ = self.law.respond(self.gap(nodal, directors), multiplier)
         _add(force, self._unknowns, -(self.area * pressure)[:, None] * self._slope(first))
 
+    def add_multiplier_derivative(self, force, nodal, directors, first, multiplier, change) -> None:
+        """Add the derivative of the internal force along a change (k,) of the multipliers to force (n,)."""
+        _, _, stiffness = self.law.respond(self.gap(nodal, directors), multiplier)
+        pressure = stiffness / self.law.penalty * change
+        _add(force, self._unknowns, -(self.area * pressure)[:, None] * self._slope(first))
+
     def add_force_and_tangent(self, force, data, nodal, directors, first, second, multiplier) -> None:
         """Add force and symmetric tangent values on the shell's pattern; `second` (nn, 3, 3) as `Shell.directors` returns."""
         _, pressure, stiffness = self.law.respond(self.gap(nodal, directors), multiplier)

@@ -147,6 +147,19 @@ class PressedShell:
         nodal = self.nodal(q)
         return self.contact.energy(nodal, self.shell.directors(nodal)[0], self.multiplier)
 
+    def renewal_force(self, q: np.ndarray) -> np.ndarray:
+        """Derivative (k,) of the contact's potential with respect to the multipliers, m3: the work of renewing them."""
+        return self.contact_state(q).force / self.contact.law.penalty
+
+    def multiplier_derivative(self, q: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Derivative (n,) of the residual along a change (k,) of the multipliers."""
+        out = np.zeros(self.size)
+        if self.contact is not None and change.any():
+            nodal = self.nodal(q)
+            d, d1, _ = self.shell.directors(nodal)
+            self.contact.add_multiplier_derivative(out, nodal, d, d1, self.multiplier, change)
+        return out
+
     # -- what solvers ask -----------------------------------------------------------------------------------------------------------
 
     def factor(self) -> DirectFactor:

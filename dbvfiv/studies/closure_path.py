@@ -10,8 +10,8 @@ from continuation import NotConverged
 from ..errors import SolveError
 from ..model.newton import NewtonOptions
 from .closure_arclength import arclength_path
-from .closure_balance import EnergyLedger
 from .closure_buckling import Buckling, BucklingWatch
+from .closure_energy import EnergyLedger
 from .closure_model import ClosureModel
 from .closure_opening import FACES, opening
 from .closure_state import QUARTERS, ClosureState, contact_front, describe_closure
@@ -52,6 +52,7 @@ class ClosureOptions:
     penetration: float = 1e-6
     eigenvalues: int = 4
     arclength: bool = True
+    balance_tolerance: float = 0.0
 
     @classmethod
     def of(cls, case) -> "ClosureOptions":
@@ -60,6 +61,7 @@ class ClosureOptions:
         return cls(
             NewtonOptions(steady.tolerance, steady.max_iterations), closure.max_step, closure.max_step / 20,
             penetration=closure.penetration, eigenvalues=closure.eigenvalues, arclength=closure.arclength,
+            balance_tolerance=closure.balance_tolerance,
         )  # fmt: skip
 
 
@@ -107,7 +109,7 @@ class ClosurePath:
         self.points: list[PathPoint] = []
         self.watch = BucklingWatch(pressed, steps, options.eigenvalues)
         self.beyond_limit = False
-        self.energy = EnergyLedger(pressed)
+        self.energy = EnergyLedger(pressed, options.balance_tolerance)
         self.energy.begin(self.steps.q, 0.0)
 
     @property
@@ -140,10 +142,10 @@ class ClosurePath:
                     f"{pressed.contact_state(self.steps.q).penetration:.2g} m; a larger closure.contact_depth may help."
                 )
             pressed.renew_multipliers(self.steps.q)
-            self.energy.renewed()
             last = self.steps.settle()
             self.energy.add(self.steps.q, target, self.steps.slope)
             iterations, updates = iterations + last.iterations, updates + 1
+        self.energy.settle()
         spectrum = self.watch.see(target, self.steps.q)
         return describe_closure(
             self.model, self.steps.q, target, spectrum, beyond_limit=self.beyond_limit, energy_balance=self.energy.error,
@@ -167,7 +169,7 @@ class ClosurePath:
             raise SolveError(f"{error} Arclength did not get under way either: {reason}") from reason
         for point in path.branch.points[1:]:
             self.points.append(self._point(float(point.z[-1]), point.z[:-1], np.empty(0), arclength=True))
-            self.energy.add(point.z[:-1], float(point.z[-1]))
+            self.energy.add(point.z[:-1], float(point.z[-1]), refine=False)
         for limit in path.limits:
             self.buckling.append(Buckling("limit point", limit.pressure, limit.q, limit.shape, limit.eigenvalue))
         self.beyond_limit = self.beyond_limit or bool(path.limits)

@@ -11,7 +11,8 @@ from dbvfiv.contact import ContactLaw, PlaneContact, PressedShell, tributary_are
 from dbvfiv.model.linear import DirectFactor
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.shell import Shell, ShellMesh
-from dbvfiv.studies.closure_balance import EnergyLedger, force_balance
+from dbvfiv.studies.closure_balance import force_balance
+from dbvfiv.studies.closure_energy import EnergyLedger
 from dbvfiv.studies.load_steps import LoadStepOptions, LoadSteps
 from tests.shell.structures import grid, isotropic_section
 
