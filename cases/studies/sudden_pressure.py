@@ -118,7 +118,6 @@ def draw_pressures(rows: list[dict], runs: dict, path: Path) -> None:
         distance.set(xlabel="Time, s", ylabel="Relative distance to the steady state", ylim=(1e-9, 2))
         flow.set_title("Water, pressure applied at once", loc="left", fontweight="bold")
         distance.set_title("dotted: decay of the slowest mode", loc="left")
-        figure.tight_layout()
         figure.savefig(path, dpi=90)
 
 
@@ -142,7 +141,6 @@ def draw_groups(groups: dict, path: Path) -> None:
             panel.set_ylabel("Mass flow, kg/s")
         for panel in panels[: len(groups)][-columns:]:
             panel.set_xlabel("Time, s")
-        figure.tight_layout()
         figure.savefig(path, dpi=80)
 
 

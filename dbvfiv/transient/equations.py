@@ -264,8 +264,9 @@ class ValveMotion:
         self._factor = None
 
     @property
-    def factorisations(self) -> int:
-        return 0 if self._factor is None else self._factor.factorisations
+    def factored(self) -> bool:
+        """Whether there are factors to solve with."""
+        return self._factor is not None and self._factor.factorisations > 0
 
     def _solver(self, inner: int) -> CoupledFactor:
         if self._factor is None:

@@ -45,7 +45,7 @@ class StepOptions:
     tolerance: float = 1e-4
     floor: float = 1e-10
     max_iterations: int = 20
-    refactor_at: float = 0.3
+    refactor_at: float = 0.5
     diverged: float = 100.0
     smallest_fraction: float = 1.0 / 16.0
     largest_turn: float = 0.3

@@ -1,0 +1,79 @@
+"""Steps of the 28 x 48 valve in a limit cycle against one force evaluation and one solve."""
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from time import perf_counter, process_time
+
+import numpy as np
+
+from dbvfiv.case.model import Case
+from dbvfiv.model import ValveModel
+from dbvfiv.results.header import Header
+from dbvfiv.studies.observer import Observer
+from dbvfiv.transient.file import TransientFile
+from dbvfiv.transient.options import RunOptions
+from dbvfiv.transient.run import Runner
+
+from .registry import Row, benchmark
+
+STEPS = 2000
+#: 6 kPa and a fluid somewhat lighter than at the onset of flutter; the push is near the amplitude of the cycle.
+CYCLE = {
+    "drive.pressure": 6e3, "fluid.density": 50.0, "damping.alpha": 0.0, "transient.start": "kick", "transient.kick_opening": 4.6e-3,
+    "transient.step": 5e-4, "transient.duration": 0.25,
+}  # fmt: skip
+
+
+class Unit(Observer):
+    """Measures one force evaluation and one solve while a run goes on, so that a slow spell of the machine meets both, and its own time."""
+
+    def __init__(self, every: int = 50):
+        self.every, self.count, self.spent, self.wall = every, 0, 0.0, 0.0
+        self.force, self.solve = [], []
+        self.motion = self.q = None
+
+    def item(self, row) -> None:
+        self.count += 1
+        if self.count % self.every or not self.motion.factored:
+            return
+        start, wall = process_time(), perf_counter()
+        for kept, function in ((self.force, lambda: self.motion.model.shell.force(self.q)), (self.solve, lambda: self.motion.solve(self.q, 0.0))):
+            for _ in range(2):  # the first for the caches
+                begin = process_time()
+                function()
+                taken = process_time() - begin
+            kept.append(taken)
+        self.spent += process_time() - start
+        self.wall += perf_counter() - wall
+
+
+@benchmark("time-steps")
+def time_steps():
+    """2000 steps of 0.1 ms as `dbvfiv transient` makes them: history, verdicts and the file included."""
+    case = Case().replace(CYCLE)
+    model = ValveModel(case)
+    cycle = Runner(model).start().progress.state
+    case = case.replace({"transient.step": 1e-4, "transient.duration": cycle.time + STEPS * 1e-4})
+    model.case = case
+    unit = Unit()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run.h5"
+        with TransientFile(path, model, Header.of("transient", case)) as file:
+            empty = os.path.getsize(path)
+            runner = Runner(model, RunOptions.of(case), unit, file)
+            unit.motion, unit.q = runner.motion, cycle.q
+            start, wall = process_time(), perf_counter()
+            run = runner.start(cycle)
+            spent, wall = process_time() - start - unit.spent, perf_counter() - wall - unit.wall
+            file.conclude(run)
+        size = os.path.getsize(path)
+    force, solve = np.median(unit.force), np.median(unit.solve)
+    steps = run.progress.steps
+    lip = 1e3 * run.history["lip_opening"]
+    yield Row("one step over one force evaluation and one solve with existing factors", spent / steps / (force + solve), target=4.0,
+              note=f"{steps} steps, processor time {1e3 * spent / steps:.2f} ms, force {1e3 * force:.2f} ms, solve {1e3 * solve:.2f} ms")  # fmt: skip
+    yield Row("residuals a step", run.residuals / steps, "", note=f"solves {run.solves / steps:.2f}, steps per factorisation {steps / max(1, run.factorisations):.0f}")
+    yield Row("steps per second of processor time", steps / spent, "1/s", note=f"{steps / wall:.0f} by the clock; lip between {lip.min():.2f} and {lip.max():.2f} mm")
+    yield Row("file per 10 000 steps", (size - empty) / steps * 1e4 / 2**20, "MiB", note=f"and {empty / 2**20:.2f} MiB for mesh and restart points")

@@ -1,0 +1,134 @@
+"""Motions other than a valve's, for the stepper: a shell under pressure and equations with one unknown."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import scipy.sparse as sp
+
+from dbvfiv.model.linear import CoupledFactor
+from dbvfiv.shell import Shell
+from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
+from dbvfiv.transient.equations import Load
+from dbvfiv.transient.kernels import inertia_force, kinetic_energy, strain_energy
+
+NONE = np.zeros(1)
+
+
+class Motion:
+    """What the stepper asks of any motion without a fluid; the load is a force that the positions fix."""
+
+    moving_fluid = False
+
+    def __init__(self, size: int, alpha: float = 0.0, beta: float = 0.0):
+        self.size, self.conditions = size, SimpleNamespace(alpha=alpha, beta=beta, density=0.0)
+
+    def begin_step(self, state, h, inlet):
+        pass
+
+    def drop_factors(self):
+        pass
+
+    def momentum(self, q, v):
+        return self.inertia(q, np.zeros_like(v), v)
+
+    def load(self, q, v, q_new, v_new, step, speed=None) -> Load:
+        return Load(self.pressure_force(q, step.inlet), 0.0, *5 * (NONE,), step.inlet, 0.0)
+
+    def pressure_force(self, q, pressure):
+        return np.zeros(self.size)
+
+    def force_rate(self, q, v):
+        return np.zeros(self.size) if not np.any(v) else (self.internal_force(q + 1e-6 * v) - self.internal_force(q - 1e-6 * v)) / 2e-6
+
+    def turn(self, dq):
+        return 0.0
+
+    def length(self, dq):
+        return float(np.max(np.abs(dq)))
+
+
+class PointMotion(Motion):
+    """a + damping(q) v + force(q) = 0 with one unknown."""
+
+    def __init__(self, force, stiffness, damping=lambda q: 0.0 * q, damping_slope=lambda q: 0.0 * q, beta: float = 0.0):
+        super().__init__(1, beta=beta)
+        self._force, self._stiffness, self._damping, self._slope = force, stiffness, damping, damping_slope
+
+    def internal_force(self, q):
+        return self._force(q)
+
+    def inertia(self, q, v, a):
+        return a + self._damping(q) * v
+
+    def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None):
+        now = weights.theta
+        viscous = now * (weights.velocity * self._damping(q) + self._slope(q) * v)
+        self._matrix = weights.inertia + viscous + weights.force * self._stiffness(q_new)
+
+    def solve(self, force, outlet):
+        return force / self._matrix, 0.0
+
+    def accelerations(self, q, v, speed, inlet):
+        load = self.load(q, v, q, v, SimpleNamespace(inlet=inlet))
+        return -self._force(q) - self.conditions.beta * self._stiffness(q) * v - self._damping(q) * v, load
+
+
+class ShellMotion(Motion):
+    """A shell under one uniform follower pressure."""
+
+    def __init__(self, shell: Shell, alpha: float = 0.0, beta: float = 0.0):
+        super().__init__(shell.size, alpha, beta)
+        self.shell = shell
+        pattern = shell.dofs.matrix(np.ones(len(shell.dofs.pattern[1])))
+        self._factor = CoupledFactor(pattern, sp.csr_matrix((shell.size, 0)), sp.csr_matrix((0, shell.size)))
+        self._all = np.ones(shell.mesh.element_count)
+
+    def _pressure(self, pressure):
+        return np.full(self.shell.mesh.node_count, pressure)
+
+    def internal_force(self, q):
+        return self.shell.force(q)
+
+    def pressure_force(self, q, pressure):
+        mesh, nodal = self.shell.mesh, self.shell.dofs.expand(q)
+        out = np.zeros_like(nodal)
+        pressure_force(mesh.quads, mesh.nodes, nodal, self._pressure(pressure), self._all, out)
+        return self.shell.dofs.restrict(out)
+
+    def inertia(self, q, v, a):
+        shell = self.shell
+        nodal = shell.dofs.expand(q)
+        _, d1, d2 = shell.directors(nodal)
+        out = np.zeros_like(nodal)
+        inertia_force(shell.mesh.quads, shell._integrals, d1, d2, shell.dofs.expand(v), shell.dofs.expand(a), out)
+        return shell.dofs.restrict(out)
+
+    def _refactor(self, values):
+        none = np.zeros(0)
+        self._factor.refactor(values, none, none, np.zeros((0, 0)))
+
+    def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None):
+        shell, mesh = self.shell, self.shell.mesh
+        _, values = shell.force_and_tangent(q_new)
+        values = weights.force * values + weights.inertia * shell.mass(q)
+        pressure = weights.load * weights.theta * load.inlet
+        pressure_stiffness(mesh.quads, mesh.nodes, shell.dofs.expand(q), self._pressure(pressure), self._all, shell.dofs.slots, -1.0, values)
+        self._refactor(values)
+
+    def solve(self, force, outlet):
+        return self._factor.solve(force), 0.0
+
+    def accelerations(self, q, v, speed, inlet):
+        load = self.load(q, v, q, v, SimpleNamespace(inlet=inlet))
+        self._refactor(self.shell.mass(q))
+        return self._factor.solve(load.force - self.internal_force(q) - self.inertia(q, v, 0 * v)), load
+
+    def energy(self, q, v) -> float:
+        """Kinetic and strain energy, J."""
+        shell = self.shell
+        nodal = shell.dofs.expand(q)
+        d, d1, _ = shell.directors(nodal)
+        kinetic = kinetic_energy(shell.mesh.quads, shell._integrals, d1, shell.dofs.expand(v))
+        return float(kinetic + strain_energy(shell.mesh.quads, shell.mesh.nodes, nodal, d, *shell._reference, *shell._wall))

@@ -1,0 +1,72 @@
+"""A suddenly pressurised Mooney-Rivlin balloon: largest stretch and period against quadrature of its energy equation.
+
+With P = p r0/(h0 C10), C01/C10 = 0.25 and time in r0 sqrt(rho/C10) a thin sphere at rest obeys l'^2 / 2 + w(l) = 0, w as in `potential`. Reference numbers: P = 1: largest
+stretch 1.079943, period 1.29213; P = 2: 1.205003, 1.53042.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+
+from dbvfiv.transient.scheme import scheme
+from dbvfiv.transient.state import consistent_state
+from dbvfiv.transient.stepper import Stepper, StepOptions
+from tests.shell.structures import richardson
+from tests.verification.moving import ShellMotion
+from tests.verification.test_shell_balloon import RUBBER, H, octant
+
+REFERENCE = {1.0: (1.079943, 1.29213), 2.0: (1.205003, 1.53042)}
+UNIT = np.sqrt(RUBBER.density / RUBBER.c10)  # s, radius 1
+RATIO = RUBBER.c01 / RUBBER.c10
+
+
+def potential(stretch, load):
+    """Strain energy less work of the pressure, over 4 pi r0^2 h0 C10."""
+    i1, i2 = 2 * stretch**2 + stretch**-4 - 3, stretch**4 + 2 * stretch**-2 - 3
+    return i1 + RATIO * i2 - load * (stretch**3 - 1) / 3
+
+
+@pytest.mark.parametrize("load", REFERENCE)
+def test_reference_numbers(load):
+    largest = brentq(lambda s: potential(s, load), 1.01, 1.5)
+    middle, half = 0.5 * (1 + largest), 0.5 * (largest - 1)
+
+    def slowness(angle):  # l = middle - half cos(angle)
+        stretch = middle - half * np.cos(angle)
+        return half * np.sin(angle) / np.sqrt(-2 * potential(stretch, load))
+
+    period = 2 * quad(slowness, 0, np.pi, limit=200)[0]
+    assert (largest, period) == pytest.approx(REFERENCE[load], rel=2e-6)
+
+
+def blow_up(shell, load: float, steps: int):
+    """Largest mean stretch and period (in units of the reference) of the shell in a step of 1/steps of the period."""
+    pressure = load * H * RUBBER.c10
+    motion = ShellMotion(shell)
+    state = consistent_state(motion, 0.0, np.zeros(shell.size), np.zeros(shell.size), 0.0, pressure)
+    stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: pressure, StepOptions(tolerance=1e-6))
+    step = REFERENCE[load][1] * UNIT / steps
+    times, radii = [0.0], [1.0]
+    for _ in range(int(1.15 * steps)):
+        state = stepper.step(state, step).state
+        times.append(state.time)
+        radii.append(np.linalg.norm(shell.mesh.nodes + shell.dofs.expand(state.q)[:, :3], axis=1).mean())
+    curve = CubicSpline(times, radii)
+    turns = [t for t in curve.derivative().roots(extrapolate=False) if t > 0.25 * steps * step]
+    return float(curve(turns[0])), turns[1] / UNIT
+
+
+@pytest.mark.parametrize("load", REFERENCE)
+def test_balloon(load):
+    found = np.array([blow_up(octant(n), load, 100) for n in (2, 4, 8)])
+    in_time = blow_up(octant(4), load, 200)
+    refined = found[1] + (in_time - found[1]) * 4 / 3  # the step's share, of second order, on the middle mesh
+    limits = np.array([richardson(found[:, k]) for k in range(2)])
+    values = limits[:, 1] + refined - found[1]
+    print(f"\nP {load}: meshes {found.tolist()} step halved {in_time}; orders {limits[:, 0]}, limits {values}")
+    assert values == pytest.approx(REFERENCE[load], rel=5e-4)
+    assert limits[:, 0] == pytest.approx(2.0, abs=0.3)

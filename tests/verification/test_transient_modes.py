@@ -1,0 +1,107 @@
+"""Three routes to one number: the full pencil, its reduction to the fluid's transfer function, and the ringing of the nonlinear valve after a small push.
+
+The push follows the leading oscillating mode. Growth rate and frequency are read off the lip by fitting x_{k+1} + g^2 x_{k-1} = 2 g cos(omega h) x_k, which holds for one
+mode exactly; without numerical damping the step leaves errors of second order, which two steps show and remove.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.model import Conditions, linearise
+from dbvfiv.transient.options import RunOptions
+from dbvfiv.transient.run import Runner
+from dbvfiv.transient.start import steady_positions
+from dbvfiv.transient.stepper import StepOptions
+from eigen import SearchOptions, sweep
+
+PUSH = 1e-8  # m; at 2 kPa, where stops at the corners of the lips part, 1e-6 m changes the frequency by 0.5 %
+BETA = 0.003
+QUASI, STORAGE = "quasi-steady", "storage"
+#: Continuity law, pressure (Pa), density (kg/m3), and the sign of the growth rate.
+STATES = [
+    (QUASI, 2e3, 10.0, +1), (QUASI, 6e3, 1.2, +1), (QUASI, 10e3, 100.0, -1), (QUASI, 18e3, 1000.0, -1),
+    (STORAGE, 2e3, 1.2, +1), (STORAGE, 6e3, 1.2, +1), (STORAGE, 10e3, 10.0, -1), (STORAGE, 18e3, 1000.0, -1),
+]  # fmt: skip
+
+
+def three_routes(law: str, pressure: float, density: float, mesh=(8, 12), steps=(50, 100), periods: float = 1.25) -> dict:
+    """Eigenvalues of the leading oscillating mode by the three ways, the last by steps per period and in the limit of small ones."""
+    changes = {
+        "mesh.around": mesh[0], "mesh.along": mesh[1], "fluid.continuity": law, "fluid.density": density, "drive.pressure": pressure,
+        "damping.alpha": 0.0, "damping.beta": BETA, "transient.start": "kick", "transient.kick_opening": PUSH,
+    }  # fmt: skip
+    valve = dbvfiv.load(changes=changes)
+    model = valve.model
+    full = next(m for m in valve.modes(count=8).modes if m.frequency > 0)
+    eigenvalue = complex(full.growth_rate, 2 * np.pi * full.frequency)
+    q = steady_positions(model, pressure)
+    state = linearise(model, q, pressure)
+    densities = density * np.array([0.9, 0.95, 1.0, 1.05, 1.1])  # judged at the ends and fed in the middle: the state itself is none of the checks
+    found = sweep(lambda d: state.pencil(Conditions(float(d), 0.0, BETA)), densities, 4, SearchOptions(limit_point=-1 / BETA), checks=2)
+    reduced = found.eigenvalues[2][np.argmin(np.abs(found.eigenvalues[2] - eigenvalue))]
+    lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
+    rings = []
+    for count in steps:
+        step = 1 / full.frequency / count
+        model.case = valve.case.replace({"transient.step": step, "transient.duration": periods * count * step})
+        options = replace(RunOptions.of(model.case), step=StepOptions(tolerance=1e-8, floor=1e-13))
+        run = Runner(model, options).start()
+        assert not run.failures
+        x = run.history["lip_opening"] - q[lip]
+        rings.append(ringing(x / PUSH, step))
+    first, second = rings[-2:]
+    ratio = (steps[-1] / steps[-2]) ** 2
+    return {"full": eigenvalue, "reduced": complex(reduced), "in time": rings, "limit": second + (second - first) / (ratio - 1)}
+
+
+def ringing(x: np.ndarray, step: float) -> complex:
+    """Eigenvalue of a series that one mode makes."""
+    square, double = np.linalg.lstsq(np.stack([-x[:-2], x[1:-1]], axis=1), x[2:], rcond=None)[0]
+    root = np.roots([1.0, -double, square]).astype(complex)
+    return complex(np.log(root[np.argmax(root.imag)]) / step)
+
+
+def errors(found: complex, expected: complex) -> tuple[float, float]:
+    """Relative errors of growth rate and frequency."""
+    return abs(found.real / expected.real - 1), abs(abs(found.imag) / abs(expected.imag) - 1)
+
+
+def table(rows: list) -> str:
+    """Lines for the documentation."""
+    lines = ["| continuity | kPa | kg/m3 | growth rate, frequency (full) | reduced | in time | off by, % |", "|---|---|---|---|---|---|---|"]
+    for (law, pressure, density, _), r in rows:
+        def text(v):
+            return f"{v.real:.4f}, {abs(v.imag) / (2 * np.pi):.4f}"
+
+        growth, frequency = errors(r["limit"], r["full"])
+        lines.append(f"| {law} | {pressure / 1e3:g} | {density:g} | {text(r['full'])} | {text(r['reduced'])} | {text(r['limit'])} | {100 * growth:.3f}, {100 * frequency:.4f} |")
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("law, pressure, density, sign", STATES)
+def test_three_routes(law, pressure, density, sign):
+    found = three_routes(law, pressure, density)
+    full = found["full"]
+    print(f"\n{law} {pressure:g} {density:g}: full {full:.5f} reduced {found['reduced']:.5f} in time {found['in time']} limit {found['limit']:.5f}")
+    assert np.sign(full.real) == sign
+    assert abs(found["reduced"] - full) < 1e-6 * abs(full)
+    growth, frequency = errors(found["limit"], full)
+    assert growth < 0.01 and frequency < 0.005
+    # what the step leaves falls as its square
+    off = [abs(complex(r.real, abs(r.imag)) - full) for r in found["in time"]]
+    assert off[1] < 0.3 * off[0]
+
+
+@pytest.mark.slow
+def test_three_routes_on_the_valve():
+    rows = [(state, three_routes(*state[:3], mesh=(28, 48))) for state in STATES]
+    print("\n" + table(rows))
+    for (_, _, _, sign), found in rows:
+        growth, frequency = errors(found["limit"], found["full"])
+        assert np.sign(found["full"].real) == sign
+        assert growth < 0.01 and frequency < 0.005

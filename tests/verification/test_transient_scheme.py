@@ -1,0 +1,116 @@
+"""Order of accuracy of the coupled steps, energy of a free swing, and oscillators with one unknown through the same stepper."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+import dbvfiv
+from dbvfiv.transient.equations import ValveMotion
+from dbvfiv.transient.scheme import scheme
+from dbvfiv.transient.start import steady_positions
+from dbvfiv.transient.state import consistent_state
+from dbvfiv.transient.stepper import Stepper, StepOptions
+from tests.verification.moving import PointMotion
+
+TIGHT = StepOptions(tolerance=1e-9, floor=1e-13)
+COARSE = {"mesh.around": 6, "mesh.along": 8}
+
+
+def run(motion, state, step: float, count: int, pressure=lambda t: 0.0, nd: float = 0.0, options=TIGHT):
+    """States after each of `count` steps, the first included."""
+    stepper = Stepper(motion, scheme("generalised-alpha", nd), pressure, options)
+    states = [state]
+    for _ in range(count):
+        states.append(stepper.step(states[-1], step).state)
+    return states
+
+
+# -- order --------------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", ["quasi-steady", "storage"])
+@pytest.mark.parametrize("nd", [0.0, 0.5])
+def test_order_of_the_coupled_scheme(law, nd):
+    """The open valve in water while the inlet pressure changes smoothly, compared at one instant."""
+    model = dbvfiv.load(changes=COARSE | {"fluid.continuity": law, "damping.alpha": 0.0}).model
+    motion = ValveMotion(model)
+    q = steady_positions(model, 12e3)
+    density = motion.conditions.density
+    speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(q)), 12e3, density)
+    start = consistent_state(motion, 0.0, q, 0 * q, speed, 12e3)
+
+    def pressure(t):
+        return 12e3 + 4e3 * np.sin(0.5 * np.pi * min(t / 0.02, 1.0)) ** 4
+
+    lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
+    ends = []
+    for count in (20, 40, 80, 160):
+        end = run(motion, start, 0.02 / count, count, pressure, nd)[-1]
+        ends.append([end.q[lip], end.v[lip], end.speed, np.linalg.norm(end.q)])
+    ends = np.array(ends)
+    differences = np.abs(np.diff(ends, axis=0))
+    orders = np.log2(differences[:-1] / differences[1:])
+    print(f"\n{law}, numerical damping {nd}: orders of lip position, lip velocity, inlet velocity, |q|:\n{orders.round(2)}")
+    assert orders[-1].min() > 1.85
+    assert orders[-1].mean() == pytest.approx(2.0, abs=0.1)
+
+
+# -- energy -------------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_free_swing_keeps_its_energy_over_10_000_steps():
+    """The valve let go from its shape at 2 kPa: no load, no stops, no damping of any kind."""
+    start = steady_positions(dbvfiv.load(changes=COARSE).model, 2e3)
+    free = {"drive.kind": "uniform", "drive.pressure": 0.0, "supports.lip_stop": False, "damping.alpha": 0.0, "damping.beta": 0.0}
+    motion = ValveMotion(dbvfiv.load(changes=COARSE | free).model)
+    state = consistent_state(motion, 0.0, start, 0 * start, 0.0, 0.0)
+    stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: 0.0, StepOptions(tolerance=1e-8))
+    energy = sum(motion.energies(state.q, state.v))
+    off = np.empty(10_000)
+    for k in range(len(off)):
+        state = stepper.step(state, 2e-4).state
+        off[k] = sum(motion.energies(state.q, state.v)) / energy - 1.0
+    thirds = np.array_split(off, 4)
+    print(f"\nrelative energy off by {off.min():.2e} to {off.max():.2e}; means of the quarters {[f'{t.mean():.1e}' for t in thirds]}")
+    assert np.abs(off).max() < 2e-3
+    assert abs(thirds[-1].mean() - thirds[0].mean()) < 5e-4  # it swings about, it does not drift
+
+
+# -- one unknown --------------------------------------------------------------------------------------------------------------------
+
+
+def oscillator_start(motion, q: float, v: float):
+    return consistent_state(motion, 0.0, np.array([q]), np.array([v]), 0.0, 0.0)
+
+
+@pytest.mark.parametrize("mu, period, amplitude", [(0.5, 6.380676, 2.002488), (1.0, 6.663287, 2.008620)])
+def test_van_der_pol(mu, period, amplitude):
+    """x'' - mu (1 - x^2) x' + x = 0: period and amplitude of its cycle (reference numbers), by two steps."""
+    motion = PointMotion(lambda q: q, np.ones_like, lambda q: -mu * (1 - q**2), lambda q: 2 * mu * q)
+    found = []
+    for step in (0.01, 0.005):
+        states = run(motion, oscillator_start(motion, 2.0, 0.0), step, int(60 / step))
+        curve = CubicSpline([s.time for s in states], [s.q[0] for s in states])
+        tops = [t for t in curve.derivative().roots(extrapolate=False) if t > 40 and curve(t) > 0]
+        found.append((np.diff(tops)[-1], float(curve(tops[-1]))))
+    limit = np.array(found[1]) + (np.array(found[1]) - found[0]) / 3
+    print(f"\nmu {mu}: {found} limit {limit}")
+    assert limit == pytest.approx([period, amplitude], rel=1e-6)
+
+
+@pytest.mark.parametrize("beta", [0.0, 0.05])
+def test_linear_oscillator(beta):
+    """q'' + q + beta q' = 0 against its exact solution; the damping goes the way of stiffness damping."""
+    motion = PointMotion(lambda q: q, np.ones_like, beta=beta)
+    decay, omega = 0.5 * beta, np.sqrt(1 - 0.25 * beta**2)
+    errors = []
+    for count in (50, 100, 200):
+        end = run(motion, oscillator_start(motion, 1.0, 0.0), 10 / count, count)[-1]
+        exact = np.exp(-decay * 10) * (np.cos(omega * 10) + decay / omega * np.sin(omega * 10))
+        errors.append(abs(end.q[0] - exact))
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    print(f"\nbeta {beta}: errors {errors} orders {orders}")
+    assert orders == pytest.approx(2.0, abs=0.1)
