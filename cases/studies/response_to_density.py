@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("--longest", type=float, default=3.0, help="of a run next to the onset, s; with --theory")
     parser.add_argument("--continuity", default="quasi-steady")
     parser.add_argument("--kick", default="1 mm")
-    parser.add_argument("--ways", default="down,up")
+    parser.add_argument("--back", type=float, nargs="*", help="densities of the way up; all by default")
     parser.add_argument("--theory", action="store_true", help="onset and normal form too")
     given = parser.parse_args()
     around, along = given.mesh.split("x")
@@ -50,13 +50,14 @@ def main() -> None:
     if given.theory:
         theory = _theory(base, given.folder / "theory.json")
     rows, last = [], None
-    for way in given.ways.split(","):
-        for density in sorted(given.densities, reverse=way == "down"):
+    ways = {"down": sorted(given.densities, reverse=True), "up": sorted(given.densities if given.back is None else given.back)}
+    for way, densities in ways.items():
+        for density in densities:
             case = base.replace({"fluid.density": density})
             if theory:  # next to the onset everything is slow
                 rate = np.interp(density, theory["densities"], theory["growth"])
                 case = case.replace({"transient.duration": min(max(case.transient.duration, 3.0 / rate if rate > 1e-6 else 0.0), given.longest)})
-            if way != given.ways.split(",")[0] and not _moving(case, last):
+            if way == "up" and not _moving(case, last):
                 break  # at rest again: from here on it would be the first way's kicks once more
             last = _run(case, given.folder / f"{way}-{density:g}.h5", last)
             rows.append(_row(way, last))

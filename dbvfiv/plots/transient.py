@@ -122,6 +122,7 @@ def phase_portrait(result: "TransientResults") -> Figure:
     x, v = 1e3 * h["lip_opening"], h["lip_velocity"]
     axes.plot(x, v, color="0.75", lw=0.7, label="whole run")
     rows = _cycle_rows(result)
+    rows = np.concatenate([[max(rows[0] - 1, 0)], rows])  # a cycle is no whole number of steps: one more closes the loop
     axes.plot(x[rows], v[rows], color=COMPUTED, lw=1.8, label="last cycle" if result.cycle else "last fifth of the run")
     axes.plot(x[0], v[0], "o", color=ACCENT, label="start")
     axes.set_xlabel("Lip opening, mm")

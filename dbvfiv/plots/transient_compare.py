@@ -15,12 +15,14 @@ if TYPE_CHECKING:
     from ..transient.result import TransientResults
 
 
+_QUIET = tuple(f"transient.{key}" for key in ("save_every", "restart_every", "stop_when", "duration", "start_file", "start_state"))
+
+
 def differing_keys(results: "Sequence[TransientResults]") -> list[str]:
     """Keys of the cases that are not the same in all runs, those that only steer the run left out."""
     flat = [_flat(result.case.to_dict()) for result in results]
     keys = [key for key in flat[0] if any(case.get(key) != flat[0][key] for case in flat)]
-    quiet = ("transient.save_every", "transient.restart_every", "transient.stop_when", "transient.duration")
-    return [key for key in keys if key not in quiet]
+    return [key for key in keys if key not in _QUIET]
 
 
 def labels(results: "Sequence[TransientResults]") -> list[str]:
@@ -36,23 +38,46 @@ def labels(results: "Sequence[TransientResults]") -> list[str]:
 
 
 def compare(results: "Sequence[TransientResults]") -> Figure:
-    """Mass flow and lip opening of several runs over time (compare Figs. 5-3 to 5-10, 7-13 and 7-14 of Wang 2014)."""
-    figure = new_figure(8.0, 6.2)
-    flow, lip = figure.subplots(2, 1, sharex=True)
+    """Mass flow and lip opening of several runs over time (compare Figs. 5-3 to 5-10, 7-13 and 7-14 of Wang 2014); where all end in cycles, these in phase."""
+    cycles = all(result.cycle for result in results)
+    figure = new_figure(10.0 if cycles else 8.0, 5.6 + 0.22 * len(results))
+    panels = figure.subplots(2, 2 if cycles else 1, sharex="col", squeeze=False, gridspec_kw={"width_ratios": [3, 2] if cycles else [1]})
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(results)))
     styles = ["-", "--", "-.", ":"]
     for i, (result, label, colour) in enumerate(zip(results, labels(results), colours)):
-        h = result.history
-        verdict = f"{label}: {result.verdict['verdict']}"
-        flow.plot(h["time"], h["mass_flow"], styles[i % 4], color=colour, lw=1.4, label=verdict)
-        lip.plot(h["time"], 1e3 * h["lip_opening"], styles[i % 4], color=colour, lw=1.4)
-    flow.set_ylabel("Mass flow, kg/s")
-    lip.set_ylabel("Lip opening, mm")
-    lip.set_xlabel("Time, s")
-    lip.set_xlim(left=min(r.history["time"][0] for r in results), right=max(r.history["time"][-1] for r in results))
-    flow.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    flow.set_title("Comparison of runs", loc="left", fontweight="bold")
+        h, look = result.history, {"ls": styles[i % 4], "color": colour, "lw": 0.9 if cycles else 1.4}
+        parts = [(slice(None), h["time"])]
+        if cycles:
+            parts.append(_last_cycles(result))
+        for column, (rows, time) in enumerate(parts):
+            panels[0, column].plot(time, h["mass_flow"][rows], label=f"{label}: {result.verdict['verdict']}" if column == 0 else None, **look)
+            panels[1, column].plot(time, 1e3 * h["lip_opening"][rows], **look)
+            look["lw"] = 1.5
+    panels[0, 0].set_ylabel("Mass flow, kg/s")
+    panels[1, 0].set_ylabel("Lip opening, mm")
+    panels[1, 0].set_xlabel("Time, s")
+    panels[1, 0].set_xlim(left=min(r.history["time"][0] for r in results), right=max(r.history["time"][-1] for r in results))
+    panels[0, 0].set_title("Comparison of runs", loc="left", fontweight="bold")
+    if cycles:
+        panels[0, 1].set_title("Last two cycles, in phase", loc="left")
+        panels[1, 1].set_xlabel("Time from the lip's way up, ms")
+    figure.legend(loc="outside lower left", ncols=2 if len(results) > 3 else 1)
     return figure
+
+
+def _last_cycles(result: "TransientResults", count: int = 2) -> tuple[slice, np.ndarray]:
+    """Rows of the last cycles, and times, ms, from the instant at which the lip's opening rises through its mean."""
+    h = result.history
+    t, x = h["time"], h["lip_opening"] - result.verdict["lip_opening"]["mean"]
+    period = result.cycle[1] - result.cycle[0]
+    rising = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0) & (t[1:] <= t[-1] - count * period))
+    if not len(rising):
+        first = int(np.searchsorted(t, t[-1] - count * period))
+        return slice(first, None), 1e3 * (t[first:] - t[first])
+    at = rising[-1]
+    begin = t[at] - x[at] * (t[at + 1] - t[at]) / (x[at + 1] - x[at])
+    end = int(np.searchsorted(t, begin + count * period, side="right")) + 1
+    return slice(at, end), 1e3 * (t[at:end] - begin)
 
 
 def save_comparison(results: "Sequence[TransientResults]", path: Path) -> Path:
