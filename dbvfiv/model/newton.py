@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import weakref
+import weakref
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,6 +115,8 @@ class EquilibriumSolver:
         snes.setFromOptions()
         for key in ("snes_linesearch_type", "snes_linesearch_maxstep"):
             settings.delValue(key)
+        # left alone, it would be freed by PETSc when Python has ended already, and its preconditioner is Python's: a crash at the end of the program
+        weakref.finalize(self, snes.destroy)
 
     def solve(self, start: np.ndarray, pressure: float) -> NewtonResult:
         """Iterate from a state (n,) to the equilibrium at an inlet pressure, Pa."""
