@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import weakref
-import weakref
 from dataclasses import dataclass
 
 import numpy as np
