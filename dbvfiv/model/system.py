@@ -101,6 +101,13 @@ class ValveSystem(SystemBase):
     def _rates(u_rate, n):
         return (np.zeros(n), np.zeros(n), u_rate[n : 2 * n], 0.0, u_rate[2 * n])
 
+    def _still(self, u, mu):
+        """Motion and parameters of a state at rest; derivatives of others are not needed, since equilibria do not move."""
+        motion, parameters = self._at(u, mu)
+        if np.any(motion[1]):
+            raise OutOfDomain("The valve moves, and derivatives are taken at rest.")
+        return motion, parameters
+
     # -- the contract ---------------------------------------------------------------------------------------------------------------
 
     def residual(self, u, mu):
@@ -127,16 +134,16 @@ class ValveSystem(SystemBase):
     def d_parameter(self, u, mu, name):
         if name not in PARAMETERS:
             return super().d_parameter(u, mu, name)
-        motion, parameters = self._at(u, mu)
+        motion, parameters = self._still(u, mu)
         return np.concatenate([np.zeros(self._base.size), -self._analytic(mu).parameter_slope(motion, parameters, name)])
 
     def d2(self, u, mu, a, b):
-        motion, parameters = self._at(u, mu)
+        motion, parameters = self._still(u, mu)
         n = self._base.size
         return np.concatenate([np.zeros(n), -self._analytic(mu).second(motion, parameters, self._static(a, n), self._static(b, n))])
 
     def d3(self, u, mu, a, b, c):
-        motion, parameters = self._at(u, mu)
+        motion, parameters = self._still(u, mu)
         n = self._base.size
         directions = (self._static(x, n) for x in (a, b, c))
         return np.concatenate([np.zeros(n), -self._analytic(mu).third(motion, parameters, *directions)])
@@ -144,17 +151,17 @@ class ValveSystem(SystemBase):
     def d2_parameter(self, u, mu, name, a):
         if name not in PARAMETERS:
             return super().d2_parameter(u, mu, name, a)
-        motion, parameters = self._at(u, mu)
+        motion, parameters = self._still(u, mu)
         n = self._base.size
         return np.concatenate([np.zeros(n), -self._analytic(mu).mixed(motion, parameters, self._static(a, n), name)])
 
     def mass_d(self, u, mu, c, a):
-        motion, parameters = self._at(u, mu)
+        motion, parameters = self._still(u, mu)
         n = self._base.size
         return np.concatenate([np.zeros(n), self._analytic(mu).second(motion, parameters, self._rates(c, n), self._static(a, n))])
 
     def mass_d2(self, u, mu, c, a, b):
-        motion, parameters = self._at(u, mu)
+        motion, parameters = self._still(u, mu)
         n = self._base.size
         forms = self._analytic(mu).third(motion, parameters, self._rates(c, n), self._static(a, n), self._static(b, n))
         return np.concatenate([np.zeros(n), forms])
@@ -162,7 +169,7 @@ class ValveSystem(SystemBase):
     def mass_parameter(self, u, mu, name, c):
         if name not in PARAMETERS:
             return super().mass_parameter(u, mu, name, c)
-        motion, parameters = self._at(u, mu)
+        motion, parameters = self._still(u, mu)
         n = self._base.size
         return np.concatenate([np.zeros(n), self._analytic(mu).mixed(motion, parameters, self._rates(c, n), name)])
 

@@ -1,7 +1,7 @@
 """Steady states and leading eigenvalues anywhere in the space of parameters, each state found from the nearest one known."""
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from .observer import Observer
 from .parameters import Place, rebuilder
 from .steady import LoadPath, SteadyOptions
 
+#: Steps over the last one up to which a cubic is trusted ahead of it.
+REACH = 2.0
+
 
 @dataclass
 class _Built:
@@ -23,6 +26,24 @@ class _Built:
     path: LoadPath
     solver: ColumnSolver
     known: dict[float, np.ndarray]
+    trail: list[tuple[float, np.ndarray, np.ndarray]] = field(default_factory=list)  # pressure, state and slope of the last two
+
+    def aim(self, target: float) -> None:
+        """Predict the next state by the cubic through the last two and their slopes; along the tangent alone where it reaches too far ahead."""
+        if len(self.trail) < 2 or self.path.slope is None or self.trail[-1][0] != self.path.pressure:
+            return
+        (p0, q0, s0), (p1, q1, s1) = self.trail
+        width, ahead = p1 - p0, target - p1
+        if not 0 < ahead / width <= REACH:
+            return
+        secant = (q1 - q0) / width
+        square, cube = (2 * s1 + s0 - 3 * secant) / width, (s0 + s1 - 2 * secant) / width**2
+        self.path.slope = s1 + ahead * (square + ahead * cube)
+
+    def passed(self) -> None:
+        """Remember where the path has arrived."""
+        if self.path.slope is not None:
+            self.trail = [*self.trail[-1:], (self.path.pressure, self.path.q, self.path.slope)]
 
 
 class StabilityWalk:
@@ -70,7 +91,9 @@ class StabilityWalk:
         nearest = min([0.0, *built.known], key=lambda p: abs(p - place.pressure))
         if nearest and abs(nearest - place.pressure) < abs(path.pressure - place.pressure):
             path.pressure, path.q, path.slope = nearest, built.known[nearest], None
+        built.aim(place.pressure)
         path.go_to(place.pressure)
+        built.passed()
         if len(built.known) > 400:
             built.known.clear()
         built.known[place.pressure] = path.q
