@@ -203,41 +203,10 @@ class Valve:
         >>> result = dbvfiv.load().closure(["7 kPa", "28 kPa"])          # doctest: +SKIP
         >>> result.states[-1].closed, result.critical_pressure           # doctest: +SKIP
         """
-        from .results.closure import ClosureResults
-        from .results.closure_file import ClosureFile
-        from .results.header import Header
-        from .studies.closure import run_closure
-        from .studies.closure_model import closure_model
-        from .studies.observer import Observer, Observers
+        from .results.closure_run import start_closure
 
         pressures = read_pressures(self.case.closure.pressures if pressure is None else pressure, "pressure")
-        case = self.case.replace({"closure.pressures": list(pressures)})
-        observer = observer or Observer()
-        try:
-            model = closure_model(case)
-        except CaseError:
-            raise
-        except ValueError as error:  # what geometry, mesh and shell refuse
-            raise CaseError(str(error)) from error
-        header = Header.of("closure", case, self.name)
-
-        def follow(result):
-            if not in_time or result.interrupted:
-                return None
-            from .studies.closing import run_closing
-
-            return run_closing(case, observer)
-
-        if output is None:
-            result = run_closure(case, pressures, observer=observer, model=model)
-            return ClosureResults.of(result, header, follow(result))
-        with ClosureFile(output, model, header) as file:
-            result = run_closure(case, pressures, observer=Observers(file, observer), model=model)
-            file.conclude(result)
-            closing = follow(result)
-            if closing is not None:
-                file.keep_closing(closing)
-        return ClosureResults.of(result, header, closing)
+        return start_closure(self.case.replace({"closure.pressures": list(pressures)}), self.name, in_time, output, observer)
 
     def onset(self, over: str | None = None, *, output: str | Path | None = None, observer: "Observer | None" = None) -> "OnsetResults":
         """Every onset along one parameter; see `dbvfiv.stability.onset`.

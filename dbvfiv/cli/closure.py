@@ -84,6 +84,23 @@ def command(
         raise SolveError(f"{len(results[0].states)} of {len(wanted)} back pressures were reached.")  # why was said when it happened
 
 
+def report(result, path: Path, plots: Path | None, as_json: bool) -> None:
+    """Show a run that was continued."""
+    from ..errors import SolveError
+
+    figures = _figures([result], plots) if plots is not None else []
+    if as_json:
+        print_json(result.summary() | {"output": str(path), "figures": [str(figure) for figure in figures]})
+    else:
+        print("\n".join([*result.lines(), f"Kept in {path}."]))
+        if figures:
+            print(f"{len(figures)} figures in {plots}.")
+    if not result.complete:
+        raise KeyboardInterrupt
+    if result.failures:
+        raise SolveError(f"{len(result.states)} of {len(result.case.closure.pressures)} back pressures were reached.")
+
+
 def _figures(results, folder: Path) -> list[Path]:
     written = []
     for number, result in enumerate(results):

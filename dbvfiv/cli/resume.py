@@ -21,10 +21,11 @@ def command(
     workers: Annotated[Optional[int], typer.Option("--workers", "-w", metavar="N", min=1, help="Of a map: processes that share the columns.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Continue a transient run, a stability map or an onset run that was interrupted or killed, or a finished transient run with a later --duration.
+    """Continue a transient run, a stability map, an onset or a closure run that was interrupted or killed, or a finished transient run with a later
+    --duration.
 
     A transient run goes on from the last restart point in the same file, with the same numbers as a run that was never interrupted; a map solves the
-    columns that are missing in it, an onset run the values.
+    columns that are missing in it, an onset run the values, a closure run the back pressures.
     """
     from ..case.quantity import Quantity
     from ..errors import CaseError
@@ -32,8 +33,14 @@ def command(
     from .transient import report
 
     kind = _kind(file)
-    if kind in ("map", "onset") and (duration is not None or animate is not None):
-        raise CaseError(f"--duration and --animate belong to transient runs; this is {'a map' if kind == 'map' else 'an onset run'}.")
+    others = {"map": "a map", "onset": "an onset run", "closure": "a closure run"}
+    if kind in others and (duration is not None or animate is not None):
+        raise CaseError(f"--duration and --animate belong to transient runs; this is {others[kind]}.")
+    if kind == "closure":
+        from ..results.closure_run import resume_closure
+        from .closure import report as report_closure
+
+        return report_closure(resume_closure(file, Progress(quiet=as_json)), file, plots, as_json)
     if kind == "onset":
         from ..stability import resume_onset
         from .onset import report as report_onset

@@ -21,8 +21,11 @@ from .state import LAYERS, LayerData, layers_of
 if TYPE_CHECKING:
     from ..studies.closing import ClosingResult
     from ..studies.closure import ClosureResult
+    from ..studies.closure_buckling import Buckling
     from ..studies.closure_model import ClosureModel
+    from ..studies.closure_path import PathPoint
     from ..studies.closure_state import ClosureState
+    from ..studies.state import SteadyState
     from .vtkhdf import Step
     from .whole_valve import WholeValve
 
@@ -111,11 +114,11 @@ class ClosureResults(Result):
         model = result.model
         header = header or Header.of("closure", model.case)
         return cls(
-            replace(header, complete=not result.interrupted),
+            replace(header, complete=not (result.interrupted or (closing is not None and closing.interrupted))),
             MeshData.of(model),
             [row_from(model, state) for state in result.states],
             lambda i: layers_of(model, result.states[i].q),
-            path_rows(result), buckling_rows(result), opened_rows(result),
+            path_rows(result.path), buckling_rows(model, result.buckling), opened_rows(result.opened),
             model.supports, reference_opening(model),
             closing=closing, warnings=result.warnings, failures=result.failures, model=model,
         )  # fmt: skip
@@ -234,24 +237,23 @@ def row_from(model: "ClosureModel", state: "ClosureState") -> dict[str, Any]:
     return row | {"nodal": model.pressed.nodal(state.q)}
 
 
-def path_rows(result: "ClosureResult") -> list[dict[str, Any]]:
+def path_rows(points: "Sequence[PathPoint]") -> list[dict[str, Any]]:
     names = [c.name for c in PATH if c.name != "lowest_eigenvalue"]
     return [
         {name: getattr(point, name) for name in names} | {"lowest_eigenvalue": float(point.eigenvalues[0]) if len(point.eigenvalues) else np.nan}
-        for point in result.path
+        for point in points
     ]
 
 
-def buckling_rows(result: "ClosureResult") -> list[dict[str, Any]]:
-    nodal = result.model.pressed.nodal
+def buckling_rows(model: "ClosureModel", found: "Sequence[Buckling]") -> list[dict[str, Any]]:
+    nodal = model.pressed.nodal
     return [
-        {"pressure": b.pressure, "kind": b.kind, "eigenvalue": b.eigenvalue, "nodal": nodal(b.q), "shape": nodal(b.shape)}
-        for b in result.buckling
+        {"pressure": b.pressure, "kind": b.kind, "eigenvalue": b.eigenvalue, "nodal": nodal(b.q), "shape": nodal(b.shape)} for b in found
     ]
 
 
-def opened_rows(result: "ClosureResult") -> list[dict[str, Any]]:
-    return [{c.name: getattr(state, c.name) for c in OPENED} for state in result.opened]
+def opened_rows(states: "Sequence[SteadyState]") -> list[dict[str, Any]]:
+    return [{c.name: getattr(state, c.name) for c in OPENED} for state in states]
 
 
 def reference_opening(model: "ClosureModel") -> float:

@@ -72,6 +72,15 @@ OPENED = (
     Column("outlet_area", "m^2", "Flow area at the lip, whole valve"),
     Column("mass_flow", "kg/s", "Mass flow, whole valve"),
 )
+#: What it takes to go on from a state, a row for each.
+RESTART = (
+    Column("step", "Pa", "Load step to try next"),
+    Column("slope", "m/Pa, rad/Pa", "Derivative of the unknowns by the pressure"),
+    Column("multiplier", "Pa", "Contact multipliers"),
+    Column("energy", "J", "Work, work of renewing multipliers, contact potential, strain energy, defect; number of equilibria in between"),
+    Column("path_rows", "", "Points of the path up to the state", "i8"),
+    Column("buckling_rows", "", "Buckling states up to it", "i8"),
+)
 REVERSAL = (
     Column("time", "s", "Time"),
     Column("inlet_pressure", "Pa", "Pressure of the drive"),

@@ -11,7 +11,7 @@ from ..errors import SolveError
 from ..model import ValveModel
 from .closure_buckling import Buckling
 from .closure_model import HELD_LIPS, ClosureModel, closure_model
-from .closure_path import ClosureOptions, ClosurePath, PathPoint
+from .closure_path import ClosureOptions, ClosurePath, PathPoint, PathRestart
 from .closure_state import ClosureState
 from .observer import Observer
 from .state import SteadyState
@@ -55,16 +55,29 @@ class ClosureResult:
         return self.buckling[0].pressure if self.buckling else None
 
 
+class Keeper:
+    """What keeps a run while it goes on; does nothing."""
+
+    def turned_back(self, opened: tuple[SteadyState, ...]) -> None:
+        """The states of an open start are found."""
+
+    def reached(self, path: ClosurePath, state: ClosureState) -> None:
+        """A back pressure is reached, and the path stands there."""
+
+
 def run_closure(
     case: Case,
     pressures: Iterable[float] | None = None,
     options: ClosureOptions | None = None,
     observer: Observer | None = None,
     model: ClosureModel | None = None,
+    keeper: Keeper | None = None,
+    restart: PathRestart | None = None,
 ) -> ClosureResult:
     """Equilibria of a case at a list of back pressures, Pa, each reached from the one before.
 
-    A pressure that is not reached ends the list, for those after it lie beyond it; an interrupt keeps what was found.
+    A pressure that is not reached ends the list, for those after it lie beyond it; an interrupt keeps what was found. With a `restart` the walk goes on
+    from there and the result holds what came after it.
 
     Examples
     --------
@@ -88,11 +101,16 @@ def run_closure(
     observer.begin("closure", len(pressures))
     warn([*model_warnings(model), *start_warnings(model)])
     path = ClosurePath(model, options, observer)
+    keeper = Keeper() if keeper is None else keeper
+    if restart is not None:
+        path.resume(restart)
     interrupted = False
     try:
-        if case.closure.start == "open":
+        if case.closure.start == "open" and restart is None:
             opened = _turned_back(case, observer)
+            keeper.turned_back(opened)
         for state in _states(path, pressures, failures, observer):
+            keeper.reached(path, state)
             observer.item(state)
             states.append(state)
     except KeyboardInterrupt:

@@ -64,6 +64,11 @@ class BucklingWatch:
             self._stable = None
         return spectrum
 
+    def resume(self, pressure: float, q: np.ndarray, lowest: float, found: tuple[Buckling, ...]) -> None:
+        """Go on from a state with its lowest eigenvalue and what was found before it."""
+        self.found[:] = found
+        self._stable = (pressure, q, lowest) if lowest > 0 else None
+
     def forget(self) -> None:
         """The path has jumped: the next equilibrium does not follow from the last."""
         self._stable = None

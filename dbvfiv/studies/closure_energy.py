@@ -98,6 +98,16 @@ class EnergyLedger:
         """What is missing in the balance over the work of the pressure, sizes added up over all stretches."""
         return self.defect / abs(self.work) if self.work else 0.0
 
+    @property
+    def totals(self) -> tuple[float, ...]:
+        """All sums, to go on with elsewhere."""
+        return (self.work, self.renewal, self.contact, self.strain, self.defect, float(self.equilibria))
+
+    @totals.setter
+    def totals(self, values: tuple[float, ...]) -> None:
+        self.work, self.renewal, self.contact, self.strain, self.defect = (float(value) for value in values[:5])
+        self.equilibria = int(values[5])
+
     def begin(self, q: np.ndarray, pressure: float, slope: np.ndarray | None = None) -> None:
         """Where the path starts, with dq/dP if that is known."""
         self._last = (pressure, self.pressed.multiplier.copy(), q, slope)

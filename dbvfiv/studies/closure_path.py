@@ -93,6 +93,38 @@ class PathPoint:
     arclength: bool = False
 
 
+@dataclass(frozen=True)
+class PathRestart:
+    """What a walk needs to go on from a state that it reached, as if it had never stopped.
+
+    Attributes
+    ----------
+    pressure : float, Pa
+    q, slope : (n,) arrays
+        Unknowns and their derivative by the pressure.
+    multiplier : (k,) array, Pa
+    step : float, Pa
+        Load step to try next.
+    beyond_limit : bool
+    eigenvalue : float, 1/s2
+        Lowest stiffness eigenvalue there.
+    energy : tuple of float
+        See `EnergyLedger.totals`.
+    buckling : tuple of Buckling
+        Found so far.
+    """
+
+    pressure: float
+    q: np.ndarray
+    slope: np.ndarray
+    multiplier: np.ndarray
+    step: float
+    beyond_limit: bool
+    eigenvalue: float
+    energy: tuple[float, ...]
+    buckling: tuple[Buckling, ...] = ()
+
+
 @dataclass
 class ClosurePath:
     """Walks a model from one back pressure to the next."""
@@ -116,6 +148,24 @@ class ClosurePath:
     def buckling(self) -> list[Buckling]:
         """Where the tangent stiffness became singular, in the order met."""
         return self.watch.found
+
+    def restart(self, eigenvalue: float) -> PathRestart:
+        """Where the walk stands; `eigenvalue` is the lowest stiffness eigenvalue of the state just reached."""
+        steps = self.steps
+        return PathRestart(
+            steps.pressure, steps.q, steps.slope, self.model.pressed.multiplier, steps._step, self.beyond_limit, eigenvalue, self.energy.totals,
+            tuple(self.buckling),
+        )  # fmt: skip
+
+    def resume(self, at: PathRestart) -> None:
+        """Stand where another walk stood."""
+        steps = self.steps
+        steps.pressure, steps.q, steps.slope, steps._step = at.pressure, at.q, at.slope, at.step
+        self.model.pressed.multiplier = at.multiplier
+        self.beyond_limit = at.beyond_limit
+        self.watch.resume(at.pressure, at.q, at.eigenvalue, at.buckling)
+        self.energy.begin(at.q, at.pressure, at.slope)
+        self.energy.totals = at.energy
 
     def go_to(self, target: float) -> ClosureState:
         """Equilibrium at a back pressure, Pa, with the penetration asked for.

@@ -191,5 +191,5 @@ def test_no_refinement_hides_a_force_that_is_no_derivative_of_the_energy(case, m
     path.steps.reach(2.05e3)
     ledger.add(path.steps.q, path.steps.pressure)
     ledger.settle()
-    assert ledger.renewal > 0.0 and ledger.equilibria > 0
+    assert ledger.renewal > 0.0
     assert ledger.error < 1e-7 if share == 1.0 else ledger.error > 1e-6
