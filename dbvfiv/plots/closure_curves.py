@@ -36,6 +36,7 @@ def closure_curve(result: "ClosureResults") -> Figure:
     length, force, moved, stiffness = panels
     length.plot(p, values("contact_front") * 1e3, color=COMPUTED, label="front of contact on the centre line")
     length.plot(p, values("sealed_length") * 1e3, color=ACCENT, label="sealed length")
+    length.plot(p, values("lip_seal") * 1e3, color=ACCENT, ls="--", label="of it from the lip on")
     length.axhline(result.case.valve.duckbill_length * 1e3, color=REST, lw=0.9, ls=":")
     length.set_ylabel("Length along the axis, mm")
     length.legend()

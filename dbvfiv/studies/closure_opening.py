@@ -43,12 +43,20 @@ class Opening:
         return int(np.argmin(self.area))
 
     def shut_length(self, fraction: float) -> float:
-        """Length along the axis, m, on which the opening is below a fraction of that of the lip at rest; areas are linear between rows."""
+        """Length along the axis, m, on which the opening is below a fraction of that of the lip at rest."""
         return float(sum(b - a for a, b in self.shut_intervals(fraction)))
 
+    def lip_seal(self, fraction: float) -> float:
+        """Length, m, that is shut in that sense from the lip on without a break."""
+        intervals = self.shut_intervals(fraction)
+        return intervals[0][1] - self.z[0] if intervals and intervals[0][0] <= self.z[0] else 0.0
+
     def shut_intervals(self, fraction: float) -> list[tuple[float, float]]:
-        """Intervals of z, m, on which the valve is shut in that sense."""
-        excess = self.area - fraction * self.reference
+        """Intervals of z, m, on which the valve is shut in that sense.
+
+        Between rows the roots of the areas are taken as linear, because walls that touch part from each other with at least the square of the distance.
+        """
+        excess = np.sqrt(self.area) - np.sqrt(fraction * self.reference)
         cuts: list[tuple[float, float]] = []
         for i in range(len(self.z) - 1):
             a, b, fa, fb = self.z[i], self.z[i + 1], excess[i], excess[i + 1]

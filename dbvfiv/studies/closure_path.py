@@ -75,7 +75,7 @@ class PathPoint:
     max_displacement : float, m
     contact_force : float, N
     least_opening : float, m2
-    sealed_length : float, m
+    sealed_length, lip_seal : float, m
     contact_front : float, m
     eigenvalues : (k,) array, 1/s2
         Real parts, ascending; empty on stretches followed by arclength.
@@ -88,6 +88,7 @@ class PathPoint:
     contact_force: float
     least_opening: float
     sealed_length: float
+    lip_seal: float
     contact_front: float
     eigenvalues: np.ndarray
     arclength: bool = False
@@ -237,6 +238,7 @@ class ClosurePath:
             contact_force=FACES * contact.total,
             least_opening=float(QUARTERS * passage.area.min()),
             sealed_length=passage.shut_length(model.case.closure.shut_fraction),
+            lip_seal=passage.lip_seal(model.case.closure.shut_fraction),
             contact_front=contact_front(passage, model),
             eigenvalues=eigenvalues,
             arclength=arclength,

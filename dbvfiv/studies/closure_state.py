@@ -27,6 +27,10 @@ class ClosureState:
         Some section is shut: less than `closure.shut_fraction` of the lip's opening at rest is left.
     sealed_length : float, m
         Length along the axis on which sections are shut.
+    lip_seal : float, m
+        The part of it that begins at the lip.
+    joint_seal : float, m
+        The rest, at the joint of duckbill and saddle and on the saddle.
     sealed_intervals : tuple of (start, stop), m
     sealed_area : float, m2
         Area over which the inner faces press on each other.
@@ -76,6 +80,8 @@ class ClosureState:
     q: np.ndarray
     closed: bool
     sealed_length: float
+    lip_seal: float
+    joint_seal: float
     sealed_intervals: tuple[tuple[float, float], ...]
     sealed_area: float
     contact_force: float
@@ -130,7 +136,7 @@ def describe_closure(model: ClosureModel, q: np.ndarray, pressure: float, spectr
     state, passage = pressed.contact_state(q), opening(model, q)
     fraction = model.case.closure.shut_fraction
     intervals = passage.shut_intervals(fraction)
-    length = passage.shut_length(fraction)
+    length, lip = passage.shut_length(fraction), passage.lip_seal(fraction)
     pressures = np.zeros(len(nodal))
     pressures[pressed.contact.nodes] = state.pressure
     faces = face.gap(nodal, pressed.shell.directors(nodal)[0])
@@ -149,6 +155,8 @@ def describe_closure(model: ClosureModel, q: np.ndarray, pressure: float, spectr
         q=np.asarray(q),
         closed=bool(intervals),
         sealed_length=length,
+        lip_seal=lip,
+        joint_seal=length - lip,
         sealed_intervals=tuple(intervals),
         sealed_area=float(FACES * pressed.contact.area[state.touching].sum()),
         contact_force=FACES * state.total,

@@ -147,12 +147,15 @@ def test_a_penetration_out_of_reach_is_an_error(case, monkeypatch):
         path.go_to(14e3)
 
 
-def test_shut_intervals_are_cut_linearly_between_rows():
+def test_shut_intervals_are_cut_between_rows_where_roots_of_areas_are_linear():
     z = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
     passage = Opening(z, np.array([0.0, 0.0, 2.0, 0.0, 2.0]), 1.0, np.zeros((5, 2)), np.ones(5))
-    assert passage.shut_intervals(0.5) == [(0.0, 1.25), (2.75, 3.25)]
-    assert passage.shut_length(0.5) == pytest.approx(1.75)
+    assert np.ravel(passage.shut_intervals(0.5)) == pytest.approx([0.0, 1.5, 2.5, 3.5])
+    assert passage.shut_length(0.5) == pytest.approx(2.5) and passage.lip_seal(0.5) == pytest.approx(1.5)
     assert passage.narrowest == 0
+    parting = Opening(z, np.maximum(z - 0.5, 0.0) ** 2, 1.0, np.zeros((5, 2)), np.ones(5))
+    assert parting.lip_seal(0.81) == pytest.approx(1.4)
+    assert Opening(z, np.array([2.0, 0.0, 0.0, 2.0, 2.0]), 1.0, np.zeros((5, 2)), np.ones(5)).lip_seal(0.5) == 0.0
 
 
 def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
