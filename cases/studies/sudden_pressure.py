@@ -28,7 +28,7 @@ ALPHA_3 = {"damping.alpha": 3, "damping.beta": 0.003}
 #: Groups of runs that differ in one thing: title, common changes, and what differs by name.
 GROUPS = {
     "law": ("Flow with and without its unsteady term, 36 kPa, alpha 0 (Fig. 5-10)", {"drive.pressure": 36e3, "damping.alpha": 0, "damping.beta": 0.003},
-            {"unsteady": {}, "steady": {"fluid.unsteady": False}}),
+            {"unsteady": {}, "steady": {"fluid.unsteady": False}, "steady, beta 0.004 s": {"fluid.unsteady": False, "damping.beta": 0.004}}),
     "mesh": ("Mesh, 36 kPa (Fig. 5-3)", {"drive.pressure": 36e3} | ALPHA_3,
              {f"{a} x {b}": {"mesh.around": a, "mesh.along": b} for a, b in ((5, 8), (10, 24), (14, 24), (28, 48), (36, 64))}),
     "step": ("Step, 29 kPa (Fig. 5-4)", {"drive.pressure": 29e3} | ALPHA_3,
@@ -59,7 +59,7 @@ def main() -> None:
         title, common, members = GROUPS[name]
         groups[title] = {}
         for member, changes in members.items():
-            run = kept_run(base.replace(common | changes), given.folder / f"{name}-{member.replace(' ', '').replace('/', '-per-')}.h5")
+            run = kept_run(base.replace(common | changes), given.folder / f"{name}-{member.replace(' ', '').replace(',', '-').replace('/', '-per-')}.h5")
             groups[title][member] = run
             rows.append({"group": name, "member": member} | _row(run))
             print(_line(rows[-1]), flush=True)
@@ -110,12 +110,12 @@ def draw_pressures(rows: list[dict], runs: dict, path: Path) -> None:
             t = np.array([0.2, 0.9])
             at = int(np.argmin(np.abs(h["time"] - 0.35)))
             level = abs(h["mass_flow"][at] / row["steady"] - 1.0)
-            distance.semilogy(t, level * np.exp(row["growth_rate"] * (t - h["time"][at])), color=colour, lw=0.8, ls=":")
+            distance.semilogy(t, level * np.exp(row["growth_rate"] * (t - h["time"][at])), color="black", lw=1.0, ls=":")
         flow.set(xlabel="Time, s", ylabel="Mass flow over that of the steady state", xlim=(0, 0.6), ylim=(0, 1.1))
         flow.legend(loc="lower right", ncols=2)
         distance.axhline(CLOSE, color=REST, lw=0.8)
         distance.axvline(MARK, color=REST, lw=0.8)
-        distance.set(xlabel="Time, s", ylabel="Relative distance to the steady state", ylim=(1e-9, 2))
+        distance.set(xlabel="Time, s", ylabel="Relative distance to the steady state", ylim=(1e-8, 2))
         flow.set_title("Water, pressure applied at once", loc="left", fontweight="bold")
         distance.set_title("dotted: decay of the slowest mode", loc="left")
         figure.savefig(path, dpi=90)
@@ -136,7 +136,7 @@ def draw_groups(groups: dict, path: Path) -> None:
                 panel.plot(run.history["time"], run.history["mass_flow"], color=colour, ls=dash, lw=1.3, label=name)
             panel.set_title(title, loc="left", fontsize=9)
             panel.set_xlim(0, MARK)
-            panel.legend(loc="lower right", fontsize=8)
+            panel.legend(loc="lower right", fontsize=8, frameon=True, framealpha=0.85, edgecolor="none")
         for panel in panels[::columns]:
             panel.set_ylabel("Mass flow, kg/s")
         for panel in panels[: len(groups)][-columns:]:

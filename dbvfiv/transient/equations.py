@@ -16,7 +16,7 @@ from ..model import ValveModel
 from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
 from .fluid import MovingFluid
-from .kernels import inertia_force, kinetic_energy, strain_energy
+from .kernels import inertia_force, kinetic_energy, row_motion, strain_energy
 
 
 @dataclass(frozen=True)
@@ -174,11 +174,10 @@ class ValveMotion:
         model = self.model
         nodal = model.nodal(q)
         nodal_new = nodal if q_new is q else model.nodal(q_new)
-        area_new = model.rows.areas(nodal_new)
-        area = area_new if q_new is q else model.rows.areas(nodal)
-        inlet = step.inlet
+        new = self._passage(nodal_new, v_new)
+        mid = new if q_new is q else self._passage(nodal, v)
+        area, area_new, inlet = mid[0], new[0], step.inlet
         if self.moving_fluid:
-            mid, new = (area, self._area_rate(nodal, v)), (area_new, self._area_rate(nodal_new, v_new))
             if speed is None:
                 speed = self.fluid.velocity(mid, new, inlet, step.speed, step.theta, step.psi_weight, float(step.psi_known[0]))
             mid_speed = step.speed + step.theta * (speed - step.speed)
@@ -192,9 +191,12 @@ class ValveMotion:
         zero = np.zeros(self.stations)
         return Load(model.pressure_force(nodal, p), 0.0, p, area_new, model.flow.velocities(area_new, speed), zero, zero, inlet, speed)
 
-    def _area_rate(self, nodal: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Rates (m,) of the areas, which are quadratic in the deformed positions."""
-        return self.model.rows.second(self._position(nodal), self.model.nodal(v))
+    def _passage(self, nodal: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Areas (m,) and their rates (m,)."""
+        rows = self.model.rows
+        area, rate = np.empty(self.stations), np.empty(self.stations)
+        row_motion(rows.rows, self.model.shell.mesh.nodes, nodal, self.model.nodal(v), area, rate)
+        return area + rows.offset, rate
 
     def _position(self, nodal):
         out = nodal.copy()
@@ -236,13 +238,12 @@ class ValveMotion:
         values = model.follower_stiffness(nodal, weights.load * weights.theta * load.pressure, values)
         forces = weights.load * model.station_forces(nodal).data
         slope = model.rows.jacobian(nodal).data
-        area = model.rows.areas(nodal)
+        mid = self._passage(nodal, v_load)
         if not self.moving_fluid:
-            _, gradient = model.flow.steady_operator(area, load.inlet)
+            _, gradient = model.flow.steady_operator(mid[0], load.inlet)
             self._solver(0).refactor(values, forces, slope, weights.theta * gradient)
             return
-        nodal_new = model.nodal(q_new)
-        mid, new = (area, self._area_rate(nodal, v_load)), (load.area, self._area_rate(nodal_new, v_new))
+        new = self._passage(model.nodal(q_new), v_new)
         found = self.fluid.pressure_slopes(mid, new, load.mid_speed, load.speed[-1], weights.theta, weights.velocity, weights.psi)
         self._refactor_moving(values, forces, slope, *found)
 
@@ -292,7 +293,7 @@ class ValveMotion:
             self._solver(0).refactor(mass, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
             return self.solve(load.force - forces, 0.0)[0], load
         rows, fluid = model.rows, self.fluid
-        area, rate = rows.areas(nodal), self._area_rate(nodal, v)
+        area, rate = self._passage(nodal, v)
         by_area, by_rate, by_speed = (fluid.integrate(slope) for slope in fluid.slopes(area, rate, speed))
         bend = rows.second(model.nodal(v), model.nodal(v))
         known = by_area @ rate + by_rate @ bend

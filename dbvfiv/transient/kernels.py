@@ -69,6 +69,26 @@ def kinetic_energy(quads, integrals, director1, rate):
     return 0.5 * total
 
 
+@numba.njit(cache=True)
+def row_motion(rows, nodes, nodal, rate, area, area_rate):
+    """Areas (m,) under the deformed rows (m, k) of nodes and their rates; see `dbvfiv.flow.rows.RowAreas`, whose offset is not added."""
+    for k in range(rows.shape[0]):
+        total = 0.0
+        change = 0.0
+        a = rows[k, 0]
+        x = nodes[a, 0] + nodal[a, 0]
+        y = nodes[a, 1] + nodal[a, 1]
+        for column in range(1, rows.shape[1]):
+            b = rows[k, column]
+            x_next = nodes[b, 0] + nodal[b, 0]
+            y_next = nodes[b, 1] + nodal[b, 1]
+            total += 0.5 * (y + y_next) * (x_next - x)
+            change += 0.5 * ((rate[a, 1] + rate[b, 1]) * (x_next - x) + (y + y_next) * (rate[b, 0] - rate[a, 0]))
+            a, x, y = b, x_next, y_next
+        area[k] = total
+        area_rate[k] = change
+
+
 @numba.njit(fastmath=FAST, inline="always")
 def _rubber_energy(c10, c01, c11, e):
     a = 1 + 2 * e[0]

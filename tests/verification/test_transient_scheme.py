@@ -73,10 +73,10 @@ def test_a_free_swing_keeps_its_energy_over_10_000_steps():
     for k in range(len(off)):
         state = stepper.step(state, 2e-4).state
         off[k] = sum(motion.energies(state.q, state.v)) / energy - 1.0
-    thirds = np.array_split(off, 4)
-    print(f"\nrelative energy off by {off.min():.2e} to {off.max():.2e}; means of the quarters {[f'{t.mean():.1e}' for t in thirds]}")
-    assert np.abs(off).max() < 2e-3
-    assert abs(thirds[-1].mean() - thirds[0].mean()) < 5e-4  # it swings about, it does not drift
+    quarters = np.array_split(off, 4)
+    print(f"\nrelative energy off by {off.min():.2e} to {off.max():.2e}; means of the quarters {[f'{t.mean():.1e}' for t in quarters]}")
+    assert np.abs(off).max() < 5e-4
+    assert abs(quarters[-1].mean() - quarters[0].mean()) < 1e-4
 
 
 # -- one unknown --------------------------------------------------------------------------------------------------------------------
