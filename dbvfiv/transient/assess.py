@@ -11,6 +11,8 @@ from .history import History
 
 #: Areas below this multiple of the lip gap at rest count as closed.
 CLOSED = 2.0
+#: Pascal; no fluid's pressure falls further below that of the surroundings.
+ATMOSPHERE = 101_325.0
 
 
 @dataclass(frozen=True)
@@ -89,3 +91,20 @@ def assess(history: History, gap: float, residual: float = np.nan, options: Judg
         reason = "The smallest flow area stays at that of the lip gap at rest."
         found = [Verdict(**{**vars(v), "name": "closed", "decided": True, "reason": reason}) for v in found]
     return RunVerdict(*found, residual, history.rows - 1, float(time[-1]))
+
+
+def beyond_model(history: History) -> str | None:
+    """Sentence on pressures that no fluid could have, None without any.
+
+    An ideal incompressible fluid pays any price for passing a gap that shuts; a real one separates, cavitates or is compressed. What follows such an instant
+    is the solution of the equations and no prediction.
+    """
+    lowest = np.min(history["station_pressure"], axis=1)
+    beyond = np.flatnonzero(lowest < -ATMOSPHERE)
+    if not len(beyond):
+        return None
+    time, share = history["time"][beyond[0]], len(beyond) / len(lowest)
+    return (
+        f"Pressures fall below vacuum from {time:.4g} s on, in {100 * share:.2g} % of the steps and down to {1e-3 * lowest.min():.4g} kPa, where the valve slams "
+        "shut: the fluid's equations are beyond their range there, and the motion afterwards is no prediction."
+    )

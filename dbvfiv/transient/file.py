@@ -164,7 +164,8 @@ class TransientFile(Observer):
                 _copy(old["states"], new["states"], restart.states)
                 for slot in ("0", "1"):
                     new[f"restart/{slot}"][:] = old[f"restart/{slot}"][:]
-                warnings = read_texts(old, "messages/warnings")
+                # sentences on the part that is done are made anew at the end
+                warnings = [text for text in read_texts(old, "messages/warnings") if not text.startswith("Pressures fall")]
             os.replace(copy, path)
         finally:
             copy.unlink(missing_ok=True)

@@ -12,7 +12,7 @@ from ..model import ValveModel
 from ..model.valve import QUARTERS
 from ..studies.observer import Observer
 from ..studies.steady import model_warnings
-from .assess import RunVerdict, assess
+from .assess import RunVerdict, assess, beyond_model
 from .control import step_control
 from .drive import Drive
 from .equations import ValveMotion
@@ -211,6 +211,10 @@ class Runner:
         if finish:
             self._checkpoint(history, progress)
         verdict = self._verdict(history, progress)
+        sentence = beyond_model(history)
+        if sentence:
+            self._warnings.append(sentence)
+            self.observer.warn(sentence)
         self.observer.end(interrupted)
         work = (self.stepper.residuals, self.stepper.solves, self.stepper.factorisations, self.control.halvings)
         return TransientRun(self.model, history, progress, verdict, self._warnings, failures, interrupted, stopped, *work)

@@ -280,3 +280,15 @@ def test_killed_with_signal_9_at_any_moment(tmp_path, valve):
             assert all(np.array_equal(resumed.history[name], whole.history[name]) for name in whole.history)
     assert len(set(found)) >= 3
     assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
+
+
+def test_pressures_below_vacuum_are_told():
+    from dbvfiv.transient.assess import beyond_model
+
+    pressure = np.zeros((100, 5))
+    history = {"time": np.linspace(0, 1, 100), "station_pressure": pressure}
+    pressure[40:] = -1.0e5
+    assert beyond_model(history) is None
+    pressure[50:60, 2] = -2.5e6
+    sentence = beyond_model(history)
+    assert "from 0.5051 s" in sentence and "10 %" in sentence and "-2500 kPa" in sentence
