@@ -198,8 +198,14 @@ class ClosureResults(Result):
         return [*HEAD, *(row_of(state) for state in self.states), *self.verdict()]
 
     def verdict(self) -> list[str]:
-        """Sentences on buckling and on the turn of the drive."""
-        return [*self._buckling_verdict(), *self._closing_verdict()]
+        """Sentences on the balances, on buckling and on the turn of the drive."""
+        return [*self._balance_verdict(), *self._buckling_verdict(), *self._closing_verdict()]
+
+    def _balance_verdict(self) -> list[str]:
+        if not self.states:
+            return []
+        force, energy = (max(getattr(state, name) for state in self.states) for name in ("force_balance", "energy_balance"))
+        return [f"Forces balance to {force:.1g} of their sizes, work and energies to {energy:.1g} of the work."]
 
     def _closing_verdict(self) -> list[str]:
         if self.closing is None:
