@@ -109,11 +109,13 @@ class ClosingResult:
 
     @property
     def closing_time(self) -> float | None:
-        """Time from the start of the turn from which on the valve is shut to the end of the run, s; None if it ends open."""
-        last_open = [s.time for s in self.samples if s.least_opening > self.shut_below]
-        if not self.samples or self.samples[-1].least_opening > self.shut_below:
-            return None
-        return max(0.0, (last_open[-1] if last_open else self.turn.start) - self.turn.start)
+        """Time from the start of the turn to the first instant from which on it is shut to the end of the run, s; None if it ends open."""
+        since = None
+        for sample in reversed(self.samples):
+            if sample.least_opening > self.shut_below:
+                break
+            since = sample.time
+        return None if since is None else max(0.0, since - self.turn.start)
 
     def summary(self) -> dict:
         """Plain SI numbers for JSON."""

@@ -111,7 +111,7 @@ def test_a_history_that_opens_again_is_not_shut_before_it_shuts_for_good():
 
     history = [sample(0.1 * i, passage) for i, passage in enumerate((9, 9, 9, 1, 5, 1, 1, 1))]
     result = ClosingResult(tuple(history), turn, 2.0)
-    assert result.first_shut == pytest.approx(0.2) and result.closing_time == pytest.approx(0.3)
+    assert result.first_shut == pytest.approx(0.2) and result.closing_time == pytest.approx(0.4)
     assert result.summary()["stays_shut"] is True
     assert ClosingResult(tuple(history[:5]), turn, 2.0).closing_time is None
 
