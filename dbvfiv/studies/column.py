@@ -79,7 +79,7 @@ class ColumnSolver:
         Estimated relative error of an eigenvalue above which a cell is solved directly.
     """
 
-    def __init__(self, snapshots: int = 4, tolerance: float = TOLERANCE):
+    def __init__(self, snapshots: int = 3, tolerance: float = TOLERANCE):
         self.snapshots, self.tolerance = snapshots, tolerance
         self._static, self._workspace = StaticSolver(), Workspace()
 

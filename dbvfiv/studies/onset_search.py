@@ -122,7 +122,7 @@ class OnsetSearch:
             taken = ends[np.unique(np.linspace(0, len(ends) - 1, 6).astype(int))]
             conditions = [self.place(v).condition for v in taken]
             floors = [floor_of(c[2]) for c in conditions]
-            self._fine = family.fine(conditions, 0.75 * min(floors) if np.isfinite(floors).all() else -np.inf)
+            self._fine = family.fine(conditions, 0.75 * min(floors) if np.isfinite(floors).all() else -np.inf, most=5)
         values = self._fine.eigenvalues([place.condition])[0]
         upper = values[(values.imag >= 0) & (values.real > floor_of(place.beta))]
         return upper[np.argsort(-upper.real)][:8]

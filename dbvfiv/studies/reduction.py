@@ -280,7 +280,7 @@ class StateFamily:
         scale = 1.0 / (1.0 + pairs.values * beta)
         return pairs.q - self.solver.solve(force) * scale, pairs.w - self.solver.solve_transposed(back) * np.conj(scale)
 
-    def fine(self, conditions, floor: float, most: int = 5) -> Reduced:
+    def fine(self, conditions, floor: float, most: int = 4) -> Reduced:
         """Second stage: a space made of corrected leading vectors at some conditions."""
         columns = []
         for condition in conditions:
