@@ -31,21 +31,23 @@ def onset(result: "OnsetResults") -> Figure:
     values = result.values / scale
     figure = new_figure(7.2, 5.6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    ranges = unstable_ranges(result)
     for axes in (top, bottom):
         if axis.log:
             axes.set_xscale("log")
             axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
             decades = np.log10(values[-1] / values[0]) if len(values) > 1 else 1.0
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.6 else (1.0,), numticks=12))
-        for a, b in unstable_ranges(result):
-            axes.axvspan(a / scale, b / scale, color=_UNSTABLE, lw=0, zorder=0)
+        for a, b in ranges:
+            axes.axvspan(a / scale, b / scale, color=_UNSTABLE, lw=0, zorder=0, label="unstable" if axes is top and a == ranges[0][0] else None)
     growth, frequency = result.growth_rates, result.frequencies
     low = _floor(growth)
     for k in range(1, growth.shape[1]):
         top.plot(values, np.where(growth[:, k] > low, growth[:, k], np.nan), ".", color=REST, ms=3.5, label="further modes" if k == 1 else None)
         bottom.plot(values, np.where(growth[:, k] > low, frequency[:, k], np.nan), ".", color=REST, ms=3.5)
     top.plot(values, growth[:, 0], "-", color=COMPUTED, label="leading mode")
-    bottom.plot(values, np.where(_jumps(frequency[:, 0]), np.nan, frequency[:, 0]), "-", color=COMPUTED)
+    changes = np.flatnonzero(_jumps(frequency[:, 0]))
+    bottom.plot(np.insert(values, changes, np.nan), np.insert(frequency[:, 0], changes, np.nan), "-", color=COMPUTED)
     top.axhline(0.0, color="0.25", lw=1.0)
     for row in result.points:
         x = row["value"] / scale
@@ -60,13 +62,14 @@ def onset(result: "OnsetResults") -> Figure:
         # on the side of the mark that the curve leaves free
         place = {"xytext": (9, -8), "va": "top"} if row["gains"] else {"xytext": (9, 8), "va": "bottom"}
         top.annotate(words, (x, 0.0), textcoords="offset points", fontsize=8.5, color=PUBLISHED, path_effects=[withStroke(linewidth=3, foreground="white")], **place)
-    top.set_ylim(bottom=low)
+    # room for the words at the marks
+    top.set_ylim(low, max(1.1 * np.nanmax(growth), -0.3 * low))
     top.set_ylabel("Growth rate, 1/s")
     bottom.set_ylabel("Frequency, Hz")
     bottom.set_ylim(bottom=0)
     bottom.set_xlabel(LABELS[axis.parameter])
     top.set_title(_title(result), loc="left", fontweight="bold")
-    top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
+    top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2)
     if len(values) > 1:
         bottom.set_xlim(values[0], values[-1])
     return figure
