@@ -164,14 +164,14 @@ class TransientResults(Result):
             f"{verdict['verdict']}{'' if verdict['decided'] else ' (not certain)'} after {verdict['time']:.4g} s and {verdict['steps']} steps",
             verdict["reason"],
             "",
-            "               last         mean    amplitude    frequency   cycles   periodicity error",
+            "                     last         mean    amplitude    frequency   cycles   periodicity error",
         ]
         for name, unit, factor in (("mass_flow", "kg/s", 1.0), ("lip_opening", "mm", 1e3)):
             found = verdict[name]
             numbers = (factor * h[name][-1], *(None if found[k] is None else f * found[k] for k, f in (("mean", factor), ("amplitude", factor), ("frequency", 1.0))))
             cells = "".join(f"{'-' if value is None else f'{value:.5g}':>13}" for value in numbers)
             error = found["periodicity_error"]
-            lines.append(f"{name.replace('_', ' '):<12}{cells[5:]}{found['cycles_observed']:>9}{'-' if error is None else f'{error:.2g}':>20}   {unit}, Hz")
+            lines.append(f"{name.replace('_', ' '):<12}{cells}{found['cycles_observed']:>9}{'-' if error is None else f'{error:.2g}':>20}   {unit}, Hz")
         return lines
 
     @cached_property

@@ -148,7 +148,8 @@ def _name(series: Series, cycles: Cycles, recent: Cycles, facts: dict, direction
             return Verdict(direction, False, words + ", less and less: it may be on its way to another amplitude.", **facts)
         doubled = abs(np.log(cycles.spread[-1] / cycles.spread[max(0, count - options.cycles)])) > 0.3
         return Verdict(direction, count >= options.cycles or (count >= 5 and doubled), words + ".", **facts)
-    if count < options.cycles and error > options.periodic and _swings(series) > 4 * options.cycles:
+    enough = (1.5 if error > options.noisy else 4.0) * options.cycles  # swings without a return
+    if count < options.cycles and error > options.periodic and _swings(series) >= enough:
         return Verdict("irregular", True, f"After {_swings(series)} swings it still repeats within {100 * error:.2g} % only.", **facts)
     if count < options.cycles:
         return Verdict("undecided", False, f"Only {count} cycles have been seen and {options.cycles} are needed.", **facts)
