@@ -1,6 +1,6 @@
 """One limit cycle on several steps and meshes: amplitude, period and mean, and the orders in which they converge.
 
-On the finest steps the run starts from the cycle that the run on the step before ended in; other meshes start from their own steady state with a kick. Runs are
+Each step after the longest starts from the cycle that the run on the step before ended in; other meshes start from their own steady state with a kick. Runs are
 kept in files of the folder, so a study that is started again goes on.
 
     python cases/studies/cycle_convergence.py out/cycle --density 45 --steps 2 1 0.5 0.25 0.1 --meshes 14x24 42x72
@@ -71,8 +71,11 @@ def _on(base, mesh: str, step: float):
 
 
 def _row(mesh: str, step: float, result) -> dict:
-    numbers = {name: factor * result.verdict[signal][key] for name, (signal, key, factor) in QUANTITIES.items()}
     lip = result.verdict["lip_opening"]
+    numbers = {}
+    for name, (signal, key, factor) in QUANTITIES.items():
+        value = result.verdict[signal][key]  # None where no cycle was found
+        numbers[name] = float("nan") if value is None else factor * value
     return {"mesh": mesh, "step, ms": step, **numbers, "verdict": result.verdict["verdict"], "trend a cycle": lip["amplitude_trend"], "cycles": lip["cycles_observed"]}
 
 
@@ -82,6 +85,8 @@ def _tell(row: dict) -> None:
 
 def order(steps, values) -> float:
     """p of value = limit + c step^p through three points, not a number if there is none."""
+    if not np.isfinite(values).all() or values[1] == values[2]:
+        return float("nan")
     ratio = (values[0] - values[1]) / (values[1] - values[2])
 
     def miss(p):
