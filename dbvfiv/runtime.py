@@ -6,6 +6,7 @@ are first imported, and never overwrites what the user has set.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import sys
 from pathlib import Path
@@ -21,6 +22,18 @@ def cache_directory() -> Path:
     return Path(platformdirs.user_cache_dir("dbvfiv"))
 
 
+def kernel_directory() -> Path:
+    """Folder of compiled element loops, another one for other sources.
+
+    Numba looks at the file of a loop alone, not at those of the functions and constants that it compiles into it.
+    """
+    package = Path(__file__).parent
+    digest = hashlib.sha256()
+    for source in (*sorted((package / "shell").glob("*.py")), package / "transient" / "kernels.py"):
+        digest.update(source.read_bytes())
+    return cache_directory() / "numba" / digest.hexdigest()[:16]
+
+
 def prepare() -> None:
     """Set the surroundings; safe to call again, also after JAX was imported.
 
@@ -32,7 +45,7 @@ def prepare() -> None:
         "JAX_COMPILATION_CACHE_DIR": str(cache / "jax"),
         "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.2",
         "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
-        "NUMBA_CACHE_DIR": str(cache / "numba"),
+        "NUMBA_CACHE_DIR": str(kernel_directory()),
         # element loops and the small factorisations here lose time to threads
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .kernel_rubber import FAST, rubber_stress, rubber_tangent
+from .kernel_rubber import FAST
+from .kernel_section import section_stress, section_tangent
 from .reference import SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE
 
 _SLOPE = np.ascontiguousarray(SLOPE)
@@ -20,7 +21,7 @@ _EDGE_WEIGHTS = np.ascontiguousarray(SHEAR_WEIGHTS)
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def _gather(quad, nodes, displacement, director, x, d):
+def gather(quad, nodes, displacement, director, x, d):
     for a in range(4):
         n = quad[a]
         for i in range(3):
@@ -29,7 +30,7 @@ def _gather(quad, nodes, displacement, director, x, d):
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def _bases(point, x, d, basis, turn):
+def bases(point, x, d, basis, turn):
     """Covariant base vectors and director derivatives at one point, each (2, 3)."""
     for c in range(2):
         for i in range(3):
@@ -43,7 +44,7 @@ def _bases(point, x, d, basis, turn):
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def _edge_shears(x, d, edge):
+def edge_shears(x, d, edge):
     for g in range(4):
         a = _EDGES[g, 0]
         b = _EDGES[g, 1]
@@ -54,7 +55,7 @@ def _edge_shears(x, d, edge):
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def _strains(point, basis, turn, edge, shear0, metric0, metric1, q, qk, p, strain):
+def strains(point, basis, turn, edge, shear0, metric0, metric1, q, qk, p, strain):
     """Section strains in local axes: membrane (3), bending (3), transverse shear (2)."""
     c00 = -metric0[0]
     c01 = -metric0[1]
@@ -78,94 +79,6 @@ def _strains(point, basis, turn, edge, shear0, metric0, metric1, q, qk, p, strai
     g1 = _EDGE_WEIGHTS[point, 2] * (edge[2] - shear0[2]) + _EDGE_WEIGHTS[point, 3] * (edge[3] - shear0[3])
     strain[6] = p[0, 0] * g0 + p[0, 1] * g1
     strain[7] = p[1, 0] * g0 + p[1, 1] * g1
-
-
-@numba.njit(fastmath=FAST, inline="always")
-def _linear_response(stiffness, h, strain, stress):
-    h2 = h * h
-    h3 = h2 * h
-    for i in range(3):
-        n = 0.0
-        m = 0.0
-        for j in range(3):
-            n += h * stiffness[i, j] * strain[j] + h2 * stiffness[i, 3 + j] * strain[3 + j]
-            m += h2 * stiffness[3 + i, j] * strain[j] + h3 * stiffness[3 + i, 3 + j] * strain[3 + j]
-        stress[i] = n
-        stress[3 + i] = m
-    for i in range(2):
-        stress[6 + i] = h * (stiffness[6 + i, 6] * strain[6] + stiffness[6 + i, 7] * strain[7])
-
-
-@numba.njit(fastmath=FAST, inline="always")
-def _point_strain(zeta, h, scale, strain, e):
-    t = zeta * h
-    for i in range(3):
-        e[i] = strain[i] + t * strain[3 + i]
-    e[3] = scale * strain[6]
-    e[4] = scale * strain[7]
-
-
-@numba.njit(fastmath=FAST, inline="always")
-def _section_stress(stiffness, points, constants, scales, h, strain, stress, e, s):
-    _linear_response(stiffness, h, strain, stress)
-    for l in range(points.shape[0]):
-        _point_strain(points[l, 0], h, scales[l], strain, e)
-        rubber_stress(constants[l, 0], constants[l, 1], constants[l, 2], e, s)
-        w = points[l, 1] * h
-        t = points[l, 0] * h
-        for i in range(3):
-            stress[i] += w * s[i]
-            stress[3 + i] += w * t * s[i]
-        stress[6] += w * scales[l] * s[3]
-        stress[7] += w * scales[l] * s[4]
-
-
-@numba.njit(fastmath=FAST, inline="always")
-def _section_tangent(stiffness, points, constants, scales, h, strain, stress, tangent, e, s, t5):
-    _linear_response(stiffness, h, strain, stress)
-    h2 = h * h
-    h3 = h2 * h
-    for i in range(3):
-        for j in range(3):
-            tangent[i, j] = h * stiffness[i, j]
-            tangent[i, 3 + j] = h2 * stiffness[i, 3 + j]
-            tangent[3 + i, 3 + j] = h3 * stiffness[3 + i, 3 + j]
-        for j in range(2):
-            tangent[i, 6 + j] = 0.0
-            tangent[3 + i, 6 + j] = 0.0
-    for i in range(2):
-        for j in range(2):
-            tangent[6 + i, 6 + j] = h * stiffness[6 + i, 6 + j]
-    for l in range(points.shape[0]):
-        k = scales[l]
-        _point_strain(points[l, 0], h, k, strain, e)
-        rubber_tangent(constants[l, 0], constants[l, 1], constants[l, 2], e, s, t5)
-        w = points[l, 1] * h
-        t = points[l, 0] * h
-        wt = w * t
-        wtt = wt * t
-        for i in range(3):
-            stress[i] += w * s[i]
-            stress[3 + i] += wt * s[i]
-            for j in range(i, 3):
-                v = t5[i, j]
-                tangent[i, j] += w * v
-                tangent[3 + i, 3 + j] += wtt * v
-                tangent[i, 3 + j] += wt * v
-                if j > i:
-                    tangent[j, 3 + i] += wt * v
-            for j in range(2):
-                v = k * t5[i, 3 + j]
-                tangent[i, 6 + j] += w * v
-                tangent[3 + i, 6 + j] += wt * v
-        stress[6] += w * k * s[3]
-        stress[7] += w * k * s[4]
-        tangent[6, 6] += w * k * k * t5[3, 3]
-        tangent[6, 7] += w * k * k * t5[3, 4]
-        tangent[7, 7] += w * k * k * t5[4, 4]
-    for i in range(8):
-        for j in range(i):
-            tangent[i, j] = tangent[j, i]
 
 
 @numba.njit(fastmath=FAST, inline="always")
@@ -229,16 +142,16 @@ def shell_force(quads, nodes, q, director, director1, shear0, metric0, metric1, 
     g = np.empty(2)
     for el in range(quads.shape[0]):
         quad = quads[el]
-        _gather(quad, nodes, q, director, x, d)
-        _edge_shears(x, d, edge)
+        gather(quad, nodes, q, director, x, d)
+        edge_shears(x, d, edge)
         for a in range(4):
             for i in range(3):
                 fx[a, i] = 0.0
                 fd[a, i] = 0.0
         for point in range(4):
-            _bases(point, x, d, basis, turn)
-            _strains(point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], mq[el, point], mqk[el, point], mp[el, point], strain)
-            _section_stress(stiffness, points, constants, scales, thickness[el], strain, stress, e, s)
+            bases(point, x, d, basis, turn)
+            strains(point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], mq[el, point], mqk[el, point], mp[el, point], strain)
+            section_stress(stiffness, points, constants, scales, thickness[el], strain, stress, e, s)
             _covariant_stress(mq[el, point], mqk[el, point], mp[el, point], area[el, point], stress, n, m, g)
             _add_forces(point, n, m, g, basis, turn, x, d, fx, fd)
         for a in range(4):
@@ -288,8 +201,8 @@ def shell_tangent(quads, nodes, q, director, director1, director2, shear0, metri
     for el in range(quads.shape[0]):
         quad = quads[el]
         h = thickness[el]
-        _gather(quad, nodes, q, director, x, d)
-        _edge_shears(x, d, edge)
+        gather(quad, nodes, q, director, x, d)
+        edge_shears(x, d, edge)
         for a in range(4):
             for i in range(3):
                 fx[a, i] = 0.0
@@ -319,12 +232,12 @@ def shell_tangent(quads, nodes, q, director, director1, director2, shear0, metri
                 shear_rows[ed, 5 * a + 3 + r] = ta
                 shear_rows[ed, 5 * b + 3 + r] = tb
         for point in range(4):
-            _bases(point, x, d, basis, turn)
+            bases(point, x, d, basis, turn)
             ql = mq[el, point]
             qkl = mqk[el, point]
             pl = mp[el, point]
-            _strains(point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], ql, qkl, pl, strain)
-            _section_tangent(stiffness, points, constants, scales, h, strain, stress, tangent, e, s, t5)
+            strains(point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], ql, qkl, pl, strain)
+            section_tangent(stiffness, points, constants, scales, h, strain, stress, tangent, e, s, t5)
             weight = area[el, point]
             _covariant_stress(ql, qkl, pl, weight, stress, n, m, g)
             _add_forces(point, n, m, g, basis, turn, x, d, fx, fd)

@@ -4,8 +4,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..shell.kernel import _bases, _edge_shears, _gather, _linear_response, _point_strain, _strains
+from ..shell.kernel import bases, edge_shears, gather, strains
 from ..shell.kernel_rubber import FAST
+from ..shell.kernel_section import linear_response, point_strain
 
 
 @numba.njit(cache=True, fastmath=FAST)
@@ -118,20 +119,20 @@ def strain_energy(
     e = np.empty(5)
     total = 0.0
     for el in range(quads.shape[0]):
-        _gather(quads[el], nodes, displacement, director, x, d)
-        _edge_shears(x, d, edge)
+        gather(quads[el], nodes, displacement, director, x, d)
+        edge_shears(x, d, edge)
         h = thickness[el]
         for point in range(4):
-            _bases(point, x, d, basis, turn)
-            _strains(
+            bases(point, x, d, basis, turn)
+            strains(
                 point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], mq[el, point], mqk[el, point], mp[el, point], strain
             )
-            _linear_response(stiffness, h, strain, stress)
+            linear_response(stiffness, h, strain, stress)
             density = 0.0
             for i in range(8):
                 density += 0.5 * stress[i] * strain[i]
             for l in range(points.shape[0]):
-                _point_strain(points[l, 0], h, scales[l], strain, e)
+                point_strain(points[l, 0], h, scales[l], strain, e)
                 density += points[l, 1] * h * _rubber_energy(constants[l, 0], constants[l, 1], constants[l, 2], e)
             total += area[el, point] * density
     return total

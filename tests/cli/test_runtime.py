@@ -1,7 +1,11 @@
 """The surroundings that importing the package sets."""
 
+import shutil
 import subprocess
 import sys
+from pathlib import Path
+
+from dbvfiv import runtime
 
 CODE = """
 import os
@@ -23,7 +27,21 @@ def run(before: str = "", **environment: str) -> list[str]:
 
 
 def test_double_precision_and_caches(tmp_path):
-    assert run(DBVFIV_CACHE=str(tmp_path)) == ["float64", str(tmp_path / "jax"), str(tmp_path / "numba"), "1"]
+    precision, jax, numba, threads = run(DBVFIV_CACHE=str(tmp_path))
+    assert (precision, jax, threads) == ("float64", str(tmp_path / "jax"), "1")
+    assert Path(numba).parent == tmp_path / "numba"
+
+
+def test_changed_sources_are_compiled_anew(tmp_path, monkeypatch):
+    """Also those of what a compiled loop calls, which Numba's own check does not see."""
+    package = tmp_path / "dbvfiv"
+    shutil.copytree(Path(runtime.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(runtime, "__file__", str(package / "runtime.py"))
+    before = runtime.kernel_directory()
+    assert runtime.kernel_directory() == before
+    called = package / "shell" / "kernel_rubber.py"
+    called.write_text(called.read_text() + "# changed\n")
+    assert runtime.kernel_directory() != before
 
 
 def test_also_when_jax_was_there_first(tmp_path):

@@ -1,0 +1,98 @@
+"""Compiled section response: what the layers of a wall answer to membrane strains, curvatures and shears.
+
+Plies answer linearly by their integrated stiffness; rubber is integrated over points through the thickness. Strains and resultants are ordered
+membrane (3), bending (3), transverse shear (2).
+"""
+from __future__ import annotations
+
+import numba
+
+from .kernel_rubber import FAST, rubber_stress, rubber_tangent
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def linear_response(stiffness, h, strain, stress):
+    h2 = h * h
+    h3 = h2 * h
+    for i in range(3):
+        n = 0.0
+        m = 0.0
+        for j in range(3):
+            n += h * stiffness[i, j] * strain[j] + h2 * stiffness[i, 3 + j] * strain[3 + j]
+            m += h2 * stiffness[3 + i, j] * strain[j] + h3 * stiffness[3 + i, 3 + j] * strain[3 + j]
+        stress[i] = n
+        stress[3 + i] = m
+    for i in range(2):
+        stress[6 + i] = h * (stiffness[6 + i, 6] * strain[6] + stiffness[6 + i, 7] * strain[7])
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def point_strain(zeta, h, scale, strain, e):
+    t = zeta * h
+    for i in range(3):
+        e[i] = strain[i] + t * strain[3 + i]
+    e[3] = scale * strain[6]
+    e[4] = scale * strain[7]
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def section_stress(stiffness, points, constants, scales, h, strain, stress, e, s):
+    linear_response(stiffness, h, strain, stress)
+    for l in range(points.shape[0]):
+        point_strain(points[l, 0], h, scales[l], strain, e)
+        rubber_stress(constants[l, 0], constants[l, 1], constants[l, 2], e, s)
+        w = points[l, 1] * h
+        t = points[l, 0] * h
+        for i in range(3):
+            stress[i] += w * s[i]
+            stress[3 + i] += w * t * s[i]
+        stress[6] += w * scales[l] * s[3]
+        stress[7] += w * scales[l] * s[4]
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def section_tangent(stiffness, points, constants, scales, h, strain, stress, tangent, e, s, t5):
+    linear_response(stiffness, h, strain, stress)
+    h2 = h * h
+    h3 = h2 * h
+    for i in range(3):
+        for j in range(3):
+            tangent[i, j] = h * stiffness[i, j]
+            tangent[i, 3 + j] = h2 * stiffness[i, 3 + j]
+            tangent[3 + i, 3 + j] = h3 * stiffness[3 + i, 3 + j]
+        for j in range(2):
+            tangent[i, 6 + j] = 0.0
+            tangent[3 + i, 6 + j] = 0.0
+    for i in range(2):
+        for j in range(2):
+            tangent[6 + i, 6 + j] = h * stiffness[6 + i, 6 + j]
+    for l in range(points.shape[0]):
+        k = scales[l]
+        point_strain(points[l, 0], h, k, strain, e)
+        rubber_tangent(constants[l, 0], constants[l, 1], constants[l, 2], e, s, t5)
+        w = points[l, 1] * h
+        t = points[l, 0] * h
+        wt = w * t
+        wtt = wt * t
+        for i in range(3):
+            stress[i] += w * s[i]
+            stress[3 + i] += wt * s[i]
+            for j in range(i, 3):
+                v = t5[i, j]
+                tangent[i, j] += w * v
+                tangent[3 + i, 3 + j] += wtt * v
+                tangent[i, 3 + j] += wt * v
+                if j > i:
+                    tangent[j, 3 + i] += wt * v
+            for j in range(2):
+                v = k * t5[i, 3 + j]
+                tangent[i, 6 + j] += w * v
+                tangent[3 + i, 6 + j] += wt * v
+        stress[6] += w * k * s[3]
+        stress[7] += w * k * s[4]
+        tangent[6, 6] += w * k * k * t5[3, 3]
+        tangent[6, 7] += w * k * k * t5[3, 4]
+        tangent[7, 7] += w * k * k * t5[4, 4]
+    for i in range(8):
+        for j in range(i):
+            tangent[i, j] = tangent[j, i]
