@@ -58,10 +58,11 @@ def rows(entry: dict) -> list[str]:
     for p in entry["points"]:
         below, above = p["below"], p["above"]
         counts = ", ".join(f"{side['unstable_count']}/{side['unstable_count_independent']}" for side in (below, above))
+        lyapunov = "" if p["first_lyapunov_coefficient"] is None else f"{p['first_lyapunov_coefficient']:+.3g}"
         spread = "" if p["uncertainty"] is None else f"{p['uncertainty'] / scale:.2g}"
         lines.append(
             f"{start} {p['value'] / scale:.6f} | {spread} | {p['frequency']:.3f} | {below['growth_rate']:+.4f} | {above['growth_rate']:+.4f} | {counts} | "
-            f"{'above' if p['gains'] else 'below'} | {p['criticality']} | {p['first_lyapunov_coefficient']:+.3g} |{'' if p['confirmed'] else ' NOT CONFIRMED'}"
+            f"{'above' if p['gains'] else 'below'} | {p['criticality']} | {lyapunov} |{'' if p['confirmed'] else ' NOT CONFIRMED'}"
         )
     return lines or [f"{start} none, largest growth rate {entry['largest_growth_rate']:.3f} 1/s |"]
 
