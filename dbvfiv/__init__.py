@@ -12,7 +12,7 @@ from . import runtime
 runtime.prepare()
 
 __version__ = "0.1.0"
-__all__ = ["load", "load_result"]
+__all__ = ["load", "load_result", "resume"]
 
 
 def __getattr__(name: str):
@@ -21,6 +21,8 @@ def __getattr__(name: str):
         from .api import load as found
     elif name == "load_result":
         from .results import load_result as found
+    elif name == "resume":
+        from .resuming import resume as found
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = found

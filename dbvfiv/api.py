@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .results.steady import SteadyResults
     from .results.sweep import SweepResults
     from .studies.observer import Observer
+    from .transient.result import TransientResults
 
 _PRESSURE = Quantity("Pa", "kPa")
 _HIGHEST = 1e7
@@ -236,6 +237,39 @@ class Valve:
 
         changes = {key: value for key, value in (("map.x", x), ("map.y", y)) if value is not None}
         return stability_map(self.case.replace(changes) if changes else self.case, self.name, output, observer, workers)
+
+    def transient(
+        self, duration: float | str | None = None, *, output: str | Path | None = None, observer: "Observer | None" = None, **changes: Any
+    ) -> "TransientResults":
+        """A time history of the coupled valve that ends with a verdict; see `dbvfiv.transient`.
+
+        Parameters
+        ----------
+        duration : number (s) or text with a unit, optional
+            That of the case by default.
+        output : path, optional
+            Result file, written while the run goes on; `dbvfiv.resume` continues it.
+        observer : Observer, optional
+        changes
+            As for `modes`: pressure, density, continuity, alpha, beta.
+
+        Raises
+        ------
+        CaseError
+            For a start or a drive that cannot be used.
+        SolveError
+            If there is no first state. A step that is not found ends the run, which keeps what it has.
+
+        Examples
+        --------
+        >>> run = dbvfiv.load("cases/light-fluid.toml").transient()      # doctest: +SKIP
+        >>> run.verdict["verdict"], run.history["lip_opening"]           # doctest: +SKIP
+        """
+        from .api_modes import changed
+        from .transient.api import transient
+
+        valve = changed(self, changes, {"transient.duration": duration})
+        return transient(valve.model, valve.name, output, observer)
 
     def _run(self, pressures: Sequence[float], output: str | Path | None, observer: "Observer | None") -> "SteadyResults":
         from .results.header import Header

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
+from ..errors import CaseError
+
 if TYPE_CHECKING:
     from ..case import Case
-
 
 
 def _writable(path: Path | None) -> Path | None:
@@ -18,6 +19,13 @@ def _writable(path: Path | None) -> Path | None:
         from ..results.files import check_writable
 
         check_writable(path)
+    return path
+
+
+def _folder(path: Path | None) -> Path | None:
+    """Refuse a name for figures that is taken by a file before anything is computed."""
+    if path is not None and path.exists() and not path.is_dir():
+        raise CaseError(f"--plots {str(path)!r} is a file and not a folder.")
     return path
 
 
@@ -31,6 +39,9 @@ AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on stand
 Output = Annotated[
     Optional[Path],
     typer.Option("-o", "--output", metavar="RESULT.h5", help="Keep everything in this HDF5 file.", callback=_writable),
+]
+PlotFolder = Annotated[
+    Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.", callback=_folder)
 ]
 
 

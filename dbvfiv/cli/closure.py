@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from ._options import AsJson, CaseFile, Output, Override, read_case
+from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json
 from ._progress import Progress
 
@@ -17,7 +17,6 @@ Pressures = Annotated[
     Optional[list[str]],
     typer.Option("--pressure", "-p", metavar="P", help="Back pressure, 7e3 (Pa) or '7 kPa'; may be repeated."),
 ]
-PlotFolder = Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")]
 
 
 def command(
@@ -48,10 +47,6 @@ def command(
 
     case = read_case(case_file, overrides)
     wanted = read_pressures(pressures, "--pressure") if pressures else case.closure.pressures
-    if plots is not None and plots.exists() and not plots.is_dir():
-        from ..errors import CaseError
-
-        raise CaseError(f"--plots {str(plots)!r} is a file and not a folder.")
     name = case_file.stem if case_file else "dbv12"
     results, failures = [], []
     supports = [case.closure.supports]

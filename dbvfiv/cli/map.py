@@ -7,13 +7,12 @@ from typing import Annotated, Optional
 
 import typer
 
-from ._options import AsJson, CaseFile, Output, Override, read_case
+from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json
 from ._progress import Progress
 
 ORDER = 30
 
-PlotFolder = Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")]
 _RANGE = "PARAMETER=START:STOP:COUNT[:log] of pressure, density, alpha, beta, storage, thickness, angle or strain"
 
 
@@ -38,12 +37,9 @@ def command(
 
     dbvfiv map cases/dbv12.toml --x "pressure=0.5 kPa:20 kPa:64" --y density=1:1000:64:log --workers 2 -o map.h5 --plots figures
     """
-    from ..errors import CaseError
     from ..stability import stability_map
 
     case = read_case(case_file, overrides)
-    if plots is not None and plots.exists() and not plots.is_dir():
-        raise CaseError(f"--plots {str(plots)!r} is a file and not a folder.")
     changes = {"map.x": x, "map.y": y, "map.continuity": "both" if both else None, "map.workers": workers}
     changes = {key: value for key, value in changes.items() if value is not None}
     case = case.replace(changes) if changes else case

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 
-from ._options import AsJson, CaseFile, Output, Override, read_case
+from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json
 from ._progress import Progress
 
 ORDER = 25
 
-PlotFolder = Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")]
 
 
 def command(
@@ -43,8 +41,6 @@ def command(
     from ..errors import CaseError
 
     case = read_case(case_file, overrides)
-    if plots is not None and plots.exists() and not plots.is_dir():
-        raise CaseError(f"--plots {str(plots)!r} is a file and not a folder.")
     if animate and plots is None:
         raise CaseError("--animate needs --plots DIR, the folder that the GIF is written into.")
     valve = Valve(case, case_file.stem if case_file else "dbv12")

@@ -7,13 +7,12 @@ from typing import Annotated, Optional
 
 import typer
 
-from ._options import AsJson, CaseFile, Output, Override, read_case
+from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json
 from ._progress import Progress
 
 ORDER = 28
 
-PlotFolder = Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")]
 
 
 def command(
@@ -42,12 +41,9 @@ def command(
 
     dbvfiv onset cases/dbv12.toml --over density --set drive.pressure="6 kPa"
     """
-    from ..errors import CaseError
     from ..stability import onset
 
     case = read_case(case_file, overrides)
-    if plots is not None and plots.exists() and not plots.is_dir():
-        raise CaseError(f"--plots {str(plots)!r} is a file and not a folder.")
     if over is not None:
         case = case.replace({"onset.over": over})
     result = onset(case, case_file.stem if case_file else "dbv12", output, Progress(quiet=as_json))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 
-from ._options import AsJson, CaseFile, Output, Override, read_case
+from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json
 from ._progress import Progress
 
@@ -19,7 +18,6 @@ Pressures = Annotated[
         "--pressure", "-p", metavar="P", help="Inlet pressure, 36e3 (Pa) or '36 kPa', or a range '2 kPa:50 kPa:12'; may be repeated."
     ),
 ]
-PlotFolder = Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")]
 
 
 def command(
@@ -46,8 +44,6 @@ def command(
 
     case = read_case(case_file, overrides)
     wanted = _pressures(case, pressures, overrides)
-    if plots is not None:
-        _check_folder(plots)
     valve = Valve(case, case_file.stem if case_file else "dbv12")
     valve.model  # a case that gives no model is told before the table begins
     if not as_json:
@@ -94,9 +90,3 @@ def _range(text: str) -> tuple[float, ...]:
     except ValueError as error:
         raise CaseError(f"--pressure is given as {text!r}, {error}; a range is START:STOP:COUNT, with ':log' behind it for logarithmic steps.") from None
 
-
-def _check_folder(folder: Path) -> None:
-    from ..errors import CaseError
-
-    if folder.exists() and not folder.is_dir():
-        raise CaseError(f"--plots {str(folder)!r} is a file and not a folder.")

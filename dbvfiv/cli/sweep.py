@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 
-from ._options import AsJson, CaseFile, Output, Override, read_case
+from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json
 from ._progress import Progress
 from .modes import number_or_text
 
 ORDER = 26
 
-PlotFolder = Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")]
 
 
 def command(
@@ -38,12 +36,10 @@ def command(
     dbvfiv sweep cases/dbv12.toml -p "6 kPa" --set damping.alpha=0 --over density=1:1000:40:log -o sweep.h5 --plots figures
     """
     from ..api import Valve
-    from ..errors import CaseError, SolveError
+    from ..errors import SolveError
     from ..results.sweep_table import head, row_of
 
     case = read_case(case_file, overrides)
-    if plots is not None and plots.exists() and not plots.is_dir():
-        raise CaseError(f"--plots {str(plots)!r} is a file and not a folder.")
     if over is not None:
         case = case.replace({"sweep.over": over})
     valve = Valve(case, case_file.stem if case_file else "dbv12")

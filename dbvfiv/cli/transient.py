@@ -7,13 +7,12 @@ from typing import Annotated, Optional
 
 import typer
 
-from ._options import AsJson, CaseFile, Output, Override, read_case
+from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json
 from ._progress import Progress
 
 ORDER = 40
 
-PlotFolder = Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.")]
 Animation = Annotated[Optional[Path], typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")]
 
 
@@ -33,14 +32,10 @@ def command(
     dbvfiv transient cases/dbv12.toml --set transient.start=kick --set fluid.density=10 -o run.h5
     """
     from ..api import Valve
-    from ..errors import CaseError
-    from ..transient.api import transient
 
     case = read_case(case_file, overrides)
-    if plots is not None and plots.exists() and not plots.is_dir():
-        raise CaseError(f"--plots {str(plots)!r} is a file and not a folder.")
     valve = Valve(case, case_file.stem if case_file else "dbv12")
-    result = transient(valve.model, valve.name, output, Progress(quiet=as_json))
+    result = valve.transient(output=output, observer=Progress(quiet=as_json))
     report(result, output, plots, animate, as_json)
 
 

@@ -58,6 +58,18 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
             raise CaseError(f"The {kind} result {str(path)!r} is damaged or cut short ({type(error).__name__}: {detail}).") from error
 
 
+def kind_of(path: str | Path) -> str:
+    """Which study a result file is of: "steady", "map", "transient" and so on.
+
+    Raises
+    ------
+    CaseError
+        As `reading`.
+    """
+    with reading(path) as file:
+        return str(file.attrs["dbvfiv_kind"])
+
+
 def _opened(path: Path) -> h5py.File:
     """A file for reading; one in single-writer mode also while it is written, or after its writer was killed."""
     try:

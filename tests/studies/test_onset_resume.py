@@ -121,7 +121,7 @@ def test_the_command_resumes(case, tmp_path, capsys):
     path = tmp_path / "onset.h5"
     onset(case.replace({"onset.coarse_mesh": 0.0}), "valve", path, Watch(3))
     assert run(["resume", str(path), "--animate", "x.gif"]) == 2
-    assert "onset run" in capsys.readouterr().err
+    assert "kind 'onset'" in capsys.readouterr().err
     assert run(["resume", str(path)]) == 0
     assert "stable above" in capsys.readouterr().out
     assert run(["resume", str(path)]) == 2

@@ -249,6 +249,22 @@ def test_progress_and_history_survive_packing(valve):
     assert history.rows == run.history.rows and np.array_equal(history["station_area"], run.history["station_area"])
 
 
+def test_the_python_interface_runs_and_resumes(tmp_path):
+    import dbvfiv
+
+    small = dbvfiv.load(changes={"mesh.around": 4, "mesh.along": 6, "transient.step": "2 ms"})
+    path = tmp_path / "run.h5"
+    run = small.transient("10 ms", density=500.0, output=path)
+    assert run.case.transient.duration == 0.01 and run.case.fluid.density == 500.0
+    longer = dbvfiv.resume(path, duration=0.02)
+    assert longer.history["time"][-1] == pytest.approx(0.02)
+    assert np.array_equal(longer.history["lip_opening"][:6], run.history["lip_opening"])
+    states = tmp_path / "steady.h5"
+    small.steady([6e3], output=states)
+    with pytest.raises(CaseError, match="kind 'steady'"):
+        dbvfiv.resume(states, duration=1.0)
+
+
 @pytest.mark.slow
 def test_killed_with_signal_9_at_any_moment(tmp_path, valve):
     """The file can be read and resumed whenever its writer dies, and loses no more than the steps since the last restart point."""

@@ -1,0 +1,60 @@
+"""Interrupted studies go on where their files end."""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import CaseError
+
+if TYPE_CHECKING:
+    from .results.result import Result
+    from .studies.observer import Observer
+
+
+def resume(
+    path: str | Path, *, duration: float | None = None, workers: int | None = None, observer: "Observer | None" = None
+) -> "Result":
+    """Continue an interrupted or killed study in its file: a transient run, a map, an onset or a closure run.
+
+    Parameters
+    ----------
+    path : path
+        Result file; its case says what is still to do.
+    duration : float, optional
+        Of a transient run: a later end, s.
+    workers : int, optional
+        Of a map: processes that share the columns.
+    observer : Observer, optional
+
+    Returns
+    -------
+    Result
+        As of the study itself.
+
+    Raises
+    ------
+    CaseError
+        If the file is none of these, or there is nothing left to do.
+    """
+    from .results.files import kind_of
+
+    kind = kind_of(path)
+    if kind not in ("transient", "map", "onset", "closure"):
+        raise CaseError(f"{str(path)!r} holds a result of kind {kind!r}; what can be resumed are transient, map, onset and closure runs.")
+    if duration is not None and kind != "transient":
+        raise CaseError(f"A new duration belongs to transient runs; {str(path)!r} is of kind {kind!r}.")
+    if kind == "map":
+        from .stability import resume_map
+
+        return resume_map(path, observer, workers)
+    if kind == "onset":
+        from .stability import resume_onset
+
+        return resume_onset(path, observer)
+    if kind == "closure":
+        from .results.closure_run import resume_closure
+
+        return resume_closure(path, observer)
+    from .transient.api import resume as resume_transient
+
+    return resume_transient(path, duration, observer)
