@@ -15,8 +15,8 @@ from ..flow import Channel
 from ..model import ValveModel
 from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
-from .fluid import MovingFluid
 from .kernels import inertia_force, kinetic_energy, row_motion, strain_energy
+from .reversible import ReversibleFluid
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class ValveMotion:
         self.model = model
         self.conditions = Conditions.of(model.case) if conditions is None else conditions
         self.moving_fluid = isinstance(model.flow, Channel) and model.flow.unsteady
-        self.fluid = MovingFluid(model.flow, self.conditions.density) if self.moving_fluid else None
+        self.fluid = ReversibleFluid(model.flow, self.conditions.density) if self.moving_fluid else None
         self.size = model.size
         self.stations = model.stations
         shell = model.shell
@@ -197,6 +197,12 @@ class ValveMotion:
         area, rate = np.empty(self.stations), np.empty(self.stations)
         row_motion(rows.rows, self.model.shell.mesh.nodes, nodal, self.model.nodal(v), area, rate)
         return area + rows.offset, rate
+
+    def speeds(self, state) -> np.ndarray:
+        """Speeds (m,) of the fluid in a state, m/s; zeros where it is none of the unknowns."""
+        if not self.moving_fluid:
+            return np.zeros(self.stations)
+        return self.fluid.state(*self._passage(self.model.nodal(state.q), state.v), state.speed).speed
 
     def _position(self, nodal):
         out = nodal.copy()

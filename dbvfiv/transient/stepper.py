@@ -14,7 +14,13 @@ import numpy as np
 from ..model.linear import SingularMatrix
 from .equations import Load, Step, Weights
 from .scheme import Scheme
+from .scheme import scheme as member
 from .state import MotionState
+
+#: Speed inwards, relative to the largest speed, that is none.
+INWARD = 1e-6
+#: Least numerical damping of steps that start with fluid drawn in: without any, the kicks that walls get then alternate from step to step for good.
+DAMPING = 0.2
 
 
 @dataclass(frozen=True)
@@ -38,8 +44,8 @@ class StepOptions:
     largest_turn : float
         Largest change of a rotation in a step, rad. Directors that turn further between two instants can gain energy from stiffness damping.
     backward : bool
-        Meet the fluid's equations at the end of every step, not of those alone in which momentum is lost: for walls that shut in several places, where
-        the momentum of a part is lost while that of the whole is kept.
+        Meet the fluid's equations at the end of every step, not of those alone in which momentum is lost or fluid is drawn in: for walls that shut in
+        several places.
     """
 
     tolerance: float = 1e-4
@@ -99,6 +105,7 @@ class Stepper:
 
     def __init__(self, motion, scheme: Scheme, pressure: Callable[[float], float], options: StepOptions = StepOptions()):
         self.motion, self.scheme, self.pressure, self.options = motion, scheme, pressure, options
+        self._damped = member("generalised-alpha", max(DAMPING, scheme.gamma - 0.5))
         self.residuals = self.solves = self.factorisations = 0
         self.forget()
 
@@ -106,7 +113,7 @@ class Stepper:
         """Drop factors and the memory of the predictor; with `all` the factorisation's analysis too, so that the next step depends on the state alone."""
         if all:
             self.motion.drop_factors()
-        self._factored: tuple[float, bool] | None = None
+        self._factored: tuple[float, bool, float] | None = None
         self._history: list[tuple[float, np.ndarray]] = []
 
     # -- the step -------------------------------------------------------------------------------------------------------------------
@@ -119,8 +126,10 @@ class Stepper:
         StepFailure
         """
         before = (self.residuals, self.solves, self.factorisations)
-        for robust in (self.options.backward or not self._smooth(state, h), True):
-            trial = _Trial(self.motion, self.scheme, state, h, self.pressure, robust)
+        outward = _outward(self.motion.speeds(state))
+        scheme = self.scheme if outward else self._damped
+        for robust in (self.options.backward or not (outward and self._smooth(state, h)), True):
+            trial = _Trial(self.motion, scheme, state, h, self.pressure, robust)
             self.motion.begin_step(state, h, trial.fluid.inlet)
             try:
                 self._iterate(trial)
@@ -135,22 +144,26 @@ class Stepper:
             raise StepFailure(f"A director turned by {turn:.2g} rad.")
         new = trial.state()
         past = self._history[-1] if self._history else None
-        here = (state.time + (1.0 - self.scheme.alpha_m) * h, trial.a_mid)
+        here = (state.time + (1.0 - scheme.alpha_m) * h, trial.a_mid)
         self._history = [*self._history[-3:], here]
         work = [now - then for now, then in zip((self.residuals, self.solves, self.factorisations), before)]
         jump = 0.0 if past is None else self.motion.length(here[1] - past[1]) * h / (here[0] - past[0])
-        return StepResult(new, trial.load, *self._works(trial), *work, self.scheme.error_constant * h * h * jump)
+        return StepResult(new, trial.load, *self._works(trial), *work, scheme.error_constant * h * h * jump)
 
     @staticmethod
     def _smooth(state: MotionState, h: float) -> bool:
-        """Whether the fluid's momentum changed little in the step before."""
-        return bool(abs(h * state.psi_rate[0]) <= 0.34 * abs(state.psi[0]))
+        """Whether the fluid flowed outwards before the last step, and the momentum of its sections changed little in that.
+
+        Sections, as what one loses another may gain; before too, as flow that has just turned round rings.
+        """
+        now, change = _sections(state.psi), h * _sections(state.psi_rate)
+        return bool(np.abs(change).sum() <= 0.34 * np.abs(now).sum()) and _outward(now - change)
 
     @staticmethod
     def _kept_momentum(trial: "_Trial") -> bool:
-        """Whether the fluid kept most of its momentum in a step, whichever way it flows; if it did not, its equations are better met at the end."""
-        new, old = trial.load.psi[0], trial.old.psi[0]
-        return bool(new * np.sign(old) >= 0.5 * abs(old))
+        """Whether the fluid's sections kept most of their momentum in a step and none turned round; if not, its equations are better met at the end."""
+        new, old = _sections(trial.load.psi), _sections(trial.old.psi)
+        return bool(np.clip(old - new, 0.0, old).sum() <= 0.5 * old.sum()) and _outward(trial.load.speed)
 
     def _works(self, trial: "_Trial") -> tuple[float, float]:
         """Work of the pressure and dissipation of a step, by the scheme's own weights."""
@@ -239,7 +252,7 @@ class Stepper:
         Those at the ends of steps would not do: without numerical damping they alternate about the true ones. From a state without a past, the step
         goes on at its velocities.
         """
-        state, s, h = trial.old, self.scheme, trial.h
+        state, s, h = trial.old, trial.scheme, trial.h
         if self._history:
             a = self._extrapolated(state.time + (1.0 - s.alpha_m) * h)
             trial.set((a - s.alpha_m * state.a) / (1.0 - s.alpha_m))
@@ -283,6 +296,16 @@ class Stepper:
         return self.motion.solve(-trial.residual, -trial.load.outlet)[0]
 
 
+def _sections(psi: np.ndarray) -> np.ndarray:
+    """Integral of the speed over each section between two stations (m - 1,), m2/s: its momentum per density and area."""
+    return -np.diff(psi)
+
+
+def _outward(speed: np.ndarray) -> bool:
+    """Whether no speed (m,), or momentum of a section, points inwards."""
+    return not np.any(speed < -INWARD * np.abs(speed).max(initial=0.0))
+
+
 class _Trial:
     """A candidate for the new state; its unknowns are the accelerations. The inlet velocity follows from them.
 
@@ -295,7 +318,7 @@ class _Trial:
         self.motion, self.scheme, self.old, self.h = motion, scheme, old, h
         s, now = scheme, scheme.now
         theta, rate = (1.0, 1.0) if robust else (now, s.rate)
-        self.kind = (h, robust)
+        self.kind = (h, robust, s.gamma)
         self.weights = Weights(
             theta=theta,
             load=now if robust else 1.0,

@@ -20,6 +20,7 @@ from dbvfiv.transient.file import read_restart
 from dbvfiv.transient.history import History
 from dbvfiv.transient.options import RunOptions
 from dbvfiv.transient.run import Progress, Runner, run_transient
+from dbvfiv.transient.start import steady_positions
 
 SHORT = {"transient.duration": 0.02, "transient.restart_every": 7, "transient.save_every": 0.005}
 
@@ -49,8 +50,6 @@ def test_kick_rings_at_the_eigenvalue(valve):
                                "drive.pressure": 6e3, "fluid.density": 10.0, "damping.alpha": 0.0}))  # fmt: skip
     value = run.progress.eigenvalue
     h = run.history
-    from dbvfiv.transient.start import steady_positions
-
     still = steady_positions(run.model, 6e3)[run.model.shell.dofs.index[run.model.mesh.rows[0, 0], 1]]
     expected = 1e-5 * np.exp(value * h["time"]).real
     assert h["lip_opening"][0] - still == pytest.approx(1e-5, rel=1e-6)
@@ -66,6 +65,21 @@ def test_storage_law_lets_the_wall_displace_fluid(valve):
     stored = 4 * volume(h["station_area"], z, axis=1)
     gained = volume(h["inlet_mass_flow"] - h["mass_flow"], h["time"]) / 1000.0
     assert stored[-1] - stored[0] == pytest.approx(gained, rel=0.01)
+
+
+@pytest.mark.parametrize("kpa", [18, 36])
+def test_storage_law_draws_water_in_through_shut_lips_and_opens(valve, kpa):
+    """The saddle grows while the lips are shut; the valve opens all the same and comes to rest where load steps lead."""
+    run = run_transient(valve({"fluid.continuity": "storage", "drive.pressure": 1e3 * kpa, "transient.duration": 0.5}))
+    h = run.history
+    assert not run.failures
+    drawn = h["time"][h["mass_flow"] < 0]
+    assert len(drawn) > 5 and drawn.max() < 0.1
+    q = steady_positions(run.model, 1e3 * kpa)
+    steady = 4e3 * run.model.flow.inlet_velocity(run.model.rows.areas(run.model.nodal(q)), 1e3 * kpa, 1e3) * run.model.rows.areas(run.model.nodal(q))[-1]
+    assert h["mass_flow"][-1] == pytest.approx(steady, rel=1e-4)
+    assert np.abs(run.progress.state.q - q).max() < 1e-4 * np.abs(q).max()
+    assert run.halvings < 30
 
 
 def test_drives(tmp_path, valve):

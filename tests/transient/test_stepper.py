@@ -92,6 +92,44 @@ def test_slamming_lips_are_survived(valve):
     assert np.abs(state.q).max() < 1.0
 
 
+def _kinds(motion, state, h, steps, pressure):
+    """Whether each step was robust, and whether fluid was drawn in during it."""
+    kinds = []
+
+    class Watched(Stepper):
+        def _iterate(self, trial):
+            kinds.append(trial.weights.theta == 1.0)
+            super()._iterate(trial)
+
+    stepper, found = Watched(motion, scheme("generalised-alpha"), pressure, StepOptions()), []
+    control = FixedSteps(stepper, ControlOptions(h))
+    for _ in range(steps):
+        result = control.advance(state, 1e9)
+        found.append((kinds[-1], bool(result.load.speed.min() < 0)))
+        state = result.state
+    return np.array(found)
+
+
+def test_steps_are_robust_while_fluid_is_drawn_in_and_of_second_order_after(valve):
+    motion = ValveMotion(valve({"fluid.continuity": "storage"}))
+    rest = np.zeros(motion.size)
+    robust, inward = _kinds(motion, consistent_state(motion, 0.0, rest, rest, 0.0, 18e3), 1e-3, 150, lambda t: 18e3).T
+    last = np.flatnonzero(inward).max()
+    assert inward.sum() > 20 and last < 120
+    assert robust[inward].all() and robust[: last + 1].mean() > 0.9
+    assert robust[last + 1 :].sum() < 8 and not robust[last + 20 :].any()
+
+
+def test_steps_of_a_smooth_cycle_are_of_second_order(valve, open_state):
+    """Large outward oscillations of a light fluid, flow changing by a tenth in a step."""
+    model = valve({"fluid.density": 50.0, "damping.alpha": 0.0})
+    motion = ValveMotion(model)
+    speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(open_state)), 12e3, 50.0)
+    state = consistent_state(motion, 0.0, 1.15 * open_state, 0 * open_state, speed, 12e3)
+    robust, inward = _kinds(motion, state, 5e-4, 100, lambda t: 12e3).T
+    assert not robust.any() and not inward.any()
+
+
 def test_factors_are_kept(valve, open_state):
     motion = ValveMotion(valve({"fluid.density": 300.0}))
     speed = motion.model.flow.inlet_velocity(motion.model.rows.areas(motion.model.nodal(open_state)), 12e3, 300.0)

@@ -27,7 +27,7 @@ def test_response_to_density(tmp_path):
     study(*arguments)
     first = table(tmp_path / "response.csv")
     assert [(row["way"], row["density"]) for row in first] == [("down", "300"), ("down", "100"), ("up", "100"), ("up", "300")]
-    assert all(int(row["steps"]) == 30 for row in first)
+    assert all(int(row["steps"]) >= 30 for row in first)  # slamming lips may halve some
     times = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
     study(*arguments)
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")} == times  # read, not run again

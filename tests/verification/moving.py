@@ -42,6 +42,9 @@ class Motion:
     def force_rate(self, q, v):
         return np.zeros(self.size) if not np.any(v) else (self.internal_force(q + 1e-6 * v) - self.internal_force(q - 1e-6 * v)) / 2e-6
 
+    def speeds(self, state):
+        return NONE
+
     def turn(self, dq):
         return 0.0
 
