@@ -6,13 +6,22 @@ import json
 import math
 import sys
 from dataclasses import asdict, is_dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Sequence
 
 
 def print_json(document: Any) -> None:
     """Print one JSON document; arrays become lists, numbers that are not finite become null."""
     json.dump(_plain(document), sys.stdout, indent=1, allow_nan=False)
     sys.stdout.write("\n")
+
+
+def print_places(output: Path | None, figures: Sequence[Path], folder: Path | None) -> None:
+    """Say where the result and the figures are."""
+    if output:
+        print(f"Kept in {output}.")
+    if figures:
+        print(f"{len(figures)} figure{'s' * (len(figures) > 1)} in {folder}.")
 
 
 def _plain(value: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
-from ._output import print_json
+from ._output import print_json, print_places
 from ._progress import Progress
 
 ORDER = 35
@@ -72,7 +72,7 @@ def command(
             document["compared"] = results[1].summary()
         print_json(document | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
     elif figures:
-        print(f"{len(figures)} figures in {plots}.")
+        print_places(None, figures, plots)
     if not all(result.complete for result in results):
         raise KeyboardInterrupt
     if failures:
@@ -87,9 +87,8 @@ def report(result, path: Path, plots: Path | None, as_json: bool) -> None:
     if as_json:
         print_json(result.summary() | {"output": str(path), "figures": [str(figure) for figure in figures]})
     else:
-        print("\n".join([*result.lines(), f"Kept in {path}."]))
-        if figures:
-            print(f"{len(figures)} figures in {plots}.")
+        print("\n".join(result.lines()))
+        print_places(path, figures, plots)
     if not result.complete:
         raise KeyboardInterrupt
     if result.failures:

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 import typer
 
 from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
-from ._output import print_json
+from ._output import print_json, print_places
 from ._progress import Progress
 
 ORDER = 25
@@ -52,9 +52,7 @@ def command(
         print_json(result.summary() | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
         return
     print("\n".join(result.lines()))
-    for text in (f"Kept in {output}." if output else "", f"{len(figures)} figures in {plots}." if figures else ""):
-        if text:
-            print(text)
+    print_places(output, figures, plots)
 
 
 def number_or_text(value: str | None) -> float | str | None:

@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
-from ._output import print_json
+from ._output import print_json, print_places
 from ._progress import Progress
 
 ORDER = 28
@@ -59,9 +59,7 @@ def report(result, output: Path | None, plots: Path | None, as_json: bool) -> No
         print_json(result.summary() | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
     else:
         print("\n".join(result.lines()))
-        for text in (f"Kept in {output}." if output else "", f"{len(figures)} figures in {plots}." if figures else ""):
-            if text:
-                print(text)
+        print_places(output, figures, plots)
     if not result.complete:
         raise KeyboardInterrupt
     if result.failures:

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 import typer
 
 from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
-from ._output import print_json
+from ._output import print_json, print_places
 from ._progress import Progress
 
 ORDER = 20
@@ -57,9 +57,7 @@ def command(
         document["figures"] = [str(figure) for figure in figures]
         print_json(document)
     else:
-        for text in (f"Kept in {output}." if output else "", f"{len(figures)} figures in {plots}." if figures else ""):
-            if text:
-                print(text)
+        print_places(output, figures, plots)
     if not result.complete:
         raise KeyboardInterrupt
     if result.failures:

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 import typer
 
 from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
-from ._output import print_json
+from ._output import print_json, print_places
 from ._progress import Progress
 from .modes import number_or_text
 
@@ -53,9 +53,7 @@ def command(
         print_json(result.summary() | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
     else:
         print("\n".join(result.lines()[2 + len(result.values):]))
-        for text in (f"Kept in {output}." if output else "", f"{len(figures)} figures in {plots}." if figures else ""):
-            if text:
-                print(text)
+        print_places(output, figures, plots)
     if result.failures:
         kept = f"; they are kept in {output}" if output else ""
         raise SolveError(f"{len(result.values)} of {len(result.axis.values)} values were reached{kept}.")  # why was said when it happened
