@@ -65,31 +65,36 @@ class CoupledPencil:
     S1: np.ndarray | None = None
 
     def __post_init__(self):
-        def put(name, value):
-            object.__setattr__(self, name, value)
-
         for name in ("M", "C", "K"):
-            put(name, _real_csr(name, getattr(self, name)))
+            self._put(name, _real_csr(name, getattr(self, name)))
         n = self.M.shape[0]
         if (self.G is None) != (self.J is None):
             raise ValueError("G and J belong together: give both or neither.")
         for name, empty in (("G", (n, 0)), ("J", (0, n))):
             value = getattr(self, name)
-            put(name, _real_csr(name, sp.csr_matrix(empty) if value is None else value))
+            self._put(name, _real_csr(name, sp.csr_matrix(empty) if value is None else value))
         m = self.G.shape[1]
-        b = 0
+        self._check({"M": (n, n), "C": (n, n), "K": (n, n), "G": (n, m), "J": (m, n)})
+        self._check_fluid()
+
+    def _check_fluid(self):
+        """Fill in the parts of the fluid that are missing, and check all of them."""
+        m, b = self.m, 0
         for name, axis in (("S0", 0), ("S1", 0), ("R0", 0), ("R1", 0), ("R2", 0),
                            ("B0", 1), ("B1", 1)):
             if getattr(self, name) is not None:
                 b = np.atleast_2d(np.asarray(getattr(self, name))).shape[axis]
                 break
-        shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "G": (n, m), "J": (m, n)}
+        shapes = {}
         for name in FLUID_PARTS:
             shapes[name] = {"A": (m, m), "B": (m, b), "R": (b, m), "S": (b, b)}[name[0]]
             value = getattr(self, name)
             value = np.zeros(shapes[name]) if value is None else np.array(value, float, ndmin=2)
             value.setflags(write=False)
-            put(name, value)
+            self._put(name, value)
+        self._check(shapes)
+
+    def _check(self, shapes):
         for name, shape in shapes.items():
             value = getattr(self, name)
             if value.shape != shape:
@@ -98,6 +103,9 @@ class CoupledPencil:
             data = value.data if sp.issparse(value) else value
             if not np.isfinite(data).all():
                 raise ValueError(f"The part {name} of the pencil holds a number that is not finite.")
+
+    def _put(self, name, value):
+        object.__setattr__(self, name, value)
 
     @property
     def n(self) -> int:
@@ -120,8 +128,14 @@ class CoupledPencil:
         return 2 * self.n + self.b
 
     def replace(self, **parts) -> CoupledPencil:
-        """The same pencil with some parts exchanged."""
-        return replace(self, **parts)
+        """The same pencil with some parts exchanged; the structure is not checked again where the fluid alone is."""
+        if not set(parts) <= set(FLUID_PARTS):
+            return replace(self, **parts)
+        other = object.__new__(type(self))
+        for name in part_names():
+            other._put(name, parts[name] if name in parts else getattr(self, name))
+        other._check_fluid()
+        return other
 
     def fluid_at(self, s: complex):
         """Values A(s), B(s), R(s), S(s) of the fluid polynomials."""

@@ -80,7 +80,7 @@ def sweep(pencil_at: Callable[[float], CoupledPencil], values, count: int,
     options = options or SearchOptions()
     workspace = workspace or Workspace()
     # small to begin with: what it lacks comes from the first full solve
-    basis = basis or TransferBasis(pencil_at(float(values[0])), modes=12, compression=1e-4)
+    basis = basis or TransferBasis(pencil_at(float(values[0])), modes=8, compression=2e-4)
     band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
 
     def reduced(value):

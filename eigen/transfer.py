@@ -104,6 +104,7 @@ class TransferBasis:
         room = self.V.shape[0] - self.V.shape[1]
         self.V = np.hstack([self.V, X[:, ::-1][:, :room]])
         self._projected.clear()
+        self._structure = (None, None, None), None
         self._reduced_G = self.V.T @ self._G
         self._reduced_J = self._J @ self.V
 
@@ -129,9 +130,10 @@ class TransferBasis:
             alpha * project(M) + beta * project(Ks).
         """
         C = self.project(pencil.C) if damping is None else damping
-        return CoupledPencil(M=self.project(pencil.M), C=C, K=self.project(pencil.K),
-                             G=self._reduced_G, J=self._reduced_J,
-                             **{name: getattr(pencil, name) for name in FLUID_PARTS})
+        matrices = (self.project(pencil.M), C, self.project(pencil.K))
+        if not all(a is b for a, b in zip(matrices, self._structure[0])):
+            self._structure = matrices, CoupledPencil(*matrices, self._reduced_G, self._reduced_J)
+        return self._structure[1].replace(**{name: getattr(pencil, name) for name in FLUID_PARTS})
 
     def transfer(self, pencil: CoupledPencil, s: complex) -> np.ndarray:
         """H(s) = J (s^2 M + s C + K)^-1 G on the basis, shape (m, m)."""

@@ -103,14 +103,15 @@ class LinearisedState:
     forces: object
     slope: object
     area: np.ndarray
-    _damping: dict = field(default_factory=dict, repr=False, compare=False)
+    _damped: dict = field(default_factory=dict, repr=False, compare=False)
 
-    def damping(self, alpha: float, beta: float):
-        """(n, n) sparse matrix alpha M + beta K_s; the last one is kept, so a sweep over the fluid reuses it."""
-        if (alpha, beta) not in self._damping:
-            self._damping.clear()
-            self._damping[alpha, beta] = alpha * self.mass + beta * self.structure
-        return self._damping[alpha, beta]
+    def damped(self, alpha: float, beta: float) -> CoupledPencil:
+        """The pencil with damping C = alpha M + beta K_s but no fluid; the last one is kept, so a sweep over the fluid reuses it."""
+        if (alpha, beta) not in self._damped:
+            self._damped.clear()
+            damping = alpha * self.mass + beta * self.structure
+            self._damped[alpha, beta] = CoupledPencil(self.mass, damping, self.stiffness, self.forces, self.slope)
+        return self._damped[alpha, beta]
 
     def pencil(self, conditions: Conditions, fluid: bool = True, storage: float | None = None) -> CoupledPencil:
         """Quadratic pencil of small motions.
@@ -123,16 +124,16 @@ class LinearisedState:
         storage : float, optional
             Blend of the continuity laws, 0 quasi-steady to 1 storage; the model's own by default.
         """
-        damping = self.damping(conditions.alpha, conditions.beta)
+        damped = self.damped(conditions.alpha, conditions.beta)
         flow = self.model.flow
         if not fluid or not isinstance(flow, Channel):
-            return CoupledPencil(self.mass, damping, self.stiffness)
+            return CoupledPencil(damped.M, damped.C, damped.K)
         if not flow.unsteady:
             _, slope = flow.steady_operator(self.area, self.inlet)
-            return CoupledPencil(self.mass, damping, self.stiffness, self.forces, self.slope, A0=slope)
+            return damped.replace(A0=slope)
         storage = flow.storage if storage is None else storage
         parts = fluid_parts(flow, self.area, self.inlet, conditions.density, storage)
-        return CoupledPencil(self.mass, damping, self.stiffness, self.forces, self.slope, **parts)
+        return damped.replace(**parts)
 
 
 def fluid_parts(flow: Channel, area: np.ndarray, inlet: float, density: float, storage: float, velocity: float | None = None) -> dict:
