@@ -57,6 +57,10 @@ class ReversibleFluid(MovingFluid):
         return (_zero(missing, old) - start) / theta
 
 
+#: Inlet velocity, m/s, beyond which no zero is looked for.
+_RUNAWAY = 1e12
+
+
 def _upstream(values: np.ndarray) -> np.ndarray:
     """Sums of values (m, ...) from each station to the inlet."""
     return np.cumsum(values[::-1], axis=0)[::-1]
@@ -73,7 +77,7 @@ def _zero(function, start: float) -> float:
     far, reach = start, -np.sign(value) * max(1e-3, 0.1 * abs(start))
     while function(far)[0] * value > 0.0:
         far, reach = far + reach, 2.0 * reach
-        if not np.isfinite(far):
+        if not abs(far) < _RUNAWAY:
             return np.nan
     low, high = (far, start) if value > 0.0 else (start, far)
     u, last = start, high - low
