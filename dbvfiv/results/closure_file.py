@@ -9,7 +9,7 @@ from ..studies.closure_path import PathRestart
 from ..studies.observer import Observer
 from .closure import buckling_rows, opened_rows, path_rows, reference_opening, row_from
 from .closure_table import BUCKLING, FIELDS, OPENED, PATH, RESTART, REVERSAL, SUMMARY
-from .files import create, reopen
+from .files import KeptFile, create, reopen
 from .header import Header, write_header
 from .layout import Table, read_texts, replace_texts
 from .mesh import MeshData, write_mesh
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _TABLES = {"path": PATH, "buckling": BUCKLING, "opened": OPENED, "restart": RESTART}
 
 
-class ClosureFile(Observer):
+class ClosureFile(KeptFile, Observer):
     """Keeps every state as soon as it is found, with the path to it and what it takes to go on from there; a context manager.
 
     It is the `Keeper` of a run and, for warnings, an observer.
@@ -174,15 +174,6 @@ class ClosureFile(Observer):
             group.attrs[name] = value
         self._file.attrs["complete"] = not closing.interrupted
         self._file.flush()
-
-    def close(self) -> None:
-        self._file.close()
-
-    def __enter__(self) -> "ClosureFile":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     def _new_states(self, eigenvalues: int) -> None:
         mesh = self._mesh

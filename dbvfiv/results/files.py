@@ -4,7 +4,7 @@ from __future__ import annotations
 import os
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Iterator
+from typing import Iterator, Self
 
 import h5py
 
@@ -56,6 +56,21 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
         except _BROKEN as error:
             detail = " ".join(str(error).split())[:120].rstrip(".")
             raise CaseError(f"The {kind} result {str(path)!r} is damaged or cut short ({type(error).__name__}: {detail}).") from error
+
+
+class KeptFile:
+    """A result file that is open while a study runs, as `_file`; leaving the context closes it."""
+
+    _file: h5py.File
+
+    def close(self) -> None:
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
 
 
 def kind_of(path: str | Path) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import CaseError
 from ..studies.map_column import CELLS, MapColumn, MapPlan
 from ..studies.observer import Observer
-from .files import create, reading, reopen
+from .files import KeptFile, create, reading, reopen
 from .header import Header, write_header
 from .layout import Table, read_texts, replace_texts
 from .mesh import MeshData, write_mesh
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _LAST = {"curves": CURVE_POINTS, "checks": CHECKS}
 
 
-class MapFile(Observer):
+class MapFile(KeptFile, Observer):
     """Observer that keeps every column as soon as it is finished; a context manager.
 
     Parameters
@@ -94,15 +94,6 @@ class MapFile(Observer):
         replace_texts(self._messages, "failures", result.failures)
         self._file.attrs["complete"] = not result.interrupted
         self._file.flush()
-
-    def close(self) -> None:
-        self._file.close()
-
-    def __enter__(self) -> "MapFile":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def read_columns(file: h5py.File) -> list[MapColumn]:

@@ -14,7 +14,7 @@ from ..errors import CaseError
 from ..studies.observer import Observer
 from ..studies.onset_point import OnsetPoint, OnsetSample, Side
 from ..studies.parameters import Place
-from .files import create, reading, reopen
+from .files import KeptFile, create, reading, reopen
 from .header import Header, read_header, write_header
 from .layout import TEXT, Column, Table, replace_texts
 from .mesh import MeshData, write_mesh
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 MODES = 4
 
 
-class OnsetFile(Observer):
+class OnsetFile(KeptFile, Observer):
     """Observer that keeps every sample and every onset as soon as it is found; a context manager.
 
     Parameters
@@ -85,15 +85,6 @@ class OnsetFile(Observer):
         replace_texts(self._messages, "failures", failures)
         self._file.attrs["complete"] = bool(complete)
         self._file.flush()
-
-    def close(self) -> None:
-        self._file.close()
-
-    def __enter__(self) -> "OnsetFile":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def row_of_point(point: OnsetPoint) -> dict[str, Any]:

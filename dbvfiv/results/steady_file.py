@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Sequence
 
 from ..studies.observer import Observer
-from .files import create
+from .files import KeptFile, create
 from .header import Header, write_header
 from .layout import Table, replace_texts
 from .mesh import MeshData, write_mesh
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..model import ValveModel
 
 
-class SteadyFile(Observer):
+class SteadyFile(KeptFile, Observer):
     """Observer that keeps every state as soon as it is found; a context manager.
 
     Parameters
@@ -64,15 +64,6 @@ class SteadyFile(Observer):
         replace_texts(self._messages, "failures", failures)
         self._file.attrs["complete"] = bool(complete)
         self._file.flush()
-
-    def close(self) -> None:
-        self._file.close()
-
-    def __enter__(self) -> "SteadyFile":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def _shapes(mesh: MeshData) -> dict[str, tuple[int, ...]]:
