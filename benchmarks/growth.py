@@ -1,4 +1,5 @@
 """Growth of time and memory with the mesh, in processor time, and which BLAS the factorisation stands on."""
+
 from __future__ import annotations
 
 import json
@@ -31,7 +32,9 @@ print(json.dumps({"before": before, "peak": peak(), "failures": failures}))
 
 
 def processor_medians(functions: dict, rounds: int) -> dict[str, float]:
-    """Median processor seconds of functions that take turns: other programs on the machine slow them, but are not counted."""
+    """Median processor seconds of functions that take turns: other programs on the machine slow them, but are not
+    counted.
+    """
     taken = {name: [] for name in functions}
     for turn in range(rounds + 1):
         for name, function in functions.items():
@@ -43,7 +46,9 @@ def processor_medians(functions: dict, rounds: int) -> dict[str, float]:
 
 
 def slow_blas() -> bool:
-    """Whether this process has loaded the plain reference BLAS: factorisations then take several times longer and every ratio to them looks too good."""
+    """Whether this process has loaded the plain reference BLAS: factorisations then take several times longer and every
+    ratio to them looks too good.
+    """
     try:
         lines = Path("/proc/self/maps").read_text().splitlines()
     except OSError:
@@ -53,7 +58,9 @@ def slow_blas() -> bool:
 
 @benchmark("growth")
 def growth():
-    """Force, tangent and LU from 14 x 24 to 56 x 96, processor time; the LU without the solve that detects its breakdown."""
+    """Force, tangent and LU from 14 x 24 to 56 x 96, processor time; the LU without the solve that detects its
+    breakdown.
+    """
     yield Row("plain reference BLAS in use (0 no, 1 yes: install libopenblas0-pthread)", float(slow_blas()), "", 0.0)
     found = []
     for (around, along), rounds in zip(MESHES, (25, 15, 7)):
@@ -74,7 +81,12 @@ def growth():
         reference = (around, along) == (28, 48)
         for name, target in (("force and tangent", 3.0), ("force", 0.8)):
             note = f"{1e3 * times[name]:.1f} over {1e3 * times['LU']:.1f} ms"
-            yield Row(f"{around} x {along}: {name} over LU", times[name] / times["LU"], target=target if reference else None, note=note)
+            yield Row(
+                f"{around} x {along}: {name} over LU",
+                times[name] / times["LU"],
+                target=target if reference else None,
+                note=note,
+            )
     for name in ("unknowns", "force", "force and tangent", "LU"):
         yield Row(f"{name}: 56 x 96 over 14 x 24", found[-1][name] / found[0][name])
 
@@ -92,5 +104,7 @@ def memory():
         if found["failures"]:
             raise RuntimeError(found["failures"][0])
         above.append(found["peak"] - found["before"])
-        yield Row(f"{around} x {along}: peak memory", found["peak"], "MiB", note=f"{above[-1]:.0f} MiB above the imports")
+        yield Row(
+            f"{around} x {along}: peak memory", found["peak"], "MiB", note=f"{above[-1]:.0f} MiB above the imports"
+        )
     yield Row("memory above the imports: 56 x 96 over 14 x 24", above[-1] / above[0])

@@ -1,10 +1,11 @@
 """Benchmarks register themselves; each yields rows."""
+
 from __future__ import annotations
 
 import gc
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
-from typing import Callable, Iterator
 
 import numpy as np
 

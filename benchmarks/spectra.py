@@ -1,4 +1,5 @@
 """Coupled eigenvalues of the 28 x 48 valve against one real LU refactorisation."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -10,7 +11,8 @@ from eigen import SearchOptions, Workspace, leading_modes, sweep
 from .registry import Row, benchmark, medians, seconds
 from .statics import model_of, refactorisation
 
-#: Light stiffness damping, so that ten modes lie right of the limit point at -1/beta, and the reference damping, where six do.
+#: Light stiffness damping, so that ten modes lie right of the limit point at -1/beta, and the reference damping, where
+#: six do.
 LIGHT = Conditions(10.0, 5.0, 3e-4)
 REFERENCE = Conditions(10.0, 0.0, 3e-3)
 
@@ -41,14 +43,17 @@ def modes():
         found = solve(conditions)
         yield Row(
             f"leading modes, ten asked for, beta {conditions.beta:g} s, over one LU refactorisation",
-            (times[name] - times["assembly"]) / unit, target=30.0,
+            (times[name] - times["assembly"]) / unit,
+            target=30.0,
             note=f"{1e3 * times[name]:.0f} ms, {len(found)} found, residual {found.residual.max():.0e}",
-        )  # fmt: skip
+        )
 
 
 @benchmark("density-sweep")
 def density_sweep():
-    """A hundred densities at one pressure on one structural basis, certified, against single solves; the direct way on a sample."""
+    """A hundred densities at one pressure on one structural basis, certified, against single solves; the direct way on
+    a sample.
+    """
     model = model_of(28, 48)
     state = linearise(model, run_steady(model, [6e3]).states[0].q, 6e3)
     options = SearchOptions(limit_point=-1 / REFERENCE.beta)
@@ -60,7 +65,13 @@ def density_sweep():
     single = medians({"one": lambda: leading_modes(at(10.0), 6, options, workspace=workspace)}, 5)["one"]
     densities = np.geomspace(1.0, 1000.0, 100)
     spent, result = seconds(lambda: sweep(at, densities, 6, options, workspace=workspace))
-    yield Row("100-point density sweep over one such solve", spent / single, target=10.0,
-              note=f"{spent:.2f} s, basis {result.basis_size}, certified {result.certified}, full solves {result.full_solves}")  # fmt: skip
+    yield Row(
+        "100-point density sweep over one such solve",
+        spent / single,
+        target=10.0,
+        note=(
+            f"{spent:.2f} s, basis {result.basis_size}, certified {result.certified}, full solves {result.full_solves}"
+        ),
+    )
     direct, _ = seconds(lambda: [leading_modes(at(d), 6, options, workspace=workspace) for d in densities[::20]])
     yield Row("the direct way, 100 solves, from a sample of 5", direct * 20 / single)

@@ -1,4 +1,7 @@
-"""A map of 64 x 64 cells over pressure and density at 28 x 48, every cell with its certificate, against that many independent eigenvalue solves."""
+"""A map of 64 x 64 cells over pressure and density at 28 x 48, every cell with its certificate, against that many
+independent eigenvalue solves.
+"""
+
 from __future__ import annotations
 
 import multiprocessing
@@ -23,12 +26,23 @@ WORKERS = 2
 
 @benchmark("map")
 def stability_map():
-    """Two processes, their start included; the direct way on a sample of cells of the same map, steady states and linearisations left out of its time."""
+    """Two processes, their start included; the direct way on a sample of cells of the same map, steady states and
+    linearisations left out of its time.
+    """
     case = load_case(
         None,
-        ["mesh.around=28", "mesh.along=48", "damping.alpha=0", "damping.beta=0.003", f"map.x=pressure=500:50000:{CELLS}", f"map.y=density=1:1000:{CELLS}:log",
-         "map.curve=false", "map.refine=0", "map.checks=0"],
-    )  # fmt: skip
+        [
+            "mesh.around=28",
+            "mesh.along=48",
+            "damping.alpha=0",
+            "damping.beta=0.003",
+            f"map.x=pressure=500:50000:{CELLS}",
+            f"map.y=density=1:1000:{CELLS}:log",
+            "map.curve=false",
+            "map.refine=0",
+            "map.checks=0",
+        ],
+    )
     plan, walk = MapPlan.of(case), StabilityWalk(case)
     random = np.random.default_rng(1)
     picks = sorted((int(i), int(j)) for i, j in random.integers(0, CELLS, (SAMPLE, 2)))
@@ -44,25 +58,49 @@ def stability_map():
             place = plan.place(plan.x.values[i], plan.y.values[j], plan.laws[0])
             linear = walk.linear(place)
             begun, own = time.perf_counter(), time.process_time()
-            spectrum = leading_modes(linear.pencil(place.conditions, storage=place.storage), 6, search_options(place.beta))
+            spectrum = leading_modes(
+                linear.pencil(place.conditions, storage=place.storage), 6, search_options(place.beta)
+            )
             seconds.append((time.perf_counter() - begun, time.process_time() - own))
             direct.append((i, j, complex(spectrum.eigenvalues[0]), spectrum.unstable_count))
     one, one_work = np.median(seconds, axis=0)
     growth, frequency, unstable = (result.grid(name)[0] for name in ("growth_rate", "frequency", "unstable"))
-    error = max(abs(complex(growth[j, i], 2 * np.pi * frequency[j, i]) - value) / abs(value) for i, j, value, _ in direct)
+    error = max(
+        abs(complex(growth[j, i], 2 * np.pi * frequency[j, i]) - value) / abs(value) for i, j, value, _ in direct
+    )
     processor = sum(column.seconds for column in result.columns)
     yield Row(
-        f"map of {CELLS} x {CELLS} cells, 2 workers, over {CELLS**2} independent solves", taken / (CELLS**2 * one), target=1 / 60,
-        note=f"1/{CELLS**2 * one / taken:.0f}; {taken:.0f} s, {processor / CELLS:.2f} s of one core a column, one solve {one:.2f} s",
-    )  # fmt: skip
+        f"map of {CELLS} x {CELLS} cells, 2 workers, over {CELLS**2} independent solves",
+        taken / (CELLS**2 * one),
+        target=1 / 60,
+        note=(
+            f"1/{CELLS**2 * one / taken:.0f}; {taken:.0f} s, {processor / CELLS:.2f} s of one core a "
+            f"column, one solve {one:.2f} s"
+        ),
+    )
     yield Row(
-        "the same in processor time, that of the map shared by its workers", float(work / WORKERS / (CELLS**2 * one_work)),
-        note=f"1/{CELLS**2 * one_work * WORKERS / work:.0f}; {work:.0f} s with starts, one solve {one_work:.2f} s; for machines that do other things as well",
-    )  # fmt: skip
-    yield Row(f"largest relative difference of {SAMPLE} sampled cells from the full pencil", float(error), unit="", target=1e-6)
+        "the same in processor time, that of the map shared by its workers",
+        float(work / WORKERS / (CELLS**2 * one_work)),
+        note=(
+            f"1/{CELLS**2 * one_work * WORKERS / work:.0f}; {work:.0f} s with starts, one solve "
+            f"{one_work:.2f} s; for machines that do other things as well"
+        ),
+    )
+    yield Row(
+        f"largest relative difference of {SAMPLE} sampled cells from the full pencil",
+        float(error),
+        unit="",
+        target=1e-6,
+    )
     wrong = sum(int(unstable[j, i] != count) for i, j, _, count in direct)
     yield Row("sampled cells with another number of unstable eigenvalues", wrong, unit="", target=0)
-    yield Row("cells without a certificate", int((~result.grid("certified")[0]).sum()), unit="", target=0, note=f"{int((result.grid('how') == 1).sum())} solved directly")
+    yield Row(
+        "cells without a certificate",
+        int((~result.grid("certified")[0]).sum()),
+        unit="",
+        target=0,
+        note=f"{int((result.grid('how') == 1).sum())} solved directly",
+    )
 
 
 def _processor() -> float:

@@ -1,4 +1,5 @@
-"""Force, tangent and head-discharge curve of the 12-inch valve against one numeric LU refactorisation of its tangent."""
+"""Force, tangent and head-discharge curve of the 12-inch valve against a numeric LU refactorisation of its tangent."""
+
 from __future__ import annotations
 
 import os
@@ -70,8 +71,18 @@ def head_discharge():
         spent, result = seconds(lambda: run_steady(model, CURVE))
         iterations = sum(state.iterations for state in result.states)
         target = 8.0 if (around, along) == (28, 48) else None
-        yield Row(f"{around} x {along}: 12 pressures over 12 x 4 (assembly + LU)", spent / unit, target=target, note=f"{spent:.2f} s, {iterations} Newton steps")
-        yield Row(f"{around} x {along}: force and tangent", 1e3 * times["tangent"], "ms", note=f"LU {1e3 * times['lu']:.1f} ms, {model.size} unknowns")
+        yield Row(
+            f"{around} x {along}: 12 pressures over 12 x 4 (assembly + LU)",
+            spent / unit,
+            target=target,
+            note=f"{spent:.2f} s, {iterations} Newton steps",
+        )
+        yield Row(
+            f"{around} x {along}: force and tangent",
+            1e3 * times["tangent"],
+            "ms",
+            note=f"LU {1e3 * times['lu']:.1f} ms, {model.size} unknowns",
+        )
     yield Row("largest memory of this process", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, "MiB")
 
 
@@ -83,6 +94,11 @@ def first_call():
         environment = os.environ | {"DBVFIV_CACHE": cache}
         for variable in ("NUMBA_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR"):
             environment.pop(variable, None)
-        for what, target in (("first process, compilation included", 30.0), ("later process, from the compilation cache", 10.0)):
-            spent, _ = seconds(lambda: subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True))
+        for what, target in (
+            ("first process, compilation included", 30.0),
+            ("later process, from the compilation cache", 10.0),
+        ):
+            spent, _ = seconds(
+                lambda: subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True)
+            )
             yield Row(f"{what}: one steady state at 28 x 48", spent, "s", target)

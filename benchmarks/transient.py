@@ -1,4 +1,5 @@
 """Steps of the 28 x 48 valve in a limit cycle against one force evaluation and one solve."""
+
 from __future__ import annotations
 
 import os
@@ -21,13 +22,20 @@ from .registry import Row, benchmark
 STEPS = 2000
 #: 6 kPa and a fluid somewhat lighter than at the onset of flutter; the push is near the amplitude of the cycle.
 CYCLE = {
-    "drive.pressure": 6e3, "fluid.density": 50.0, "damping.alpha": 0.0, "transient.start": "kick", "transient.kick_opening": 4.6e-3,
-    "transient.step": 5e-4, "transient.duration": 0.25,
-}  # fmt: skip
+    "drive.pressure": 6e3,
+    "fluid.density": 50.0,
+    "damping.alpha": 0.0,
+    "transient.start": "kick",
+    "transient.kick_opening": 4.6e-3,
+    "transient.step": 5e-4,
+    "transient.duration": 0.25,
+}
 
 
 class Unit(Observer):
-    """Measures one force evaluation and one solve while a run goes on, so that a slow spell of the machine meets both, and its own time."""
+    """Measures one force evaluation and one solve while a run goes on, so that a slow spell of the machine meets both,
+    and its own time.
+    """
 
     def __init__(self, every: int = 50):
         self.every, self.count, self.spent, self.wall = every, 0, 0.0, 0.0
@@ -39,7 +47,10 @@ class Unit(Observer):
         if self.count % self.every or not self.motion.factored:
             return
         start, wall = process_time(), perf_counter()
-        for kept, function in ((self.force, lambda: self.motion.model.shell.force(self.q)), (self.solve, lambda: self.motion.solve(self.q, 0.0))):
+        for kept, function in (
+            (self.force, lambda: self.motion.model.shell.force(self.q)),
+            (self.solve, lambda: self.motion.solve(self.q, 0.0)),
+        ):
             for _ in range(2):  # the first for the caches
                 begin = process_time()
                 function()
@@ -72,8 +83,30 @@ def time_steps():
     force, solve = np.median(unit.force), np.median(unit.solve)
     steps = run.progress.steps
     lip = 1e3 * run.history["lip_opening"]
-    yield Row("one step over one force evaluation and one solve with existing factors", spent / steps / (force + solve), target=4.0,
-              note=f"{steps} steps, processor time {1e3 * spent / steps:.2f} ms, force {1e3 * force:.2f} ms, solve {1e3 * solve:.2f} ms")  # fmt: skip
-    yield Row("residuals a step", run.residuals / steps, "", note=f"solves {run.solves / steps:.2f}, steps per factorisation {steps / max(1, run.factorisations):.0f}")
-    yield Row("steps per second of processor time", steps / spent, "1/s", note=f"{steps / wall:.0f} by the clock; lip between {lip.min():.2f} and {lip.max():.2f} mm")
-    yield Row("file per 10 000 steps", (size - empty) / steps * 1e4 / 2**20, "MiB", note=f"and {empty / 2**20:.2f} MiB for mesh and restart points")
+    yield Row(
+        "one step over one force evaluation and one solve with existing factors",
+        spent / steps / (force + solve),
+        target=4.0,
+        note=(
+            f"{steps} steps, processor time {1e3 * spent / steps:.2f} ms, force {1e3 * force:.2f} "
+            f"ms, solve {1e3 * solve:.2f} ms"
+        ),
+    )
+    yield Row(
+        "residuals a step",
+        run.residuals / steps,
+        "",
+        note=f"solves {run.solves / steps:.2f}, steps per factorisation {steps / max(1, run.factorisations):.0f}",
+    )
+    yield Row(
+        "steps per second of processor time",
+        steps / spent,
+        "1/s",
+        note=f"{steps / wall:.0f} by the clock; lip between {lip.min():.2f} and {lip.max():.2f} mm",
+    )
+    yield Row(
+        "file per 10 000 steps",
+        (size - empty) / steps * 1e4 / 2**20,
+        "MiB",
+        note=f"and {empty / 2**20:.2f} MiB for mesh and restart points",
+    )

@@ -48,9 +48,7 @@ class Bordered:
             self._delta_star = self.d - self._w @ self.b
         sizes = np.array([abs(self._delta), abs(self._delta_star)])
         if not np.all(np.isfinite(sizes)) or np.any(sizes == 0.0):
-            raise SingularSystem(
-                "The bordered matrix is singular: the border does not lift the rank loss."
-            )
+            raise SingularSystem("The bordered matrix is singular: the border does not lift the rank loss.")
 
     @property
     def complement_sign(self) -> float:

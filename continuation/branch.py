@@ -51,8 +51,14 @@ class SpecialPoint:
     def to_dict(self) -> dict:
         """Without the vectors."""
         values = {k: v if isinstance(v, str) else float(v) for k, v in self.values.items()}
-        return {"kind": self.kind, "index": self.index, "mu": self.mu, "located": self.located,
-                "reason": self.reason, **values}
+        return {
+            "kind": self.kind,
+            "index": self.index,
+            "mu": self.mu,
+            "located": self.located,
+            "reason": self.reason,
+            **values,
+        }
 
 
 @dataclass
@@ -148,7 +154,7 @@ class Branch:
     def mu(self, index: int) -> dict[str, float]:
         """All parameters at a point."""
         z = self.points[index].z
-        return {**self.fixed, **dict(zip(self.names, map(float, z[self.size:])))}
+        return {**self.fixed, **dict(zip(self.names, map(float, z[self.size :])))}
 
     def of_kind(self, kind: str, located: bool = True) -> list[SpecialPoint]:
         """Special points of one kind, located ones only unless told otherwise."""
@@ -164,7 +170,7 @@ class Branch:
             "reason": self.reason,
             "points": [
                 {
-                    **dict(zip(columns, map(float, point.z[self.size:]))),
+                    **dict(zip(columns, map(float, point.z[self.size :]))),
                     "residual": float(point.residual),
                     "iterations": int(point.iterations),
                     "unstable_count": None if point.unstable < 0 else int(point.unstable),
@@ -184,7 +190,7 @@ class Branch:
         storage.save(self, Path(path))
 
     @classmethod
-    def load(cls, path: str | Path) -> "Branch":
+    def load(cls, path: str | Path) -> Branch:
         """Read what `save` wrote."""
         return storage.load(Path(path))
 

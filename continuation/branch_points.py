@@ -79,8 +79,7 @@ class BranchPointMonitor:
         if not np.isfinite(g0 * g1) or (g0 * g1 >= 0 and g1 != 0):
             return []
         if not tracer.options.locate:
-            return [special_at(tracer, "branch point", after, index, False,
-                               "location was not asked for")]
+            return [special_at(tracer, "branch point", after, index, False, "location was not asked for")]
         sizes = []
 
         def indicator(here):
@@ -111,11 +110,13 @@ class BranchPointMonitor:
         rows = problem.frame(np.stack([guess.tangent, v], axis=1))
         condition = BranchPointCondition(unfolded.direction, rows)
         name = problem.names[0]
-        augmented = companion(tracer, condition, (name, unfolded.name), unfolded,
-                              {**problem.mu(guess.z), unfolded.name: 0.0})
+        augmented = companion(
+            tracer, condition, (name, unfolded.name), unfolded, {**problem.mu(guess.z), unfolded.name: 0.0}
+        )
         frame = np.hstack([rows, np.zeros((2, 1))])
-        result = correct(augmented, np.append(guess.z, 0.0), frame, tracer.options.newton, None,
-                         tracer.options.location_tolerance)
+        result = correct(
+            augmented, np.append(guess.z, 0.0), frame, tracer.options.newton, None, tracer.options.location_tolerance
+        )
         if not result.converged:
             return f"Newton's method on the augmented system: {result.reason}"
         if abs(result.z[-1]) > 1e-6 * (1 + np.abs(result.z[:-1]).max()):
@@ -150,9 +151,7 @@ def branch_directions(problem, value, tangent):
     for j in range(2):
         for i in range(2):
             y = kernel[:, j]
-            form[i, j] = value.w @ value.extended_along(
-                kernel[:, i], y[:-1], {name: float(y[-1])}
-            )
+            form[i, j] = value.w @ value.extended_along(kernel[:, i], y[:-1], {name: float(y[-1])})
     form = 0.5 * (form + form.T)
     eigenvalues, rotation = np.linalg.eigh(form)
     # form = l0 x^2 + l1 y^2 = 0 has two real lines when l0 < 0 < l1 (one may be zero).
@@ -190,15 +189,13 @@ class Unfolded(SystemBase):
         return self.inner.linear(u, self._rest(mu))
 
     def d_parameter(self, u, mu, name):
-        return self.direction if name == self.name else self.inner.d_parameter(
-            u, self._rest(mu), name)
+        return self.direction if name == self.name else self.inner.d_parameter(u, self._rest(mu), name)
 
     def d2(self, u, mu, a, b):
         return self.inner.d2(u, self._rest(mu), a, b)
 
     def d2_parameter(self, u, mu, name, a):
-        return np.zeros(self.size) if name == self.name else self.inner.d2_parameter(
-            u, self._rest(mu), name, a)
+        return np.zeros(self.size) if name == self.name else self.inner.d2_parameter(u, self._rest(mu), name, a)
 
     def d_parameters2(self, u, mu, first, second):
         if self.name in (first, second):

@@ -19,8 +19,7 @@ from continuation.tracer import Tracer
 
 def branch_tracer(system, mu, parameter, options, events=(), spectrum=None, observers=None):
     """The tracer of a branch with the monitors the options ask for."""
-    problem = Problem(system, mu, (parameter,), None, options.state_scale,
-                      options.parameter_scales)
+    problem = Problem(system, mu, (parameter,), None, options.state_scale, options.parameter_scales)
     monitors: list = []
     if options.folds and options.method == "arclength":
         monitors.append(FoldMonitor())
@@ -91,7 +90,11 @@ def continue_branch(
 
 
 def resume(
-    system, branch: Branch, options: ContinuationOptions | None = None, events=(), spectrum=None,
+    system,
+    branch: Branch,
+    options: ContinuationOptions | None = None,
+    events=(),
+    spectrum=None,
     observers=None,
 ) -> Branch:
     """Go on from the last point of a branch of equilibria, e.g. one loaded from a file.
@@ -101,19 +104,25 @@ def resume(
     if branch.kind != "equilibria":
         raise ValueError(f"This resumes branches of equilibria, not a {branch.kind}.")
     options = options or ContinuationOptions()
-    tracer = branch_tracer(system, branch.fixed, branch.names[0], options, events, spectrum,
-                           observers)
+    tracer = branch_tracer(system, branch.fixed, branch.names[0], options, events, spectrum, observers)
     last = branch.points[-1]
     here = tracer.start(last.z, last.tangent, branch.restart.get("frame"))
-    longer = replace(branch, points=list(branch.points), special=list(branch.special),
-                     reason="running", restart=dict(branch.restart))
+    longer = replace(
+        branch, points=list(branch.points), special=list(branch.special), reason="running", restart=dict(branch.restart)
+    )
     step = float(np.clip(branch.next_step or options.step, options.min_step, options.max_step))
     return tracer.run(longer, here, step)
 
 
 def switch_branch(
-    system, special: SpecialPoint, parameter: str, options: ContinuationOptions | None = None,
-    side: int = 1, events=(), spectrum=None, observers=None,
+    system,
+    special: SpecialPoint,
+    parameter: str,
+    options: ContinuationOptions | None = None,
+    side: int = 1,
+    events=(),
+    spectrum=None,
+    observers=None,
 ) -> Branch:
     """Follow the other branch through a simple branch point, to one side.
 
@@ -155,8 +164,7 @@ def switch_branch(
             gap = gap / problem.norm(gap)
             known = special.tangent / problem.norm(special.tangent)
             if abs(problem.dot(gap, direction)) > abs(problem.dot(gap, known)):
-                branch = Branch("equilibria", system.size, (parameter,), (), dict(special.mu),
-                                [here.point()])
+                branch = Branch("equilibria", system.size, (parameter,), (), dict(special.mu), [here.point()])
                 return tracer.run(branch, here, step)
             reason = "the corrector fell back to the known branch"
         step *= options.shrink

@@ -55,8 +55,10 @@ class OrbitSystem(SystemBase):
     def __init__(self, system, mesh, degree, reference, period_scale=1.0):
         self.inner = system
         self.mesh = np.asarray(mesh, float)
-        require(np.all(np.diff(self.mesh) > 0) and self.mesh[0] == 0 and self.mesh[-1] == 1,
-                "The mesh of an orbit must increase from 0 to 1.")
+        require(
+            np.all(np.diff(self.mesh) > 0) and self.mesh[0] == 0 and self.mesh[-1] == 1,
+            "The mesh of an orbit must increase from 0 to 1.",
+        )
         require(2 <= degree <= 7, f"The degree of the collocation is 2 to 7, not {degree}.")
         self.degree, self.intervals = int(degree), self.mesh.size - 1
         self.n = system.size
@@ -69,8 +71,7 @@ class OrbitSystem(SystemBase):
         self._period_scale = float(period_scale)
         own = getattr(system, "state_weights", None)
         each = np.full(self.n, 1.0 / self.n) if own is None else np.asarray(own, float)
-        self.state_weights = np.append(np.tile(each / self.nodes, self.nodes),
-                                       period_scale**-2)
+        self.state_weights = np.append(np.tile(each / self.nodes, self.nodes), period_scale**-2)
         self._each = each
         self.set_reference(reference)
 
@@ -88,8 +89,12 @@ class OrbitSystem(SystemBase):
 
     def restart_data(self) -> dict:
         """What a file needs to build this system again."""
-        return {"mesh": self.mesh, "degree": np.array(self.degree),
-                "reference": self._reference, "period_scale": np.array(self._period_scale)}
+        return {
+            "mesh": self.mesh,
+            "degree": np.array(self.degree),
+            "reference": self._reference,
+            "period_scale": np.array(self._period_scale),
+        }
 
     def _index(self, j):
         return (j * self.degree + np.arange(self.degree + 1)) % self.nodes
@@ -112,7 +117,7 @@ class OrbitSystem(SystemBase):
         row = 0
         for _, _, _, x, velocity in self._points(nodes):
             f = self.inner.residual(x, mu)
-            result[row: row + self.n] = period * f - self._mass(x, mu, velocity)
+            result[row : row + self.n] = period * f - self._mass(x, mu, velocity)
             row += self.n
         result[-1] = self._phase @ nodes.ravel()
         return result
@@ -132,7 +137,7 @@ class OrbitSystem(SystemBase):
             part = period * self.inner.d_parameter(x, mu, name)
             if self._massive:
                 part = part - self.inner.mass_parameter(x, mu, name, velocity)
-            result[row: row + self.n] = part
+            result[row : row + self.n] = part
             row += self.n
         return result
 
@@ -146,21 +151,17 @@ class OrbitSystem(SystemBase):
         nodes, period = self.split(u)
         m, n = self.degree, self.n
         result = []
-        for j, k, h, x, velocity in self._points(nodes):
+        for _j, k, h, x, velocity in self._points(nodes):
             if k == 0:
                 block, by_period = np.zeros((m * n, (m + 1) * n)), np.zeros(m * n)
                 result.append((block, by_period))
             jacobian, mass = self.inner.linear(x, mu).to_dense()
             slope = period * jacobian
             if not getattr(self.inner, "constant_mass", True):
-                slope = slope - np.stack(
-                    [self.inner.mass_d(x, mu, velocity, e) for e in np.eye(n)], axis=1
-                )
+                slope = slope - np.stack([self.inner.mass_d(x, mu, velocity, e) for e in np.eye(n)], axis=1)
             rows = slice(k * n, (k + 1) * n)
             for i in range(m + 1):
-                block[rows, i * n: (i + 1) * n] = (
-                    self._value[k, i] * slope - self._slope[k, i] / h * mass
-                )
+                block[rows, i * n : (i + 1) * n] = self._value[k, i] * slope - self._slope[k, i] / h * mass
             by_period[rows] = self.inner.residual(x, mu)
         return result
 
@@ -197,8 +198,7 @@ class OrbitSystem(SystemBase):
     def evaluate(self, nodes, times) -> np.ndarray:
         """States at scaled times, shape (times, n)."""
         times = np.mod(np.asarray(times, float), 1.0)
-        interval = np.clip(np.searchsorted(self.mesh, times, side="right") - 1, 0,
-                           self.intervals - 1)
+        interval = np.clip(np.searchsorted(self.mesh, times, side="right") - 1, 0, self.intervals - 1)
         result = np.empty((times.size, self.n))
         for j in np.unique(interval):
             here = interval == j
@@ -215,10 +215,12 @@ class OrbitSystem(SystemBase):
     def adapted_mesh(self, nodes) -> np.ndarray:
         """A mesh of as many intervals that equidistributes the local error (de Boor 1973)."""
         m, h = self.degree, np.diff(self.mesh)
-        top = np.stack([
-            np.polynomial.polynomial.polyfit(self._local, nodes[self._index(j)], m)[-1] / h[j] ** m
-            for j in range(self.intervals)
-        ])
+        top = np.stack(
+            [
+                np.polynomial.polynomial.polyfit(self._local, nodes[self._index(j)], m)[-1] / h[j] ** m
+                for j in range(self.intervals)
+            ]
+        )
         # The next derivative, from jumps of the highest one between interval middles.
         gap = 0.5 * (h + np.roll(h, -1))
         jump = np.abs(np.roll(top, -1, axis=0) - top).max(axis=1) / gap

@@ -22,10 +22,8 @@ def colour_columns(pattern: sp.spmatrix) -> np.ndarray:
     by_row, by_column = sp.csr_matrix(pattern), sp.csc_matrix(pattern)
     colours = np.full(pattern.shape[1], -1)
     for j in range(pattern.shape[1]):
-        rows = by_column.indices[by_column.indptr[j]:by_column.indptr[j + 1]]
-        taken = {
-            colours[k] for r in rows for k in by_row.indices[by_row.indptr[r]:by_row.indptr[r + 1]]
-        }
+        rows = by_column.indices[by_column.indptr[j] : by_column.indptr[j + 1]]
+        taken = {colours[k] for r in rows for k in by_row.indices[by_row.indptr[r] : by_row.indptr[r + 1]]}
         colour = 0
         while colour in taken:
             colour += 1

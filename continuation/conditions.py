@@ -196,9 +196,7 @@ class BranchPointValue:
             change = change + s * self._derivatives.d2_parameter(self._name, du)
             for name, amount in dmu.items():
                 if amount != 0.0:
-                    change = change + s * amount * self._system.d_parameters2(
-                        self._u, self._mu, self._name, name
-                    )
+                    change = change + s * amount * self._system.d_parameters2(self._u, self._mu, self._name, name)
         return change
 
     def along(self, du, dmu):

@@ -6,29 +6,40 @@ import numpy as np
 
 from continuation.conditions import BogdanovTakensCondition, generic_borders, null_pair
 from continuation.errors import ContinuationError, DerivativeMissing, SingularSystem
+from continuation.here import Here
 from continuation.locate import special_at
 from continuation.normal_form import fold_coefficient, hopf_normal_form
 from continuation.problem import Problem, correct
-from continuation.here import Here
 
 
 def solve_bogdanov_takens(tracer, z, v, w):
     """Newton on ``F = 0, g = 0, w' B v = 0`` in state and both parameters."""
     problem, options = tracer.problem, tracer.options
-    augmented = Problem(problem.system, problem.fixed, problem.names,
-                        BogdanovTakensCondition(w, v), options.state_scale,
-                        options.parameter_scales)
-    return correct(augmented, z[: problem.n + 2], tracer.frame, options.newton, None,
-                   options.location_tolerance)
+    augmented = Problem(
+        problem.system,
+        problem.fixed,
+        problem.names,
+        BogdanovTakensCondition(w, v),
+        options.state_scale,
+        options.parameter_scales,
+    )
+    return correct(augmented, z[: problem.n + 2], tracer.frame, options.newton, None, options.location_tolerance)
 
 
 def bogdanov_takens_special(tracer, result, tangent, index):
     value = result.local.condition
     here = Here(result.z, tangent, result.local)
     v = value.v / np.linalg.norm(value.v)
-    return special_at(tracer, "bogdanov-takens", here, index, True, "",
-                      {"omega": 0.0, "iterations": result.iterations},
-                      {"right": v, "left": value.w})
+    return special_at(
+        tracer,
+        "bogdanov-takens",
+        here,
+        index,
+        True,
+        "",
+        {"omega": 0.0, "iterations": result.iterations},
+        {"right": v, "left": value.w},
+    )
 
 
 class FoldCurveMonitor:
@@ -73,8 +84,9 @@ class FoldCurveMonitor:
                 return bogdanov_takens_special(tracer, result, here.tangent, index)
             return special_at(tracer, kind, here, index, False, result.reason)
         coefficient = fold_coefficient(tracer.problem.system, here.local.u, here.local.mu, v, w)
-        return special_at(tracer, kind, here, index, True, "",
-                          {"quadratic_coefficient": coefficient}, {"right": v, "left": w})
+        return special_at(
+            tracer, kind, here, index, True, "", {"quadratic_coefficient": coefficient}, {"right": v, "left": w}
+        )
 
 
 class HopfCurveMonitor:
@@ -141,15 +153,12 @@ class HopfCurveMonitor:
         value = here.local.condition
         v = value.v / np.linalg.norm(value.v)
         values = {"omega": here.tests["omega"], "first_lyapunov_coefficient": here.tests["l1"]}
-        return [special_at(tracer, kind, here, index, True, "", values,
-                           {"right": v, "left": value.w})]
+        return [special_at(tracer, kind, here, index, True, "", values, {"right": v, "left": value.w})]
 
     def _end(self, tracer, before, after, index):
         """The Bogdanov-Takens point where the frequency reaches zero."""
         n = tracer.problem.n
-        share = before.tests["omega"] ** 2 / (
-            before.tests["omega"] ** 2 + after.tests["omega"] ** 2
-        )
+        share = before.tests["omega"] ** 2 / (before.tests["omega"] ** 2 + after.tests["omega"] ** 2)
         z = before.z + share * (after.z - before.z)
         v = before.local.condition.v.real
         w = before.local.condition.w.real

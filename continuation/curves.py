@@ -18,20 +18,22 @@ from continuation.tracer import Tracer
 _KINDS = {"fold curve": FoldCondition, "hopf curve": HopfCondition}
 
 
-def _tracer(kind, system, mu, parameters, condition, options, observers, lyapunov=True,
-            spectrum=None):
+def _tracer(kind, system, mu, parameters, condition, options, observers, lyapunov=True, spectrum=None):
     if len(set(parameters)) != 2:
         raise ValueError(f"A {kind} needs two different parameters, not {parameters}.")
-    problem = Problem(system, mu, parameters, condition, options.state_scale,
-                      options.parameter_scales)
+    problem = Problem(system, mu, parameters, condition, options.state_scale, options.parameter_scales)
     monitor = FoldCurveMonitor() if kind == "fold curve" else HopfCurveMonitor(lyapunov)
     monitors = [monitor, CountMonitor(spectrum)] if options.eigenvalues else [monitor]
     return Tracer(problem, options, monitors, observers)
 
 
 def continue_fold(
-    system, special: SpecialPoint, parameters: tuple[str, str],
-    options: ContinuationOptions | None = None, observers=None, spectrum=None,
+    system,
+    special: SpecialPoint,
+    parameters: tuple[str, str],
+    options: ContinuationOptions | None = None,
+    observers=None,
+    spectrum=None,
 ) -> Branch:
     """Follow a fold in two parameters; cusps and Bogdanov-Takens points are noted.
 
@@ -50,13 +52,25 @@ def continue_fold(
     Branch
         Of kind ``"fold curve"``.
     """
-    return _continue("fold curve", ("fold", "bogdanov-takens", "cusp"), system, special,
-                     parameters, options, observers, spectrum=spectrum)
+    return _continue(
+        "fold curve",
+        ("fold", "bogdanov-takens", "cusp"),
+        system,
+        special,
+        parameters,
+        options,
+        observers,
+        spectrum=spectrum,
+    )
 
 
 def continue_hopf(
-    system, special: SpecialPoint, parameters: tuple[str, str],
-    options: ContinuationOptions | None = None, observers=None, lyapunov: bool = True,
+    system,
+    special: SpecialPoint,
+    parameters: tuple[str, str],
+    options: ContinuationOptions | None = None,
+    observers=None,
+    lyapunov: bool = True,
     spectrum=None,
 ) -> Branch:
     """Follow a Hopf point in two parameters.
@@ -77,12 +91,20 @@ def continue_hopf(
         Of kind ``"hopf curve"``; ``values("omega")`` is the angular frequency along it,
         ``values("l1")`` the first Lyapunov coefficient.
     """
-    return _continue("hopf curve", ("hopf", "generalised hopf", "zero-hopf"), system, special,
-                     parameters, options, observers, lyapunov, spectrum)
+    return _continue(
+        "hopf curve",
+        ("hopf", "generalised hopf", "zero-hopf"),
+        system,
+        special,
+        parameters,
+        options,
+        observers,
+        lyapunov,
+        spectrum,
+    )
 
 
-def _continue(kind, accepted, system, special, parameters, options, observers, lyapunov=True,
-              spectrum=None):
+def _continue(kind, accepted, system, special, parameters, options, observers, lyapunov=True, spectrum=None):
     options = options or ContinuationOptions()
     if special.kind not in accepted or "right" not in special.vectors:
         raise NotABifurcation(
@@ -90,15 +112,14 @@ def _continue(kind, accepted, system, special, parameters, options, observers, l
             f"{special.kind}{'' if special.located else ' that was only bracketed'}."
         )
     condition = _KINDS[kind](special.vectors["left"], special.vectors["right"])
-    tracer = _tracer(kind, system, special.mu, parameters, condition, options, observers,
-                     lyapunov, spectrum)
+    tracer = _tracer(kind, system, special.mu, parameters, condition, options, observers, lyapunov, spectrum)
     problem = tracer.problem
     extra = [special.values["omega"]] if problem.e else []
     n = problem.n
     z = problem.pack(special.u, special.mu, extra)
     # The branch the point was found on gives one direction, the second parameter the other.
     along = np.zeros(n + 2)
-    along[: n] = special.tangent[: n]
+    along[:n] = special.tangent[:n]
     if special.tangent.size > n and special.kind == "hopf":
         along[n] = special.tangent[n]
     second = np.zeros(n + 2)
@@ -107,23 +128,28 @@ def _continue(kind, accepted, system, special, parameters, options, observers, l
     direction = np.zeros(z.size)
     direction[n + 1] = options.direction
     here = tracer.start(z, direction, frame)
-    branch = Branch(kind, n, tuple(parameters), problem.condition.extra_names,
-                    dict(special.mu), [here.point()])
+    branch = Branch(kind, n, tuple(parameters), problem.condition.extra_names, dict(special.mu), [here.point()])
     return tracer.run(branch, here, options.step)
 
 
-def resume_curve(system, branch: Branch, options: ContinuationOptions | None = None,
-                 observers=None, lyapunov: bool = True, spectrum=None) -> Branch:
+def resume_curve(
+    system,
+    branch: Branch,
+    options: ContinuationOptions | None = None,
+    observers=None,
+    lyapunov: bool = True,
+    spectrum=None,
+) -> Branch:
     """Go on from the last point of a fold or Hopf curve, e.g. one loaded from a file."""
     if branch.kind not in _KINDS:
         raise ValueError(f"This resumes fold and Hopf curves, not {branch.kind}.")
     options = options or ContinuationOptions()
     condition = _KINDS[branch.kind](branch.restart["p"], branch.restart["q"])
-    tracer = _tracer(branch.kind, system, branch.fixed, branch.names, condition, options,
-                     observers, lyapunov, spectrum)
+    tracer = _tracer(branch.kind, system, branch.fixed, branch.names, condition, options, observers, lyapunov, spectrum)
     last = branch.points[-1]
     here = tracer.start(last.z, last.tangent, branch.restart["frame"])
-    longer = replace(branch, points=list(branch.points), special=list(branch.special),
-                     reason="running", restart=dict(branch.restart))
+    longer = replace(
+        branch, points=list(branch.points), special=list(branch.special), reason="running", restart=dict(branch.restart)
+    )
     step = float(np.clip(branch.next_step or options.step, options.min_step, options.max_step))
     return tracer.run(longer, here, step)

@@ -28,16 +28,12 @@ class FoldMonitor:
             point = solve_fold(tracer, guess)
             return point if isinstance(point, str) else (point.z, point)
 
-        result, guess, reason = safeguarded(
-            tracer, before, after, lambda here: here.tangent[n], attempt
-        )
+        result, guess, reason = safeguarded(tracer, before, after, lambda here: here.tangent[n], attempt)
         if result is None:
             return [special_at(tracer, "fold", guess, index, False, reason)]
         v, w = result.local.condition.v, result.local.condition.w
         values = {"iterations": result.iterations}
-        values["quadratic_coefficient"] = fold_coefficient(
-            tracer.problem.system, result.local.u, result.local.mu, v, w
-        )
+        values["quadratic_coefficient"] = fold_coefficient(tracer.problem.system, result.local.u, result.local.mu, v, w)
         here = Here(result.z, np.append(v, 0.0), result.local)
         here.tangent = here.tangent / tracer.problem.norm(here.tangent)
         return [special_at(tracer, "fold", here, index, True, "", values, {"right": v, "left": w})]
@@ -52,8 +48,7 @@ def solve_fold(tracer, guess):
         _, q, p, _ = null_pair(guess.local.linear, p / np.linalg.norm(p), q / np.linalg.norm(q))
     augmented = companion(tracer, FoldCondition(p, q))
     frame = augmented.frame(guess.tangent[:, None])
-    result = correct(augmented, guess.z, frame, tracer.options.newton, None,
-                     tracer.options.location_tolerance)
+    result = correct(augmented, guess.z, frame, tracer.options.newton, None, tracer.options.location_tolerance)
     if not result.converged:
         return f"Newton's method on the augmented system: {result.reason}"
     return result

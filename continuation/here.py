@@ -36,6 +36,13 @@ class Here:
     data: dict = field(default_factory=dict)
 
     def point(self) -> CurvePoint:
-        return CurvePoint(self.z, self.tangent, self.step, self.iterations,
-                           float(self.local.size), dict(self.tests), self.unstable,
-                           self.eigenvalues)
+        return CurvePoint(
+            self.z,
+            self.tangent,
+            self.step,
+            self.iterations,
+            float(self.local.size),
+            dict(self.tests),
+            self.unstable,
+            self.eigenvalues,
+        )

@@ -29,8 +29,9 @@ def solve_hopf(tracer, guess, omega, vector):
     p, q = hopf_borders(guess.local.linear, omega, vector)
     augmented = companion(tracer, HopfCondition(p, q))
     frame = augmented.frame(guess.tangent[:, None])
-    result = correct(augmented, np.append(guess.z, omega), frame, tracer.options.newton, None,
-                     tracer.options.location_tolerance)
+    result = correct(
+        augmented, np.append(guess.z, omega), frame, tracer.options.newton, None, tracer.options.location_tolerance
+    )
     if not result.converged:
         return f"Newton's method on the augmented system: {result.reason}"
     if not result.z[-1] > 0:
@@ -48,12 +49,15 @@ def describe_hopf(tracer, result, tangent, index):
     values = {"omega": omega, "iterations": result.iterations, "eigen_residual": float(defect)}
     vectors = {"right": q, "left": value.w}
     try:
-        form = hopf_normal_form(problem.system, result.local.u, result.local.mu, omega,
-                                q, value.w, problem.names[0])
+        form = hopf_normal_form(problem.system, result.local.u, result.local.mu, omega, q, value.w, problem.names[0])
         values.update(
-            first_lyapunov_coefficient=form.l1, c1_real=form.c1.real, c1_imag=form.c1.imag,
-            crossing_real=form.crossing.real, crossing_imag=form.crossing.imag,
-            criticality=form.criticality, amplitude_coefficient=form.amplitude_coefficient(),
+            first_lyapunov_coefficient=form.l1,
+            c1_real=form.c1.real,
+            c1_imag=form.c1.imag,
+            crossing_real=form.crossing.real,
+            crossing_imag=form.crossing.imag,
+            criticality=form.criticality,
+            amplitude_coefficient=form.amplitude_coefficient(),
         )
         vectors["left"] = form.p
     except (DerivativeMissing, ContinuationError) as error:

@@ -80,18 +80,12 @@ class JaxSystem(SystemBase):
 
             self._mass_apply = jax.jit(b)
             self._mass_d1 = jax.jit(lambda u, mu, c, a: _jvp(lambda x: b(x, mu, c), u, a))
-            self._mass_d2 = jax.jit(
-                lambda u, mu, c, a, d: _jvp(lambda x: _jvp(lambda y: b(y, mu, c), x, a), u, d)
-            )
-            self._mass_mu = jax.jit(
-                lambda u, mu, dmu, c: jax.jvp(lambda m: b(u, m, c), (mu,), (dmu,))[1]
-            )
-            eye = jnp.eye(self.size) if self._mass_colouring is None else jnp.asarray(
-                self._mass_colouring.seeds
-            )
+            self._mass_d2 = jax.jit(lambda u, mu, c, a, d: _jvp(lambda x: _jvp(lambda y: b(y, mu, c), x, a), u, d))
+            self._mass_mu = jax.jit(lambda u, mu, dmu, c: jax.jvp(lambda m: b(u, m, c), (mu,), (dmu,))[1])
+            eye = jnp.eye(self.size) if self._mass_colouring is None else jnp.asarray(self._mass_colouring.seeds)
             self._mass_matrix = jax.jit(lambda u, mu: jax.vmap(lambda s: b(u, mu, s))(eye))
 
-    # -- residual and first derivatives ---------------------------------------------------
+    # -- residual and first derivatives
 
     def residual(self, u, mu):
         return np.asarray(self._residual(np.asarray(u, float), _floats(mu)))
@@ -114,7 +108,7 @@ class JaxSystem(SystemBase):
     def d_parameter(self, u, mu, name):
         return self._directional(u, mu, [(None, name)])
 
-    # -- higher derivatives ---------------------------------------------------------------
+    # -- higher derivatives
 
     def d2(self, u, mu, a, b):
         return self._directional(u, mu, [(a, None), (b, None)])
@@ -138,7 +132,7 @@ class JaxSystem(SystemBase):
             tangents.append((step, {key: float(key == name) for key in mu}))
         return np.asarray(self._along[len(tangents)](np.asarray(u, float), mu, tangents))
 
-    # -- mass -----------------------------------------------------------------------------
+    # -- mass
 
     def mass_d(self, u, mu, c, a):
         if self._callable_mass is None:

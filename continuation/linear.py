@@ -50,7 +50,6 @@ class DenseSolver:
     def solve_transpose(self, rhs):
         return sla.lu_solve((self._lu, self._pivots), rhs, trans=1, check_finite=False)
 
-
     def determinant_sign(self):
         """Sign of the determinant of the (real) matrix factorised."""
         swaps = np.count_nonzero(self._pivots != np.arange(self._pivots.size))
@@ -90,9 +89,7 @@ class SparseSolver:
     def _solve(self, rhs, trans):
         rhs = np.asarray(rhs)
         if np.iscomplexobj(rhs) and not np.iscomplexobj(self.matrix.data):
-            return self._lu.solve(rhs.real.copy(), trans) + 1j * self._lu.solve(
-                rhs.imag.copy(), trans
-            )
+            return self._lu.solve(rhs.real.copy(), trans) + 1j * self._lu.solve(rhs.imag.copy(), trans)
         return self._lu.solve(rhs.astype(self.matrix.dtype), trans)
 
     def solve(self, rhs):

@@ -15,16 +15,31 @@ SLACK = 0.02
 def companion(tracer, condition, names=None, system=None, mu=None):
     """A problem in the same units as the tracer's, with a condition."""
     problem, options = tracer.problem, tracer.options
-    return Problem(system or problem.system, mu or problem.fixed, names or problem.names,
-                   condition, options.state_scale, options.parameter_scales)
+    return Problem(
+        system or problem.system,
+        mu or problem.fixed,
+        names or problem.names,
+        condition,
+        options.state_scale,
+        options.parameter_scales,
+    )
 
 
 def special_at(tracer, kind, here, index, located, reason="", values=None, vectors=None):
     """A `SpecialPoint` at a point of the curve."""
     problem = tracer.problem
-    return SpecialPoint(kind, index, problem.u(here.z).copy(), problem.mu(here.z),
-                        here.z.copy(), here.tangent.copy(), located, reason,
-                        values or {}, vectors or {})
+    return SpecialPoint(
+        kind,
+        index,
+        problem.u(here.z).copy(),
+        problem.mu(here.z),
+        here.z.copy(),
+        here.tangent.copy(),
+        located,
+        reason,
+        values or {},
+        vectors or {},
+    )
 
 
 def safeguarded(tracer, before, after, indicator, attempt, rounds=16):

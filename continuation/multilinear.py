@@ -9,14 +9,12 @@ def expand(function, *vectors):
     """Apply a real multilinear ``function`` to complex vectors by splitting them."""
     for i, vector in enumerate(vectors):
         if np.iscomplexobj(vector):
-            head, tail = vectors[:i], vectors[i + 1:]
+            head, tail = vectors[:i], vectors[i + 1 :]
             result = 0.0
             if np.any(vector.real):
                 result = result + expand(function, *head, np.ascontiguousarray(vector.real), *tail)
             if np.any(vector.imag):
-                result = result + 1j * expand(
-                    function, *head, np.ascontiguousarray(vector.imag), *tail
-                )
+                result = result + 1j * expand(function, *head, np.ascontiguousarray(vector.imag), *tail)
             return np.zeros(vector.size, complex) if np.isscalar(result) else result
     return np.asarray(function(*vectors))
 

@@ -80,7 +80,7 @@ class NewtonResult:
     residual: float
     history: tuple[float, ...] = field(default=())
 
-    def required(self) -> "NewtonResult":
+    def required(self) -> NewtonResult:
         """The result itself, or `NotConverged` when it is none."""
         if self.converged:
             return self
@@ -179,6 +179,7 @@ def equilibrium(
         damping = 1.0
         trial = evaluate(u + step)
         if options.line_search:
+
             def merit(position, value):
                 factor = 1.0 if deflation is None else deflation.magnitude(position)
                 return factor * residual_norm(system, value)

@@ -146,10 +146,7 @@ def hopf_normal_form(system, u, mu, omega, q, p, parameter: str | None = None) -
         return d.d2(a, b) - d.mass_d(sa * a, b) - d.mass_d(sb * b, a)
 
     def third(a, sa, b, sb, c, sc):
-        return (
-            d.d3(a, b, c) - d.mass_d2(sa * a, b, c) - d.mass_d2(sb * b, a, c)
-            - d.mass_d2(sc * c, a, b)
-        )
+        return d.d3(a, b, c) - d.mass_d2(sa * a, b, c) - d.mass_d2(sb * b, a, c) - d.mass_d2(sc * c, a, b)
 
     conj = q.conj()
     h20 = -linear.shifted(2 * s).solve(second(q, s, q, s))
@@ -170,7 +167,15 @@ def hopf_normal_form(system, u, mu, omega, q, p, parameter: str | None = None) -
         change = d.jacobian_along(q, du, dmu) - s * d.mass_along(q, du, dmu)
         crossing = complex(np.vdot(p, change))
     return HopfNormalForm(
-        float(omega), q, p, c1, c1.real / omega, h20, h11, np.array(u), crossing,
+        float(omega),
+        q,
+        p,
+        c1,
+        c1.real / omega,
+        h20,
+        h11,
+        np.array(u),
+        crossing,
         cancellation,
     )
 

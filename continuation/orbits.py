@@ -143,7 +143,8 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
             raise NotConverged(
                 f"No periodic orbit was found near the guess: {result.reason} after "
                 f"{result.iterations} iterations, residual {result.residual:.3g}.",
-                result.reason, result,
+                result.reason,
+                result,
             )
         nodes, period = frame.split(result.u)
         spread = np.ptp(nodes, axis=0).max()
@@ -164,7 +165,10 @@ def _orbit(frame, u, mu, residual):
 
 
 def continue_orbits(
-    system, orbit: Orbit, parameter: str, options: ContinuationOptions | None = None,
+    system,
+    orbit: Orbit,
+    parameter: str,
+    options: ContinuationOptions | None = None,
     observers=None,
 ) -> Branch:
     """Follow a periodic orbit in one parameter on its mesh.
@@ -187,8 +191,12 @@ def continue_orbits(
 
 
 def orbits_from_hopf(
-    system, special: SpecialPoint, parameter: str, amplitude: float,
-    options: ContinuationOptions | None = None, discretisation: OrbitOptions | None = None,
+    system,
+    special: SpecialPoint,
+    parameter: str,
+    amplitude: float,
+    options: ContinuationOptions | None = None,
+    discretisation: OrbitOptions | None = None,
     observers=None,
 ) -> Branch:
     """Follow the periodic orbits born at a located Hopf point.
@@ -203,8 +211,15 @@ def orbits_from_hopf(
     require(amplitude > 0, f"The first amplitude must be positive, not {amplitude}.")
     options = options or ContinuationOptions(newton=NewtonOptions(tolerance=1e-9))
     shape = discretisation or OrbitOptions()
-    form = hopf_normal_form(system, special.u, special.mu, special.values["omega"],
-                            special.vectors["right"], special.vectors["left"], parameter)
+    form = hopf_normal_form(
+        system,
+        special.u,
+        special.mu,
+        special.values["omega"],
+        special.vectors["right"],
+        special.vectors["left"],
+        parameter,
+    )
     mesh = np.linspace(0.0, 1.0, shape.intervals + 1)
     blank = np.zeros((shape.intervals * shape.degree, system.size))
     period = 2 * np.pi / form.omega
@@ -219,30 +234,27 @@ def orbits_from_hopf(
     mu[parameter] += change
     frame.set_reference(special.u + harmonic)
     direction = np.concatenate([harmonic.ravel(), [0.0, 0.0]])
-    u = np.append(nodes.ravel(), 2 * np.pi / (form.omega + form.crossing.imag * change
-                                              + form.c1.imag * radius**2))
+    u = np.append(nodes.ravel(), 2 * np.pi / (form.omega + form.crossing.imag * change + form.c1.imag * radius**2))
     return _follow(frame, u, mu, parameter, direction, options, observers)
 
 
-def resume_orbits(system, branch: Branch, options: ContinuationOptions | None = None,
-                  observers=None) -> Branch:
+def resume_orbits(system, branch: Branch, options: ContinuationOptions | None = None, observers=None) -> Branch:
     """Go on from the last point of a branch of orbits, e.g. one loaded from a file."""
     require(branch.kind == "orbits", f"This needs a branch of orbits, not {branch.kind}.")
     options = options or ContinuationOptions(newton=NewtonOptions(tolerance=1e-9))
     data, last = branch.restart, branch.points[-1]
-    frame = OrbitSystem(system, data["mesh"], int(data["degree"]), data["reference"],
-                        float(data["period_scale"]))
+    frame = OrbitSystem(system, data["mesh"], int(data["degree"]), data["reference"], float(data["period_scale"]))
     tracer = _tracer(frame, branch.fixed, branch.names[0], options, observers)
     here = tracer.start(last.z, last.tangent, data["frame"])
-    longer = replace(branch, points=list(branch.points), special=list(branch.special),
-                     reason="running", restart=dict(branch.restart))
+    longer = replace(
+        branch, points=list(branch.points), special=list(branch.special), reason="running", restart=dict(branch.restart)
+    )
     step = float(np.clip(branch.next_step or options.step, options.min_step, options.max_step))
     return tracer.run(longer, here, step)
 
 
 def _tracer(frame, mu, parameter, options, observers):
-    problem = Problem(frame, mu, (parameter,), None, options.state_scale,
-                      options.parameter_scales)
+    problem = Problem(frame, mu, (parameter,), None, options.state_scale, options.parameter_scales)
     return Tracer(problem, options, [FloquetMonitor()], observers)
 
 

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-_MARKERS = {"fold": "s", "branch point": "D", "hopf": "o", "bogdanov-takens": "*",
-            "generalised hopf": "^", "cusp": "v", "zero-hopf": "P"}
+_MARKERS = {
+    "fold": "s",
+    "branch point": "D",
+    "hopf": "o",
+    "bogdanov-takens": "*",
+    "generalised hopf": "^",
+    "cusp": "v",
+    "zero-hopf": "P",
+}
 
 
 def plot_branch(branch, observable=None, ax=None):
@@ -29,6 +36,7 @@ def plot_branch(branch, observable=None, ax=None):
         ax = plt.subplots()[1]
     two = len(branch.names) == 2
     if observable is None:
+
         def observable(u):
             return np.abs(u).max()
     elif isinstance(observable, (int, np.integer)):
@@ -53,9 +61,13 @@ def plot_branch(branch, observable=None, ax=None):
     for special in branch.special:
         if not np.isfinite(special.u).all():
             continue
-        ax.plot(special.mu[branch.names[0]], height(special.u, special.mu),
-                _MARKERS.get(special.kind, "x"), label=special.kind,
-                fillstyle="full" if special.located else "none")
+        ax.plot(
+            special.mu[branch.names[0]],
+            height(special.u, special.mu),
+            _MARKERS.get(special.kind, "x"),
+            label=special.kind,
+            fillstyle="full" if special.located else "none",
+        )
     handles, labels = ax.get_legend_handles_labels()
     unique = dict(zip(labels, handles))
     if unique:

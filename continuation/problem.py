@@ -62,17 +62,17 @@ class Problem:
         return z[: self.n]
 
     def p(self, z):
-        return z[self.n: self.n + self.k]
+        return z[self.n : self.n + self.k]
 
     def extra(self, z):
-        return z[self.n + self.k:]
+        return z[self.n + self.k :]
 
     def mu(self, z) -> dict[str, float]:
         return {**self.fixed, **dict(zip(self.names, map(float, self.p(z))))}
 
     def changes(self, y) -> dict[str, float]:
         """The parameter part of a direction, by name."""
-        return dict(zip(self.names, map(float, y[self.n: self.n + self.k])))
+        return dict(zip(self.names, map(float, y[self.n : self.n + self.k])))
 
     def pack(self, u, mu, extra=()):
         return np.concatenate([u, [mu[name] for name in self.names], np.atleast_1d(extra)])
@@ -127,9 +127,7 @@ class Local:
             self.basis = np.stack([self.solver.solve(row) for row in unit], axis=1)
         self.condition = None
         if problem.condition is not None:
-            self.condition = problem.condition.evaluate(
-                system, u, mu, problem.names, self.linear, problem.extra(z)
-            )
+            self.condition = problem.condition.evaluate(system, u, mu, problem.names, self.linear, problem.extra(z))
 
     @property
     def values(self) -> np.ndarray:
@@ -167,7 +165,7 @@ class Local:
         if self.condition is not None:
             right = right - self._along(particular)
         if normal is not None:
-            last = np.concatenate([normal[: n + k] @ self.basis, normal[n + k:]])
+            last = np.concatenate([normal[: n + k] @ self.basis, normal[n + k :]])
             rows = np.vstack([rows, last])
             right = np.append(right, -offset - normal[: n + k] @ particular)
         try:

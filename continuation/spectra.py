@@ -52,8 +52,7 @@ def shift_invert_spectrum(linearisation, count, near=0.0, tolerance=1e-10) -> Sp
     start = np.cos(np.arange(1.0, n + 1.0)).astype(complex)
     size = min(n - 1, max(2 * count + 1, 20))
     try:
-        theta, vectors = spla.eigs(operator, k=count, which="LM", v0=start, ncv=size,
-                                   tol=tolerance)
+        theta, vectors = spla.eigs(operator, k=count, which="LM", v0=start, ncv=size, tol=tolerance)
     except spla.ArpackNoConvergence as error:
         theta, vectors = error.eigenvalues, error.eigenvectors
     if theta.size == 0:

@@ -64,13 +64,11 @@ class SpectrumMonitor:
         limit = tracer.options.stability_tolerance
         modes = [self.modes(tracer, here) for here in (past, before, after)]
         onward = dict(match_modes(modes[1], modes[2]))
-        s = np.array([-tracer.problem.norm(before.z - past.z), 0.0,
-                      tracer.problem.norm(after.z - before.z)])
+        s = np.array([-tracer.problem.norm(before.z - past.z), 0.0, tracer.problem.norm(after.z - before.z)])
         for i, j in match_modes(modes[0], modes[1]):
             if j not in onward:
                 continue
-            y = np.array([modes[0][0][i].real, modes[1][0][j].real,
-                          modes[2][0][onward[j]].real]) - limit
+            y = np.array([modes[0][0][i].real, modes[1][0][j].real, modes[2][0][onward[j]].real]) - limit
             if not (np.all(y > 0) or np.all(y < 0)):
                 continue
             bend, slope, _ = np.polyfit(s, y, 2)
@@ -90,16 +88,18 @@ class SpectrumMonitor:
             self._between(tracer, low, middle, at, 1, [], new)
             self._between(tracer, middle, high, at, 1, [], new)
             known = special + self._recent
-            return [n for n in new if not any(
-                n.kind == k.kind and np.allclose(n.z, k.z, rtol=1e-7, atol=1e-9) for k in known)]
+            return [
+                n
+                for n in new
+                if not any(n.kind == k.kind and np.allclose(n.z, k.z, rtol=1e-7, atol=1e-9) for k in known)
+            ]
         return []
 
     def _between(self, tracer, before, after, index, depth, found, special):
         a, b = self.modes(tracer, before), self.modes(tracer, after)
         limit = tracer.options.stability_tolerance
         pairs = match_modes(a, b)
-        crossing = [(i, j) for i, j in pairs
-                    if (a[0][i].real > limit) != (b[0][j].real > limit)]
+        crossing = [(i, j) for i, j in pairs if (a[0][i].real > limit) != (b[0][j].real > limit)]
         oscillating = [(i, j) for i, j in crossing if a[0][i].imag > 0 and b[0][j].imag > 0]
         real = [(i, j) for i, j in crossing if a[0][i].imag == 0 and b[0][j].imag == 0]
         expected = sum(2 * _sign(b[0][j].real - a[0][i].real) for i, j in oscillating)
@@ -108,8 +108,11 @@ class SpectrumMonitor:
         mixed = len(oscillating) + len(real) < len(crossing)
         contradictory = mixed or (known and expected != after.unstable - before.unstable)
         # Two real eigenvalues that cross together may have been a pair in between.
-        explained = [s for s in found if s.kind in ("fold", "branch point")
-                     and -SLACK <= tracer.fraction(before, after, s.z)[0] <= 1 + SLACK]
+        explained = [
+            s
+            for s in found
+            if s.kind in ("fold", "branch point") and -SLACK <= tracer.fraction(before, after, s.z)[0] <= 1 + SLACK
+        ]
         hidden = len(real) >= 2 and len(real) > len(explained)
         if (contradictory or hidden) and depth < tracer.options.max_subdivisions:
             middle = tracer.at(before, after, 0.5)
@@ -118,8 +121,10 @@ class SpectrumMonitor:
                 self._between(tracer, middle, after, index, depth + 1, found, special)
                 return
         if contradictory:
-            reason = (f"the count of unstable eigenvalues went from {before.unstable} to "
-                      f"{after.unstable}, the modes that could be followed explain {expected:+d}")
+            reason = (
+                f"the count of unstable eigenvalues went from {before.unstable} to "
+                f"{after.unstable}, the modes that could be followed explain {expected:+d}"
+            )
             special.append(special_at(tracer, "stability change", after, index, False, reason))
         for i, j in oscillating:
             special.append(self._locate(tracer, before, after, index, i, j, special))
@@ -149,8 +154,7 @@ class SpectrumMonitor:
         if result is None:
             reason = f"a real eigenvalue crossed zero; {reason}"
             return [special_at(tracer, "zero eigenvalue", guess, index, False, reason)]
-        if any(other.located and np.allclose(other.z, result.z[:-1], rtol=1e-7, atol=1e-9)
-               for other in known):
+        if any(other.located and np.allclose(other.z, result.z[:-1], rtol=1e-7, atol=1e-9) for other in known):
             return []
         return [search.describe(tracer, result, guess, index)]
 
@@ -176,8 +180,15 @@ class SpectrumMonitor:
 
     def _locate(self, tracer, before, after, index, i, j, special):
         if not tracer.options.locate:
-            return special_at(tracer, "hopf", after, index, False, "location was not asked for",
-                              {"omega": float(self.modes(tracer, after)[0][j].imag)})
+            return special_at(
+                tracer,
+                "hopf",
+                after,
+                index,
+                False,
+                "location was not asked for",
+                {"omega": float(self.modes(tracer, after)[0][j].imag)},
+            )
         limit = tracer.options.stability_tolerance
         mode_at = self._follow(tracer, before, after, i, j)
 
@@ -195,8 +206,10 @@ class SpectrumMonitor:
             if abs(found_omega - omega) > room:
                 return "Newton's method went to another frequency"
             for other in special:
-                if other.kind == "hopf" and other.located and np.allclose(
-                    np.append(other.z, other.values["omega"]), result.z, rtol=1e-9, atol=1e-12
+                if (
+                    other.kind == "hopf"
+                    and other.located
+                    and np.allclose(np.append(other.z, other.values["omega"]), result.z, rtol=1e-9, atol=1e-12)
                 ):
                     return "Newton's method found the same point again"
             return result.z[:-1], result
@@ -205,8 +218,7 @@ class SpectrumMonitor:
             tracer, before, after, lambda here: mode_at(here)[0][0].real - limit, attempt
         )
         if result is None:
-            return special_at(tracer, "hopf", guess, index, False, reason,
-                              {"omega": float(mode_at(before)[0][0].imag)})
+            return special_at(tracer, "hopf", guess, index, False, reason, {"omega": float(mode_at(before)[0][0].imag)})
         return describe_hopf(tracer, result, guess.tangent, index)
 
 

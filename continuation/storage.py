@@ -28,11 +28,17 @@ def save(branch, path: Path) -> None:
 def _write(file, branch) -> None:
     points = branch.points
     file.attrs["format"] = FORMAT
-    file.attrs["header"] = json.dumps({
-        "kind": branch.kind, "size": branch.size, "names": branch.names,
-        "extra_names": branch.extra_names, "fixed": branch.fixed, "reason": branch.reason,
-        "next_step": branch.next_step,
-    })
+    file.attrs["header"] = json.dumps(
+        {
+            "kind": branch.kind,
+            "size": branch.size,
+            "names": branch.names,
+            "extra_names": branch.extra_names,
+            "fixed": branch.fixed,
+            "reason": branch.reason,
+            "next_step": branch.next_step,
+        }
+    )
     file["z"] = np.array([p.z for p in points])
     file["tangent"] = np.array([p.tangent for p in points])
     for name in ("step", "iterations", "residual", "unstable"):
@@ -51,12 +57,16 @@ def _write(file, branch) -> None:
     group = file.create_group("special")
     for number, special in enumerate(branch.special):
         item = group.create_group(f"{number:06d}")
-        item.attrs["header"] = json.dumps({
-            "kind": special.kind, "index": special.index, "mu": special.mu,
-            "located": special.located, "reason": special.reason,
-            "values": {k: (v if isinstance(v, str) else float(v))
-                       for k, v in special.values.items()},
-        })
+        item.attrs["header"] = json.dumps(
+            {
+                "kind": special.kind,
+                "index": special.index,
+                "mu": special.mu,
+                "located": special.located,
+                "reason": special.reason,
+                "values": {k: (v if isinstance(v, str) else float(v)) for k, v in special.values.items()},
+            }
+        )
         item["u"], item["z"], item["tangent"] = special.u, special.z, special.tangent
         for name, vector in special.vectors.items():
             item[f"vectors/{name}"] = vector
@@ -76,29 +86,54 @@ def load(path: Path):
         if file.attrs.get("format") != FORMAT:
             raise ValueError(f"{path} is not a branch file of format {FORMAT}.")
         header = json.loads(file.attrs["header"])
-        data = {name: file[name][()] for name in
-                ("z", "tangent", "step", "iterations", "residual", "unstable", "eigenvalues")}
+        data = {
+            name: file[name][()]
+            for name in ("z", "tangent", "step", "iterations", "residual", "unstable", "eigenvalues")
+        }
         tests = {name: item[()] for name, item in file["tests"].items()}
         points = []
         for i in range(len(data["z"])):
             values = data["eigenvalues"][i]
-            points.append(CurvePoint(
-                data["z"][i], data["tangent"][i], float(data["step"][i]),
-                int(data["iterations"][i]), float(data["residual"][i]),
-                {name: float(column[i]) for name, column in tests.items()
-                 if not np.isnan(column[i])},
-                int(data["unstable"][i]), values[~np.isnan(values.real)],
-            ))
+            points.append(
+                CurvePoint(
+                    data["z"][i],
+                    data["tangent"][i],
+                    float(data["step"][i]),
+                    int(data["iterations"][i]),
+                    float(data["residual"][i]),
+                    {name: float(column[i]) for name, column in tests.items() if not np.isnan(column[i])},
+                    int(data["unstable"][i]),
+                    values[~np.isnan(values.real)],
+                )
+            )
         special = []
         for item in file["special"].values():
             own = json.loads(item.attrs["header"])
             vectors = {name: v[()] for name, v in item.get("vectors", {}).items()}
-            special.append(SpecialPoint(
-                own["kind"], own["index"], item["u"][()], own["mu"], item["z"][()],
-                item["tangent"][()], own["located"], own["reason"], own["values"], vectors,
-            ))
+            special.append(
+                SpecialPoint(
+                    own["kind"],
+                    own["index"],
+                    item["u"][()],
+                    own["mu"],
+                    item["z"][()],
+                    item["tangent"][()],
+                    own["located"],
+                    own["reason"],
+                    own["values"],
+                    vectors,
+                )
+            )
         restart = {name: item[()] for name, item in file.get("restart", {}).items()}
     return Branch(
-        header["kind"], header["size"], tuple(header["names"]), tuple(header["extra_names"]),
-        header["fixed"], points, special, header["reason"], header["next_step"], restart,
+        header["kind"],
+        header["size"],
+        tuple(header["names"]),
+        tuple(header["extra_names"]),
+        header["fixed"],
+        points,
+        special,
+        header["reason"],
+        header["next_step"],
+        restart,
     )

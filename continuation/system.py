@@ -55,10 +55,7 @@ class Spectrum:
         chosen: list[int] = []
         for i, value in enumerate(values):
             # Only a value that came from the lower half can be the partner of an upper one.
-            partner = any(
-                abs(value - values[j]) <= 1e-6 * max(1.0, abs(value)) and flip[i] != flip[j]
-                for j in chosen
-            )
+            partner = any(abs(value - values[j]) <= 1e-6 * max(1.0, abs(value)) and flip[i] != flip[j] for j in chosen)
             if value.imag == 0.0 or not partner:
                 chosen.append(i)
         return values[chosen], vectors[:, chosen]

@@ -31,11 +31,10 @@ class Tracer:
         self.observers = as_observers(observers)
         self.frame = problem.natural_frame()
 
-    # -- points ---------------------------------------------------------------------------
+    # -- points
 
     def correct(self, z, normal):
-        return correct(self.problem, z, self.frame, self.options.newton, normal,
-                       self.options.location_tolerance)
+        return correct(self.problem, z, self.frame, self.options.newton, normal, self.options.location_tolerance)
 
     def here(self, correction, reference, measure=True) -> Here:
         """A corrected point with tangent (to the side of ``reference``) and tests."""
@@ -90,7 +89,7 @@ class Tracer:
                 side = -1
         return best
 
-    # -- the run --------------------------------------------------------------------------
+    # -- the run
 
     def start(self, z, direction, frame=None) -> Here:
         """Correct the first point and choose the side to leave it on.
@@ -114,7 +113,8 @@ class Tracer:
             raise NotConverged(
                 f"The first point was not found: {correction.reason} after "
                 f"{correction.iterations} iterations, residual {correction.residual:.3g}.",
-                correction.reason, correction,
+                correction.reason,
+                correction,
             )
         here = self.here(correction, direction, measure=False)
         self.frame = self.problem.frame(here.local.basis)

@@ -1,9 +1,11 @@
 """The valve from Python: load a case, ask for states, read results."""
+
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Iterable, Mapping, Sequence, overload
+from typing import TYPE_CHECKING, Any, overload
 
 from .case import load_case
 from .case.model import Case
@@ -13,8 +15,8 @@ from .errors import CaseError, SolveError
 if TYPE_CHECKING:
     from .model import ValveModel
     from .results.closure import ClosureResults
-    from .results.modes import ModesResults
     from .results.map import MapResults
+    from .results.modes import ModesResults
     from .results.onset import OnsetResults
     from .results.state import State
     from .results.steady import SteadyResults
@@ -56,7 +58,7 @@ class Valve:
         return f"Valve({self.name!r})"
 
     @cached_property
-    def model(self) -> "ValveModel":
+    def model(self) -> ValveModel:
         from .model import ValveModel
 
         try:
@@ -68,17 +70,17 @@ class Valve:
         except ValueError as error:  # what geometry, mesh and shell refuse
             raise CaseError(str(error)) from error
 
-    def replace(self, changes: Mapping[str, Any]) -> "Valve":
+    def replace(self, changes: Mapping[str, Any]) -> Valve:
         """A valve with some keys of its case changed, such as ``{"fluid.density": 10}``."""
         return Valve(self.case.replace(changes), self.name)
 
     @overload
-    def steady(self, pressure: float | str) -> "State": ...
+    def steady(self, pressure: float | str) -> State: ...
 
     @overload
-    def steady(self, pressure: Iterable[float | str] | None = None) -> "SteadyResults": ...
+    def steady(self, pressure: Iterable[float | str] | None = None) -> SteadyResults: ...
 
-    def steady(self, pressure=None, *, output: str | Path | None = None, observer: "Observer | None" = None):
+    def steady(self, pressure=None, *, output: str | Path | None = None, observer: Observer | None = None):
         """Equilibria.
 
         Parameters
@@ -99,7 +101,8 @@ class Valve:
         CaseError
             For a pressure that cannot be used or a case that gives no model.
         SolveError
-            If one pressure was asked for and not reached. Of several, `failures` of the result names those that were not.
+            If one pressure was asked for and not reached. Of several, `failures` of the result names those that were
+            not.
         """
         single = isinstance(pressure, (int, float, str)) or hasattr(pressure, "__float__")
         asked = self.case.steady.pressures if pressure is None else [pressure] if single else pressure
@@ -118,10 +121,11 @@ class Valve:
         *,
         count: int | None = None,
         output: str | Path | None = None,
-        observer: "Observer | None" = None,
+        observer: Observer | None = None,
         **changes: Any,
-    ) -> "ModesResults":
-        """Leading modes of the coupled valve at one pressure: growth rates, frequencies, shapes, and whether the state is stable.
+    ) -> ModesResults:
+        """Leading modes of the coupled valve at one pressure: growth rates, frequencies, shapes, and whether the state
+        is stable.
 
         Parameters
         ----------
@@ -156,9 +160,9 @@ class Valve:
         *,
         count: int | None = None,
         output: str | Path | None = None,
-        observer: "Observer | None" = None,
+        observer: Observer | None = None,
         **changes: Any,
-    ) -> "SweepResults":
+    ) -> SweepResults:
         """Modes tracked along pressure, density, alpha or beta.
 
         Parameters
@@ -180,8 +184,8 @@ class Valve:
         *,
         in_time: bool = False,
         output: str | Path | None = None,
-        observer: "Observer | None" = None,
-    ) -> "ClosureResults":
+        observer: Observer | None = None,
+    ) -> ClosureResults:
         """Equilibria under back pressure: whether, where and how firmly the valve shuts.
 
         Parameters
@@ -207,9 +211,13 @@ class Valve:
         from .results.closure_run import start_closure
 
         pressures = read_pressures(self.case.closure.pressures if pressure is None else pressure, "pressure")
-        return start_closure(self.case.replace({"closure.pressures": list(pressures)}), self.name, in_time, output, observer)
+        return start_closure(
+            self.case.replace({"closure.pressures": list(pressures)}), self.name, in_time, output, observer
+        )
 
-    def onset(self, over: str | None = None, *, output: str | Path | None = None, observer: "Observer | None" = None) -> "OnsetResults":
+    def onset(
+        self, over: str | None = None, *, output: str | Path | None = None, observer: Observer | None = None
+    ) -> OnsetResults:
         """Every onset along one parameter; see `dbvfiv.stability.onset`.
 
         Parameters
@@ -219,11 +227,19 @@ class Valve:
         """
         from .stability import onset
 
-        return onset(self.case if over is None else self.case.replace({"onset.over": over}), self.name, output, observer)
+        return onset(
+            self.case if over is None else self.case.replace({"onset.over": over}), self.name, output, observer
+        )
 
     def map(
-        self, x: str | None = None, y: str | None = None, *, workers: int | None = None, output: str | Path | None = None, observer: "Observer | None" = None
-    ) -> "MapResults":
+        self,
+        x: str | None = None,
+        y: str | None = None,
+        *,
+        workers: int | None = None,
+        output: str | Path | None = None,
+        observer: Observer | None = None,
+    ) -> MapResults:
         """Stability over two parameters; see `dbvfiv.stability.stability_map`.
 
         Parameters
@@ -239,8 +255,13 @@ class Valve:
         return stability_map(self.case.replace(changes) if changes else self.case, self.name, output, observer, workers)
 
     def transient(
-        self, duration: float | str | None = None, *, output: str | Path | None = None, observer: "Observer | None" = None, **changes: Any
-    ) -> "TransientResults":
+        self,
+        duration: float | str | None = None,
+        *,
+        output: str | Path | None = None,
+        observer: Observer | None = None,
+        **changes: Any,
+    ) -> TransientResults:
         """A time history of the coupled valve that ends with a verdict; see `dbvfiv.transient`.
 
         Parameters
@@ -271,7 +292,7 @@ class Valve:
         valve = changed(self, changes, {"transient.duration": duration})
         return transient(valve.model, valve.name, output, observer)
 
-    def _run(self, pressures: Sequence[float], output: str | Path | None, observer: "Observer | None") -> "SteadyResults":
+    def _run(self, pressures: Sequence[float], output: str | Path | None, observer: Observer | None) -> SteadyResults:
         from .results.header import Header
         from .results.steady import SteadyResults
         from .results.steady_file import SteadyFile

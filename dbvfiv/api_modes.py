@@ -1,4 +1,5 @@
 """Modes and sweeps from Python: what `Valve` and `State` offer, once for both."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -26,7 +27,7 @@ KEYS = {
 }
 
 
-def changed(valve: "Valve", given: dict[str, Any], more: dict[str, Any]) -> "Valve":
+def changed(valve: Valve, given: dict[str, Any], more: dict[str, Any]) -> Valve:
     """The valve with what was given as arguments put into its case; None stands for nothing given.
 
     Raises
@@ -36,11 +37,13 @@ def changed(valve: "Valve", given: dict[str, Any], more: dict[str, Any]) -> "Val
     unknown = [name for name in given if name not in KEYS]
     if unknown:
         raise CaseError(f"{unknown[0]!r} is given, which is nothing to choose here; known are {', '.join(KEYS)}.")
-    changes = {KEYS[name]: value for name, value in given.items() if value is not None} | {k: v for k, v in more.items() if v is not None}
+    changes = {KEYS[name]: value for name, value in given.items() if value is not None} | {
+        k: v for k, v in more.items() if v is not None
+    }
     return valve.replace(changes) if changes else valve
 
 
-def modes_of(valve: "Valve", start: "State | None", output: str | Path | None, observer: "Observer | None") -> "ModesResults":
+def modes_of(valve: Valve, start: State | None, output: str | Path | None, observer: Observer | None) -> ModesResults:
     """Leading modes of a valve at its drive.pressure, or at a state found before.
 
     Raises
@@ -61,7 +64,7 @@ def modes_of(valve: "Valve", start: "State | None", output: str | Path | None, o
     return result
 
 
-def state_of(valve: "Valve", start: "State | None", observer: "Observer") -> "tuple[SteadyState, tuple[str, ...]]":
+def state_of(valve: Valve, start: State | None, observer: Observer) -> tuple[SteadyState, tuple[str, ...]]:
     """The equilibrium at drive.pressure, and warnings: from a state found before, at rest, or by load steps."""
     from .studies.modes import rest_state
     from .studies.state import describe_state
@@ -71,7 +74,9 @@ def state_of(valve: "Valve", start: "State | None", observer: "Observer") -> "tu
     if start is not None:
         kept = ("converged", "iterations", "load_steps", "residual", "rounding", "reason")
         # flow and jet follow the density of this case
-        return describe_state(model, start.q, start.pressure, **{name: getattr(start, name) for name in kept}), start.results.warnings
+        return describe_state(
+            model, start.q, start.pressure, **{name: getattr(start, name) for name in kept}
+        ), start.results.warnings
     if pressure == 0:
         return rest_state(model), ()
     result = run_steady(model, [pressure], observer=observer)
@@ -82,7 +87,7 @@ def state_of(valve: "Valve", start: "State | None", observer: "Observer") -> "tu
     return result.states[0], result.warnings
 
 
-def sweep_of(valve: "Valve", start: "State | None", output: str | Path | None, observer: "Observer | None") -> "SweepResults":
+def sweep_of(valve: Valve, start: State | None, output: str | Path | None, observer: Observer | None) -> SweepResults:
     """Modes tracked along the parameter of sweep.over.
 
     Raises

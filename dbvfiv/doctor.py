@@ -128,7 +128,9 @@ def _petsc(problems: list[Problem]) -> dict[str, Any]:
 
 
 def _reference_blas() -> str:
-    """"reference" if the loaded libblas is the plain one, "optimised" otherwise, "unknown" where the system does not tell."""
+    """ "reference" if the loaded libblas is the plain one, "optimised" otherwise, "unknown" where the system does not
+    tell.
+    """
     try:
         with open("/proc/self/maps") as maps:
             loaded = {line.split()[-1] for line in maps if "libblas" in line}
@@ -162,7 +164,10 @@ def petsc_remedy() -> str:
     if os.environ.get("CONDA_PREFIX"):
         return "conda install -c conda-forge petsc4py slepc4py"
     if os.path.exists("/etc/debian_version"):
-        return "make setup (as root or with sudo: apt-get install python3-petsc4py-real python3-slepc4py-real libopenblas0-pthread)"
+        return (
+            "make setup (as root or with sudo: apt-get install python3-petsc4py-real "
+            "python3-slepc4py-real libopenblas0-pthread)"
+        )
     return "conda env create -f environment.yml, or load your cluster's petsc4py and slepc4py modules, then make setup"
 
 

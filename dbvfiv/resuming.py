@@ -1,4 +1,5 @@
 """Interrupted studies go on where their files end."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -12,8 +13,8 @@ if TYPE_CHECKING:
 
 
 def resume(
-    path: str | Path, *, duration: float | None = None, workers: int | None = None, observer: "Observer | None" = None
-) -> "Result":
+    path: str | Path, *, duration: float | None = None, workers: int | None = None, observer: Observer | None = None
+) -> Result:
     """Continue an interrupted or killed study in its file: a transient run, a map, an onset or a closure run.
 
     Parameters
@@ -40,7 +41,10 @@ def resume(
 
     kind = kind_of(path)
     if kind not in ("transient", "map", "onset", "closure"):
-        raise CaseError(f"{str(path)!r} holds a result of kind {kind!r}; what can be resumed are transient, map, onset and closure runs.")
+        raise CaseError(
+            f"{str(path)!r} holds a result of kind {kind!r}; what can be resumed are transient, map, onset "
+            f"and closure runs."
+        )
     if duration is not None and kind != "transient":
         raise CaseError(f"A new duration belongs to transient runs; {str(path)!r} is of kind {kind!r}.")
     if kind == "map":

@@ -1,4 +1,5 @@
 """Onsets and stability maps of a valve, with or without a result file, and runs that go on."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -13,7 +14,9 @@ if TYPE_CHECKING:
     from .results.onset import OnsetResults
 
 
-def onset(case: Case, name: str = "case", output: str | Path | None = None, observer: Observer | None = None) -> "OnsetResults":
+def onset(
+    case: Case, name: str = "case", output: str | Path | None = None, observer: Observer | None = None
+) -> OnsetResults:
     """Onsets along the parameter of `case.onset`.
 
     Parameters
@@ -53,7 +56,7 @@ def onset(case: Case, name: str = "case", output: str | Path | None = None, obse
     return OnsetResults.of(result, header, model)
 
 
-def resume_onset(path: str | Path, observer: Observer | None = None) -> "OnsetResults":
+def resume_onset(path: str | Path, observer: Observer | None = None) -> OnsetResults:
     """Go on with an interrupted or killed onset run; samples and points in its file are not solved again.
 
     Raises
@@ -80,8 +83,12 @@ def resume_onset(path: str | Path, observer: Observer | None = None) -> "OnsetRe
 
 
 def stability_map(
-    case: Case, name: str = "case", output: str | Path | None = None, observer: Observer | None = None, workers: int | None = None
-) -> "MapResults":
+    case: Case,
+    name: str = "case",
+    output: str | Path | None = None,
+    observer: Observer | None = None,
+    workers: int | None = None,
+) -> MapResults:
     """The stability map of `case.map`.
 
     Parameters
@@ -112,7 +119,7 @@ def stability_map(
     return MapResults.of(result, header, mesh)
 
 
-def resume_map(path: str | Path, observer: Observer | None = None, workers: int | None = None) -> "MapResults":
+def resume_map(path: str | Path, observer: Observer | None = None, workers: int | None = None) -> MapResults:
     """Go on with an interrupted or killed map; finished columns are not solved again.
 
     Raises

@@ -1,4 +1,5 @@
 """Spectra of large sparse quadratic pencils with a low-rank, frequency-dependent coupling."""
+
 from .certificate import CertifiedSpectrum, certified_spectrum
 from .condensation import Workspace
 from .derivative import PencilDerivative, difference, eigenvalue_derivative
@@ -13,8 +14,27 @@ from .tracking import Branches, TrackOptions, track
 from .transfer import TransferBasis
 from .winding import Count, unstable_count
 
-__all__ = ["Branches", "CertifiedSpectrum", "Count", "CoupledPencil", "Mode", "Oval",
-           "PencilDerivative", "SearchOptions", "SearchedRegion", "SingularShiftError", "Spectrum",
-           "Sweep", "TrackOptions", "TransferBasis", "Workspace", "certified_spectrum",
-           "difference", "eigenvalue_derivative", "leading_modes", "sweep", "track",
-           "unstable_count"]
+__all__ = [
+    "Branches",
+    "CertifiedSpectrum",
+    "Count",
+    "CoupledPencil",
+    "Mode",
+    "Oval",
+    "PencilDerivative",
+    "SearchOptions",
+    "SearchedRegion",
+    "SingularShiftError",
+    "Spectrum",
+    "Sweep",
+    "TrackOptions",
+    "TransferBasis",
+    "Workspace",
+    "certified_spectrum",
+    "difference",
+    "eigenvalue_derivative",
+    "leading_modes",
+    "sweep",
+    "track",
+    "unstable_count",
+]

@@ -1,4 +1,5 @@
 """Leading modes together with the independent count of the unstable ones."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -51,9 +52,16 @@ class CertifiedSpectrum:
         return self.unstable_count == 0 if self.agrees else None
 
 
-def certified_spectrum(pencil: CoupledPencil, count: int, options: SearchOptions | None = None, *,
-                       workspace: Workspace | None = None, basis: TransferBasis | None = None,
-                       exact: bool = False, check_points: int = 2) -> CertifiedSpectrum:
+def certified_spectrum(
+    pencil: CoupledPencil,
+    count: int,
+    options: SearchOptions | None = None,
+    *,
+    workspace: Workspace | None = None,
+    basis: TransferBasis | None = None,
+    exact: bool = False,
+    check_points: int = 2,
+) -> CertifiedSpectrum:
     """Leading modes and an independent count of the unstable ones, with their agreement.
 
     Parameters
@@ -88,8 +96,12 @@ def certified_spectrum(pencil: CoupledPencil, count: int, options: SearchOptions
         return unstable_count(model, scale=scale, hints=[*hints, *spectrum.eigenvalues], band=band)
 
     winding = counted()
-    if winding.number > _listed(spectrum, winding) and len(spectrum) \
-            and spectrum.growth_rate[-1] > winding.line and np.isinf(spectrum.band):
+    if (
+        winding.number > _listed(spectrum, winding)
+        and len(spectrum)
+        and spectrum.growth_rate[-1] > winding.line
+        and np.isinf(spectrum.band)
+    ):
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
     if winding.number != _listed(spectrum, winding) and np.isfinite(spectrum.band):
@@ -97,16 +109,18 @@ def certified_spectrum(pencil: CoupledPencil, count: int, options: SearchOptions
         winding = counted(band=0.999 * spectrum.band)
         if winding.number > _listed(spectrum, winding) and spectrum.growth_rate[-1] > winding.line:
             band = SearchOptions() if options is None else options
-            spectrum = leading_modes(pencil, winding.number + 2, replace(
-                band, max_frequency=spectrum.band), workspace=workspace)
+            spectrum = leading_modes(
+                pencil, winding.number + 2, replace(band, max_frequency=spectrum.band), workspace=workspace
+            )
     listed = _listed(spectrum, winding)
     error = None
     if not small and not exact:
         error = response_error(pencil, basis, _checks(spectrum, winding, check_points))
     trusted = winding.certain and (error is None or error < 0.1)
     agrees = trusted and winding.number == listed
-    return CertifiedSpectrum(spectrum, winding, agrees, listed, winding.number, error,
-                             _statement(spectrum, winding, listed, agrees, error))
+    return CertifiedSpectrum(
+        spectrum, winding, agrees, listed, winding.number, error, _statement(spectrum, winding, listed, agrees, error)
+    )
 
 
 def _listed(spectrum, winding) -> int:
@@ -124,8 +138,7 @@ def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> 
         s = 2j * np.pi * float(f)
         factor.refactor(structure.values(s).astype(complex))
         exact = real_apply(pencil.J, factor.solve(pencil.G.toarray().astype(complex)))
-        small = [condensed_matrix(*pencil.fluid_at(s), H)
-                 for H in (exact, basis.transfer(pencil, s))]
+        small = [condensed_matrix(*pencil.fluid_at(s), H) for H in (exact, basis.transfer(pencil, s))]
         if small[0].size:
             ratio = np.linalg.det(np.linalg.solve(small[0], small[1]))
             worst = max(worst, float(abs(np.log(ratio))) if ratio != 0 else np.inf)
@@ -142,12 +155,18 @@ def _statement(spectrum, winding, listed, agrees, error):
     where = "" if winding.line == 0 else f" with a growth rate above {winding.line:.4g} 1/s"
     where += "" if np.isinf(winding.band) else f" up to {winding.band:.4g} Hz"
     if agrees:
-        return (f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree.")
+        return f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree."
     if not winding.certain:
-        return (f"The spectrum lists {listed} unstable eigenvalues{where}; the independent count "
-                f"({winding.number}) is uncertain: {' '.join(winding.notes)}")
+        return (
+            f"The spectrum lists {listed} unstable eigenvalues{where}; the independent count "
+            f"({winding.number}) is uncertain: {' '.join(winding.notes)}"
+        )
     if error is not None and error >= 0.1:
-        return (f"The spectrum lists {listed} unstable eigenvalues{where}; the reduced basis behind "
-                f"the independent count ({winding.number}) is too coarse (error {error:.2g}).")
-    return (f"The spectrum lists {listed} unstable eigenvalues{where}, the independent count finds "
-            f"{winding.number}: they disagree.")
+        return (
+            f"The spectrum lists {listed} unstable eigenvalues{where}; the reduced basis behind "
+            f"the independent count ({winding.number}) is too coarse (error {error:.2g})."
+        )
+    return (
+        f"The spectrum lists {listed} unstable eigenvalues{where}, the independent count finds "
+        f"{winding.number}: they disagree."
+    )

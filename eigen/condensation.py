@@ -1,11 +1,17 @@
 """Solves with the full pencil T(sigma), the fluid condensed to a small dense matrix."""
+
 from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as la
 
-from .factorization import (MumpsFactorization, SingularShiftError, StructureMatrices,
-                            SuperluFactorization, petsc_is_complex)
+from .factorization import (
+    MumpsFactorization,
+    SingularShiftError,
+    StructureMatrices,
+    SuperluFactorization,
+    petsc_is_complex,
+)
 from .pencil import CoupledPencil, real_apply
 
 
@@ -153,8 +159,9 @@ class ShiftedPencil:
 
     def _back(self, right, transposed):
         if np.iscomplexobj(right) and not np.iscomplexobj(self._small[0]):
-            return (la.lu_solve(self._small, right.real, transposed, check_finite=False)
-                    + 1j * la.lu_solve(self._small, right.imag, transposed, check_finite=False))
+            return la.lu_solve(self._small, right.real, transposed, check_finite=False) + 1j * la.lu_solve(
+                self._small, right.imag, transposed, check_finite=False
+            )
         return la.lu_solve(self._small, right, transposed, check_finite=False)
 
     def _check(self):
@@ -191,5 +198,5 @@ def _times(scale, x):
 
 
 def _reciprocal_condition(matrix, lu):
-    gecon, = la.get_lapack_funcs(("gecon",), (matrix,))
+    (gecon,) = la.get_lapack_funcs(("gecon",), (matrix,))
     return float(gecon(lu[0], np.linalg.norm(matrix, 1))[0])

@@ -1,4 +1,5 @@
 """What a search has covered, and whether that is what was asked for."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -63,7 +64,7 @@ def _widest_covered(found, aim) -> tuple[float, float] | None:
     """The widest band whose leading modes the region covers, with the growth rate of the last."""
     region = SearchedRegion(tuple(found.ovals.values()))
     tops = np.unique(found.values.imag)[::-1]
-    for band in tops[::max(1, tops.size // 60)]:
+    for band in tops[:: max(1, tops.size // 60)]:
         growth = np.sort(found.values.real[found.values.imag <= band])[::-1]
         if growth.size < aim:
             return None

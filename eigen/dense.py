@@ -1,4 +1,5 @@
 """All eigenvalues of a small pencil."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -27,9 +28,9 @@ def all_pairs(pencil: CoupledPencil, *, left: bool):
     keep = values.imag >= 0
     values, x = values[keep] * unit, right[:, keep] * col[:, None]
     if not left:
-        return values, x[:n], x[2 * n:], None, None
+        return values, x[:n], x[2 * n :], None, None
     z = conjugate_left[:, keep] * row[:, None]
-    return values, x[:n], x[2 * n:], z[n:2 * n], z[2 * n:]
+    return values, x[:n], x[2 * n :], z[n : 2 * n], z[2 * n :]
 
 
 def all_eigenvalues(pencil: CoupledPencil) -> np.ndarray:
@@ -51,7 +52,7 @@ def _scaled(pencil):
     # else infinite eigenvalues are hard to tell
     unit = np.sqrt(_largest(pencil.K) / (_largest(pencil.M) or 1.0)) or 1.0
     col = np.ones(pencil.order)
-    col[n:2 * n] = unit
+    col[n : 2 * n] = unit
     F, E = F * col, E * (col * unit)
     size = np.maximum(np.abs(F).max(axis=1), np.abs(E).max(axis=1))
     row = 1.0 / np.where(size > 0, size, 1.0)
@@ -70,8 +71,9 @@ def _standard(F, E, left):
         return values, right, None
     values, below, right = la.eig(matrix, left=True, right=True, check_finite=False)
     # y^H E^-1 F = l y^H, hence z = E^-T y
-    z = (la.lu_solve(lu, below.real, trans=1, check_finite=False)
-         + 1j * la.lu_solve(lu, below.imag, trans=1, check_finite=False))
+    z = la.lu_solve(lu, below.real, trans=1, check_finite=False) + 1j * la.lu_solve(
+        lu, below.imag, trans=1, check_finite=False
+    )
     return values, right, z
 
 

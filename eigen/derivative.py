@@ -1,4 +1,5 @@
 """Derivative of an eigenvalue with respect to a parameter, from left and right vectors."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -69,8 +70,9 @@ def eigenvalue_derivative(pencil: CoupledPencil, mode: Mode, change: PencilDeriv
     if mode.left_q is None:
         raise ValueError("The derivative of an eigenvalue needs its left vector: search with left=True.")
     s = np.array([mode.eigenvalue])
-    below = coupling_of_modes(pencil, s, mode.left_q[:, None], mode.left_u[:, None],
-                              s, mode.q[:, None], mode.u[:, None])[0, 0]
+    below = coupling_of_modes(
+        pencil, s, mode.left_q[:, None], mode.left_u[:, None], s, mode.q[:, None], mode.u[:, None]
+    )[0, 0]
     if abs(below) == 0.0:
         raise ValueError("The eigenvalue is defective; it has no derivative.")
     f, g = _changed(pencil, mode, change)
@@ -99,17 +101,21 @@ def _changed(pencil, mode, change):
     y = real_apply(pencil.J, q)
     dy = applied("J", q, m)
     p = A @ y + B @ u
-    dp = A @ dy + sum(s**k * fluid(f"A{k}", y, m) for k in range(3)) + sum(
-        s**k * fluid(f"B{k}", u, m) for k in range(2))
-    f = (s * s * applied("M", q, n) + s * applied("C", q, n) + applied("K", q, n)
-         - applied("G", p, n) - real_apply(pencil.G, np.asarray(dp, complex)))
-    g = R @ dy + sum(s**k * fluid(f"R{k}", y, b) for k in range(3)) + sum(
-        s**k * fluid(f"S{k}", u, b) for k in range(2))
+    dp = (
+        A @ dy + sum(s**k * fluid(f"A{k}", y, m) for k in range(3)) + sum(s**k * fluid(f"B{k}", u, m) for k in range(2))
+    )
+    f = (
+        s * s * applied("M", q, n)
+        + s * applied("C", q, n)
+        + applied("K", q, n)
+        - applied("G", p, n)
+        - real_apply(pencil.G, np.asarray(dp, complex))
+    )
+    g = R @ dy + sum(s**k * fluid(f"R{k}", y, b) for k in range(3)) + sum(s**k * fluid(f"S{k}", u, b) for k in range(2))
     return f, g
 
 
 def difference(first: CoupledPencil, second: CoupledPencil, step: float) -> PencilDerivative:
     """Derivative from two pencils a step apart."""
     names = ("M", "C", "K", "G", "J") + FLUID_PARTS
-    return PencilDerivative(**{name: (getattr(second, name) - getattr(first, name)) / step
-                               for name in names})
+    return PencilDerivative(**{name: (getattr(second, name) - getattr(first, name)) / step for name in names})

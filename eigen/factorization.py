@@ -5,6 +5,7 @@ complex shift goes to MUMPS where PETSc is complex and to SciPy's SuperLU where 
 measured on a shell-like pencil with 6800 unknowns, SuperLU's complex LU took 1.5 times a
 real MUMPS refactorisation, the equivalent real form of twice the size 6 times.
 """
+
 from __future__ import annotations
 
 import weakref
@@ -48,15 +49,15 @@ class StructureMatrices:
     def fits(self, pencil: CoupledPencil) -> bool:
         """Whether a pencil has the very pattern of the one this was made for."""
         return self._sources is not None and all(
-            _same_pattern(p, *old) for p, old in zip((pencil.M, pencil.C, pencil.K), self._sources))
+            _same_pattern(p, *old) for p, old in zip((pencil.M, pencil.C, pencil.K), self._sources)
+        )
 
     def load(self, pencil: CoupledPencil) -> None:
         """Take the numbers of a pencil with the same pattern."""
         parts = (pencil.M, pencil.C, pencil.K)
         if not self.fits(pencil):
             keys = _keys(self.indptr, self.indices, self.shape[1])
-            self._places = [np.searchsorted(keys, _keys(p.indptr, p.indices, self.shape[1]))
-                            for p in parts]
+            self._places = [np.searchsorted(keys, _keys(p.indptr, p.indices, self.shape[1])) for p in parts]
             self._sources = [(p.indptr, p.indices) for p in parts]
         self.data = np.zeros((3, self.indices.size))
         for row, place, part in zip(self.data, self._places, parts):
@@ -75,8 +76,9 @@ class StructureMatrices:
     def columns(self, values: np.ndarray) -> sp.csc_matrix:
         """Entries on the common pattern as compressed columns."""
         if self._transpose is None:
-            order = sp.csr_matrix((np.arange(self.indices.size, dtype=float), self.indices,
-                                   self.indptr), self.shape).tocsc()
+            order = sp.csr_matrix(
+                (np.arange(self.indices.size, dtype=float), self.indices, self.indptr), self.shape
+            ).tocsc()
             self._transpose = (order.indptr, order.indices, order.data.astype(np.int64))
         indptr, indices, order = self._transpose
         return sp.csc_matrix((values[order], indices, indptr), self.shape)
@@ -101,7 +103,8 @@ class MumpsFactorization:
         self._indptr = structure.indptr.astype(PETSc.IntType)
         self._indices = structure.indices.astype(PETSc.IntType)
         self._matrix = PETSc.Mat().createAIJWithArrays(
-            (n, n), (self._indptr, self._indices, self._values), comm=PETSc.COMM_SELF)
+            (n, n), (self._indptr, self._indices, self._values), comm=PETSc.COMM_SELF
+        )
         self._matrix.assemble()
         self._solver = PETSc.KSP().create(comm=PETSc.COMM_SELF)
         self._solver.setType("preonly")
@@ -164,8 +167,7 @@ class MumpsFactorization:
     def solve_transposed(self, b: np.ndarray) -> np.ndarray:
         """Solve with the transpose (not the adjoint)."""
         if b.ndim == 2:
-            return np.stack([self.solve_transposed(column) for column in b.T], axis=1) \
-                if b.shape[1] else np.array(b)
+            return np.stack([self.solve_transposed(column) for column in b.T], axis=1) if b.shape[1] else np.array(b)
         if self._splits(b):
             return self.solve_transposed(b.real) + 1j * self.solve_transposed(b.imag)
         self._rhs_array[:] = b
@@ -180,11 +182,10 @@ class MumpsFactorization:
             return np.array(b)
         if self._splits(b):
             both = self._block(np.hstack([b.real, b.imag]))
-            return both[:, :b.shape[1]] + 1j * both[:, b.shape[1]:]
+            return both[:, : b.shape[1]] + 1j * both[:, b.shape[1] :]
         right = np.asfortranarray(b, dtype=self.dtype)
         out = np.zeros(right.shape, self.dtype, order="F")
-        wrapped = [self._petsc.Mat().createDense(a.shape, array=a, comm=self._petsc.COMM_SELF)
-                   for a in (right, out)]
+        wrapped = [self._petsc.Mat().createDense(a.shape, array=a, comm=self._petsc.COMM_SELF) for a in (right, out)]
         for w in wrapped:
             w.assemble()
         self._factor.matSolve(*wrapped)
@@ -254,8 +255,12 @@ class ScaledLU:
         self._scale = 1.0 / np.sqrt(np.where(size > 1e-12 * typical, size, typical))
         D = sp.diags(self._scale)
         try:
-            self._lu = spla.splu((D @ matrix @ D).tocsc(), permc_spec="MMD_AT_PLUS_A",
-                                 diag_pivot_thresh=0.01, options={"SymmetricMode": True})
+            self._lu = spla.splu(
+                (D @ matrix @ D).tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.01,
+                options={"SymmetricMode": True},
+            )
         except RuntimeError as error:
             raise SingularShiftError(f"SuperLU could not factor the matrix ({error}).") from error
 
@@ -292,8 +297,12 @@ def is_positive_definite(matrix: sp.spmatrix) -> bool:
         return False
     scale = sp.diags(1 / np.sqrt(diagonal))
     try:
-        lu = spla.splu((scale @ matrix @ scale).tocsc(), permc_spec="MMD_AT_PLUS_A",
-                       diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        lu = spla.splu(
+            (scale @ matrix @ scale).tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
     except RuntimeError:
         return False
     # with pivots from the diagonal only, their signs are the inertia (Sylvester)

@@ -1,4 +1,5 @@
 """Eigenvalues of a pencil near one shift, by SLEPc's Krylov-Schur method."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -69,7 +70,7 @@ class _ShiftAndInvert:
     def _right(self, x):
         """y = (F - sigma E)^-1 E x by T(sigma) (q, U) = -(f, g), v = q_in + sigma q."""
         p, s, n = self.shifted.pencil, self.shifted.shift, self.n
-        q_in, v_in, u_in = x[:n], x[n:2 * n] * self.scale, x[2 * n:]
+        q_in, v_in, u_in = x[:n], x[n : 2 * n] * self.scale, x[2 * n :]
         f = real_apply(p.M, v_in) + _apply(self.shifted.damping_shifted, q_in)
         g = np.zeros(self.b, dtype=np.result_type(x, s))
         if p.m:
@@ -83,7 +84,7 @@ class _ShiftAndInvert:
     def _left(self, z):
         """y = E^T (F - sigma E)^-T z; the left vector of T is part of (F - sigma E)^-T z."""
         p, s, n = self.shifted.pencil, self.shifted.shift, self.n
-        z1, z2, z3 = z[:n], z[n:2 * n] / self.scale, z[2 * n:]
+        z1, z2, z3 = z[:n], z[n : 2 * n] / self.scale, z[2 * n :]
         w, W = self.shifted.solve_transposed(-(z1 + s * z2), -z3)
         # a is the multiplier of dq/dt = v, from the second block column
         a = z2 + _apply(self._CT, w)
@@ -98,16 +99,24 @@ class _ShiftAndInvert:
 
     def left_vector(self, z):
         """Left vector of the polynomial from an eigenvector of the transposed operator."""
-        w, W = self.shifted.solve_transposed(-(z[:self.n] + self.shifted.shift
-                                               * z[self.n:2 * self.n] / self.scale), -z[2 * self.n:])
+        w, W = self.shifted.solve_transposed(
+            -(z[: self.n] + self.shifted.shift * z[self.n : 2 * self.n] / self.scale), -z[2 * self.n :]
+        )
         return w, W
 
 
-def near_shift(shifted: ShiftedPencil, wanted: int, *, tolerance: float = 1e-10,
-               subspace: int | None = None,
-               max_restarts: int = 60, patience: int = 3,
-               transposed: bool = False, limit_point: float | None = None,
-               enough: Callable[[np.ndarray, float], bool] | None = None) -> KrylovPairs:
+def near_shift(
+    shifted: ShiftedPencil,
+    wanted: int,
+    *,
+    tolerance: float = 1e-10,
+    subspace: int | None = None,
+    max_restarts: int = 60,
+    patience: int = 3,
+    transposed: bool = False,
+    limit_point: float | None = None,
+    enough: Callable[[np.ndarray, float], bool] | None = None,
+) -> KrylovPairs:
     """The eigenvalues nearest to the shift of a factored pencil.
 
     Parameters
@@ -208,7 +217,6 @@ class _Patience:
             return self.reasons.DIVERGED_ITS
         return self.reasons.CONVERGED_ITERATING
 
-
     def _converged(self, solver, number):
         """Transformed eigenvalues converged so far, from the projected Schur form."""
         projected = solver.getDS()
@@ -240,16 +248,19 @@ def _collect(solver, shell, operator, size, limit=0.0) -> KrylovPairs:
             u.append(W)
         else:
             q.append(x[:n])
-            u.append(x[2 * n:])
+            u.append(x[2 * n :])
     k = len(values)
     far = limit or (min(theta_size) if k else np.inf)
-    reach = far ** -0.5 if operator.paired else 1.0 / far
+    reach = far**-0.5 if operator.paired else 1.0 / far
     return KrylovPairs(
         eigenvalues=np.array(values, complex),
         vectors_q=np.array(q, complex).reshape(k, n).T,
         vectors_u=np.array(u, complex).reshape(k, operator.b).T,
-        reach=reach, iterations=solver.getIterationNumber(),
-        applications=operator.applications, exhausted=found >= size)
+        reach=reach,
+        iterations=solver.getIterationNumber(),
+        applications=operator.applications,
+        exhausted=found >= size,
+    )
 
 
 def _from_pair(theta, shift, x, n, operator):
@@ -261,7 +272,7 @@ def _from_pair(theta, shift, x, n, operator):
         pencil = operator.shifted.pencil
         estimate = [_left_residual(pencil, c, w, W) for c in candidates]
         return candidates[int(np.argmin(estimate))]
-    rate = x[n:2 * n] * operator.scale
+    rate = x[n : 2 * n] * operator.scale
     distance = [np.linalg.norm(rate - c * x[:n]) for c in candidates]
     return candidates[int(np.argmin(distance))]
 
@@ -269,9 +280,12 @@ def _from_pair(theta, shift, x, n, operator):
 def _left_residual(pencil, s, w, W):
     A, B, R, S = pencil.fluid_at(s)
     t = real_apply(pencil.G.T.tocsr(), w)
-    first = (s * s * real_apply(pencil.M.T, w) + s * real_apply(pencil.C.T, w)
-             + real_apply(pencil.K.T, w)
-             + real_apply(pencil.J.T.tocsr(), R.T @ W - A.T @ t))
+    first = (
+        s * s * real_apply(pencil.M.T, w)
+        + s * real_apply(pencil.C.T, w)
+        + real_apply(pencil.K.T, w)
+        + real_apply(pencil.J.T.tocsr(), R.T @ W - A.T @ t)
+    )
     return np.linalg.norm(first)
 
 

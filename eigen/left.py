@@ -1,4 +1,5 @@
 """Left vectors: found with the factor at hand, scaled against the right ones."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -12,14 +13,21 @@ from .products import coupling_of_modes
 from .residual import factored_beside
 
 
-def attach_left(pencil, shifted: ShiftedPencil, batch, wanted, tolerance, found,
-                limit_point: float | None = None) -> None:
+def attach_left(
+    pencil, shifted: ShiftedPencil, batch, wanted, tolerance, found, limit_point: float | None = None
+) -> None:
     """Left vectors from the same factor, matched by eigenvalue; strays by inverse iteration."""
     k = batch.values.size
     batch.left_q = np.zeros((pencil.n, k), complex)
     batch.left_u = np.zeros((pencil.b, k), complex)
-    pairs = near_shift(shifted, wanted, tolerance=tolerance, transposed=True,
-                       limit_point=limit_point, enough=lambda values, _: _all_there(batch, values))
+    pairs = near_shift(
+        shifted,
+        wanted,
+        tolerance=tolerance,
+        transposed=True,
+        limit_point=limit_point,
+        enough=lambda values, _: _all_there(batch, values),
+    )
     found.applications += pairs.applications
     free = np.ones(pairs.eigenvalues.size, bool)
     workspace = Workspace()

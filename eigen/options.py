@@ -1,4 +1,5 @@
 """What a search for leading modes can be told."""
+
 from __future__ import annotations
 
 import math

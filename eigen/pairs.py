@@ -1,4 +1,5 @@
 """Eigenpairs on their way from a Krylov method to a result: verified, refined, merged."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -7,7 +8,7 @@ import numpy as np
 
 from .condensation import Workspace
 from .region import Oval
-from .residual import (Residuals, acceptable, balanced, derivative_times, newton, preferable)
+from .residual import Residuals, acceptable, balanced, derivative_times, newton, preferable
 
 SAME = 1e-6  # relative distance below which two shifts are taken to have found one eigenvalue
 TIGHT = 1e-9  # residual above which the inner unknowns of the fluid are computed afresh
@@ -46,8 +47,7 @@ def upper_half(values, q, u):
     values = np.where(flat, values.real + 0j, values)
     upper = list(np.flatnonzero(values.imag >= 0))
     for i in np.flatnonzero(values.imag < 0):  # a partner that did not converge with it
-        mirror = [j for j in upper if abs(values[j] - values[i].conj()) <= SAME * scale[i]
-                  and values[j].imag > 0]
+        mirror = [j for j in upper if abs(values[j] - values[i].conj()) <= SAME * scale[i] and values[j].imag > 0]
         partner_count = np.sum(np.abs(values - values[i]) <= SAME * scale[i])
         if len(mirror) < partner_count:
             values[i] = values[i].conj()
@@ -135,13 +135,14 @@ def refine(pencil, batch, aim, band, tolerance, found) -> np.ndarray:
             good[i] = acceptable(batch.residual[i], batch.backward[i], tolerance)
             continue
         value, q, u, residual, backward = newton(
-            pencil, batch.values[i], batch.q[:, i], batch.u[:, i],
-            workspace=workspace, tolerance=tolerance)
+            pencil, batch.values[i], batch.q[:, i], batch.u[:, i], workspace=workspace, tolerance=tolerance
+        )
         moved = abs(value - batch.values[i]) > 1e-3 * abs(batch.values[i])
         if moved or not acceptable(residual, backward, tolerance):
             found.rejected += 1
-            found.note(f"A pair near {batch.values[i]:.6g} was rejected: its residual "
-                       f"{residual:.1g} exceeds the tolerance.")
+            found.note(
+                f"A pair near {batch.values[i]:.6g} was rejected: its residual {residual:.1g} exceeds the tolerance."
+            )
             continue
         good[i] = True
         batch.values[i], batch.residual[i], batch.backward[i] = value, residual, backward
@@ -178,6 +179,7 @@ def merge(found: Found, batch: Found) -> None:
 
 def empty(pencil, left) -> Found:
     """Nothing found yet."""
+
     def none(rows):
         return np.zeros((rows, 0), complex)
 

@@ -1,4 +1,5 @@
 """A quadratic pencil with a low-rank coupling that depends on the eigenvalue."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
@@ -80,8 +81,7 @@ class CoupledPencil:
     def _check_fluid(self):
         """Fill in the parts of the fluid that are missing, and check all of them."""
         m, b = self.m, 0
-        for name, axis in (("S0", 0), ("S1", 0), ("R0", 0), ("R1", 0), ("R2", 0),
-                           ("B0", 1), ("B1", 1)):
+        for name, axis in (("S0", 0), ("S1", 0), ("R0", 0), ("R1", 0), ("R2", 0), ("B0", 1), ("B1", 1)):
             if getattr(self, name) is not None:
                 b = np.atleast_2d(np.asarray(getattr(self, name))).shape[axis]
                 break
@@ -98,8 +98,7 @@ class CoupledPencil:
         for name, shape in shapes.items():
             value = getattr(self, name)
             if value.shape != shape:
-                raise ValueError(f"The part {name} of the pencil has shape {value.shape}; "
-                                 f"{shape} is needed.")
+                raise ValueError(f"The part {name} of the pencil has shape {value.shape}; {shape} is needed.")
             data = value.data if sp.issparse(value) else value
             if not np.isfinite(data).all():
                 raise ValueError(f"The part {name} of the pencil holds a number that is not finite.")
@@ -139,8 +138,12 @@ class CoupledPencil:
 
     def fluid_at(self, s: complex):
         """Values A(s), B(s), R(s), S(s) of the fluid polynomials."""
-        return (self.A0 + s * (self.A1 + s * self.A2), self.B0 + s * self.B1,
-                self.R0 + s * (self.R1 + s * self.R2), self.S0 + s * self.S1)
+        return (
+            self.A0 + s * (self.A1 + s * self.A2),
+            self.B0 + s * self.B1,
+            self.R0 + s * (self.R1 + s * self.R2),
+            self.S0 + s * self.S1,
+        )
 
     def terms(self, s: complex, q: np.ndarray, U: np.ndarray):
         """Vectors whose sums are the two block rows of T(s) x.
@@ -160,11 +163,14 @@ class CoupledPencil:
         y = real_apply(self.J, q)
         motion = self.A0 @ y + s * (self.A1 @ y) + s**2 * (self.A2 @ y)
         inner = self.B0 @ U + s * (self.B1 @ U)
-        structure = [s**2 * real_apply(self.M, q), s * real_apply(self.C, q),
-                     real_apply(self.K, q), -real_apply(self.G, motion),
-                     -real_apply(self.G, inner)]
-        fluid = [self.R0 @ y, s * (self.R1 @ y), s**2 * (self.R2 @ y),
-                 self.S0 @ U, s * (self.S1 @ U)]
+        structure = [
+            s**2 * real_apply(self.M, q),
+            s * real_apply(self.C, q),
+            real_apply(self.K, q),
+            -real_apply(self.G, motion),
+            -real_apply(self.G, inner),
+        ]
+        fluid = [self.R0 @ y, s * (self.R1 @ y), s**2 * (self.R2 @ y), self.S0 @ U, s * (self.S1 @ U)]
         return structure, fluid
 
     def first_order(self) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,5 @@
 """The part of the complex plane in which a search found every eigenvalue."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

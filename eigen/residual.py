@@ -1,4 +1,5 @@
 """How well a pair satisfies the full pencil, and Newton's method for one that does not."""
+
 from __future__ import annotations
 
 from functools import cached_property
@@ -28,17 +29,23 @@ class Residuals:
     def _norms(self):
         p = self.pencil
         coupling = _norm(p.G) * _norm(p.J)
-        return {"M": _norm(p.M), "C": _norm(p.C), "K": _norm(p.K),
-                "A": [coupling * np.linalg.norm(a) for a in (p.A0, p.A1, p.A2)],
-                "B": [_norm(p.G) * np.linalg.norm(a) for a in (p.B0, p.B1)]}
+        return {
+            "M": _norm(p.M),
+            "C": _norm(p.C),
+            "K": _norm(p.K),
+            "A": [coupling * np.linalg.norm(a) for a in (p.A0, p.A1, p.A2)],
+            "B": [_norm(p.G) * np.linalg.norm(a) for a in (p.B0, p.B1)],
+        }
 
     @cached_property
     def _fluid_rows(self):
         # per row: rows of the fluid may carry different units
         p = self.pencil
         J = _norm(p.J)
-        return ([J * np.linalg.norm(a, axis=1) for a in (p.R0, p.R1, p.R2)],
-                [np.linalg.norm(a, axis=1) for a in (p.S0, p.S1)])
+        return (
+            [J * np.linalg.norm(a, axis=1) for a in (p.R0, p.R1, p.R2)],
+            [np.linalg.norm(a, axis=1) for a in (p.S0, p.S1)],
+        )
 
     def measure(self, eigenvalues, q, u) -> tuple[np.ndarray, np.ndarray]:
         """Residual and backward error of pairs, as `Spectrum` defines them.
@@ -61,13 +68,16 @@ class Residuals:
         a = np.abs(s)
         size_q, size_u = np.linalg.norm(q, axis=0), np.linalg.norm(u, axis=0)
         n = self._norms
-        full = ((a**2 * n["M"] + a * n["C"] + n["K"] + sum(a**k * x for k, x in enumerate(n["A"])))
-                * size_q + sum(a**k * x for k, x in enumerate(n["B"])) * size_u)
+        full = (a**2 * n["M"] + a * n["C"] + n["K"] + sum(a**k * x for k, x in enumerate(n["A"]))) * size_q + sum(
+            a**k * x for k, x in enumerate(n["B"])
+        ) * size_u
         residual, backward = _ratio(left, terms), _ratio(left, full)
         if self.pencil.b:
             R, S = self._fluid_rows
-            scale = (sum(np.outer(r, a**k) for k, r in enumerate(R)) * size_q
-                     + sum(np.outer(r, a**k) for k, r in enumerate(S)) * size_u)
+            scale = (
+                sum(np.outer(r, a**k) for k, r in enumerate(R)) * size_q
+                + sum(np.outer(r, a**k) for k, r in enumerate(S)) * size_u
+            )
             fluid_error = _ratio(np.abs(sum(fluid)), scale).max(axis=0)
             residual, backward = np.maximum(residual, fluid_error), np.maximum(backward, fluid_error)
         return residual, backward
@@ -91,7 +101,8 @@ def balanced(pencil: CoupledPencil, eigenvalues, q, u) -> np.ndarray:
 def preferable(residual, backward, old_residual, old_backward):
     """Whether a pair is better than the one before: closer, or at rounding level at last."""
     return (residual < old_residual) & ((backward <= ROUNDING) | (old_backward > ROUNDING)) | (
-        (backward <= ROUNDING) & (old_backward > ROUNDING))
+        (backward <= ROUNDING) & (old_backward > ROUNDING)
+    )
 
 
 def acceptable(residual, backward_error, tolerance) -> np.ndarray:
@@ -99,8 +110,7 @@ def acceptable(residual, backward_error, tolerance) -> np.ndarray:
     return (residual <= tolerance) | (backward_error <= ROUNDING)
 
 
-def newton(pencil: CoupledPencil, eigenvalue: complex, q, u, *, workspace: Workspace,
-           tolerance: float, steps: int = 4):
+def newton(pencil: CoupledPencil, eigenvalue: complex, q, u, *, workspace: Workspace, tolerance: float, steps: int = 4):
     """Improve one pair by inverse iteration on the full pencil, with a new LU each step.
 
     Solves T(l) y = T'(l) x and takes l - (c^H x)/(c^H y), x = y / (c^H y).
@@ -122,8 +132,7 @@ def newton(pencil: CoupledPencil, eigenvalue: complex, q, u, *, workspace: Works
             return plain
         other = balanced(pencil, [l], q[:, None], u[:, None])
         r, e = residuals.measure(np.array([l]), q[:, None], other)
-        return (l, q, other[:, 0], float(r[0]), float(e[0])) if preferable(
-            r, e, plain[3], plain[4])[0] else plain
+        return (l, q, other[:, 0], float(r[0]), float(e[0])) if preferable(r, e, plain[3], plain[4])[0] else plain
 
     best = scaled(eigenvalue, np.asarray(q, complex), np.asarray(u, complex))
     current = best
@@ -165,8 +174,11 @@ def factored_beside(pencil: CoupledPencil, eigenvalue, workspace: Workspace):
 def derivative_times(pencil: CoupledPencil, s: complex, q, u):
     """T'(s) x for one vector, or columns with their own s; shapes as (q, u)."""
     y = real_apply(pencil.J, q)
-    f = 2 * s * real_apply(pencil.M, q) + real_apply(pencil.C, q) - real_apply(
-        pencil.G, pencil.A1 @ y + 2 * s * (pencil.A2 @ y) + pencil.B1 @ u)
+    f = (
+        2 * s * real_apply(pencil.M, q)
+        + real_apply(pencil.C, q)
+        - real_apply(pencil.G, pencil.A1 @ y + 2 * s * (pencil.A2 @ y) + pencil.B1 @ u)
+    )
     g = pencil.R1 @ y + 2 * s * (pencil.R2 @ y) + pencil.S1 @ u
     return f, g
 

@@ -5,6 +5,7 @@ symmetric and positive definite, so that D_ref has no zero on or right of the li
 Tait, Chetaev). The ratio has no pole there and tends to a known power of s at infinity; its
 zeros right of the line are the eigenvalues counted, the structure's own among them.
 """
+
 from __future__ import annotations
 
 import warnings
@@ -14,8 +15,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from .condensation import condensed_matrix
-from .factorization import (SingularShiftError, StructureMatrices, SuperluFactorization,
-                            is_positive_definite, superlu)
+from .factorization import SingularShiftError, StructureMatrices, SuperluFactorization, is_positive_definite, superlu
 from .pencil import CoupledPencil, real_apply
 
 
@@ -73,8 +73,7 @@ class Determinant:
                     break
             else:
                 raise ValueError("No stable reference structure was found for the count.")
-        self._reference = tuple((part + shift * p.M).tocsr()
-                                for part, shift in zip(symmetric, shifts))
+        self._reference = tuple((part + shift * p.M).tocsr() for part, shift in zip(symmetric, shifts))
         difference = max(_gap(damping, self._reference[0]), _gap(stiffness, self._reference[1]))
         self.structure_is_reference = difference < 1e-14
         if self._dense:
@@ -95,8 +94,9 @@ class Determinant:
         else:
             H = p.J @ superlu(sp.csc_matrix(p.M)).solve(p.G.toarray())
         grows = (p.B1 != 0).any(axis=0) | (p.S1 != 0).any(axis=0)
-        leading = condensed_matrix(np.zeros_like(p.A0), np.where(grows, p.B1, p.B0),
-                                   np.zeros_like(p.R0), np.where(grows, p.S1, p.S0), H)
+        leading = condensed_matrix(
+            np.zeros_like(p.A0), np.where(grows, p.B1, p.B0), np.zeros_like(p.R0), np.where(grows, p.S1, p.S0), H
+        )
         m = p.m
         if leading.size:
             leading[:m, :m] -= p.A2 @ H
@@ -124,8 +124,9 @@ class Determinant:
             return np.zeros(0, complex)
         M, _, _, C, K = self._parts
         n = M.shape[0]
-        form = np.block([[np.zeros((n, n)), np.eye(n)],
-                         [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]])
+        form = np.block(
+            [[np.zeros((n, n)), np.eye(n)], [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]]
+        )
         values = la.eigvals(form)
         return values[values.imag > 0]
 
@@ -150,8 +151,7 @@ class Determinant:
             H = self._J @ la.lu_solve(lu, self._G, check_finite=False)
             total = 0.0
             if not self.structure_is_reference:
-                total = _dense_log(lu) - _dense_log(la.lu_factor(z * z * M + z * Cr + Kr,
-                                                                 check_finite=False))
+                total = _dense_log(lu) - _dense_log(la.lu_factor(z * z * M + z * Cr + Kr, check_finite=False))
         else:
             self._factor.refactor(self._structure.values(s).astype(complex))
             H = real_apply(p.J, self._factor.solve(p.G.toarray().astype(complex)))

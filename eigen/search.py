@@ -1,4 +1,5 @@
 """Leading eigenpairs of a pencil: shifts, merging, verification, completeness."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -6,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .condensation import Workspace
-from .coverage import (CLEAR, apart_from_limit, band_sought, is_covered, leading_band,
-                       number_in_band, would_do)
+from .coverage import CLEAR, apart_from_limit, band_sought, is_covered, leading_band, number_in_band, would_do
 from .dense import all_pairs
 from .factorization import SingularShiftError, petsc_is_complex
 from .krylov import near_shift
@@ -20,8 +20,9 @@ from .shifts import next_shift, plan_shifts
 from .spectrum import Spectrum
 
 
-def leading_modes(pencil: CoupledPencil, count: int, options: SearchOptions | None = None,
-                  *, workspace: Workspace | None = None) -> Spectrum:
+def leading_modes(
+    pencil: CoupledPencil, count: int, options: SearchOptions | None = None, *, workspace: Workspace | None = None
+) -> Spectrum:
     """The eigenpairs of largest growth rate, each verified on the full pencil.
 
     Parameters
@@ -60,8 +61,7 @@ def leading_modes(pencil: CoupledPencil, count: int, options: SearchOptions | No
         raise ValueError("The number of modes asked for must be at least 1.")
     options = options or SearchOptions()
     workspace = workspace or Workspace()
-    dense = options.method == "dense" or (options.method == "auto"
-                                          and pencil.order <= options.dense_below)
+    dense = options.method == "dense" or (options.method == "auto" and pencil.order <= options.dense_below)
     if dense:
         return _result(pencil, _dense(pencil, count, options, workspace), count, options)
     options, first = plan_shifts(pencil, count, options, workspace)
@@ -98,26 +98,27 @@ def _search(pencil, count, options, workspace, first) -> Found:
 
 def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
     """Search near one shift and merge; returns the number of eigenvalues that converged."""
+
     def enough(values, reach):
         return not found.shifts and would_do(values, shift, reach, aim, options)
 
-    shift, shifted, pairs = _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found,
-                                                  None if options.shifts else enough)
+    shift, shifted, pairs = _clear_of_eigenvalues(
+        pencil, shift, wanted, options, workspace, found, None if options.shifts else enough
+    )
     found.shifts.append(shift)
     found.applications += pairs.applications
     apart = apart_from_limit(pairs.eigenvalues, options)
-    batch = verified(pencil, *upper_half(pairs.eigenvalues[apart], pairs.vectors_q[:, apart],
-                                         pairs.vectors_u[:, apart]))
+    batch = verified(
+        pencil, *upper_half(pairs.eigenvalues[apart], pairs.vectors_q[:, apart], pairs.vectors_u[:, apart])
+    )
     polish(pencil, shifted, batch, options.tolerance)
     dropped = refine(pencil, batch, aim, band_sought(options), options.tolerance, found)
     if options.left:
-        attach_left(pencil, shifted, batch, wanted, options.krylov_tolerance, found,
-                    options.limit_point)
+        attach_left(pencil, shifted, batch, wanted, options.krylov_tolerance, found, options.limit_point)
     merge(found, batch)
     paired = isinstance(shift, complex) and not petsc_is_complex()
     mirror = np.conj(shift) if paired else shift
-    reach = min([pairs.reach * (1 + 1e-9)]
-                + [(1 - 1e-6) * np.sqrt(abs(d - shift) * abs(d - mirror)) for d in dropped])
+    reach = min([pairs.reach * (1 + 1e-9)] + [(1 - 1e-6) * np.sqrt(abs(d - shift) * abs(d - mirror)) for d in dropped])
     if reach > 0:
         found.ovals[shift] = Oval(shift, reach, paired)
     found.limited = bool(dropped.size)
@@ -136,16 +137,17 @@ def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found, enou
             shifted = workspace.shifted(pencil, moved)
         except SingularShiftError:
             continue
-        pairs = near_shift(shifted, wanted, tolerance=options.krylov_tolerance,
-                           limit_point=options.limit_point, enough=enough)
+        pairs = near_shift(
+            shifted, wanted, tolerance=options.krylov_tolerance, limit_point=options.limit_point, enough=enough
+        )
         nearest = np.abs(pairs.eigenvalues - moved).min(initial=np.inf)
         if nearest > 1e-9 * unit:
             if attempt:
-                found.notes.append(f"The shift {shift:.6g} sits on an eigenvalue; "
-                                   f"{moved:.6g} was used instead.")
+                found.notes.append(f"The shift {shift:.6g} sits on an eigenvalue; {moved:.6g} was used instead.")
             return moved, shifted, pairs
-    raise SingularShiftError(f"No usable shift was found near {shift:.6g}: the pencil is singular "
-                             "there, and perhaps everywhere.")
+    raise SingularShiftError(
+        f"No usable shift was found near {shift:.6g}: the pencil is singular there, and perhaps everywhere."
+    )
 
 
 def _dense(pencil, count, options, workspace) -> Found:
@@ -183,36 +185,54 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
     complete = certified == order.size and (order.size >= count or all_there_are)
     if options.limit_point is not None and order.size < count:
         complete = certified == order.size and low <= CLEAR * options.limit_point
-        notes.append(f"{order.size} modes have growth rates above {CLEAR * options.limit_point:.6g} 1/s. "
-                     f"Infinitely many eigenvalues accumulate at {options.limit_point:.6g} 1/s, so no "
-                     f"list of leading modes goes on from there to the {count} asked for.")
+        notes.append(
+            f"{order.size} modes have growth rates above {CLEAR * options.limit_point:.6g} 1/s. "
+            f"Infinitely many eigenvalues accumulate at {options.limit_point:.6g} 1/s, so no "
+            f"list of leading modes goes on from there to the {count} asked for."
+        )
     elif order.size < count:
-        where = "" if all_there_are or options.max_frequency is None else (
-            f" up to {options.max_frequency:.6g} Hz with a growth rate above {low:.6g} 1/s")
-        notes.append(f"{count} modes were asked for, {order.size} were found{where}"
-                     + ("; there are no more." if all_there_are or where else "."))
+        where = (
+            ""
+            if all_there_are or options.max_frequency is None
+            else (f" up to {options.max_frequency:.6g} Hz with a growth rate above {low:.6g} 1/s")
+        )
+        notes.append(
+            f"{count} modes were asked for, {order.size} were found{where}"
+            + ("; there are no more." if all_there_are or where else ".")
+        )
     if certified < order.size:
-        notes.append(f"Only the first {certified} modes are certified as leading; below a growth "
-                     f"rate of {low:.6g} 1/s the search is not complete up to "
-                     f"{band / (2 * np.pi):.6g} Hz.")
+        notes.append(
+            f"Only the first {certified} modes are certified as leading; below a growth "
+            f"rate of {low:.6g} 1/s the search is not complete up to "
+            f"{band / (2 * np.pi):.6g} Hz."
+        )
     spectrum = Spectrum(
-        eigenvalues=found.values[order], q=found.q[:, order], u=found.u[:, order],
-        residual=found.residual[order], backward_error=found.backward[order], asked=count,
-        status="complete" if complete else "incomplete", complete_above=low, complete_below=high,
+        eigenvalues=found.values[order],
+        q=found.q[:, order],
+        u=found.u[:, order],
+        residual=found.residual[order],
+        backward_error=found.backward[order],
+        asked=count,
+        status="complete" if complete else "incomplete",
+        complete_above=low,
+        complete_below=high,
         band=np.inf if found.everything and options.max_frequency is None else band / (2 * np.pi),
-        region=region, shifts=tuple(found.shifts), applications=found.applications,
-        refined=found.refined, rejected=found.rejected, notes=tuple(notes))
+        region=region,
+        shifts=tuple(found.shifts),
+        applications=found.applications,
+        refined=found.refined,
+        rejected=found.rejected,
+        notes=tuple(notes),
+    )
     if not options.left:
         return spectrum
     return _with_left(pencil, spectrum, found.left_q[:, order], found.left_u[:, order])
 
 
 def _with_left(pencil, spectrum, left_q, left_u) -> Spectrum:
-    w, W, error, defective = biorthogonalise(pencil, spectrum.eigenvalues, spectrum.q,
-                                             spectrum.u, left_q, left_u)
+    w, W, error, defective = biorthogonalise(pencil, spectrum.eigenvalues, spectrum.q, spectrum.u, left_q, left_u)
     notes = spectrum.notes
     if defective:
         which = ", ".join(f"{spectrum.eigenvalues[i]:.6g}" for i in defective)
-        notes += (f"The eigenvalues {which} are defective or nearly so; their left vectors are "
-                  "not scaled.",)
+        notes += (f"The eigenvalues {which} are defective or nearly so; their left vectors are not scaled.",)
     return replace(spectrum, left_q=w, left_u=W, biorthogonality=error, notes=notes)

@@ -1,4 +1,5 @@
 """Where to put the shifts of a search."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -43,7 +44,7 @@ def first_shift(pencil, aim, options, workspace) -> float:
             if not (np.isfinite(size) and size > 0):
                 return probe
             x /= size
-        lowest = size ** -0.5
+        lowest = size**-0.5
         # with the shift small against the frequency the estimate holds
         if lowest > 2 * probe or probe < 1e-6 * typical:
             break

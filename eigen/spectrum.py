@@ -1,4 +1,5 @@
 """The result of an eigenvalue search."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -105,17 +106,27 @@ class Spectrum:
     def mode(self, index: int) -> Mode:
         """One pair."""
         left = self.left_q is not None
-        return Mode(complex(self.eigenvalues[index]), self.q[:, index], self.u[:, index],
-                    self.left_q[:, index] if left else None,
-                    self.left_u[:, index] if left else None)
+        return Mode(
+            complex(self.eigenvalues[index]),
+            self.q[:, index],
+            self.u[:, index],
+            self.left_q[:, index] if left else None,
+            self.left_u[:, index] if left else None,
+        )
 
     def select(self, chosen) -> Spectrum:
         """The same result with some of the pairs."""
+
         def cut(array):
             return None if array is None else array[..., chosen]
 
-        return replace(self, **{name: cut(getattr(self, name)) for name in (
-            "eigenvalues", "q", "u", "residual", "backward_error", "left_q", "left_u")})
+        return replace(
+            self,
+            **{
+                name: cut(getattr(self, name))
+                for name in ("eigenvalues", "q", "u", "residual", "backward_error", "left_q", "left_u")
+            },
+        )
 
 
 @dataclass(frozen=True)

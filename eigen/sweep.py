@@ -1,4 +1,5 @@
 """Leading modes at many parameters on one structural basis, checked against full solves."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -44,11 +45,20 @@ class Sweep:
     notes: tuple[str, ...] = ()
 
 
-def sweep(pencil_at: Callable[[float], CoupledPencil], values, count: int,
-          options: SearchOptions | None = None, *, basis: TransferBasis | None = None,
-          damping_at: Callable[[float], tuple[float, float]] | None = None, stiffness=None,
-          tolerance: float = 1e-6, checks: int = 3, max_solves: int = 8,
-          workspace: Workspace | None = None) -> Sweep:
+def sweep(
+    pencil_at: Callable[[float], CoupledPencil],
+    values,
+    count: int,
+    options: SearchOptions | None = None,
+    *,
+    basis: TransferBasis | None = None,
+    damping_at: Callable[[float], tuple[float, float]] | None = None,
+    stiffness=None,
+    tolerance: float = 1e-6,
+    checks: int = 3,
+    max_solves: int = 8,
+    workspace: Workspace | None = None,
+) -> Sweep:
     """Leading modes at many values of the fluid's density, or of the damping.
 
     Parameters
@@ -89,8 +99,7 @@ def sweep(pencil_at: Callable[[float], CoupledPencil], values, count: int,
             return basis.reduced(pencil)
         alpha, beta = damping_at(value)
         Ks = pencil.K if stiffness is None else stiffness
-        return basis.reduced(pencil, damping=alpha * basis.project(pencil.M)
-                             + beta * basis.project(Ks))
+        return basis.reduced(pencil, damping=alpha * basis.project(pencil.M) + beta * basis.project(Ks))
 
     done: list[tuple[float, float]] = []
     places = np.unique(np.linspace(0, values.size - 1, max(1, checks)).astype(int))
@@ -121,10 +130,15 @@ def sweep(pencil_at: Callable[[float], CoupledPencil], values, count: int,
         found = all_eigenvalues(reduced(float(value)))
         found = found[found.imag <= band]
         found = found[np.lexsort((found.imag, -found.real))][:count]
-        row[:found.size] = found
-    notes = () if certified else (
-        f"After {len(done)} full solves the basis still missed the tolerance {tolerance:.1g}; "
-        f"the last error was {done[-1][1]:.2g}.",)
+        row[: found.size] = found
+    notes = (
+        ()
+        if certified
+        else (
+            f"After {len(done)} full solves the basis still missed the tolerance {tolerance:.1g}; "
+            f"the last error was {done[-1][1]:.2g}.",
+        )
+    )
     return Sweep(values, table, certified, tuple(done), tolerance, len(done), basis.size, notes)
 
 

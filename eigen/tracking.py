@@ -1,4 +1,5 @@
 """Following modes along a parameter."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -102,14 +103,25 @@ class _State:
         def both(a):
             return np.concatenate([a, a[..., pair].conj()], axis=-1)
 
-        return _State(pencil, both(spectrum.eigenvalues), both(spectrum.q), both(spectrum.u),
-                      both(spectrum.left_q), both(spectrum.left_u),
-                      np.concatenate([rank, rank[pair]]) < count)
+        return _State(
+            pencil,
+            both(spectrum.eigenvalues),
+            both(spectrum.q),
+            both(spectrum.u),
+            both(spectrum.left_q),
+            both(spectrum.left_u),
+            np.concatenate([rank, rank[pair]]) < count,
+        )
 
 
-def track(pencil_at: Callable[[float], CoupledPencil], values, options: TrackOptions | None = None,
-          *, solver: Callable[[CoupledPencil], Spectrum] | None = None,
-          observer: Callable[[float, int], None] | None = None) -> Branches:
+def track(
+    pencil_at: Callable[[float], CoupledPencil],
+    values,
+    options: TrackOptions | None = None,
+    *,
+    solver: Callable[[CoupledPencil], Spectrum] | None = None,
+    observer: Callable[[float, int], None] | None = None,
+) -> Branches:
     """Follow the leading modes along a parameter.
 
     From one value to the next a mode is predicted by a Newton step on the new pencil (its first
@@ -180,14 +192,19 @@ class _Follower:
             start = {int(i): 1.0 for i in self.ids}
             least = self._step(value, self.options.max_halvings, self._solve(value), start)
             confidence = np.array([least.get(int(i), 1.0) for i in self.ids])
-        self.history.append({int(i): (complex(v), float(c), bool(l)) for i, v, c, l in zip(
-            self.ids, self.state.values, confidence, self.state.leading)})
+        self.history.append(
+            {
+                int(i): (complex(v), float(c), bool(l))
+                for i, v, c, l in zip(self.ids, self.state.values, confidence, self.state.leading)
+            }
+        )
 
     def _step(self, value, halvings, target, least):
         """Match the current state with the one at `value`, over halved steps where in doubt."""
         pairs, confidence = match(self.state, target)
-        doubtful = [i for i, c in zip(pairs[0], confidence)
-                    if c < self.options.least_confidence and self.state.leading[i]]
+        doubtful = [
+            i for i, c in zip(pairs[0], confidence) if c < self.options.least_confidence and self.state.leading[i]
+        ]
         lost = np.setdiff1d(np.flatnonzero(self.state.leading), pairs[0])
         if halvings and (doubtful or lost.size):
             middle = 0.5 * (self.parameter + value)
@@ -227,10 +244,8 @@ def match(first: _State, second: _State):
     (i, j), confidence
         Indices into both, and 0..1 for each pair.
     """
-    forward = coupling_of_modes(first.pencil, first.values, first.w, first.W,
-                                second.values, second.q, second.u)
-    backward = coupling_of_modes(second.pencil, second.values, second.w, second.W,
-                                 first.values, first.q, first.u)
+    forward = coupling_of_modes(first.pencil, first.values, first.w, first.W, second.values, second.q, second.u)
+    backward = coupling_of_modes(second.pencil, second.values, second.w, second.W, first.values, first.q, first.u)
     alike = np.minimum(np.abs(forward * backward.T), 1.0)
     alike = np.where(np.isfinite(alike), alike, 0.0)
     predicted = _predict(first, second.pencil)
@@ -257,8 +272,8 @@ def _merged_planes(first, second, rows, cols, forward, backward, confidence):
             continue
         for b in range(a + 1, len(rows)):
             k, l = rows[b], cols[b]
-            pair = (second.values[[j, l]] if real_before else first.values[[i, k]])
-            others = (first.values[[i, k]] if real_before else second.values[[j, l]])
+            pair = second.values[[j, l]] if real_before else first.values[[i, k]]
+            others = first.values[[i, k]] if real_before else second.values[[j, l]]
             if abs(pair[0] - pair[1].conj()) > 1e-12 * abs(pair[0]) or (others.imag != 0).any():
                 continue
             there = forward[np.ix_([i, k], [j, l])]

@@ -1,4 +1,5 @@
 """A reduced structural basis, so that sweeps over the fluid cost small dense algebra."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -75,8 +76,7 @@ class TransferBasis:
         for shift in (0.0, 0.1 * lowest, lowest):
             try:
                 factor.refactor(structure.values(shift))
-                parts = [factor.solve(pencil.G.toarray()).real,
-                         factor.solve_transposed(pencil.J.toarray().T).real]
+                parts = [factor.solve(pencil.G.toarray()).real, factor.solve_transposed(pencil.J.toarray().T).real]
             except SingularShiftError:
                 continue
             if all(np.isfinite(p).all() for p in parts):
@@ -85,8 +85,7 @@ class TransferBasis:
 
     def enlarge(self, *vectors, compression: float = 1e-7) -> int:
         """Add vectors, shape (n, j), real or complex; returns the new size."""
-        columns = [part for v in vectors for part in
-                   ((v.real, v.imag) if np.iscomplexobj(v) else (v,))]
+        columns = [part for v in vectors for part in ((v.real, v.imag) if np.iscomplexobj(v) else (v,))]
         self._extend(np.hstack(columns), compression)
         return self.size
 
@@ -95,7 +94,7 @@ class TransferBasis:
         size = np.sqrt(np.einsum("ij,ij->j", X, self._M @ X))
         X = X[:, size > 0] / size[size > 0]
         scale = 1.0
-        for sweep in range(2):
+        for _sweep in range(2):
             X = X - self.V @ (self.V.T @ (self._M @ X))
             gram = X.T @ (self._M @ X)
             weight, turn = np.linalg.eigh(0.5 * (gram + gram.T))
@@ -137,7 +136,7 @@ class TransferBasis:
 
     def transfer(self, pencil: CoupledPencil, s: complex) -> np.ndarray:
         """H(s) = J (s^2 M + s C + K)^-1 G on the basis, shape (m, m)."""
-        D = (s * s * self.project(pencil.M) + s * self.project(pencil.C) + self.project(pencil.K))
+        D = s * s * self.project(pencil.M) + s * self.project(pencil.C) + self.project(pencil.K)
         return self._reduced_J @ np.linalg.solve(D, self._reduced_G)
 
     def lift(self, vectors: np.ndarray) -> np.ndarray:

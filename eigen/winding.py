@@ -1,4 +1,5 @@
 """Number of eigenvalues right of a line, by the argument principle."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -8,9 +9,9 @@ import numpy as np
 from .pencil import CoupledPencil
 from .response import Determinant
 
-MAX_PHASE = np.pi / 4   # largest accepted phase increment between neighbours
-MAX_LOG = 1.0           # largest accepted increment of log |f|: feels zeros beside the line
-MAX_PREDICTED = 1.5     # largest increment of log f that a neighbour's slope may predict
+MAX_PHASE = np.pi / 4  # largest accepted phase increment between neighbours
+MAX_LOG = 1.0  # largest accepted increment of log |f|: feels zeros beside the line
+MAX_PREDICTED = 1.5  # largest increment of log f that a neighbour's slope may predict
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,15 @@ class Count:
     notes: tuple[str, ...] = ()
 
 
-def unstable_count(pencil: CoupledPencil, *, line: float | None = None,
-                   band: float | None = None, hints=(), scale: float | None = None, max_points: int | None = None) -> Count:
+def unstable_count(
+    pencil: CoupledPencil,
+    *,
+    line: float | None = None,
+    band: float | None = None,
+    hints=(),
+    scale: float | None = None,
+    max_points: int | None = None,
+) -> Count:
     """Count the eigenvalues with growth rate above a line by the argument principle.
 
     The phase of det T(line + i omega) relative to a stable structure is followed from zero
@@ -150,7 +158,7 @@ class _Walk:
         top = max(self.values)
         settled = 0
         for _ in range(40):
-            top *= 10.0 ** 0.5
+            top *= 10.0**0.5
             self._add(float(top))
             gap = self._tail(top)
             settled = settled + 1 if abs(gap) < 0.05 else 0
@@ -207,9 +215,11 @@ class _Walk:
         beside = np.maximum(np.concatenate([[0.0], slope[:-1]]), np.concatenate([slope[1:], [0.0]]))
         power = 2.0 * (self.f.pencil.b + 1)  # a growth like a power of omega hides nothing
         near = (slope > power) | (np.arange(slope.size) == 0)
-        return np.flatnonzero((np.abs(steps.imag) > MAX_PHASE)
-                              | (near & (np.abs(steps.real) > MAX_LOG))
-                              | ((beside > power) & (beside * length > MAX_PREDICTED)))
+        return np.flatnonzero(
+            (np.abs(steps.imag) > MAX_PHASE)
+            | (near & (np.abs(steps.real) > MAX_LOG))
+            | ((beside > power) & (beside * length > MAX_PREDICTED))
+        )
 
     def count(self) -> Count:
         omegas = np.array(sorted(self.values))
@@ -224,8 +234,10 @@ class _Walk:
             k = max(0, len(omegas) - 4)
             slope = (raw[-1].real - raw[k].real) / np.log(omegas[-1] / omegas[k])
             degree = int(round(slope))
-            self.notes.append("The leading coefficient at infinity vanishes; its degree was "
-                              f"estimated as {degree} from the growth of the determinant.")
+            self.notes.append(
+                "The leading coefficient at infinity vanishes; its degree was "
+                f"estimated as {degree} from the growth of the determinant."
+            )
             tail = 0.0
         winding = 0.5 * degree - (phase[-1] - phase[0]) / np.pi
         closed = 0.5 * degree - (phase[-1] + tail - phase[0]) / np.pi
@@ -236,10 +248,18 @@ class _Walk:
         if abs(closed - number) > 0.05 or number < 0:
             certain = False
             self.notes.append("The winding is not a whole number.")
-        return Count(number=number, certain=certain, line=self.f.line,
-                     band=self.turn / (2 * np.pi), distance=distance,
-                     frequencies=omegas / (2 * np.pi), phase=phase, largest_increment=largest,
-                     evaluations=self.f.evaluations, notes=tuple(self.notes))
+        return Count(
+            number=number,
+            certain=certain,
+            line=self.f.line,
+            band=self.turn / (2 * np.pi),
+            distance=distance,
+            frequencies=omegas / (2 * np.pi),
+            phase=phase,
+            largest_increment=largest,
+            evaluations=self.f.evaluations,
+            notes=tuple(self.notes),
+        )
 
 
 def _principal(angle: float) -> float:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import dbvfiv  # noqa: F401  sets the surroundings before anything imports JAX
 import pytest
 from hypothesis import HealthCheck, settings
+
+import dbvfiv
 
 settings.register_profile(
     "dbvfiv", deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]

@@ -1,10 +1,12 @@
 """Onsets of the 12-inch valve at 28 x 48, for docs/stability.md: python tools/onset_numbers.py [FILE.json] [MAP.h5]
 
-Densities at 1, 2, 4 and 6 kPa, and all pressures from 0.3 to 36 kPa at 1.2, 10 and 30 kg/m3, under both continuity laws (alpha 0, beta 0.003), each with
-direct eigenvalues and independent counts on both sides, criticality, and uncertainty from a mesh of half as many elements each way. Takes some tens of
-minutes on one core. An interrupted run goes on with the searches that are missing. With the result of `dbvfiv map --both` for the same damping it also
-measures how far the onsets lie from the map's curves, and whether the signs of its cells agree with them.
+Densities at 1, 2, 4 and 6 kPa, and all pressures from 0.3 to 36 kPa at 1.2, 10 and 30 kg/m3, under both continuity laws
+(alpha 0, beta 0.003), each with direct eigenvalues and independent counts on both sides, criticality, and uncertainty
+from a mesh of half as many elements each way. Takes some tens of minutes on one core. An interrupted run goes on with
+the searches that are missing. With the result of `dbvfiv map --both` for the same damping it also measures how far the
+onsets lie from the map's curves, and whether the signs of its cells agree with them.
 """
+
 import json
 import sys
 from pathlib import Path
@@ -35,8 +37,15 @@ def main(path: Path) -> None:
         here = case.replace({fixed: value, "fluid.continuity": law})
         found = run_onset(here, OnsetOptions(parameter, tuple(map(float, values)), True), walk=walk)
         leading = found.growth_rates[:, 0]
-        done[key] = {"parameter": parameter, "law": law, "fixed": {fixed.split(".")[1]: value}, "points": [p.summary() for p in found.points],
-                     "scanned": len(leading), "largest_growth_rate": float(max(leading)), "failures": list(found.failures)}  # fmt: skip
+        done[key] = {
+            "parameter": parameter,
+            "law": law,
+            "fixed": {fixed.split(".")[1]: value},
+            "points": [p.summary() for p in found.points],
+            "scanned": len(leading),
+            "largest_growth_rate": float(max(leading)),
+            "failures": list(found.failures),
+        }
         path.write_text(json.dumps(done, indent=1) + "\n")
         for line in rows(done[key]):
             print(line, flush=True)
@@ -61,8 +70,10 @@ def rows(entry: dict) -> list[str]:
         lyapunov = "" if p["first_lyapunov_coefficient"] is None else f"{p['first_lyapunov_coefficient']:+.3g}"
         spread = "" if p["uncertainty"] is None else f"{p['uncertainty'] / scale:.2g}"
         lines.append(
-            f"{start} {p['value'] / scale:.6f} | {spread} | {p['frequency']:.3f} | {below['growth_rate']:+.4f} | {above['growth_rate']:+.4f} | {counts} | "
-            f"{'above' if p['gains'] else 'below'} | {p['criticality']} | {lyapunov} |{'' if p['confirmed'] else ' NOT CONFIRMED'}"
+            f"{start} {p['value'] / scale:.6f} | {spread} | {p['frequency']:.3f} | "
+            f"{below['growth_rate']:+.4f} | {above['growth_rate']:+.4f} | {counts} | "
+            f"{'above' if p['gains'] else 'below'} | {p['criticality']} | {lyapunov} "
+            f"|{'' if p['confirmed'] else ' NOT CONFIRMED'}"
         )
     return lines or [f"{start} none, largest growth rate {entry['largest_growth_rate']:.3f} 1/s |"]
 
@@ -73,16 +84,25 @@ def compare(numbers: Path, map_file: Path) -> None:
 
     result = load_result(map_file)
     plan = result.plan
-    lines = [(c.law, np.array([[plan.coordinate(plan.x, x), plan.coordinate(plan.y, y)] for x, y in zip(c.x, c.y)])) for c in result.curves]
+    lines = [
+        (c.law, np.array([[plan.coordinate(plan.x, x), plan.coordinate(plan.y, y)] for x, y in zip(c.x, c.y)]))
+        for c in result.curves
+    ]
     for c in result.curves:
-        print(f"curve of law {plan.laws[c.law]:g}: {len(c.x)} points, exact {c.exact}, largest distance of {c.mismatch:.1e} from the columns' onsets")
+        print(
+            f"curve of law {plan.laws[c.law]:g}: {len(c.x)} points, exact {c.exact}, largest distance of "
+            f"{c.mismatch:.1e} from the columns' onsets"
+        )
     for key, entry in json.loads(numbers.read_text()).items():
         fixed, law = entry["fixed"], LAWS.index(entry["law"])
         for p in entry["points"]:
             place = {"pressure": fixed.get("pressure", p["value"]), "density": fixed.get("density", p["value"])}
             point = np.array([plan.coordinate(plan.x, place["pressure"]), plan.coordinate(plan.y, place["density"])])
             mine = [line for number, line in lines if plan.laws[number] == law]
-            print(f"{key}: {p['value']:.6g}, {min(_distance(point, line) for line in mine):.1e} of the map's width from the curve")
+            print(
+                f"{key}: {p['value']:.6g}, {min(_distance(point, line) for line in mine):.1e} of the map's "
+                f"width from the curve"
+            )
     for number, law in enumerate(plan.laws):
         unstable = result.grid("unstable")[number] > 0
         wrong = 0
@@ -92,7 +112,10 @@ def compare(numbers: Path, map_file: Path) -> None:
             for j, y in enumerate(plan.y.values):
                 above = sum(cut > plan.coordinate(plan.y, y) for cut in cuts)
                 wrong += bool(above % 2) != bool(unstable[j, i])
-        print(f"law {law:g}: {wrong} of {unstable.size} cells have another sign than the curves say (stable at the upper edge)")
+        print(
+            f"law {law:g}: {wrong} of {unstable.size} cells have another sign than the curves say (stable "
+            f"at the upper edge)"
+        )
 
 
 def _distance(point: np.ndarray, line: np.ndarray) -> float:

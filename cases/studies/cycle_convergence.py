@@ -1,7 +1,7 @@
 """One limit cycle on several steps and meshes: amplitude, period and mean, and the orders in which they converge.
 
-Each step after the longest starts from the cycle that the run on the step before ended in; other meshes start from their own steady state with a kick. Runs are
-kept in files of the folder, so a study that is started again goes on.
+Each step after the longest starts from the cycle that the run on the step before ended in; other meshes start from
+their own steady state with a kick. Runs are kept in files of the folder, so a study that is started again goes on.
 
     python cases/studies/cycle_convergence.py out/cycle --density 45 --steps 2 1 0.5 0.25 0.1 --meshes 14x24 42x72
 """
@@ -20,9 +20,12 @@ from scipy.optimize import brentq
 import dbvfiv
 
 QUANTITIES = {
-    "lip amplitude, mm": ("lip_opening", "amplitude", 1e3), "lip mean, mm": ("lip_opening", "mean", 1e3), "period, ms": ("lip_opening", "period", 1e3),
-    "flow amplitude, kg/s": ("mass_flow", "amplitude", 1.0), "flow mean, kg/s": ("mass_flow", "mean", 1.0),
-}  # fmt: skip
+    "lip amplitude, mm": ("lip_opening", "amplitude", 1e3),
+    "lip mean, mm": ("lip_opening", "mean", 1e3),
+    "period, ms": ("lip_opening", "period", 1e3),
+    "flow amplitude, kg/s": ("mass_flow", "amplitude", 1.0),
+    "flow mean, kg/s": ("mass_flow", "mean", 1.0),
+}
 
 
 def main() -> None:
@@ -38,13 +41,22 @@ def main() -> None:
     parser.add_argument("--mesh-duration", default="0.8 s")
     parser.add_argument("--kick", default="6 mm")
     given = parser.parse_args()
-    base = dbvfiv.load().case.replace({
-        "drive.pressure": given.pressure, "damping.alpha": 0, "fluid.density": given.density, "transient.kick_opening": given.kick,
-        "transient.restart_every": 200,
-    })  # fmt: skip
+    base = dbvfiv.load().case.replace(
+        {
+            "drive.pressure": given.pressure,
+            "damping.alpha": 0,
+            "fluid.density": given.density,
+            "transient.kick_opening": given.kick,
+            "transient.restart_every": 200,
+        }
+    )
     rows, last = [], None
     for step in sorted(given.steps, reverse=True):
-        start = {"transient.start": "state", "transient.start_file": str(last.path)} if last else {"transient.start": "kick"}
+        start = (
+            {"transient.start": "state", "transient.start_file": str(last.path)}
+            if last
+            else {"transient.start": "kick"}
+        )
         duration = given.duration if last else given.mesh_duration
         case = _on(base, given.mesh, step).replace(start | {"transient.duration": duration})
         last = kept_run(case, given.folder / f"{given.mesh}-{step:g}ms.h5")
@@ -52,7 +64,9 @@ def main() -> None:
         _tell(rows[-1])
     steps = list(rows)
     for mesh in given.meshes:
-        case = _on(base, mesh, given.mesh_step).replace({"transient.start": "kick", "transient.duration": given.mesh_duration})
+        case = _on(base, mesh, given.mesh_step).replace(
+            {"transient.start": "kick", "transient.duration": given.mesh_duration}
+        )
         rows.append(_row(mesh, given.mesh_step, kept_run(case, given.folder / f"{mesh}-{given.mesh_step:g}ms.h5")))
         _tell(rows[-1])
     with (given.folder / "convergence.csv").open("w", newline="") as file:
@@ -76,11 +90,21 @@ def _row(mesh: str, step: float, result) -> dict:
     for name, (signal, key, factor) in QUANTITIES.items():
         value = result.verdict[signal][key]  # None where no cycle was found
         numbers[name] = float("nan") if value is None else factor * value
-    return {"mesh": mesh, "step, ms": step, **numbers, "verdict": result.verdict["verdict"], "trend a cycle": lip["amplitude_trend"], "cycles": lip["cycles_observed"]}
+    return {
+        "mesh": mesh,
+        "step, ms": step,
+        **numbers,
+        "verdict": result.verdict["verdict"],
+        "trend a cycle": lip["amplitude_trend"],
+        "cycles": lip["cycles_observed"],
+    }
 
 
 def _tell(row: dict) -> None:
-    print(", ".join(f"{key} {value:.7g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items()), flush=True)
+    print(
+        ", ".join(f"{key} {value:.7g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items()),
+        flush=True,
+    )
 
 
 def order(steps, values) -> float:

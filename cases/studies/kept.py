@@ -27,9 +27,16 @@ def kept_run(case, path: Path, observer=None):
     kept, wanted = result.case.to_dict(), case.to_dict()
     longer = case.transient.duration > result.case.transient.duration
     for one in (kept, wanted):
-        for name in ("start_file", "duration"):  # paths may be written relative to another folder; runs may be carried on
+        for name in (
+            "start_file",
+            "duration",
+        ):  # paths may be written relative to another folder; runs may be carried on
             one["transient"].pop(name, None)
     if kept != wanted:
         raise SystemExit(f"{path} holds a run of another case; move it away or choose another folder.")
     ended = result.complete and not (longer and result.verdict["verdict"] not in case.transient.stop_when)
-    return result if ended or result.failures else resume(path, max(case.transient.duration, result.case.transient.duration), observer)
+    return (
+        result
+        if ended or result.failures
+        else resume(path, max(case.transient.duration, result.case.transient.duration), observer)
+    )

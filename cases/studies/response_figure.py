@@ -33,7 +33,15 @@ def draw(rows: list[dict], theory: dict, path: Path) -> None:
         touching = max((row["density"] for row in rows if row["stops"]), default=None)
         if touching:
             size.axvspan(0, touching, color="0.94", zorder=0)
-            size.annotate("lips touch", (touching, 0.03), xycoords=("data", "axes fraction"), xytext=(-5, 0), textcoords="offset points", ha="right", color=REST)
+            size.annotate(
+                "lips touch",
+                (touching, 0.03),
+                xycoords=("data", "axes fraction"),
+                xytext=(-5, 0),
+                textcoords="offset points",
+                ha="right",
+                color=REST,
+            )
         size.set_xlim(0, 1.05 * max(row["density"] for row in rows))
         if theory:
             _theory(size, frequency, growth, theory)
@@ -49,27 +57,42 @@ def draw(rows: list[dict], theory: dict, path: Path) -> None:
 
 
 def _kind(verdict: str) -> str:
-    return "settled" if verdict in ("limit cycle", "steady") else "irregular" if verdict.startswith("irregular") else "on the way"
+    return (
+        "settled"
+        if verdict in ("limit cycle", "steady")
+        else "irregular"
+        if verdict.startswith("irregular")
+        else "on the way"
+    )
 
 
 def limit(row: dict) -> float | None:
-    """Amplitude, m, that the fitted amplitude equation of a run on its way leads to; zero where it dies out, None if the fit does not tell."""
+    """Amplitude, m, that the fitted amplitude equation of a run on its way leads to; zero where it dies out, None if
+    the fit does not tell.
+    """
     fit = row["growth_rate"]
     if not fit:
         return None
     if fit["rate"] < 0:
         return 0.0
-    squares = [root.real for root in np.roots([fit["fifth"], -fit["cubic"], fit["rate"]]) if abs(root.imag) < 1e-12 and root.real > 0]
+    squares = [
+        root.real
+        for root in np.roots([fit["fifth"], -fit["cubic"], fit["rate"]])
+        if abs(root.imag) < 1e-12 and root.real > 0
+    ]
     return float(np.sqrt(min(squares))) if squares else None
 
 
 def _legend(axes) -> None:
     grey = {"ls": "none", "color": "0.3"}
     for label, look in (
-        ("density going down", {"marker": "v", "ls": "none", "color": COMPUTED}), ("density going up", {"marker": "^", "ls": "none", "color": ACCENT}),
-        ("on the way when the run ended", {"marker": "v", "markerfacecolor": "none", **grey}), ("where it leads to", {"marker": "_", "ms": 11, "mew": 2, **grey}),
-        ("irregular", {"marker": "X", **grey}), ("normal form at the onset", {"color": PUBLISHED, "lw": 1.2, "ls": "--"}),
-    ):  # fmt: skip
+        ("density going down", {"marker": "v", "ls": "none", "color": COMPUTED}),
+        (("density going up"), {"marker": "^", "ls": "none", "color": ACCENT}),
+        ("on the way when the run ended", {"marker": "v", "markerfacecolor": "none", **grey}),
+        (("where it leads to"), {"marker": "_", "ms": 11, "mew": 2, **grey}),
+        ("irregular", {"marker": "X", **grey}),
+        ("normal form at the onset", {"color": PUBLISHED, "lw": 1.2, "ls": "--"}),
+    ):
         axes.plot([], [], label=label, **look)
     axes.legend(loc="upper right")
 
@@ -80,10 +103,31 @@ def _theory(size, frequency, growth, theory: dict) -> None:
     beyond = onset + side * np.linspace(0.0, 0.35 * onset, 200)
     square = np.maximum(-slope * (beyond - onset) / cubic, 0.0)
     size.plot(beyond, 1e3 * np.sqrt(square), color=PUBLISHED, lw=1.2, ls="--", zorder=1)
-    frequency.plot(beyond, theory["frequency"] + (turn * (beyond - onset) + bend * square) / (2 * np.pi), color=PUBLISHED, lw=1.2, ls="--", zorder=1)
-    frequency.plot(theory["densities"], theory["frequencies"], color=REST, lw=1.0, label="leading mode of the steady state", zorder=1)
+    frequency.plot(
+        beyond,
+        theory["frequency"] + (turn * (beyond - onset) + bend * square) / (2 * np.pi),
+        color=PUBLISHED,
+        lw=1.2,
+        ls="--",
+        zorder=1,
+    )
+    frequency.plot(
+        theory["densities"],
+        theory["frequencies"],
+        color=REST,
+        lw=1.0,
+        label="leading mode of the steady state",
+        zorder=1,
+    )
     frequency.set_ylim(0.88 * theory["frequency"], 1.02 * theory["frequency"])
-    growth.plot(theory["densities"], theory["growth"], color=REST, lw=1.0, label="leading eigenvalue; marks: amplitudes of the runs", zorder=1)
+    growth.plot(
+        theory["densities"],
+        theory["growth"],
+        color=REST,
+        lw=1.0,
+        label="leading eigenvalue; marks: amplitudes of the runs",
+        zorder=1,
+    )
     growth.axhline(0.0, color=REST, lw=0.6)
     for axes in (size, frequency, growth):
         axes.axvline(onset, color=REST, lw=0.8)

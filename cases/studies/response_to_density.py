@@ -1,9 +1,11 @@
-"""Amplitude of the oscillation against the density of the fluid: does it grow from zero or jump, and is there hysteresis?
+"""Amplitude of the oscillation against the density of the fluid: does it grow from zero or jump, and is there
+hysteresis?
 
-The densities are gone through downwards, from the steady state with a small kick, and upwards again; each run starts from the state in which the one before
-ended, or from a kick where that one had come to rest. Every run is kept in a file of the folder: a study that is started again reads those that are
-finished and goes on with the one that is not. The table (CSV) and the figure are written anew after each run. `--theory` adds the Hopf onset, its normal form
-and the growth rates of the steady state, from the eigenvalues alone.
+The densities are gone through downwards, from the steady state with a small kick, and upwards again; each run starts
+from the state in which the one before ended, or from a kick where that one had come to rest. Every run is kept in a
+file of the folder: a study that is started again reads those that are finished and goes on with the one that is not.
+The table (CSV) and the figure are written anew after each run. `--theory` adds the Hopf onset, its normal form and the
+growth rates of the steady state, from the eigenvalues alone.
 
     python cases/studies/response_to_density.py out/response 60 57 56 54 53 52 50 45 40 30 20 10 --theory
 """
@@ -22,8 +24,27 @@ from response_figure import draw
 
 import dbvfiv
 
-COLUMNS = ("way", "density", "verdict", "decided", "amplitude", "mean", "smallest", "largest", "frequency", "flow_amplitude", "flow_mean",
-           "trend", "periodicity_error", "cycles", "smallest_area", "stops", "time", "steps", "growth_rate")  # fmt: skip
+COLUMNS = (
+    "way",
+    "density",
+    "verdict",
+    "decided",
+    "amplitude",
+    "mean",
+    "smallest",
+    "largest",
+    "frequency",
+    "flow_amplitude",
+    "flow_mean",
+    "trend",
+    "periodicity_error",
+    "cycles",
+    "smallest_area",
+    "stops",
+    "time",
+    "steps",
+    "growth_rate",
+)
 
 
 def main() -> None:
@@ -41,22 +62,40 @@ def main() -> None:
     parser.add_argument("--theory", action="store_true", help="onset and normal form too")
     given = parser.parse_args()
     around, along = given.mesh.split("x")
-    base = dbvfiv.load().case.replace({
-        "mesh.around": int(around), "mesh.along": int(along), "drive.pressure": given.pressure, "damping.alpha": 0,
-        "fluid.continuity": given.continuity, "transient.step": given.step, "transient.duration": given.duration,
-        "transient.kick_opening": given.kick, "transient.stop_when": ["limit cycle", "steady"], "transient.restart_every": 100,
-    })  # fmt: skip
+    base = dbvfiv.load().case.replace(
+        {
+            "mesh.around": int(around),
+            "mesh.along": int(along),
+            "drive.pressure": given.pressure,
+            "damping.alpha": 0,
+            "fluid.continuity": given.continuity,
+            "transient.step": given.step,
+            "transient.duration": given.duration,
+            "transient.kick_opening": given.kick,
+            "transient.stop_when": ["limit cycle", "steady"],
+            "transient.restart_every": 100,
+        }
+    )
     theory = {}
     if given.theory:
         theory = _theory(base, given.folder / "theory.json")
     rows, last = [], None
-    ways = {"down": sorted(given.densities, reverse=True), "up": sorted(given.densities if given.back is None else given.back)}
+    ways = {
+        "down": sorted(given.densities, reverse=True),
+        "up": sorted(given.densities if given.back is None else given.back),
+    }
     for way, densities in ways.items():
         for density in densities:
             case = base.replace({"fluid.density": density})
             if theory:  # next to the onset everything is slow
                 rate = np.interp(density, theory["densities"], theory["growth"])
-                case = case.replace({"transient.duration": min(max(case.transient.duration, 3.0 / rate if rate > 1e-6 else 0.0), given.longest)})
+                case = case.replace(
+                    {
+                        "transient.duration": min(
+                            max(case.transient.duration, 3.0 / rate if rate > 1e-6 else 0.0), given.longest
+                        )
+                    }
+                )
             if way == "up" and not _moving(case, last):
                 break  # at rest again: from here on it would be the first way's kicks once more
             last = _run(case, given.folder / f"{way}-{density:g}.h5", last)
@@ -68,7 +107,11 @@ def main() -> None:
 
 def _run(case, path: Path, last):
     """Result of a run from the state that the last one ended in, or from a kick where that was at rest."""
-    start = {"transient.start": "state", "transient.start_file": str(last.path)} if _moving(case, last) else {"transient.start": "kick"}
+    start = (
+        {"transient.start": "state", "transient.start_file": str(last.path)}
+        if _moving(case, last)
+        else {"transient.start": "kick"}
+    )
     return kept_run(case.replace(start), path)
 
 
@@ -83,19 +126,34 @@ def _row(way: str, result) -> dict:
     late = h["time"] >= 0.5 * h["time"][-1]
     trend = (lip["amplitude_trend"] or 0.0) * (lip["frequency"] or 0.0)
     return {
-        "way": way, "density": result.case.fluid.density, "verdict": verdict["verdict"] + (" (failed)" if result.failures else ""),
-        "decided": verdict["decided"], "amplitude": lip["amplitude"], "mean": lip["mean"], "smallest": h["lip_opening"][late].min(),
-        "largest": h["lip_opening"][late].max(), "frequency": lip["frequency"], "flow_amplitude": flow["amplitude"], "flow_mean": flow["mean"],
-        "trend": trend, "periodicity_error": lip["periodicity_error"], "cycles": lip["cycles_observed"],
-        "smallest_area": h["smallest_area"][late].min(), "stops": h["stops"][late].max(), "time": verdict["time"], "steps": verdict["steps"],
+        "way": way,
+        "density": result.case.fluid.density,
+        "verdict": verdict["verdict"] + (" (failed)" if result.failures else ""),
+        "decided": verdict["decided"],
+        "amplitude": lip["amplitude"],
+        "mean": lip["mean"],
+        "smallest": h["lip_opening"][late].min(),
+        "largest": h["lip_opening"][late].max(),
+        "frequency": lip["frequency"],
+        "flow_amplitude": flow["amplitude"],
+        "flow_mean": flow["mean"],
+        "trend": trend,
+        "periodicity_error": lip["periodicity_error"],
+        "cycles": lip["cycles_observed"],
+        "smallest_area": h["smallest_area"][late].min(),
+        "stops": h["stops"][late].max(),
+        "time": verdict["time"],
+        "steps": verdict["steps"],
         "growth_rate": growth(h["time"], h["lip_opening"], lip["period"]),
-    }  # fmt: skip
+    }
 
 
 def growth(time, values, period: float | None) -> dict | None:
-    """Coefficients of d(ln A)/dt = rate - cubic A^2 + fifth A^4 fitted to the amplitudes A of a run's cycles, where these change enough to tell.
+    """Coefficients of d(ln A)/dt = rate - cubic A^2 + fifth A^4 fitted to the amplitudes A of a run's cycles, where
+    these change enough to tell.
 
-    Amplitudes are those of the first harmonic over single cycles, the fit is over the time that they take from one to the next.
+    Amplitudes are those of the first harmonic over single cycles, the fit is over the time that they take from one to
+    the next.
     """
     if not period:
         return None
@@ -106,7 +164,9 @@ def growth(time, values, period: float | None) -> dict | None:
     from scipy.interpolate import CubicSpline
 
     sampled = CubicSpline(time, values)(ends[:, None] + lags)
-    a = 2.0 * np.abs(np.mean(sampled * np.exp(2j * np.pi * np.arange(steps) / steps), axis=1))[3:]  # the kick's other modes die out first
+    a = (
+        2.0 * np.abs(np.mean(sampled * np.exp(2j * np.pi * np.arange(steps) / steps), axis=1))[3:]
+    )  # the kick's other modes die out first
     if len(a) < 12 or a.max() < 1.3 * a.min():
         return None
     rate = np.diff(np.log(a)) / period
@@ -117,7 +177,9 @@ def growth(time, values, period: float | None) -> dict | None:
 
 
 def _theory(base, path: Path) -> dict:
-    """Onset density, normal form there in terms of the lip's amplitude, and eigenvalues of the steady state over the density."""
+    """Onset density, normal form there in terms of the lip's amplitude, and eigenvalues of the steady state over the
+    density.
+    """
     if path.exists():
         return json.loads(path.read_text())
     from scipy.optimize import brentq
@@ -135,7 +197,10 @@ def _theory(base, path: Path) -> dict:
     found = [leading(v) for v in values]
     lost = np.flatnonzero(np.diff(np.sign([v.real for v in found])))
     if len(lost) != 1:
-        raise SystemExit(f"The steady state changes stability {len(lost)} times between 1.2 and 100 kg/m3; this study is for one onset.")
+        raise SystemExit(
+            f"The steady state changes stability {len(lost)} times between 1.2 and 100 kg/m3; this study is "
+            f"for one onset."
+        )
     onset = brentq(lambda v: leading(v).real, values[lost[0]], values[lost[0] + 1], rtol=1e-10)
     place = Place.of(base).at(density=onset)
     form = normal_form(base, walk, place, walk.spectrum(place).mode(0), "density")
@@ -143,13 +208,20 @@ def _theory(base, path: Path) -> dict:
     lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
     share = abs(form.q[lip])
     theory = {
-        "density": onset, "frequency": form.omega / (2 * np.pi), "criticality": form.criticality,
-        # slope of the eigenvalue, and cubic coefficient for A = 2 |z| |q_lip|: dA/dt = (slope (density - onset) + cubic A^2) A
-        "slope": [form.crossing.real, form.crossing.imag], "cubic": [form.c1.real / (2 * share) ** 2, form.c1.imag / (2 * share) ** 2],
+        "density": onset,
+        "frequency": form.omega / (2 * np.pi),
+        "criticality": form.criticality,
+        # slope of the eigenvalue, and cubic coefficient for A = 2 |z| |q_lip|: dA/dt = (slope (density - onset) + cubic
+        # A^2) A
+        "slope": [form.crossing.real, form.crossing.imag],
+        "cubic": [form.c1.real / (2 * share) ** 2, form.c1.imag / (2 * share) ** 2],
         # mean of the lip over a cycle less the steady opening, per A^2
-        "mean": float(form.h11[lip].real) / (2 * share) ** 2, "steady_opening": float(form.u[lip].real),
-        "densities": values.tolist(), "growth": [v.real for v in found], "frequencies": [abs(v.imag) / (2 * np.pi) for v in found],
-    }  # fmt: skip
+        "mean": float(form.h11[lip].real) / (2 * share) ** 2,
+        "steady_opening": float(form.u[lip].real),
+        "densities": values.tolist(),
+        "growth": [v.real for v in found],
+        "frequencies": [abs(v.imag) / (2 * np.pi) for v in found],
+    }
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(theory, indent=1) + "\n")
     return theory

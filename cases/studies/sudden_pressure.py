@@ -1,8 +1,10 @@
-"""Water, pressure applied at once to the valve at rest: does every run end in the steady state, and what does its end not depend on?
+"""Water, pressure applied at once to the valve at rest: does every run end in the steady state, and what does its end
+not depend on?
 
-Runs (after Th. 5.3): pressures from 2 to 50 kPa at alpha 5, beta 0.003; the unsteady law of the flow against the steady one at 36 kPa (Fig. 5-10); meshes
-(Fig. 5-3), steps (Fig. 5-4), beta (Fig. 5-5), alpha (Fig. 5-6) and numerical damping (Fig. 5-7) at alpha 3 otherwise. Each run is kept in a file of the folder, so that a
-study that is started again goes on where it was. It ends with pressures.csv, sensitivity.csv and two figures.
+Runs (after Th. 5.3): pressures from 2 to 50 kPa at alpha 5, beta 0.003; the unsteady law of the flow against the steady
+one at 36 kPa (Fig. 5-10); meshes (Fig. 5-3), steps (Fig. 5-4), beta (Fig. 5-5), alpha (Fig. 5-6) and numerical damping
+(Fig. 5-7) at alpha 3 otherwise. Each run is kept in a file of the folder, so that a study that is started again goes on
+where it was. It ends with pressures.csv, sensitivity.csv and two figures.
 
     python cases/studies/sudden_pressure.py out/sudden
 """
@@ -27,19 +29,48 @@ ALPHA_3 = {"damping.alpha": 3, "damping.beta": 0.003}
 
 #: Groups of runs that differ in one thing: title, common changes, and what differs by name.
 GROUPS = {
-    "law": ("Flow with and without its unsteady term, 36 kPa, alpha 0 (Fig. 5-10)", {"drive.pressure": 36e3, "damping.alpha": 0, "damping.beta": 0.003},
-            {"unsteady": {}, "steady": {"fluid.unsteady": False},
-             "steady, beta 0.004 s": {"fluid.unsteady": False, "damping.beta": 0.004, "transient.numerical_damping": 0.1}}),
-    "mesh": ("Mesh, 36 kPa (Fig. 5-3)", {"drive.pressure": 36e3} | ALPHA_3,
-             {f"{a} x {b}": {"mesh.around": a, "mesh.along": b} for a, b in ((5, 8), (10, 24), (14, 24), (28, 48), (36, 64))}),
-    "step": ("Step, 29 kPa (Fig. 5-4)", {"drive.pressure": 29e3} | ALPHA_3,
-             {f"{step} ms": {"transient.step": f"{step} ms"} for step in ("2", "1", "0.5", "0.2")}),
-    "beta": ("Stiffness damping, 36 kPa (Fig. 5-5)", {"drive.pressure": 36e3} | ALPHA_3,
-             {f"{beta:g} s": {"damping.beta": beta} for beta in (0.003, 0.01, 0.02)}),
-    "alpha": ("Mass damping, 36 kPa (Fig. 5-6)", {"drive.pressure": 36e3} | ALPHA_3, {f"{alpha} 1/s": {"damping.alpha": alpha} for alpha in (1, 3, 5)}),
-    "numerical": ("Numerical damping, 36 kPa (Fig. 5-7)", {"drive.pressure": 36e3} | ALPHA_3,
-                  {f"{nd:g}": {"transient.numerical_damping": nd} for nd in (0.0, 0.1, 0.3, 0.5)}),
-}  # fmt: skip
+    "law": (
+        "Flow with and without its unsteady term, 36 kPa, alpha 0 (Fig. 5-10)",
+        {"drive.pressure": 36e3, "damping.alpha": 0, "damping.beta": 0.003},
+        {
+            "unsteady": {},
+            "steady": {"fluid.unsteady": False},
+            "steady, beta 0.004 s": {
+                "fluid.unsteady": False,
+                "damping.beta": 0.004,
+                "transient.numerical_damping": 0.1,
+            },
+        },
+    ),
+    "mesh": (
+        "Mesh, 36 kPa (Fig. 5-3)",
+        {"drive.pressure": 36e3} | ALPHA_3,
+        {
+            f"{a} x {b}": {"mesh.around": a, "mesh.along": b}
+            for a, b in ((5, 8), (10, 24), (14, 24), (28, 48), (36, 64))
+        },
+    ),
+    "step": (
+        "Step, 29 kPa (Fig. 5-4)",
+        {"drive.pressure": 29e3} | ALPHA_3,
+        {f"{step} ms": {"transient.step": f"{step} ms"} for step in ("2", "1", "0.5", "0.2")},
+    ),
+    "beta": (
+        "Stiffness damping, 36 kPa (Fig. 5-5)",
+        {"drive.pressure": 36e3} | ALPHA_3,
+        {f"{beta:g} s": {"damping.beta": beta} for beta in (0.003, 0.01, 0.02)},
+    ),
+    "alpha": (
+        "Mass damping, 36 kPa (Fig. 5-6)",
+        {"drive.pressure": 36e3} | ALPHA_3,
+        {f"{alpha} 1/s": {"damping.alpha": alpha} for alpha in (1, 3, 5)},
+    ),
+    "numerical": (
+        "Numerical damping, 36 kPa (Fig. 5-7)",
+        {"drive.pressure": 36e3} | ALPHA_3,
+        {f"{nd:g}": {"transient.numerical_damping": nd} for nd in (0.0, 0.1, 0.3, 0.5)},
+    ),
+}
 
 
 def main() -> None:
@@ -50,7 +81,9 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=["pressures", *GROUPS], choices=["pressures", *GROUPS])
     given = parser.parse_args()
     around, along = given.mesh.split("x")
-    base = dbvfiv.load().case.replace({"mesh.around": int(around), "mesh.along": int(along), "transient.duration": MARK})
+    base = dbvfiv.load().case.replace(
+        {"mesh.around": int(around), "mesh.along": int(along), "transient.duration": MARK}
+    )
     if "pressures" in given.only:
         rows, runs = pressures(base.replace(ALPHA_5 | {"transient.duration": given.duration}), given.folder)
         _write(given.folder / "pressures.csv", rows)
@@ -60,7 +93,10 @@ def main() -> None:
         title, common, members = GROUPS[name]
         groups[title] = {}
         for member, changes in members.items():
-            run = kept_run(base.replace(common | changes), given.folder / f"{name}-{member.replace(' ', '').replace(',', '-').replace('/', '-per-')}.h5")
+            run = kept_run(
+                base.replace(common | changes),
+                given.folder / f"{name}-{member.replace(' ', '').replace(',', '-').replace('/', '-per-')}.h5",
+            )
             groups[title][member] = run
             rows.append({"group": name, "member": member} | _row(run))
             print(_line(rows[-1]), flush=True)
@@ -76,7 +112,9 @@ def pressures(base, folder: Path) -> tuple[list[dict], dict]:
         case = base.replace({"drive.pressure": 1e3 * kilo})
         runs[kilo] = run = kept_run(case, folder / f"pressure-{kilo}.h5")
         slowest = dbvfiv.load(case).modes(count=2).modes[0]
-        rows.append({"pressure": kilo} | _row(run) | {"growth_rate": slowest.growth_rate, "mode_frequency": slowest.frequency})
+        rows.append(
+            {"pressure": kilo} | _row(run) | {"growth_rate": slowest.growth_rate, "mode_frequency": slowest.frequency}
+        )
         print(_line(rows[-1]), flush=True)
     return rows, runs
 
@@ -91,11 +129,19 @@ def _row(run) -> dict:
     at = int(np.argmin(np.abs(time - MARK)))
     opened = time >= time[np.argmax(flow > 0.5 * steady)]
     return {
-        "mass_flow": flow[at], "steady": steady, "difference": flow[at] / steady - 1.0, "settled": settled, "end": flow[-1] / steady - 1.0,
-        "overshoot": max(0.0, float(flow.max() / steady - 1.0)), "monotone": bool(np.all(np.diff(flow[opened]) > -1e-7 * steady)), "smallest": flow.min() / steady,
-        "verdict": run.verdict["verdict"], "lip": run.history["lip_opening"][at], "evaluations": int(run.history["evaluations"].sum()),
+        "mass_flow": flow[at],
+        "steady": steady,
+        "difference": flow[at] / steady - 1.0,
+        "settled": settled,
+        "end": flow[-1] / steady - 1.0,
+        "overshoot": max(0.0, float(flow.max() / steady - 1.0)),
+        "monotone": bool(np.all(np.diff(flow[opened]) > -1e-7 * steady)),
+        "smallest": flow.min() / steady,
+        "verdict": run.verdict["verdict"],
+        "lip": run.history["lip_opening"][at],
+        "evaluations": int(run.history["evaluations"].sum()),
         "balance": np.abs(run.history["balance"]).max() / run.history["pressure_work"].max(),
-    }  # fmt: skip
+    }
 
 
 def draw_pressures(rows: list[dict], runs: dict, path: Path) -> None:
@@ -107,11 +153,15 @@ def draw_pressures(rows: list[dict], runs: dict, path: Path) -> None:
         for row, colour in zip(rows, colours):
             h = runs[row["pressure"]].history
             flow.plot(h["time"], h["mass_flow"] / row["steady"], color=colour, lw=1.4, label=f"{row['pressure']} kPa")
-            distance.semilogy(h["time"], np.maximum(np.abs(h["mass_flow"] / row["steady"] - 1.0), 1e-10), color=colour, lw=1.4)
+            distance.semilogy(
+                h["time"], np.maximum(np.abs(h["mass_flow"] / row["steady"] - 1.0), 1e-10), color=colour, lw=1.4
+            )
             t = np.array([0.2, 0.9])
             at = int(np.argmin(np.abs(h["time"] - 0.35)))
             level = abs(h["mass_flow"][at] / row["steady"] - 1.0)
-            distance.semilogy(t, level * np.exp(row["growth_rate"] * (t - h["time"][at])), color="black", lw=1.0, ls=":")
+            distance.semilogy(
+                t, level * np.exp(row["growth_rate"] * (t - h["time"][at])), color="black", lw=1.0, ls=":"
+            )
         flow.set(xlabel="Time, s", ylabel="Mass flow over that of the steady state", xlim=(0, 0.6), ylim=(0, 1.1))
         flow.legend(loc="lower right", ncols=2)
         distance.axhline(CLOSE, color=REST, lw=0.8)

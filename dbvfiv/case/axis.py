@@ -30,7 +30,8 @@ class Axis:
     Attributes
     ----------
     parameter : str
-        "pressure", "density", "alpha" or "beta", whose ``key`` is that of the case; studies of stability know more, see `stability_axis`.
+        "pressure", "density", "alpha" or "beta", whose ``key`` is that of the case; studies of stability know more, see
+        `stability_axis`.
     values : tuple of float
         SI values from start to stop.
     log : bool

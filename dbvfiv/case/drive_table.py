@@ -18,9 +18,10 @@ def read_drive_table(path: Path) -> list[tuple[float, float]]:
     Parameters
     ----------
     path : Path
-        CSV (commas, semicolons, tabs or blanks) of time and pressure. The first line may name the columns with units in brackets,
-        ``time [ms], pressure [kPa]``; single entries may carry their own, ``10 ms, 6 kPa``. Plain numbers without a header are s and Pa.
-        Empty lines and text after ``#`` are skipped.
+        CSV (commas, semicolons, tabs or blanks) of time and pressure. The first line may name the columns with units in
+        brackets,
+        ``time [ms], pressure [kPa]``; single entries may carry their own, ``10 ms, 6 kPa``. Plain numbers without a
+        header are s and Pa. Empty lines and text after ``#`` are skipped.
 
     Returns
     -------
@@ -50,7 +51,9 @@ def read_drive_table(path: Path) -> list[tuple[float, float]]:
             continue
         if len(words) != 2:
             raise ValueError(f"whose line {number} is not a time and a pressure")
-        rows.append(tuple(_value(word, unit, kind, number) for word, unit, kind in zip(words, units, (_TIME, _PRESSURE))))
+        rows.append(
+            tuple(_value(word, unit, kind, number) for word, unit, kind in zip(words, units, (_TIME, _PRESSURE)))
+        )
     if not rows:
         raise ValueError("which holds no rows")
     for (before, _), (after, _) in zip(rows, rows[1:]):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictStr, ValidationInfo, field_validator, model_validator
 
@@ -36,7 +36,7 @@ class MooneyRivlin(Section):
     density: Density = _density(...)
 
     @model_validator(mode="after")
-    def _stiff_at_rest(self) -> "MooneyRivlin":
+    def _stiff_at_rest(self) -> MooneyRivlin:
         modulus = 2 * (self.c10 + self.c01)
         if modulus <= 0:
             raise BrokenRule(
@@ -78,7 +78,7 @@ class Orthotropic(Section):
     density: Density = _density(...)
 
     @model_validator(mode="after")
-    def _positive_definite(self) -> "Orthotropic":
+    def _positive_definite(self) -> Orthotropic:
         limit = math.sqrt(self.e1 / self.e2)
         if abs(self.nu12) >= limit:
             raise BrokenRule(
@@ -135,7 +135,7 @@ class ShippedRubber(Section):
     density: Density = _density(1300.0)
 
 
-Card = Union[MooneyRivlin, NeoHookean, Isotropic, Orthotropic, HalpinTsai, Fit, ShippedRubber]
+Card = MooneyRivlin | NeoHookean | Isotropic | Orthotropic | HalpinTsai | Fit | ShippedRubber
 KINDS = {c.model_fields["kind"].annotation.__args__[0]: c for c in Card.__args__}
 
 
@@ -143,8 +143,11 @@ class Materials(Section):
     """Materials by name; every table ``[materials.NAME]`` adds or replaces one."""
 
     strain_level: Percent = key(
-        0.10, "Strain level of the built-in rubbers CR, SBR and EPDM; between the tested levels "
-        "10, 20, 40 and 60 % the constants are interpolated.", ge=0.10, le=0.60
+        0.10,
+        "Strain level of the built-in rubbers CR, SBR and EPDM; between the tested levels "
+        "10, 20, 40 and 60 % the constants are interpolated.",
+        ge=0.10,
+        le=0.60,
     )
     fibre_constants: Literal["program", "table"] = key(
         "program",
@@ -199,12 +202,8 @@ class Layer(Section):
     """One layer of the wall."""
 
     material: StrictStr = key(..., "Name of its material.", min_length=1)
-    thickness: Length = key(
-        ..., "Thickness before all layers are scaled to the local wall thickness.", gt=0, le=10
-    )
-    angle: Angle = key(
-        0.0, "Angle of material axis 1 from the valve's axis, in the tangent plane.", ge=-180, le=180
-    )
+    thickness: Length = key(..., "Thickness before all layers are scaled to the local wall thickness.", gt=0, le=10)
+    angle: Angle = key(0.0, "Angle of material axis 1 from the valve's axis, in the tangent plane.", ge=-180, le=180)
 
 
 DEFAULT_LAYERS = (

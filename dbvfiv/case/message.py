@@ -35,7 +35,11 @@ def sentence(error: ValidationError, source: str, lines: dict[Path, int], overri
     elif problem["type"] == "extra_forbidden":
         body = _unknown(path, owner)
     elif problem["type"] == "missing":
-        body = f"{_dotted(path)} is missing; it must be {allowed_words(field)}." if field else f"{_dotted(path)} is missing."
+        body = (
+            f"{_dotted(path)} is missing; it must be {allowed_words(field)}."
+            if field
+            else f"{_dotted(path)} is missing."
+        )
     elif problem["type"] in ("union_tag_invalid", "union_tag_not_found"):
         given = problem["input"].get("kind") if isinstance(problem["input"], dict) else None
         path += ("kind",)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Mapping
+from collections.abc import Mapping
+from typing import Any
 
 from pydantic import model_validator
 
@@ -47,7 +48,7 @@ class Case(Section):
     closure: studies.Closure = key(studies.Closure(), "Back pressure on the outside, no flow.")
 
     @model_validator(mode="after")
-    def _goes_together(self) -> "Case":
+    def _goes_together(self) -> Case:
         for i, layer in enumerate(self.layers):
             if layer.material not in self.materials.names:
                 raise BrokenRule(
@@ -66,7 +67,9 @@ class Case(Section):
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
         if self.map.axes[0].parameter == self.map.axes[1].parameter:
-            raise BrokenRule("map.y", f"{self.map.y!r}", f"it must range over another parameter than map.x = {self.map.x!r}")
+            raise BrokenRule(
+                "map.y", f"{self.map.y!r}", f"it must range over another parameter than map.x = {self.map.x!r}"
+            )
         if self.transient.step > self.transient.duration:
             raise BrokenRule(
                 "transient.step",
@@ -80,13 +83,13 @@ class Case(Section):
         return self.model_dump(mode="json")
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> "Case":
+    def from_dict(cls, data: Mapping[str, Any]) -> Case:
         """Rebuild a case from ``to_dict`` without looking for the files it was made from."""
         from .load import make_case
 
         return make_case(data, check_files=False)
 
-    def replace(self, changes: Mapping[str, Any]) -> "Case":
+    def replace(self, changes: Mapping[str, Any]) -> Case:
         """Return a validated copy with some keys changed, ``{"drive.pressure": 36e3, ...}``.
 
         Raises

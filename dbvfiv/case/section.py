@@ -26,9 +26,7 @@ class BrokenRule(ValueError):
 class Section(BaseModel):
     """A table of the case file: immutable, and closed to keys it does not know."""
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=False, allow_inf_nan=False, validate_default=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False, allow_inf_nan=False, validate_default=True)
 
 
 def key(default: Any, description: str, **limits: Any) -> Any:

@@ -5,7 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, StrictBool, StrictInt, StrictStr, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from .axis import Axis, parse_axis
 from .drive_table import read_drive_table
@@ -46,7 +55,9 @@ class Modes(Section):
     """Leading eigenvalues of the coupled state."""
 
     count: StrictInt = key(10, "How many modes; a conjugate pair is one.", ge=1, le=1000)
-    max_frequency: Frequency | None = key(None, "Only modes up to this frequency; chosen where damping does not order the modes.", gt=0, le=1e6)
+    max_frequency: Frequency | None = key(
+        None, "Only modes up to this frequency; chosen where damping does not order the modes.", gt=0, le=1e6
+    )
     shift: Rate | None = key(None, "Real part of a shift to search near, instead of automatic ones.", ge=-1e6, le=1e6)
     shift_frequency: Frequency = key(0.0, "Frequency of that shift.", ge=0, le=1e6)
     tolerance: Number = key(1e-8, "Largest accepted relative residual of the full pencil.", gt=0, le=1e-2)
@@ -58,9 +69,13 @@ class Sweep(Section):
 
     over: Range = key("density=1:1000:40:log", "Parameter and its values: PARAMETER=START:STOP:COUNT[:log].")
     count: StrictInt = key(6, "How many leading modes to follow.", ge=1, le=100)
-    checks: StrictInt = key(3, "Values at which the reduced basis, or the count of unstable modes, is checked.", ge=1, le=50)
+    checks: StrictInt = key(
+        3, "Values at which the reduced basis, or the count of unstable modes, is checked.", ge=1, le=50
+    )
     tolerance: Number = key(1e-6, "Accepted relative error of the eigenvalues on the reduced basis.", gt=0, le=1e-2)
-    least_confidence: Number = key(0.6, "A step is halved while the match of a leading mode is less certain than this.", gt=0, lt=1)
+    least_confidence: Number = key(
+        0.6, "A step is halved while the match of a leading mode is less certain than this.", gt=0, lt=1
+    )
 
     @property
     def axis(self) -> Axis:
@@ -73,14 +88,24 @@ class Onset(Section):
 
     over: StabilityRange = key(
         "density",
-        "The parameter to move: pressure, density, alpha, beta, storage (blend of the continuity laws, 0 quasi-steady to 1 storage), thickness (wall "
-        "thickness factor), angle (of the plies, degrees) or strain (level of the rubbers); with =START:STOP:COUNT[:log] behind it for another range than "
+        "The parameter to move: pressure, density, alpha, beta, storage (blend of the continuity laws, 0 "
+        "quasi-steady to 1 storage), thickness (wall "
+        "thickness factor), angle (of the plies, degrees) or strain (level of the rubbers); with "
+        "=START:STOP:COUNT[:log] behind it for another range than "
         "the usual one.",
     )
     tolerance: Number = key(1e-9, "Relative accuracy of a located onset on its mesh.", gt=0, le=1e-3)
-    normal_form: StrictBool = key(True, "Also the first Lyapunov coefficient, which tells whether cycles are attracting or repelling.")
+    normal_form: StrictBool = key(
+        True, "Also the first Lyapunov coefficient, which tells whether cycles are attracting or repelling."
+    )
     coarse_mesh: Number = key(
-        0.5, "Elements of the second mesh over those of the first, for the uncertainty by Richardson's rule; 0 leaves it out.", ge=0, lt=1
+        0.5,
+        (
+            "Elements of the second mesh over those of the first, for the uncertainty by Richardson's rule; 0 "
+            "leaves it out."
+        ),
+        ge=0,
+        lt=1,
     )
 
     @property
@@ -92,11 +117,15 @@ class Onset(Section):
 class StabilityMap(Section):
     """Stability over two parameters."""
 
-    x: StabilityRange = key("pressure=500:50000:64", "Horizontal range: PARAMETER=START:STOP:COUNT[:log]; parameters as in onset.over.")
+    x: StabilityRange = key(
+        "pressure=500:50000:64", "Horizontal range: PARAMETER=START:STOP:COUNT[:log]; parameters as in onset.over."
+    )
     y: StabilityRange = key("density=1:1000:64:log", "Vertical range, likewise.")
     continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
     curve: StrictBool = key(True, "Follow the onset curves exactly, by continuation of Hopf points.")
-    refine: StrictInt = key(2, "How often columns are put in between neighbours with different numbers of onsets.", ge=0, le=6)
+    refine: StrictInt = key(
+        2, "How often columns are put in between neighbours with different numbers of onsets.", ge=0, le=6
+    )
     checks: StrictInt = key(4, "Cells compared with the full pencil, spread over the map.", ge=0, le=1000)
     workers: StrictInt = key(1, "Processes that share the columns.", ge=1, le=1024)
 
@@ -116,39 +145,59 @@ class Transient(Section):
     duration: Time = key(0.5, "Simulated time.", gt=0, le=1e5)
     start: Literal["rest", "steady", "kick", "state"] = key(
         "rest",
-        "From the closed valve at rest, from the steady state at the pressure of the first instant, from that state with a push along an "
+        "From the closed valve at rest, from the steady state at the pressure of the first instant, from "
+        "that state with a push along an "
         "eigenvector, or from a state of a result file.",
     )
     numerical_damping: Number = key(
         0.0,
-        "Numerical damping of high frequencies: what the parameter gamma exceeds 1/2 by in the scheme; at most 1/3 with hht.",
+        (
+            "Numerical damping of high frequencies: what the parameter gamma exceeds 1/2 by in the scheme; at "
+            "most 1/3 with hht."
+        ),
         ge=0,
         le=0.5,
     )
-    scheme: Literal["generalised-alpha", "hht", "newmark"] = key("generalised-alpha", "Member of the family of time integration schemes.")
+    scheme: Literal["generalised-alpha", "hht", "newmark"] = key(
+        "generalised-alpha", "Member of the family of time integration schemes."
+    )
     coupling: Literal["monolithic", "staggered"] = key(
         "monolithic",
-        "Wall and fluid solved together, or the thesis's program: pressures of the last state on the wall, backward differences in the fluid.",
+        (
+            "Wall and fluid solved together, or the thesis's program: pressures of the last state on the wall, "
+            "backward differences in the fluid."
+        ),
     )
     adaptive: StrictBool = key(False, "Let the local error choose the steps.")
     local_error: Length = key(1e-6, "Local error of the displacements that adaptive steps aim at.", gt=0, le=1)
     smallest_step: Number = key(1 / 4096, "Smallest step before giving up, as a fraction of step.", gt=0, le=1)
     tolerance: Number = key(
-        1e-4, "Correction left in a step, relative to what the accelerations move the wall in it, at which iterations stop.", gt=0, le=0.1
+        1e-4,
+        "Correction left in a step, relative to what the accelerations move the wall in it, at which iterations stop.",
+        gt=0,
+        le=0.1,
     )
-    kick_mode: StrictInt = key(1, "Which oscillating mode the push follows, counted by growth rate from 1.", ge=1, le=100)
+    kick_mode: StrictInt = key(
+        1, "Which oscillating mode the push follows, counted by growth rate from 1.", ge=1, le=100
+    )
     kick_opening: Length = key(1e-4, "Lip opening of the push.", gt=0, le=1)
     start_file: Path | None = key(None, "Result file of the state to start from, relative to the case file.")
     start_state: StrictInt = key(-1, "Which state of start_file, from 0; negative ones count from the end.")
     ramp: Time = key(0.0, "Time in which the pressure rises from zero; zero applies it at once.", ge=0, le=1e5)
     drive_table: Path | None = key(
         None,
-        "CSV of time and pressure used instead of drive.pressure, linear between rows and constant beyond them; a header may name "
+        "CSV of time and pressure used instead of drive.pressure, linear between rows and constant beyond "
+        "them; a header may name "
         "units (time [ms], pressure [kPa]); relative to the case file.",
     )
-    save_every: Time = key(0.0, "Distance in time of full states in the result file; zero keeps none but the last.", ge=0, le=1e5)
+    save_every: Time = key(
+        0.0, "Distance in time of full states in the result file; zero keeps none but the last.", ge=0, le=1e5
+    )
     restart_every: StrictInt = key(500, "Steps between restart points.", ge=1, le=10_000_000)
-    stop_when: tuple[Verdict, ...] = key((), "Verdicts that end the run once they are certain: steady, decaying, limit cycle, growing, closed, irregular.")
+    stop_when: tuple[Verdict, ...] = key(
+        (),
+        "Verdicts that end the run once they are certain: steady, decaying, limit cycle, growing, closed, irregular.",
+    )
 
     @field_validator("drive_table", mode="after")
     @classmethod
@@ -172,14 +221,22 @@ class Transient(Section):
         return path.resolve()
 
     @model_validator(mode="after")
-    def _fits_together(self) -> "Transient":
+    def _fits_together(self) -> Transient:
         if self.scheme == "hht" and self.numerical_damping > 1 / 3:
-            raise BrokenRule("numerical_damping", f"{self.numerical_damping:g} with scheme = 'hht'", "it must be at most 1/3 there")
+            raise BrokenRule(
+                "numerical_damping", f"{self.numerical_damping:g} with scheme = 'hht'", "it must be at most 1/3 there"
+            )
         if (self.start == "state") != (self.start_file is not None):
-            given = "none with start = 'state'" if self.start_file is None else f"{str(self.start_file)!r} with start = {self.start!r}"
+            given = (
+                "none with start = 'state'"
+                if self.start_file is None
+                else f"{str(self.start_file)!r} with start = {self.start!r}"
+            )
             raise BrokenRule("start_file", given, "it goes with start = 'state' and only with that")
         if self.ramp and self.drive_table is not None:
-            raise BrokenRule("ramp", f"{self.ramp:g} s beside a drive_table", "only one of the two can say how the pressure changes")
+            raise BrokenRule(
+                "ramp", f"{self.ramp:g} s beside a drive_table", "only one of the two can say how the pressure changes"
+            )
         if self.coupling == "staggered" and self.adaptive:
             raise BrokenRule("adaptive", "true with coupling = 'staggered'", "staggered steps are of fixed length")
         return self
@@ -188,20 +245,24 @@ class Transient(Section):
 class Closure(Section):
     """Back pressure on the outside, no flow."""
 
-    pressures: tuple[LoadPressure, ...] = key(
-        (7e3, 14e3, 21e3, 28e3), "Back pressures.", min_length=1
-    )
+    pressures: tuple[LoadPressure, ...] = key((7e3, 14e3, 21e3, 28e3), "Back pressures.", min_length=1)
     supports: Literal["contact", "held-lips"] = key(
         "contact",
-        "Inner faces touching the closing plane, or the simplification of Th. 3.6: duckbill held shut, mid-surface of the "
+        "Inner faces touching the closing plane, or the simplification of Th. 3.6: duckbill held shut, "
+        "mid-surface of the "
         "saddle kept from crossing the plane.",
     )
-    start: Literal["rest", "open"] = key("rest", "From the valve at rest, or from the steady flow at open_pressure turned back.")
+    start: Literal["rest", "open"] = key(
+        "rest", "From the valve at rest, or from the steady flow at open_pressure turned back."
+    )
     open_pressure: LoadPressure = key(10e3, "Inlet pressure of the open start.")
     max_step: LoadPressure = key(1e3, "Largest load step; the stiffness is watched for buckling at each.")
     contact_depth: Length = key(
         3e-6,
-        "Depth to which the largest back pressure alone would press the faces into each other, before multipliers push them apart.",
+        (
+            "Depth to which the largest back pressure alone would press the faces into each other, before "
+            "multipliers push them apart."
+        ),
         gt=0,
         le=1e-3,
     )
@@ -212,16 +273,22 @@ class Closure(Section):
     eigenvalues: StrictInt = key(4, "Lowest eigenvalues of the tangent stiffness to follow.", ge=1, le=100)
     balance_tolerance: Number = key(
         0.0,
-        "Largest error of the energy balance over the work; load steps that miss it are halved as often as it takes, for the balance alone. 0 reports the "
+        "Largest error of the energy balance over the work; load steps that miss it are halved as often as "
+        "it takes, for the balance alone. 0 reports the "
         "balance of the load steps as they are.",
         ge=0,
         le=1,
     )
-    arclength: StrictBool = key(True, "Go on along the equilibrium path by arclength when load steps end at a limit point.")
-    reversal_time: Time = key(0.2, "Time in which the drive turns from open_pressure to as much back pressure.", gt=0, le=1e3)
+    arclength: StrictBool = key(
+        True, "Go on along the equilibrium path by arclength when load steps end at a limit point."
+    )
+    reversal_time: Time = key(
+        0.2, "Time in which the drive turns from open_pressure to as much back pressure.", gt=0, le=1e3
+    )
     reversal_hold: Time = key(0.2, "Time for which the back pressure is then held.", ge=0, le=1e3)
     reversal_continuity: Literal["storage", "quasi-steady"] = key(
         "storage",
-        "Continuity law while the drive turns. Lips that meet push the fluid between them away with storage; quasi-steady they stop it at once, and the "
+        "Continuity law while the drive turns. Lips that meet push the fluid between them away with "
+        "storage; quasi-steady they stop it at once, and the "
         "pressure of the incompressible fluid knows no bounds.",
     )

@@ -83,7 +83,7 @@ class Valve(Section):
         return path.resolve()
 
     @model_validator(mode="after")
-    def _fits_together(self) -> "Valve":
+    def _fits_together(self) -> Valve:
         if self.lip_half_width + self.lip_radius > self.flange_radius:
             widest = self.flange_radius - self.lip_radius
             raise BrokenRule(
@@ -134,7 +134,5 @@ class Mesh(Section):
 
     around: StrictInt = key(28, "Elements along the section, from the centre to the side edge.", ge=4, le=1000)
     along: StrictInt = key(48, "Elements along the axis, from lip to flange.", ge=6, le=2000)
-    grading: Number = key(
-        0.5, "Length of the element at the side edge over that at the centre.", ge=0.05, le=2.0
-    )
+    grading: Number = key(0.5, "Length of the element at the side edge over that at the centre.", ge=0.05, le=2.0)
     layer_points: StrictInt = key(2, "Gauss points through the thickness of each layer.", ge=1, le=10)

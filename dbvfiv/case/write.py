@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import textwrap
 import typing
-from typing import Any, Iterator
+from collections.abc import Iterator
+from typing import Any
 
 from .. import __version__
 from .describe import allowed_words, element_model, quantity_of, show_value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -29,23 +29,23 @@ def _folder(path: Path | None) -> Path | None:
     return path
 
 
-CaseFile = Annotated[Optional[Path], typer.Argument(metavar="[CASE]", help="Case file; the 12-inch valve without one.")]
+CaseFile = Annotated[Path | None, typer.Argument(metavar="[CASE]", help="Case file; the 12-inch valve without one.")]
 ResultFile = Annotated[Path, typer.Argument(metavar="RESULT.h5", help="Result file of an earlier command.")]
 Override = Annotated[
-    Optional[list[str]],
+    list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help='Change a key of the case: --set drive.pressure="18 kPa".'),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")]
 Output = Annotated[
-    Optional[Path],
+    Path | None,
     typer.Option("-o", "--output", metavar="RESULT.h5", help="Keep everything in this HDF5 file.", callback=_writable),
 ]
 PlotFolder = Annotated[
-    Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.", callback=_folder)
+    Path | None, typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.", callback=_folder)
 ]
 
 
-def read_case(path: Path | None, overrides: list[str] | None) -> "Case":
+def read_case(path: Path | None, overrides: list[str] | None) -> Case:
     """Load the case a command was given.
 
     Raises

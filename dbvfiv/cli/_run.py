@@ -7,7 +7,8 @@ import os
 import pkgutil
 import sys
 import traceback
-from typing import Annotated, Sequence
+from collections.abc import Sequence
+from typing import Annotated
 
 import typer
 
@@ -26,7 +27,9 @@ def _version(show: bool) -> None:
 
 
 def _root(
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
 ) -> None:
     """Fluid-induced vibration of duckbill valves.
 
@@ -37,9 +40,7 @@ def _root(
 
 def build() -> typer.Typer:
     """Collect the command modules of this package."""
-    app = typer.Typer(
-        add_completion=False, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False
-    )
+    app = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
     app.callback()(_root)
     package = __package__
     folder = importlib.import_module(package).__path__

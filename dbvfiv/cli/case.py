@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -15,7 +15,7 @@ ORDER = 10
 
 def command(
     target: Annotated[
-        Optional[str], typer.Argument(metavar="[FILE|KEY]", help="Case file; with --explain a key or a section.")
+        str | None, typer.Argument(metavar="[FILE|KEY]", help="Case file; with --explain a key or a section.")
     ] = None,
     explain: Annotated[bool, typer.Option("--explain", help="Explain KEY, or every key.")] = False,
     new: Annotated[bool, typer.Option("--new", help="Write a commented starter to FILE.")] = False,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -14,7 +14,7 @@ from ._progress import Progress
 ORDER = 35
 
 Pressures = Annotated[
-    Optional[list[str]],
+    list[str] | None,
     typer.Option("--pressure", "-p", metavar="P", help="Back pressure, 7e3 (Pa) or '7 kPa'; may be repeated."),
 ]
 
@@ -25,19 +25,23 @@ def command(
     output: Output = None,
     plots: PlotFolder = None,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Do the same with the other kind of supports, and draw both in one figure.")
+        bool,
+        typer.Option("--compare", help="Do the same with the other kind of supports, and draw both in one figure."),
     ] = False,
     in_time: Annotated[
-        bool, typer.Option("--in-time", help="Also turn the drive from closure.open_pressure to as much back pressure in time.")
+        bool,
+        typer.Option(
+            "--in-time", help="Also turn the drive from closure.open_pressure to as much back pressure in time."
+        ),
     ] = False,
     overrides: Override = None,
     as_json: AsJson = False,
 ) -> None:
     """Back pressure: does the valve shut, where and how firmly, what stays open, how far is the wall from buckling?
 
-    The pressures are those of --pressure, else closure.pressures of the case; each state is found from the one before. closure.supports chooses
-    contact of the inner faces or the simplified supports of the thesis, closure.start = "open" turns a flow back first, slowly; --in-time does so with
-    the inertia of wall and fluid and tells the closing time.
+    The pressures are those of --pressure, else closure.pressures of the case; each state is found from the one before.
+    closure.supports chooses contact of the inner faces or the simplified supports of the thesis, closure.start = "open"
+    turns a flow back first, slowly; --in-time does so with the inertia of wall and fluid and tells the closing time.
 
     dbvfiv closure cases/closure.toml -o closure.h5 --plots figures
     """
@@ -58,7 +62,12 @@ def command(
             title = [f"Supports: {kind}"] if compare else []
             print("\n".join([*title, *HEAD]), flush=True)
         target = output if output is None or not number else output.with_name(f"{output.stem}-{kind}{output.suffix}")
-        result = valve.closure(wanted, in_time=in_time and not number, output=target, observer=Progress(quiet=as_json, row=None if as_json else row_of))
+        result = valve.closure(
+            wanted,
+            in_time=in_time and not number,
+            output=target,
+            observer=Progress(quiet=as_json, row=None if as_json else row_of),
+        )
         if not as_json:
             print("\n".join([*result.verdict(), *([f"Kept in {target}."] if target else [])]))
         results.append(result)
@@ -70,13 +79,17 @@ def command(
         document = results[0].summary()
         if len(results) > 1:
             document["compared"] = results[1].summary()
-        print_json(document | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
+        print_json(
+            document | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]}
+        )
     elif figures:
         print_places(None, figures, plots)
     if not all(result.complete for result in results):
         raise KeyboardInterrupt
     if failures:
-        raise SolveError(f"{len(results[0].states)} of {len(wanted)} back pressures were reached.")  # why was said when it happened
+        raise SolveError(
+            f"{len(results[0].states)} of {len(wanted)} back pressures were reached."
+        )  # why was said when it happened
 
 
 def report(result, path: Path, plots: Path | None, as_json: bool) -> None:

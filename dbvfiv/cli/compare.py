@@ -15,10 +15,14 @@ ORDER = 52
 
 def command(
     files: Annotated[list[Path], typer.Argument(metavar="RUN.h5 RUN.h5 ...", help="Result files of transient runs.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.png", help="Figure to write.")] = Path("comparison.png"),
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.png", help="Figure to write.")] = Path(
+        "comparison.png"
+    ),
     as_json: AsJson = False,
 ) -> None:
-    """Compare transient runs: their histories in one figure, their verdicts in one table, named by the case keys that tell them apart."""
+    """Compare transient runs: their histories in one figure, their verdicts in one table, named by the case keys that
+    tell them apart.
+    """
     from ..errors import CaseError
     from ..plots.transient_compare import labels, save_comparison
     from ..results import load_result
@@ -30,12 +34,20 @@ def command(
     path = save_comparison(results, output)
     names = labels(results)
     if as_json:
-        print_json({"runs": [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, names, results)], "figure": str(path)})
+        print_json(
+            {
+                "runs": [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, names, results)],
+                "figure": str(path),
+            }
+        )
         return
     width = max(len(name) for name in names) + 2
     print(f"{'':<{width}}{'last kg/s':>11}{'lip mm':>9}{'amplitude mm':>14}{'Hz':>8}  verdict")
     for name, result in zip(names, results):
         lip, h = result.verdict["lip_opening"], result.history
         frequency = "-" if lip["frequency"] is None else f"{lip['frequency']:.3f}"
-        print(f"{name:<{width}}{h['mass_flow'][-1]:>11.5g}{1e3 * h['lip_opening'][-1]:>9.4g}{1e3 * lip['amplitude']:>14.4g}{frequency:>8}  {result.verdict['verdict']}")
+        print(
+            f"{name:<{width}}{h['mass_flow'][-1]:>11.5g}{1e3 * h['lip_opening'][-1]:>9.4g}"
+            f"{1e3 * lip['amplitude']:>14.4g}{frequency:>8}  {result.verdict['verdict']}"
+        )
     print(f"Wrote {path}.")

@@ -28,14 +28,27 @@ def command(
         print(case_toml(header.case, comments=False), end="")
         return
     if as_json:
-        facts = {name: getattr(header, name) for name in ("kind", "name", "complete", "created", "program", "command", "layout", "versions")}
+        facts = {
+            name: getattr(header, name)
+            for name in ("kind", "name", "complete", "created", "program", "command", "layout", "versions")
+        }
         mesh = {"around": around, "along": along, "layers": list(result.mesh.layer_names)}
         print_json(facts | {"mesh": mesh, "case": header.case.to_dict() if case else None} | result.summary())
         return
     drive, fluid = header.case.drive, header.case.fluid
-    load = f"{fluid.density:g} kg/m3, {fluid.continuity}" if drive.kind == "flow" else f"uniform pressure {drive.side}, no flow"
+    load = (
+        f"{fluid.density:g} kg/m3, {fluid.continuity}"
+        if drive.kind == "flow"
+        else f"uniform pressure {drive.side}, no flow"
+    )
     facts = (
-        ("result", f"{header.kind} of {header.name}, {'complete' if header.complete else 'not complete: interrupted or still running'}"),
+        (
+            "result",
+            (
+                f"{header.kind} of {header.name}, "
+                f"{'complete' if header.complete else 'not complete: interrupted or still running'}"
+            ),
+        ),
         ("written", f"{header.created} by {header.program}"),
         ("command", header.command),
         ("versions", ", ".join(f"{name} {version}" for name, version in header.versions.items() if name != "dbvfiv")),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -18,10 +18,16 @@ _RANGE = "PARAMETER=START:STOP:COUNT[:log] of pressure, density, alpha, beta, st
 
 def command(
     case_file: CaseFile = None,
-    x: Annotated[Optional[str], typer.Option("--x", metavar="RANGE", help=f"Horizontal axis, {_RANGE}; map.x without it.")] = None,
-    y: Annotated[Optional[str], typer.Option("--y", metavar="RANGE", help="Vertical axis, likewise; map.y without it.")] = None,
+    x: Annotated[
+        str | None, typer.Option("--x", metavar="RANGE", help=f"Horizontal axis, {_RANGE}; map.x without it.")
+    ] = None,
+    y: Annotated[
+        str | None, typer.Option("--y", metavar="RANGE", help="Vertical axis, likewise; map.y without it.")
+    ] = None,
     both: Annotated[bool, typer.Option("--both", help="Both continuity laws side by side.")] = False,
-    workers: Annotated[Optional[int], typer.Option("--workers", "-w", metavar="N", min=1, help="Processes that share the columns.")] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", "-w", metavar="N", min=1, help="Processes that share the columns.")
+    ] = None,
     output: Output = None,
     plots: PlotFolder = None,
     overrides: Override = None,
@@ -29,13 +35,15 @@ def command(
 ) -> None:
     """Growth rate of the leading mode over two parameters, with the exact onset curves.
 
-    Every cell carries two counts of its unstable modes, by eigenvalues and by the argument principle; some cells are solved again with the full
-    matrices (map.checks). Columns are put in where onsets appear or vanish (map.refine), and the onset curves are followed by continuation (map.curve).
+    Every cell carries two counts of its unstable modes, by eigenvalues and by the argument principle; some cells are
+    solved again with the full matrices (map.checks). Columns are put in where onsets appear or vanish (map.refine), and
+    the onset curves are followed by continuation (map.curve).
 
-    With -o every finished column is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash. Under mpiexec with mpi4py the columns are shared
-    among its processes.
+    With -o every finished column is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash. Under mpiexec with
+    mpi4py the columns are shared among its processes.
 
-    dbvfiv map cases/dbv12.toml --x "pressure=0.5 kPa:20 kPa:64" --y density=1:1000:64:log --workers 2 -o map.h5 --plots figures
+    dbvfiv map cases/dbv12.toml --x "pressure=0.5 kPa:20 kPa:64" --y density=1:1000:64:log --workers 2 -o map.h5 --plots
+    figures
     """
     from ..stability import stability_map
 
@@ -51,7 +59,10 @@ def report(result, output: Path | None, plots: Path | None, as_json: bool) -> No
     """Print a finished map, draw it, and leave with the exit status it deserves."""
     figures = result.plot(plots) if plots is not None and result.columns else []
     if as_json:
-        print_json(result.summary() | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
+        print_json(
+            result.summary()
+            | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]}
+        )
     else:
         print("\n".join(result.lines()))
         print_places(output, figures, plots)

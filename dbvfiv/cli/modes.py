@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -13,27 +13,41 @@ from ._progress import Progress
 ORDER = 25
 
 
-
 def command(
     case_file: CaseFile = None,
     pressure: Annotated[
-        Optional[str], typer.Option("--pressure", "-p", metavar="P", help="Inlet pressure in place of drive.pressure; 0 with --in-vacuo is the valve at rest.")
+        str | None,
+        typer.Option(
+            "--pressure",
+            "-p",
+            metavar="P",
+            help="Inlet pressure in place of drive.pressure; 0 with --in-vacuo is the valve at rest.",
+        ),
     ] = None,
-    density: Annotated[Optional[str], typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")] = None,
-    count: Annotated[Optional[int], typer.Option("--count", "-n", metavar="N", help="How many modes.")] = None,
-    in_vacuo: Annotated[bool, typer.Option("--in-vacuo", help="Leave the fluid out: the structure under its steady pressures alone.")] = False,
+    density: Annotated[
+        str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
+    ] = None,
+    count: Annotated[int | None, typer.Option("--count", "-n", metavar="N", help="How many modes.")] = None,
+    in_vacuo: Annotated[
+        bool, typer.Option("--in-vacuo", help="Leave the fluid out: the structure under its steady pressures alone.")
+    ] = False,
     output: Output = None,
     plots: PlotFolder = None,
     animate: Annotated[
-        Optional[list[int]], typer.Option("--animate", metavar="N", help="Write a GIF of one cycle of mode N into --plots; may be repeated.")
+        list[int] | None,
+        typer.Option(
+            "--animate", metavar="N", help="Write a GIF of one cycle of mode N into --plots; may be repeated."
+        ),
     ] = None,
     overrides: Override = None,
     as_json: AsJson = False,
 ) -> None:
-    """Leading modes of one steady state: growth rate, frequency, damping ratio, residual, and whether the state is stable.
+    """Leading modes of one steady state: growth rate, frequency, damping ratio, residual, and whether the state is
+    stable.
 
-    The number of unstable eigenvalues is counted twice, in the list of modes and by the winding of the determinant along the imaginary axis; both
-    eigenvalues of a pair count. The model has one quarter of the valve, so all modes are symmetric about both planes.
+    The number of unstable eigenvalues is counted twice, in the list of modes and by the winding of the determinant
+    along the imaginary axis; both eigenvalues of a pair count. The model has one quarter of the valve, so all modes are
+    symmetric about both planes.
 
     dbvfiv modes cases/dbv12.toml -p "6 kPa" --density 10 --set damping.alpha=0 -o modes.h5 --plots figures --animate 1
     """
@@ -45,11 +59,16 @@ def command(
         raise CaseError("--animate needs --plots DIR, the folder that the GIF is written into.")
     valve = Valve(case, case_file.stem if case_file else "dbv12")
     given = {"density": number_or_text(density), "in_vacuo": in_vacuo or None}
-    result = valve.modes(number_or_text(pressure), count=count, output=output, observer=Progress(quiet=as_json), **given)
+    result = valve.modes(
+        number_or_text(pressure), count=count, output=output, observer=Progress(quiet=as_json), **given
+    )
     figures = result.plot(plots) if plots is not None else []
     figures += [result.animate(plots / f"mode-{number}.gif", number) for number in animate or ()]
     if as_json:
-        print_json(result.summary() | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
+        print_json(
+            result.summary()
+            | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]}
+        )
         return
     print("\n".join(result.lines()))
     print_places(output, figures, plots)

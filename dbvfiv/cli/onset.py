@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -14,15 +14,15 @@ from ._progress import Progress
 ORDER = 28
 
 
-
 def command(
     case_file: CaseFile = None,
     over: Annotated[
-        Optional[str],
+        str | None,
         typer.Option(
             "--over",
             metavar="PARAMETER",
-            help="pressure, density, alpha, beta, storage, thickness, angle or strain, with =START:STOP:COUNT[:log] for a range of one's own; "
+            help="pressure, density, alpha, beta, storage, thickness, angle or strain, with "
+            "=START:STOP:COUNT[:log] for a range of one's own; "
             "onset.over without it.",
         ),
     ] = None,
@@ -33,9 +33,9 @@ def command(
 ) -> None:
     """Every onset along one parameter: value, frequency, super- or subcritical, uncertainty of the mesh.
 
-    All crossings of the range are looked for, also tongues of instability that close again. Each is located with the full matrices, confirmed by direct
-    eigenvalues and independent counts on both sides, described by its first Lyapunov coefficient (onset.normal_form), and found again on a coarser
-    mesh for an uncertainty (onset.coarse_mesh).
+    All crossings of the range are looked for, also tongues of instability that close again. Each is located with the
+    full matrices, confirmed by direct eigenvalues and independent counts on both sides, described by its first Lyapunov
+    coefficient (onset.normal_form), and found again on a coarser mesh for an uncertainty (onset.coarse_mesh).
 
     With -o every value of the scan and every onset is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash.
 
@@ -56,11 +56,16 @@ def report(result, output: Path | None, plots: Path | None, as_json: bool) -> No
 
     figures = result.plot(plots) if plots is not None and len(result.values) else []
     if as_json:
-        print_json(result.summary() | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
+        print_json(
+            result.summary()
+            | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]}
+        )
     else:
         print("\n".join(result.lines()))
         print_places(output, figures, plots)
     if not result.complete:
         raise KeyboardInterrupt
     if result.failures:
-        raise SolveError(f"Parts of the range were not reached: {len(result.failures)} states failed.")  # why was said when it happened
+        raise SolveError(
+            f"Parts of the range were not reached: {len(result.failures)} states failed."
+        )  # why was said when it happened

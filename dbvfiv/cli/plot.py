@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -14,7 +14,7 @@ from ._output import print_json
 ORDER = 50
 
 
-class Format(str, Enum):
+class Format(StrEnum):
     """Kinds of figure files."""
 
     png = "png"
@@ -25,13 +25,24 @@ def command(
     file: ResultFile,
     folder: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the figures.")] = Path("."),
     format: Annotated[Format, typer.Option("--format", help="File format.")] = Format.png,
-    only: Annotated[Optional[list[str]], typer.Option("--only", metavar="NAME", help="Draw this figure; may be repeated.")] = None,
-    pressure: Annotated[
-        Optional[str], typer.Option("--pressure", "-p", metavar="P", help="Draw 3D view and layer stresses for the state nearest to this pressure.")
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="NAME", help="Draw this figure; may be repeated.")
     ] = None,
-    mode: Annotated[Optional[int], typer.Option("--mode", metavar="N", help="Draw centre line and shape of this mode only.")] = None,
+    pressure: Annotated[
+        str | None,
+        typer.Option(
+            "--pressure",
+            "-p",
+            metavar="P",
+            help="Draw 3D view and layer stresses for the state nearest to this pressure.",
+        ),
+    ] = None,
+    mode: Annotated[
+        int | None, typer.Option("--mode", metavar="N", help="Draw centre line and shape of this mode only.")
+    ] = None,
     animate: Annotated[
-        Optional[list[int]], typer.Option("--animate", metavar="N", help="Also write a GIF of one cycle of mode N; may be repeated.")
+        list[int] | None,
+        typer.Option("--animate", metavar="N", help="Also write a GIF of one cycle of mode N; may be repeated."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

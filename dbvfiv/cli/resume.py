@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -15,17 +15,25 @@ ORDER = 45
 
 def command(
     file: ResultFile,
-    duration: Annotated[Optional[str], typer.Option("--duration", metavar="T", help="New end of the run, 2.0 (s) or '500 ms'.")] = None,
+    duration: Annotated[
+        str | None, typer.Option("--duration", metavar="T", help="New end of the run, 2.0 (s) or '500 ms'.")
+    ] = None,
     plots: PlotFolder = None,
-    animate: Annotated[Optional[Path], typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")] = None,
-    workers: Annotated[Optional[int], typer.Option("--workers", "-w", metavar="N", min=1, help="Of a map: processes that share the columns.")] = None,
+    animate: Annotated[
+        Path | None, typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", "-w", metavar="N", min=1, help="Of a map: processes that share the columns."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Continue a transient run, a stability map, an onset or a closure run that was interrupted or killed, or a finished transient run with a later
-    --duration.
+    """Continue a transient run, a stability map, an onset or a closure run that was interrupted or killed, or a
+    finished transient run with a later --duration.
 
-    A transient run goes on from the last restart point in the same file, with the same numbers as a run that was never interrupted; a map solves the
-    columns that are missing in it, an onset run the values, a closure run the back pressures.
+    A transient run goes on from the last restart point in the same file, with the same numbers as a run that was never
+    interrupted; a map solves the columns that are missing in it, an onset run the values, a closure run the back
+    pressures.
     """
     from importlib import import_module
 

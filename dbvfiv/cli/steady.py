@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -13,9 +13,12 @@ from ._progress import Progress
 ORDER = 20
 
 Pressures = Annotated[
-    Optional[list[str]],
+    list[str] | None,
     typer.Option(
-        "--pressure", "-p", metavar="P", help="Inlet pressure, 36e3 (Pa) or '36 kPa', or a range '2 kPa:50 kPa:12'; may be repeated."
+        "--pressure",
+        "-p",
+        metavar="P",
+        help="Inlet pressure, 36e3 (Pa) or '36 kPa', or a range '2 kPa:50 kPa:12'; may be repeated.",
     ),
 ]
 
@@ -30,11 +33,12 @@ def command(
 ) -> None:
     """Equilibria of the coupled valve: flow, lip area, jet velocity, deflections, layer stresses.
 
-    The pressures are those of --pressure; else a drive.pressure given with --set; else steady.pressures of the case, or its drive.pressure where
-    only that is given. Each state is found from the one before.
+    The pressures are those of --pressure; else a drive.pressure given with --set; else steady.pressures of the case, or
+    its drive.pressure where only that is given. Each state is found from the one before.
 
-    Nothing is written unless asked for: -o keeps states, stations and layer stresses in a result file (an earlier result of that name is
-    replaced), state by state, so that Ctrl-C keeps what is done. `dbvfiv plot`, `export` and `info` read it.
+    Nothing is written unless asked for: -o keeps states, stations and layer stresses in a result file (an earlier
+    result of that name is replaced), state by state, so that Ctrl-C keeps what is done. `dbvfiv plot`, `export` and
+    `info` read it.
 
     dbvfiv steady cases/dbv12.toml -p "18 kPa" -p "36 kPa" -o dbv12.h5
     """
@@ -61,7 +65,11 @@ def command(
     if not result.complete:
         raise KeyboardInterrupt
     if result.failures:
-        reached = f"{len(result.states)} of {len(wanted)} pressures were reached" if result.states else "No pressure was reached"
+        reached = (
+            f"{len(result.states)} of {len(wanted)} pressures were reached"
+            if result.states
+            else "No pressure was reached"
+        )
         kept = f"; those states are kept in {output}" if output and result.states else ""
         raise SolveError(f"{reached}{kept}.")  # why was said when it happened
 
@@ -70,7 +78,9 @@ def _pressures(case, given: list[str] | None, overrides: list[str] | None) -> tu
     from ..api import read_pressures
 
     if given:
-        return tuple(p for text in given for p in (_range(text) if ":" in text else read_pressures([text], "--pressure")))
+        return tuple(
+            p for text in given for p in (_range(text) if ":" in text else read_pressures([text], "--pressure"))
+        )
     changed = {override.partition("=")[0].strip() for override in overrides or ()}
     set_here = "drive.pressure" in changed and "steady.pressures" not in changed
     in_case = "pressure" in case.drive.model_fields_set and "pressures" not in case.steady.model_fields_set
@@ -86,5 +96,7 @@ def _range(text: str) -> tuple[float, ...]:
     try:
         return parse_axis(f"pressure={text}").values
     except ValueError as error:
-        raise CaseError(f"--pressure is given as {text!r}, {error}; a range is START:STOP:COUNT, with ':log' behind it for logarithmic steps.") from None
-
+        raise CaseError(
+            f"--pressure is given as {text!r}, {error}; a range is START:STOP:COUNT, with ':log' behind it "
+            f"for logarithmic steps."
+        ) from None

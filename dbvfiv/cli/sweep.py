@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -14,15 +14,25 @@ from .modes import number_or_text
 ORDER = 26
 
 
-
 def command(
     case_file: CaseFile = None,
     over: Annotated[
-        Optional[str], typer.Option("--over", metavar="RANGE", help="PARAMETER=START:STOP:COUNT[:log] of pressure, density, alpha or beta; sweep.over without it.")
+        str | None,
+        typer.Option(
+            "--over",
+            metavar="RANGE",
+            help="PARAMETER=START:STOP:COUNT[:log] of pressure, density, alpha or beta; sweep.over without it.",
+        ),
     ] = None,
-    pressure: Annotated[Optional[str], typer.Option("--pressure", "-p", metavar="P", help="Inlet pressure in place of drive.pressure.")] = None,
-    density: Annotated[Optional[str], typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")] = None,
-    count: Annotated[Optional[int], typer.Option("--count", "-n", metavar="N", help="How many leading modes to follow.")] = None,
+    pressure: Annotated[
+        str | None, typer.Option("--pressure", "-p", metavar="P", help="Inlet pressure in place of drive.pressure.")
+    ] = None,
+    density: Annotated[
+        str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
+    ] = None,
+    count: Annotated[
+        int | None, typer.Option("--count", "-n", metavar="N", help="How many leading modes to follow.")
+    ] = None,
     output: Output = None,
     plots: PlotFolder = None,
     overrides: Override = None,
@@ -30,10 +40,11 @@ def command(
 ) -> None:
     """Damping and frequency of the leading modes, followed along pressure, density, alpha or beta.
 
-    Each mode keeps its number through crossings; "confidence" says how sure each match is. Over density, alpha and beta the equilibrium stays and modes
-    are found on a reduced basis that full solves confirm. Ctrl-C keeps what is done.
+    Each mode keeps its number through crossings; "confidence" says how sure each match is. Over density, alpha and beta
+    the equilibrium stays and modes are found on a reduced basis that full solves confirm. Ctrl-C keeps what is done.
 
-    dbvfiv sweep cases/dbv12.toml -p "6 kPa" --set damping.alpha=0 --over density=1:1000:40:log -o sweep.h5 --plots figures
+    dbvfiv sweep cases/dbv12.toml -p "6 kPa" --set damping.alpha=0 --over density=1:1000:40:log -o sweep.h5 --plots
+    figures
     """
     from ..api import Valve
     from ..errors import SolveError
@@ -46,17 +57,26 @@ def command(
     rows = _Rows(None if as_json else head(case.sweep.axis.parameter), row_of)
     observer = Progress(quiet=as_json, row=None if as_json else rows)
     result = valve.sweep(
-        count=count, output=output, observer=observer, pressure=number_or_text(pressure), density=number_or_text(density)
+        count=count,
+        output=output,
+        observer=observer,
+        pressure=number_or_text(pressure),
+        density=number_or_text(density),
     )
     figures = result.plot(plots) if plots is not None and result.branches else []
     if as_json:
-        print_json(result.summary() | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
+        print_json(
+            result.summary()
+            | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]}
+        )
     else:
-        print("\n".join(result.lines()[2 + len(result.values):]))
+        print("\n".join(result.lines()[2 + len(result.values) :]))
         print_places(output, figures, plots)
     if result.failures:
         kept = f"; they are kept in {output}" if output else ""
-        raise SolveError(f"{len(result.values)} of {len(result.axis.values)} values were reached{kept}.")  # why was said when it happened
+        raise SolveError(
+            f"{len(result.values)} of {len(result.axis.values)} values were reached{kept}."
+        )  # why was said when it happened
     if not result.complete:
         raise KeyboardInterrupt
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -13,7 +13,9 @@ from ._progress import Progress
 
 ORDER = 40
 
-Animation = Annotated[Optional[Path], typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")]
+Animation = Annotated[
+    Path | None, typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")
+]
 
 
 def command(
@@ -26,8 +28,9 @@ def command(
 ) -> None:
     """Time history of the coupled valve and a verdict: steady, decaying, limit cycle, growing, closed or irregular.
 
-    How the run starts, what drives it, its steps and what ends it are keys of the section transient; `dbvfiv case --explain transient` lists them.
-    With -o everything is kept while the run goes on; `dbvfiv resume` continues it after Ctrl-C or a crash.
+    How the run starts, what drives it, its steps and what ends it are keys of the section transient; `dbvfiv case
+    --explain transient` lists them. With -o everything is kept while the run goes on; `dbvfiv resume` continues it
+    after Ctrl-C or a crash.
 
     dbvfiv transient cases/dbv12.toml --set transient.start=kick --set fluid.density=10 -o run.h5
     """
@@ -47,7 +50,10 @@ def report(result, output: Path | None, plots: Path | None, animate: Path | None
     if animate is not None:
         figures.append(result.animate(animate))
     if as_json:
-        print_json(result.summary() | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]})
+        print_json(
+            result.summary()
+            | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]}
+        )
     else:
         print("\n".join(result.lines()))
         for text in (f"Kept in {output}." if output else "", *(f"Wrote {figure}." for figure in figures)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -14,19 +14,40 @@ ORDER = 47
 
 
 def command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="CSV with a column of times and others of values, or the result of a transient run.")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="CSV with a column of times and others of values, or the result of a transient run."
+        ),
+    ],
     columns: Annotated[
-        Optional[list[str]], typer.Option("--column", "-c", metavar="NAME", help="Column by name or number from 1; may be repeated; all by default.")
+        list[str] | None,
+        typer.Option(
+            "--column", "-c", metavar="NAME", help="Column by name or number from 1; may be repeated; all by default."
+        ),
     ] = None,
     time: Annotated[str, typer.Option("--time", metavar="NAME", help="Column of the times, by name or number.")] = "1",
-    rate: Annotated[Optional[float], typer.Option("--rate", metavar="HZ", help="Sampling rate, where no column holds times.")] = None,
-    since: Annotated[Optional[float], typer.Option("--since", metavar="T", help="Leave out what comes before this time, s.")] = None,
-    steady: Annotated[float, typer.Option("--steady", metavar="X", help="Relative change below which a signal is steady.")] = 1e-4,
-    closed_below: Annotated[Optional[float], typer.Option("--closed-below", metavar="X", help="Level below which a signal counts as closed.")] = None,
-    plots: Annotated[Optional[Path], typer.Option("--plots", metavar="DIR", help="Draw each signal and its spectrum into this folder.")] = None,
+    rate: Annotated[
+        float | None, typer.Option("--rate", metavar="HZ", help="Sampling rate, where no column holds times.")
+    ] = None,
+    since: Annotated[
+        float | None, typer.Option("--since", metavar="T", help="Leave out what comes before this time, s.")
+    ] = None,
+    steady: Annotated[
+        float, typer.Option("--steady", metavar="X", help="Relative change below which a signal is steady.")
+    ] = 1e-4,
+    closed_below: Annotated[
+        float | None,
+        typer.Option("--closed-below", metavar="X", help="Level below which a signal counts as closed."),
+    ] = None,
+    plots: Annotated[
+        Path | None,
+        typer.Option("--plots", metavar="DIR", help="Draw each signal and its spectrum into this folder."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Judge any time series: steady, decaying, limit cycle, growing, closed or irregular, with period, amplitude, harmonics, RMS, extremes, spectrum.
+    """Judge any time series: steady, decaying, limit cycle, growing, closed or irregular, with period, amplitude,
+    harmonics, RMS, extremes, spectrum.
 
     dbvfiv verdict pressure.csv --column 2 --plots figures
     """
@@ -46,14 +67,23 @@ def command(
         try:
             verdict = judge(t[keep], values[keep], JudgeOptions(steady=steady), closed_below=closed_below)
         except ValueError as error:
-            raise CaseError(f"Column {name!r} of {str(file)!r} cannot be judged: {str(error)[0].lower()}{str(error)[1:]}") from None
+            raise CaseError(
+                f"Column {name!r} of {str(file)!r} cannot be judged: {str(error)[0].lower()}{str(error)[1:]}"
+            ) from None
         found.append((name, verdict, t[keep], values[keep]))
         if plots is not None:
             from ..plots.transient_signal import save_signal
 
             figures.append(save_signal(plots, name, t[keep], values[keep], verdict))
     if as_json:
-        print_json({"signals": [{"name": name} | verdict.summary() | {"peaks": _peaks(t, values)} for name, verdict, t, values in found]})
+        print_json(
+            {
+                "signals": [
+                    {"name": name} | verdict.summary() | {"peaks": _peaks(t, values)}
+                    for name, verdict, t, values in found
+                ]
+            }
+        )
         return
     for name, verdict, t, values in found:
         print("\n".join(_lines(name, verdict, _peaks(t, values))))
@@ -106,20 +136,32 @@ def _peaks(t, values, count: int = 5) -> list[dict]:
     frequency, amplitude = spectrum(Series.of(t, values))
     inner = [i for i in range(1, len(amplitude) - 1) if amplitude[i - 1] < amplitude[i] >= amplitude[i + 1]]
     best = sorted(inner, key=lambda i: -amplitude[i])[:count]
-    return [{"frequency": float(frequency[i]), "amplitude": float(amplitude[i])} for i in best if amplitude[i] > 1e-9 * amplitude.max()]
+    return [
+        {"frequency": float(frequency[i]), "amplitude": float(amplitude[i])}
+        for i in best
+        if amplitude[i] > 1e-9 * amplitude.max()
+    ]
 
 
 def _lines(name: str, verdict, peaks: list[dict]) -> list[str]:
     head = f"{name}: {verdict.name}{'' if verdict.decided else ' (not certain)'}. {verdict.reason}"
     numbers = [
-        ("mean", verdict.mean), ("amplitude", verdict.amplitude), ("rms", verdict.rms), ("smallest", verdict.smallest), ("largest", verdict.largest),
-        ("period, s", verdict.period), ("frequency, Hz", verdict.frequency), ("periodicity error", verdict.periodicity_error),
-    ]  # fmt: skip
+        ("mean", verdict.mean),
+        ("amplitude", verdict.amplitude),
+        ("rms", verdict.rms),
+        ("smallest", verdict.smallest),
+        ("largest", verdict.largest),
+        ("period, s", verdict.period),
+        ("frequency, Hz", verdict.frequency),
+        ("periodicity error", verdict.periodicity_error),
+    ]
     lines = [head] + [f"  {label:<20}{value:.7g}" for label, value in numbers if value == value]
     if verdict.cycles:
         lines.append(f"  {'cycles':<20}{verdict.cycles}")
     if len(verdict.harmonics):
         lines.append(f"  {'harmonics':<20}" + ", ".join(f"{a:.3g}" for a in verdict.harmonics[:, 0]))
     if peaks:
-        lines.append(f"  {'spectrum':<20}" + ", ".join(f"{p['amplitude']:.3g} at {p['frequency']:.4g} Hz" for p in peaks))
+        lines.append(
+            f"  {'spectrum':<20}" + ", ".join(f"{p['amplitude']:.3g} at {p['frequency']:.4g} Hz" for p in peaks)
+        )
     return lines

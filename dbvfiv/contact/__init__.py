@@ -1,7 +1,16 @@
 """A shell pressed by a uniform follower load against a rigid, frictionless plane."""
+
 from .inner_face import nodal_thickness, tributary_area
 from .law import ContactLaw
 from .plane import ContactState, PlaneContact
 from .pressed_shell import PressedShell, PressedTangent
 
-__all__ = ["ContactLaw", "ContactState", "PlaneContact", "PressedShell", "PressedTangent", "nodal_thickness", "tributary_area"]
+__all__ = [
+    "ContactLaw",
+    "ContactState",
+    "PlaneContact",
+    "PressedShell",
+    "PressedTangent",
+    "nodal_thickness",
+    "tributary_area",
+]

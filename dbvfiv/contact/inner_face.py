@@ -1,4 +1,5 @@
 """Wall thickness and area that belong to the nodes of a shell."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,4 +1,5 @@
 """From gap to contact pressure: penalty with augmented-Lagrangian multipliers."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -8,14 +9,17 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """t = penalty * ramp(multiplier / penalty - gap): the augmented Lagrangian of g >= 0, t >= 0, t g = 0 (Alart & Curnier 1991).
+    """t = penalty * ramp(multiplier / penalty - gap): the augmented Lagrangian of g >= 0, t >= 0, t g = 0 (Alart &
+    Curnier 1991).
 
     Attributes
     ----------
     penalty : float, Pa/m
-        The contact pressure follows the penetration with this slope; updates of the multipliers remove what penetration is left.
+        The contact pressure follows the penetration with this slope; updates of the multipliers remove what penetration
+        is left.
     rounding : float, m
-        Half width over which the kink of the ramp is rounded by a parabola, so that the tangent is continuous; 0 keeps the kink.
+        Half width over which the kink of the ramp is rounded by a parabola, so that the tangent is continuous; 0 keeps
+        the kink.
     """
 
     penalty: float

@@ -1,8 +1,10 @@
 """Frictionless one-sided contact of points on a shell's face with a plane.
 
-The point that touches lies at a depth below the mid-surface along the current director, x - depth * d, so a contact force acts on the displacement
-across the plane and on both rotations of the node. A depth of zero makes the mid-surface itself touch.
+The point that touches lies at a depth below the mid-surface along the current director, x - depth * d, so a contact
+force acts on the displacement across the plane and on both rotations of the node. A depth of zero makes the mid-surface
+itself touch.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -64,8 +66,8 @@ class PlaneContact:
     axis : int
         Normal of the plane: 0, 1 or 2.
     least_gap : float, m
-        Points that start closer to the plane than this, or beyond it, are measured from where they start plus this gap, so that only
-        further closing meets resistance. See `lifted`.
+        Points that start closer to the plane than this, or beyond it, are measured from where they start plus this gap,
+        so that only further closing meets resistance. See `lifted`.
     """
 
     def __init__(self, shell: Shell, nodes, depth, area, law: ContactLaw, axis: int = 1, least_gap: float = 0.0):
@@ -89,7 +91,9 @@ class PlaneContact:
 
     @property
     def lifted(self) -> np.ndarray:
-        """(k,) true for nodes whose gap is measured from their start because they begin too close to the plane or beyond it."""
+        """(k,) true for nodes whose gap is measured from their start because they begin too close to the plane or
+        beyond it.
+        """
         return self.lift > 0
 
     def gap(self, nodal: np.ndarray, directors: np.ndarray) -> np.ndarray:
@@ -127,7 +131,9 @@ class PlaneContact:
         _add(force, self._unknowns, -(self.area * pressure)[:, None] * self._slope(first))
 
     def add_force_and_tangent(self, force, data, nodal, directors, first, second, multiplier) -> None:
-        """Add force and symmetric tangent values on the shell's pattern; `second` (nn, 3, 3) as `Shell.directors` returns."""
+        """Add force and symmetric tangent values on the shell's pattern; `second` (nn, 3, 3) as `Shell.directors`
+        returns.
+        """
         _, pressure, stiffness = self.law.respond(self.gap(nodal, directors), multiplier)
         slope = self._slope(first)
         _add(force, self._unknowns, -(self.area * pressure)[:, None] * slope)

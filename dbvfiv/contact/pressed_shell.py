@@ -2,8 +2,10 @@
 
     r(q; P) = f_shell(q) + f_contact(q; multipliers) - sign * P * f(q) = 0
 
-with f the force of unit pressure along the outward normal. It answers what `dbvfiv.model.newton.EquilibriumSolver` and load steps ask of a model.
+with f the force of unit pressure along the outward normal. It answers what `dbvfiv.model.newton.EquilibriumSolver` and
+load steps ask of a model.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -26,7 +28,8 @@ class PressedTangent:
     structure : (nnz,) array
         Values of the symmetric tangent of shell and contact.
     stiffness : (nnz,) array
-        Values of the whole tangent: structure less the follower stiffness, not symmetric where the loaded surface has a free edge.
+        Values of the whole tangent: structure less the follower stiffness, not symmetric where the loaded surface has a
+        free edge.
     """
 
     residual: np.ndarray
@@ -71,7 +74,8 @@ class PressedShell:
         """Nodal displacements and rotations (nn, 5)."""
         return self.shell.dofs.expand(q)
 
-    # -- statics --------------------------------------------------------------------------------------------------------------------
+    # -- statics
+    # ----
 
     def residual(self, q: np.ndarray, pressure: float) -> np.ndarray:
         """Unbalanced force (n,) at a pressure, Pa."""
@@ -98,7 +102,14 @@ class PressedShell:
         stiffness = structure.copy()
         surface = self.mesh
         pressure_stiffness(
-            surface.quads, surface.nodes, nodal, self._uniform(pressure), self.loaded, self.shell.dofs.slots, -1.0, stiffness
+            surface.quads,
+            surface.nodes,
+            nodal,
+            self._uniform(pressure),
+            self.loaded,
+            self.shell.dofs.slots,
+            -1.0,
+            stiffness,
         )
         return PressedTangent(force, structure, stiffness)
 
@@ -113,7 +124,9 @@ class PressedShell:
         return out
 
     def pressure_force_second(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Second directional derivative (n,) of the force of unit pressure along nodal fields a and b (nn, 5); it is quadratic in the positions."""
+        """Second directional derivative (n,) of the force of unit pressure along nodal fields a and b (nn, 5); it is
+        quadratic in the positions.
+        """
 
         def of(x):
             out = np.zeros_like(x)
@@ -125,7 +138,8 @@ class PressedShell:
     def _uniform(self, pressure: float) -> np.ndarray:
         return np.full(self.mesh.node_count, self.sign * pressure)
 
-    # -- contact --------------------------------------------------------------------------------------------------------------------
+    # -- contact
+    # ----
 
     def contact_state(self, q: np.ndarray) -> ContactState | None:
         """Gaps and contact pressures of a state."""
@@ -160,7 +174,8 @@ class PressedShell:
             self.contact.add_multiplier_derivative(out, nodal, d, d1, self.multiplier, change)
         return out
 
-    # -- what solvers ask -----------------------------------------------------------------------------------------------------------
+    # -- what solvers ask
+    # ----
 
     def factor(self) -> DirectFactor:
         """A new factorisation object for tangents of this model."""

@@ -1,4 +1,5 @@
 """Second derivative of the contact force, by automatic differentiation of the contact's potential."""
+
 from __future__ import annotations
 
 import jax
@@ -9,7 +10,9 @@ from ..shell.rotation import director
 from .plane import PlaneContact
 
 
-def contact_second(contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def contact_second(
+    contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, a: np.ndarray, b: np.ndarray
+) -> np.ndarray:
     """Second directional derivative (nn, 5) of the contact force at nodal unknowns (nn, 5) along a and b (nn, 5)."""
     n, axis, mesh = contact.nodes, contact.axis, contact.shell.mesh
     columns = [axis, 3, 4]

@@ -1,4 +1,5 @@
 """Unsteady one-dimensional ideal flow through a passage of given areas."""
+
 from .channel import Channel, FluidOperators, UniformLoad
 from .rows import RowAreas
 

@@ -2,10 +2,12 @@
 
     p_k = P_in - rho [ (U_k^2 - U^2)/2 + d/dt integral_in^k U ds ],      p_outlet = 0
 
-Stations run from the outlet (first) to the inlet (last) and keep their places along the axis, as in the thesis's program (App. A). U is the inlet
-velocity. Continuity is blended between two laws by `storage` in 0..1: A_k U_k = A_in U - storage * integral_in^k dA/dt ds, so 0 is the quasi-steady law of the
-thesis and 1 the conservation of volume under moving walls.
+Stations run from the outlet (first) to the inlet (last) and keep their places along the axis, as in the thesis's
+program (App. A). U is the inlet velocity. Continuity is blended between two laws by `storage` in 0..1: A_k U_k = A_in U
+- storage * integral_in^k dA/dt ds, so 0 is the quasi-steady law of the thesis and 1 the conservation of volume under
+moving walls.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -43,7 +45,8 @@ class Channel:
     z : (m,) array
         Axial positions from the outlet to the inlet, m, increasing.
     floor : float
-        Smallest area, m2: the passage narrows towards it smoothly as the wall's area falls to zero and below, so a closed valve stays finite.
+        Smallest area, m2: the passage narrows towards it smoothly as the wall's area falls to zero and below, so a
+        closed valve stays finite.
     storage : float
         Blend of the continuity laws, 0 quasi-steady, 1 storage.
     unsteady : bool
@@ -63,7 +66,8 @@ class Channel:
     def count(self) -> int:
         return len(self.z)
 
-    # -- steady flow ----------------------------------------------------------------------------------------------------------------
+    # -- steady flow
+    # ----
 
     def steady_pressure(self, area: np.ndarray, inlet: float) -> np.ndarray:
         """Pressures (m,), Pa, of steady flow driven by the inlet pressure, Pa; independent of the fluid's density."""
@@ -93,7 +97,8 @@ class Channel:
         open_ = np.asarray(_open(jnp.asarray(area), self.floor))
         return velocity * open_[-1] / open_
 
-    # -- unsteady flow --------------------------------------------------------------------------------------------------------------
+    # -- unsteady flow
+    # ----
 
     def pressure(self, area, rate, acceleration, velocity, velocity_rate, inlet, density) -> np.ndarray:
         """Pressures (m,), Pa, for areas (m,), their first and second time derivatives, the inlet velocity and its rate.
@@ -101,17 +106,41 @@ class Channel:
         The first entry is the outlet pressure, which the flow equation sets to zero.
         """
         return np.asarray(
-            _pressure(self.step, self.floor, self.storage, self.unsteady, area, rate, acceleration, velocity, velocity_rate, inlet, density)
+            _pressure(
+                self.step,
+                self.floor,
+                self.storage,
+                self.unsteady,
+                area,
+                rate,
+                acceleration,
+                velocity,
+                velocity_rate,
+                inlet,
+                density,
+            )
         )
 
-    def operators(self, area, inlet: float, density: float, rate=None, acceleration=None, velocity=None, velocity_rate=0.0) -> FluidOperators:
+    def operators(
+        self, area, inlet: float, density: float, rate=None, acceleration=None, velocity=None, velocity_rate=0.0
+    ) -> FluidOperators:
         """Linearisation at a state; at the steady state of these areas unless rates are given."""
         zero = np.zeros(self.count)
         rate = zero if rate is None else rate
         acceleration = zero if acceleration is None else acceleration
         velocity = self.inlet_velocity(area, inlet, density) if velocity is None else velocity
         parts = _operators(
-            self.step, self.floor, self.storage, self.unsteady, area, rate, acceleration, velocity, velocity_rate, inlet, density
+            self.step,
+            self.floor,
+            self.storage,
+            self.unsteady,
+            area,
+            rate,
+            acceleration,
+            velocity,
+            velocity_rate,
+            inlet,
+            density,
         )
         return FluidOperators(*(np.asarray(part) for part in parts))
 
@@ -150,7 +179,9 @@ class UniformLoad:
 
 
 def _open(area, floor):
-    """Area that stays above the floor: floor + softplus(area - floor), within 1e-8 of the area from twenty floors upwards."""
+    """Area that stays above the floor: floor + softplus(area - floor), within 1e-8 of the area from twenty floors
+    upwards.
+    """
     return floor * (1.0 + jax.nn.softplus(area / floor - 1.0))
 
 

@@ -1,4 +1,5 @@
 """Flow areas of the deforming mesh rows, with exact first and second derivatives."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -10,8 +11,8 @@ from ..geometry import ValveMesh
 class RowAreas:
     """Area of each row: trapezoids between mid-surface and the x axis in the x-y plane, less the wall (Th. 4.12-4.14).
 
-    The constant difference between the surface at rest and the polygon through its nodes is added back, so that the gap at rest is the same on
-    every mesh.
+    The constant difference between the surface at rest and the polygon through its nodes is added back, so that the gap
+    at rest is the same on every mesh.
 
     Parameters
     ----------
@@ -54,7 +55,9 @@ class RowAreas:
         return sp.csr_matrix((values, self._indices, self._indptr), shape=(self.count, self.size), copy=False)
 
     def second(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Second directional derivative (rows,) of the areas along nodal fields a and b (nn, 5); the areas are quadratic."""
+        """Second directional derivative (rows,) of the areas along nodal fields a and b (nn, 5); the areas are
+        quadratic.
+        """
         slope = _polygon_slope(a[self.rows][:, :, :2])
         return np.sum(slope * b[self.rows][:, :, :2], axis=(1, 2))
 

@@ -1,8 +1,9 @@
 """Cross-sections of the mid-surface, each a curve from the centre line (x = 0) to the side edge (y = 0)."""
+
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Callable
 
 import numpy as np
 from scipy.integrate import cumulative_simpson
@@ -56,10 +57,12 @@ def key_point_sections(points: np.ndarray) -> list[Profile]:
     points : (profiles, points, 3) array, m
         From lip to flange; each profile from the centre to the side edge at one axial position.
 
-    Each profile is a cubic spline through its points over the chord length, evaluated at equal normalised arc length, as the thesis's program
-    draws its lines (App. A).
+    Each profile is a cubic spline through its points over the chord length, evaluated at equal normalised arc length,
+    as the thesis's program draws its lines (App. A).
     """
-    return [Profile(float(np.mean(profile[:, 2])), _spline_section(profile[:, :2])) for profile in np.asarray(points, float)]
+    return [
+        Profile(float(np.mean(profile[:, 2])), _spline_section(profile[:, :2])) for profile in np.asarray(points, float)
+    ]
 
 
 def _spline_section(xy: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

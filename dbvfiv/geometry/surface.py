@@ -1,4 +1,5 @@
 """The mid-surface between the sections: parametric (lip, saddle, flange) or skinned over key points."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,4 +1,5 @@
 """Graded mesh of the quarter valve, with its rows, symmetry planes and flow areas at rest."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -29,7 +30,8 @@ class ValveMesh:
     element_columns : (ne, 2) array
         Grading parameter of the two sides of each element.
     rest_area : (rows,) array, m2
-        Area between mid-surface and symmetry planes at rest, of the surface itself, not of the polygon through the nodes.
+        Area between mid-surface and symmetry planes at rest, of the surface itself, not of the polygon through the
+        nodes.
     wall_deduction : (rows,) array, m2
         Area taken by the wall (Th. 4.12-4.14), less the initial gap.
     """
@@ -96,7 +98,7 @@ def grading(columns: np.ndarray, ratio: float) -> np.ndarray:
 
 
 def row_positions(surface: Surface, along: int) -> np.ndarray:
-    """Axial positions of the rows: each piece of the surface gets elements in proportion to its length, at least one."""
+    """Axial positions of the rows: each piece of the surface gets elements by its length, at least one."""
     breaks = surface.breaks
     lengths = np.diff(breaks)
     if along < len(lengths):
@@ -112,7 +114,9 @@ def row_positions(surface: Surface, along: int) -> np.ndarray:
 
 
 def wall_deduction(valve: Valve, z: np.ndarray) -> np.ndarray:
-    """Part of the section taken by the wall (Th. 4.12-4.14, App. A): constant on duckbill and flange, linear over the saddle."""
+    """Part of the section taken by the wall (Th. 4.12-4.14, App. A): constant on duckbill and flange, linear over the
+    saddle.
+    """
     gap = valve.duckbill_wall_deduction - valve.initial_gap
     duckbill = 0.25 * np.pi * valve.lip_radius**2 + valve.lip_half_width * gap
     inner = valve.flange_radius - valve.flange_wall_deduction

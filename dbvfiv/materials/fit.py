@@ -4,10 +4,10 @@ The nominal stress of an incompressible bar at the stretch l,
 
     P = 2 (l - l^-2)(W1 + W2/l),   W1 = C10 + C11 (I2 - 3),   W2 = C01 + C11 (I1 - 3),
 
-is linear in the constants, so the fit is a linear least-squares problem. Tension alone tells C10 and C01 apart badly: over
-a small range of strains their columns are nearly parallel, and the fit returns large constants of
-opposite sign that describe the test well and other states of strain badly. The condition number
-says how far this goes; the "stable" constraint keeps the constants usable.
+is linear in the constants, so the fit is a linear least-squares problem. Tension alone tells C10 and C01 apart badly:
+over a small range of strains their columns are nearly parallel, and the fit returns large constants of opposite sign
+that describe the test well and other states of strain badly. The condition number says how far this goes; the "stable"
+constraint keeps the constants usable.
 """
 
 from __future__ import annotations

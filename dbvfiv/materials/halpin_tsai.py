@@ -78,9 +78,7 @@ def ply_from_constituents(
     for key, value in (("fibre_poisson", fibre_poisson), ("matrix_poisson", matrix_poisson)):
         # The series mean of two ratios is meaningless when one of them is not positive.
         if not 0.0 < value <= 0.5:
-            raise MaterialError(
-                f"{name}: {key} must be greater than 0 and at most 0.5, but {value:g} was given."
-            )
+            raise MaterialError(f"{name}: {key} must be greater than 0 and at most 0.5, but {value:g} was given.")
     fibre_shear = fibre_modulus / (2.0 * (1.0 + fibre_poisson))
     matrix_shear = matrix_modulus / (2.0 * (1.0 + matrix_poisson))
     transverse_shear = halpin_tsai(fibre_shear, matrix_shear, fibre_fraction, 0.0)
@@ -113,6 +111,4 @@ def fibre_ply(constants: str = "program") -> OrthotropicPly:
         return ply_from_constituents()
     if constants == "table":
         return OrthotropicPly(1558e6, 7.94e6, 0.27, 2.94e6, 2.94e6, 5.57e6, 1270.0)
-    raise MaterialError(
-        f"Fibre constants must be one of {', '.join(FIBRE_CONSTANTS)}, but {constants!r} was given."
-    )
+    raise MaterialError(f"Fibre constants must be one of {', '.join(FIBRE_CONSTANTS)}, but {constants!r} was given.")

@@ -87,8 +87,4 @@ def mooney_rivlin_energy(parameters, e):
     """
     c10, c01, c11 = parameters[0], parameters[1], parameters[2]
     inv = plane_stress_invariants(e)
-    return (
-        (c10 + c01) * inv.i1_minus_3
-        + c01 * inv.i2_minus_i1
-        + c11 * inv.i1_minus_3 * inv.i2_minus_3
-    )
+    return (c10 + c01) * inv.i1_minus_3 + c01 * inv.i2_minus_i1 + c11 * inv.i1_minus_3 * inv.i2_minus_3

@@ -43,9 +43,7 @@ class IsotropicElastic:
     density: float
 
     def __post_init__(self) -> None:
-        require_positive(
-            "Isotropic material", youngs_modulus=self.youngs_modulus, density=self.density
-        )
+        require_positive("Isotropic material", youngs_modulus=self.youngs_modulus, density=self.density)
         require_finite("Isotropic material", poisson_ratio=self.poisson_ratio)
         if not -1.0 < self.poisson_ratio <= 0.5:
             raise MaterialError(

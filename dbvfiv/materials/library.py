@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Callable
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from dbvfiv.errors import CaseError
 from dbvfiv.materials.checks import MaterialError
@@ -61,7 +62,7 @@ def law_from_card(card: Any) -> Law:
     return _LAWS[card.kind](card)
 
 
-def law_from_case(case: "Case", name: str) -> Law:
+def law_from_case(case: Case, name: str) -> Law:
     """The law of a material by its name in a case.
 
     Tables of the case go before the built-in CR, SBR, EPDM (at ``materials.strain_level``) and

@@ -54,7 +54,7 @@ class MooneyRivlin:
             )
 
     @classmethod
-    def neo_hookean(cls, shear_modulus: float, density: float) -> "MooneyRivlin":
+    def neo_hookean(cls, shear_modulus: float, density: float) -> MooneyRivlin:
         """Neo-Hookean rubber W = mu/2 (I1 - 3), that is C10 = mu/2 and nothing else."""
         require_positive("Neo-Hookean rubber", shear_modulus=shear_modulus)
         return cls(c10=0.5 * shear_modulus, c01=0.0, c11=0.0, density=density)

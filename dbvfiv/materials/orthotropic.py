@@ -71,9 +71,7 @@ class OrthotropicPly:
     def parameters(self) -> np.ndarray:
         """``[Q11, Q22, Q12, Q66, Q55 (13), Q44 (23), 0, 0]``, Pa."""
         k = 1.0 - self.nu12**2 * self.e2 / self.e1
-        return padded(
-            self.e1 / k, self.e2 / k, self.nu12 * self.e2 / k, self.g12, self.g13, self.g23
-        )
+        return padded(self.e1 / k, self.e2 / k, self.nu12 * self.e2 / k, self.g12, self.g13, self.g23)
 
     @property
     def small_strain_shear_modulus(self) -> float:

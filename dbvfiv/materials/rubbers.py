@@ -35,9 +35,7 @@ def strain_levels() -> tuple[float, ...]:
     return tuple(_data()["strain_level"])
 
 
-def rubber(
-    name: str, strain_level: float = 0.10, *, terms: int = 3, density: float | None = None
-) -> MooneyRivlin:
+def rubber(name: str, strain_level: float = 0.10, *, terms: int = 3, density: float | None = None) -> MooneyRivlin:
     """A shipped rubber at a strain level.
 
     Parameters
@@ -66,9 +64,7 @@ def rubber(
         raise MaterialError(f"A shipped rubber has 2 or 3 constants, but terms = {terms!r} was given.")
     table = data[_TABLES[terms]]
     if name not in table:
-        raise MaterialError(
-            f"The shipped rubbers are {', '.join(rubber_names())}, but {name!r} was given."
-        )
+        raise MaterialError(f"The shipped rubbers are {', '.join(rubber_names())}, but {name!r} was given.")
     require_finite(f"Rubber {name}", strain_level=strain_level)
     levels = data["strain_level"]
     if not levels[0] <= strain_level <= levels[-1]:
@@ -76,7 +72,5 @@ def rubber(
             f"Rubber {name}: strain_level must lie between {levels[0]:.0%} and {levels[-1]:.0%}, "
             f"the tested levels, but {strain_level:.4g} ({strain_level:.4%}) was given."
         )
-    c10, c01, c11 = (
-        float(np.interp(strain_level, levels, table[name][c])) for c in ("c10", "c01", "c11")
-    )
+    c10, c01, c11 = (float(np.interp(strain_level, levels, table[name][c])) for c in ("c10", "c01", "c11"))
     return MooneyRivlin(c10, c01, c11, data["density"] if density is None else density)

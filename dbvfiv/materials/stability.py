@@ -117,9 +117,7 @@ def hill_margin(law: Law, log_stretches) -> np.ndarray:
     """Least Hill modulus over 2 mu at given principal logarithmic strains (..., 3) -> (...)."""
     ln = np.asarray(log_stretches, dtype=float)
     valid = np.all(np.isfinite(ln), axis=-1)
-    moduli = np.tensordot(
-        hill_moduli(np.where(valid[..., None], ln, 0.0)), law.parameters[:3], axes=([-3], [0])
-    )
+    moduli = np.tensordot(hill_moduli(np.where(valid[..., None], ln, 0.0)), law.parameters[:3], axes=([-3], [0]))
     mean = 0.5 * (moduli[..., 0, 0] + moduli[..., 1, 1])
     lower = mean - np.hypot(0.5 * (moduli[..., 0, 0] - moduli[..., 1, 1]), moduli[..., 0, 1])
     shears = moduli[..., [2, 3, 4], [2, 3, 4]].min(axis=-1)

@@ -1,9 +1,9 @@
 """Reading a uniaxial tension test from a CSV file.
 
 The first line that is neither empty nor a comment (#) names the columns, each with its unit in
-brackets: ``engineering_strain [%], nominal_stress [MPa]``. Other columns are ignored; the order does not matter. A strain
-column may be replaced by ``stretch [-]``. Loading data only, from one cycle: which one is the
-user's choice (the thesis takes the fifth loading curve, Th. 3.2.1).
+brackets: ``engineering_strain [%], nominal_stress [MPa]``. Other columns are ignored; the order does not matter. A
+strain column may be replaced by ``stretch [-]``. Loading data only, from one cycle: which one is the user's choice (the
+thesis takes the fifth loading curve, Th. 3.2.1).
 """
 
 from __future__ import annotations
@@ -150,7 +150,5 @@ def _columns(path: Path, line: int, header: list[str]) -> dict[str, tuple[int, f
             f"nominal_stress [MPa], but it reads {', '.join(t.strip() for t in header)!r}."
         )
     if {"engineering_strain", "stretch"} <= set(found):
-        raise MaterialError(
-            f"Tension test {path}, line {line}: give either engineering_strain or stretch, not both."
-        )
+        raise MaterialError(f"Tension test {path}, line {line}: give either engineering_strain or stretch, not both.")
     return found

@@ -1,4 +1,5 @@
 """The coupled valve and its exact linearisation."""
+
 from .dynamics import Conditions, LinearisedState, dynamic_residual, linearise
 from .valve import Tangent, ValveModel
 

@@ -1,8 +1,10 @@
 """The dynamic residual once more, traceable, for its higher directional derivatives.
 
-Normal forms and sensitivities need derivatives that the compiled loops do not give. Inertia, flow and load of `dynamics.dynamic_residual` are one jax
-function of the motion and of the parameters here; the structure's forms come from the element energy.
+Normal forms and sensitivities need derivatives that the compiled loops do not give. Inertia, flow and load of
+`dynamics.dynamic_residual` are one jax function of the motion and of the parameters here; the structure's forms come
+from the element energy.
 """
+
 from __future__ import annotations
 
 from functools import partial
@@ -29,8 +31,9 @@ class AnalyticResidual:
     ----------
     model : ValveModel with flow
 
-    The residual is a vector (n + 1,): forces, then the outlet pressure. A motion is a tuple (q, v, a, velocity, velocity_rate), parameters a
-    dict with the keys of `PARAMETERS`. Second and third derivatives are taken about motions with v = 0. Lip stops are piecewise linear and have none.
+    The residual is a vector (n + 1,): forces, then the outlet pressure. A motion is a tuple (q, v, a, velocity,
+    velocity_rate), parameters a dict with the keys of `PARAMETERS`. Second and third derivatives are taken about
+    motions with v = 0. Lip stops are piecewise linear and have none.
     """
 
     def __init__(self, model: ValveModel):
@@ -101,7 +104,9 @@ class AnalyticResidual:
 
 
 def _form(form, q, *directions):
-    """A multilinear form of the structure, which dominates the costs; rates of velocity, for instance, have no part in it."""
+    """A multilinear form of the structure, which dominates the costs; rates of velocity, for instance, have no part in
+    it.
+    """
     return form(q, *directions) if all(np.any(direction) for direction in directions) else 0.0
 
 
@@ -163,9 +168,18 @@ def _remainder(static, motion, parameters, arrays):
     opening = lambda x, r: jax.jvp(areas, (x,), (r,))  # noqa: E731
     (area, area_rate), (_, area_acceleration) = jax.jvp(opening, (nodal, rate), (rate, acceleration))
     p = channel_pressure(
-        arrays["step"], arrays["floor"], parameters["storage"], unsteady, area, area_rate, area_acceleration, velocity, velocity_rate,
-        parameters["inlet"], parameters["density"],
-    )  # fmt: skip
+        arrays["step"],
+        arrays["floor"],
+        parameters["storage"],
+        unsteady,
+        area,
+        area_rate,
+        area_acceleration,
+        velocity,
+        velocity_rate,
+        parameters["inlet"],
+        parameters["density"],
+    )
     load = _pressure_force(nodal, p.at[0].set(0.0)[arrays["stations"]], arrays)
     force = _inertia(nodal, rate, acceleration, parameters["alpha"], arrays) - load
     return jnp.concatenate([force.ravel()[arrays["free"]], p[:1]])

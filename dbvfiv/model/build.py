@@ -1,4 +1,5 @@
 """From a case to the shell it describes."""
+
 from __future__ import annotations
 
 from ..case.model import Case

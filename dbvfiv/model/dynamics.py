@@ -1,10 +1,13 @@
-"""The valve in motion: the time-dependent residual of the coupled system and its exact linearisation about a steady state.
+"""The valve in motion: the time-dependent residual of the coupled system and its exact linearisation about a steady
+state.
 
     M(q) a + h(q, v) + alpha M v + beta K_s(q) v + f(q) - G(q) p = 0,     p_outlet = 0
 
-with h the inertia quadratic in the velocities (turning directors), K_s the structure's own tangent, and p the station pressures of the unsteady flow
-through the areas A(q) with rates A' = J v and A'' = J a + d2A[v, v]. The unknowns are q and the inlet velocity U.
+with h the inertia quadratic in the velocities (turning directors), K_s the structure's own tangent, and p the station
+pressures of the unsteady flow through the areas A(q) with rates A' = J v and A'' = J a + d2A[v, v]. The unknowns are q
+and the inlet velocity U.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -36,11 +39,13 @@ class Conditions:
     beta: float
 
     @classmethod
-    def of(cls, case) -> "Conditions":
+    def of(cls, case) -> Conditions:
         return cls(case.fluid.density, case.damping.alpha, case.damping.beta)
 
 
-def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q, v, a, velocity: float, velocity_rate: float):
+def dynamic_residual(
+    model: ValveModel, conditions: Conditions, inlet: float, q, v, a, velocity: float, velocity_rate: float
+):
     """Residual of the coupled equations of motion.
 
     Parameters
@@ -62,12 +67,22 @@ def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q,
     nodal, nodal_rate = model.nodal(q), model.nodal(v)
     force, structure = model.structure(q)
     mass = matrix(model.mass(q))
-    force += mass @ (a + conditions.alpha * v) + conditions.beta * (matrix(structure) @ v) + model.shell.convective_inertia(q, v)
+    force += (
+        mass @ (a + conditions.alpha * v)
+        + conditions.beta * (matrix(structure) @ v)
+        + model.shell.convective_inertia(q, v)
+    )
     slope = model.rows.jacobian(nodal)
     area = model.rows.areas(nodal)
     if isinstance(model.flow, Channel):
         p = model.flow.pressure(
-            area, slope @ v, slope @ a + model.rows.second(nodal_rate, nodal_rate), velocity, velocity_rate, inlet, conditions.density
+            area,
+            slope @ v,
+            slope @ a + model.rows.second(nodal_rate, nodal_rate),
+            velocity,
+            velocity_rate,
+            inlet,
+            conditions.density,
         )
         outlet = float(p[0])
         p = p.copy()
@@ -106,7 +121,9 @@ class LinearisedState:
     _damped: dict = field(default_factory=dict, repr=False, compare=False)
 
     def damped(self, alpha: float, beta: float) -> CoupledPencil:
-        """The pencil with damping C = alpha M + beta K_s but no fluid; the last one is kept, so a sweep over the fluid reuses it."""
+        """The pencil with damping C = alpha M + beta K_s but no fluid; the last one is kept, so a sweep over the fluid
+        reuses it.
+        """
         if (alpha, beta) not in self._damped:
             self._damped.clear()
             damping = alpha * self.mass + beta * self.structure
@@ -120,7 +137,8 @@ class LinearisedState:
         ----------
         conditions : Conditions
         fluid : bool
-            False leaves the fluid out altogether: motions in vacuo of the stressed structure, the steady pressures kept as follower loads.
+            False leaves the fluid out altogether: motions in vacuo of the stressed structure, the steady pressures kept
+            as follower loads.
         storage : float, optional
             Blend of the continuity laws, 0 quasi-steady to 1 storage; the model's own by default.
         """
@@ -136,7 +154,9 @@ class LinearisedState:
         return damped.replace(**parts)
 
 
-def fluid_parts(flow: Channel, area: np.ndarray, inlet: float, density: float, storage: float, velocity: float | None = None) -> dict:
+def fluid_parts(
+    flow: Channel, area: np.ndarray, inlet: float, density: float, storage: float, velocity: float | None = None
+) -> dict:
     """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow or at a given inlet velocity."""
     if storage != flow.storage:
         flow = Channel(flow.z, flow.floor, storage, flow.unsteady)
@@ -164,4 +184,6 @@ def linearise(model: ValveModel, q: np.ndarray, inlet: float) -> LinearisedState
     tangent = model.tangent(q, inlet)
     stiffness, forces, slope = model.matrices(tangent)
     matrix = model.shell.dofs.matrix
-    return LinearisedState(model, q, inlet, matrix(model.mass(q)), matrix(tangent.structure), stiffness, forces, slope, tangent.area)
+    return LinearisedState(
+        model, q, inlet, matrix(model.mass(q)), matrix(tangent.structure), stiffness, forces, slope, tangent.area
+    )

@@ -1,14 +1,17 @@
 """Sparse direct solves of the coupled tangent K - G D J without ever forming its dense part.
 
-The pressures couple every row of the mesh to the rows upstream, so K - G D J would be full. Keeping row areas y and station pressures p as unknowns
+The pressures couple every row of the mesh to the rows upstream, so K - G D J would be full. Keeping row areas y and
+station pressures p as unknowns
 
     [ K   0  -G   0 ] [q]   [r]
     [-J   I   0   0 ] [y] = [0]
     [ 0  -D   I  -B ] [p]   [0]
     [ 0   R   0   S ] [u]   [s]
 
-gives the same q with a sparse matrix hardly larger than K. The last row and column are there if the fluid has unknowns of its own.
+gives the same q with a sparse matrix hardly larger than K. The last row and column are there if the fluid has unknowns
+of its own.
 """
+
 from __future__ import annotations
 
 import weakref
@@ -51,7 +54,9 @@ class DirectFactor:
         self.size = len(indptr) - 1
         self._data = np.zeros(len(indices), PETSc.ScalarType)  # real numbers, whatever PETSc's scalars
         indptr, indices = np.ascontiguousarray(indptr, PETSc.IntType), np.ascontiguousarray(indices, PETSc.IntType)
-        self._matrix = PETSc.Mat().createAIJWithArrays((self.size, self.size), (indptr, indices, self._data), comm=PETSc.COMM_SELF)
+        self._matrix = PETSc.Mat().createAIJWithArrays(
+            (self.size, self.size), (indptr, indices, self._data), comm=PETSc.COMM_SELF
+        )
         self._keep = (indptr, indices)
         self._solver = PETSc.KSP().create(PETSc.COMM_SELF)
         self._solver.setType("preonly")
@@ -61,7 +66,8 @@ class DirectFactor:
         self._pc.setFactorSolverType(direct_solver())
         self._rhs, self._solution = self._matrix.createVecs()
         self.factorisations = 0
-        # PETSc keeps what Python lets go of, factors included, until it is told; runs that start afresh often would fill the memory
+        # PETSc keeps what Python lets go of, factors included, until it is told; runs that start afresh often would
+        # fill the memory
         release = weakref.finalize(self, _release, self._pc, self._solver, self._matrix, self._rhs, self._solution)
         release.atexit = False
 
@@ -145,7 +151,9 @@ class CoupledFactor:
                 [None, dense(number[4], m, m), sp.diags(number[5])],
             ]
             if inner:
-                blocks = [row + [None] for row in blocks] + [[None, dense(number[7], inner, m), None, dense(number[8], inner, inner)]]
+                blocks = [row + [None] for row in blocks] + [
+                    [None, dense(number[7], inner, m), None, dense(number[8], inner, inner)]
+                ]
                 blocks[2][3] = dense(number[6], m, inner)
             whole = sp.bmat(blocks, format="csr")
         else:

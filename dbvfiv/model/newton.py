@@ -1,4 +1,5 @@
 """Equilibrium at one pressure: globalised Newton by PETSc's SNES on the coupled residual, solved directly."""
+
 from __future__ import annotations
 
 import weakref
@@ -34,10 +35,11 @@ class NewtonOptions:
         Largest norm of the residual over that of the pressure forces.
     max_iterations : int
     line_search : str
-        A SNES line search. Full steps ("basic") serve shells best: the residual rises before it falls, as membrane forces follow bending, so
-        searches on its norm crawl; load steps catch what diverges.
+        A SNES line search. Full steps ("basic") serve shells best: the residual rises before it falls, as membrane
+        forces follow bending, so searches on its norm crawl; load steps catch what diverges.
     largest_step : float
-        Largest norm of one Newton step over that of the valve's length per root of the node count; guards against wild first steps.
+        Largest norm of one Newton step over that of the valve's length per root of the node count; guards against wild
+        first steps.
     """
 
     tolerance: float = 1e-8
@@ -114,7 +116,8 @@ class EquilibriumSolver:
         snes.setFromOptions()
         for key in ("snes_linesearch_type", "snes_linesearch_maxstep"):
             settings.delValue(key)
-        # left alone, it would be freed by PETSc when Python has ended already, and its preconditioner is Python's: a crash at the end of the program
+        # left alone, it would be freed by PETSc when Python has ended already, and its preconditioner is Python's: a
+        # crash at the end of the program
         weakref.finalize(self, snes.destroy)
 
     def solve(self, start: np.ndarray, pressure: float) -> NewtonResult:
@@ -140,7 +143,8 @@ class EquilibriumSolver:
         """Derivative (n,) of the equilibrium with respect to pressure, from the factors of the last tangent."""
         return -self.factor.solve(self.model.pressure_derivative(q, pressure))
 
-    # -- what SNES calls ------------------------------------------------------------------------------------------------------------
+    # -- what SNES calls
+    # ----
 
     def _evaluate(self, snes, x, f):
         self.residuals += 1

@@ -1,4 +1,5 @@
 """Where the valve is held: clamped flange, symmetry planes and one-sided lip stops."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -2,14 +2,16 @@
 
     q' = v,    (M - G A2 J) v' - G B1 U' = -r(q, v, U),    R2 J v' + S1 U' = -p_outlet(q, v, U)
 
-Rates of velocity enter linearly, so the mass matrix depends on the state only. Parameters: inlet pressure, fluid density, Rayleigh alpha and beta, and the
-blend of the continuity laws; whatever else a case holds is a design parameter, for which the model is built anew.
+Rates of velocity enter linearly, so the mass matrix depends on the state only. Parameters: inlet pressure, fluid
+density, Rayleigh alpha and beta, and the blend of the continuity laws; whatever else a case holds is a design
+parameter, for which the model is built anew.
 """
+
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from typing import Callable
 
 import numpy as np
 
@@ -36,7 +38,12 @@ class ValveSystem(SystemBase):
 
     constant_mass = False
 
-    def __init__(self, model: ValveModel, rebuild: Callable[[dict], ValveModel] | None = None, search: SearchOptions | None = None):
+    def __init__(
+        self,
+        model: ValveModel,
+        rebuild: Callable[[dict], ValveModel] | None = None,
+        search: SearchOptions | None = None,
+    ):
         self._base = model
         self._rebuild = rebuild
         self._models: dict[tuple, ValveModel] = {(): model}
@@ -45,7 +52,8 @@ class ValveSystem(SystemBase):
         self._length = float(np.ptp(model.mesh.nodes[:, 2]))
         self.size = 2 * model.size + 1
 
-    # -- layout ---------------------------------------------------------------------------------------------------------------------
+    # -- layout
+    # ----
 
     def state(self, q: np.ndarray, mu) -> np.ndarray:
         """State u of a steady valve with displacements q."""
@@ -59,7 +67,9 @@ class ValveSystem(SystemBase):
 
     @cached_property
     def state_weights(self) -> np.ndarray:
-        """Weights of the arclength: displacements over the valve's length, per unknown; velocities follow from them at steady states."""
+        """Weights of the arclength: displacements over the valve's length, per unknown; velocities follow from them at
+        steady states.
+        """
         n = self._base.size
         weights = np.zeros(self.size)
         weights[:n] = 1.0 / (n * self._length**2) * 1e4
@@ -75,7 +85,9 @@ class ValveSystem(SystemBase):
     def _models_get(self, key: tuple) -> ValveModel:
         if key not in self._models:
             if self._rebuild is None:
-                raise ValueError(f"This valve cannot be rebuilt for the parameters {', '.join(name for name, _ in key)}.")
+                raise ValueError(
+                    f"This valve cannot be rebuilt for the parameters {', '.join(name for name, _ in key)}."
+                )
             if len(self._models) > 8:
                 self._models = {(): self._base}
                 self._residuals = {}
@@ -102,13 +114,14 @@ class ValveSystem(SystemBase):
         return (np.zeros(n), np.zeros(n), u_rate[n : 2 * n], 0.0, u_rate[2 * n])
 
     def _still(self, u, mu):
-        """Motion and parameters of a state at rest; derivatives of others are not needed, since equilibria do not move."""
+        """Motion and parameters of a state at rest; others are not needed, since equilibria do not move."""
         motion, parameters = self._at(u, mu)
         if np.any(motion[1]):
             raise OutOfDomain("The valve moves, and derivatives are taken at rest.")
         return motion, parameters
 
-    # -- the contract ---------------------------------------------------------------------------------------------------------------
+    # -- the contract
+    # ----
 
     def residual(self, u, mu):
         motion, parameters = self._at(u, mu)
@@ -119,13 +132,19 @@ class ValveSystem(SystemBase):
     def residual_norm(self, residual) -> float:
         """Largest of the force imbalance over the load of 1 Pa, outlet pressure in Pa and velocity mismatch."""
         n = self._base.size
-        return float(max(np.linalg.norm(residual[n : 2 * n]) / self._unit_load, abs(residual[2 * n]), np.abs(residual[:n]).max() / self._length))
+        return float(
+            max(
+                np.linalg.norm(residual[n : 2 * n]) / self._unit_load,
+                abs(residual[2 * n]),
+                np.abs(residual[:n]).max() / self._length,
+            )
+        )
 
     @cached_property
     def _unit_load(self) -> float:
         return self._base.force_scale(self._base.rest(), 1.0)
 
-    def linear(self, u, mu) -> "ValveLinearisation":
+    def linear(self, u, mu) -> ValveLinearisation:
         q, v, velocity = self.split(np.asarray(u, float))
         model = self.model(mu)
         pencil = pencil_at(model, q, velocity, mu)
@@ -135,12 +154,16 @@ class ValveSystem(SystemBase):
         if name not in PARAMETERS:
             return super().d_parameter(u, mu, name)
         motion, parameters = self._still(u, mu)
-        return np.concatenate([np.zeros(self._base.size), -self._analytic(mu).parameter_slope(motion, parameters, name)])
+        return np.concatenate(
+            [np.zeros(self._base.size), -self._analytic(mu).parameter_slope(motion, parameters, name)]
+        )
 
     def d2(self, u, mu, a, b):
         motion, parameters = self._still(u, mu)
         n = self._base.size
-        return np.concatenate([np.zeros(n), -self._analytic(mu).second(motion, parameters, self._static(a, n), self._static(b, n))])
+        return np.concatenate(
+            [np.zeros(n), -self._analytic(mu).second(motion, parameters, self._static(a, n), self._static(b, n))]
+        )
 
     def d3(self, u, mu, a, b, c):
         motion, parameters = self._still(u, mu)
@@ -158,7 +181,9 @@ class ValveSystem(SystemBase):
     def mass_d(self, u, mu, c, a):
         motion, parameters = self._still(u, mu)
         n = self._base.size
-        return np.concatenate([np.zeros(n), self._analytic(mu).second(motion, parameters, self._rates(c, n), self._static(a, n))])
+        return np.concatenate(
+            [np.zeros(n), self._analytic(mu).second(motion, parameters, self._rates(c, n), self._static(a, n))]
+        )
 
     def mass_d2(self, u, mu, c, a, b):
         motion, parameters = self._still(u, mu)
@@ -245,7 +270,7 @@ class ValveLinearisation:
         v = real_apply(p.M.T.tocsr(), w) + real_apply(p.J.T.tocsr(), p.R2.T @ c - p.A2.T @ t)
         return np.concatenate([a, v, p.S1.T @ c - p.B1.T @ t])
 
-    def shifted(self, shift: complex) -> "_Shifted":
+    def shifted(self, shift: complex) -> _Shifted:
         return _Shifted(self, shift)
 
     def _zero(self):
@@ -261,7 +286,9 @@ class ValveLinearisation:
 
 
 def _factored(pencil: CoupledPencil, shift: complex):
-    """LU at a shift, a hair beside it where an eigenvalue sits on it to rounding: products use the exact shift, so bordered solves refine themselves."""
+    """LU at a shift, a hair beside it where an eigenvalue sits on it to rounding: products use the exact shift, so
+    bordered solves refine themselves.
+    """
     size = max(abs(shift), 1.0)
     for nudge in (0.0, 1e-9, -1e-8):
         try:

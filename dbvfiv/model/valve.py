@@ -1,12 +1,14 @@
 """The coupled valve: one contract for equilibria, spectra, branches and time histories.
 
-State q (n,): free displacements (m) and rotations (rad) of the quarter model. Row areas and station pressures are functions of it, so the equilibrium is
+State q (n,): free displacements (m) and rotations (rad) of the quarter model. Row areas and station pressures are
+functions of it, so the equilibrium is
 
     r(q; P) = f_shell(q) + f_stops(q) - G(q) p(A(q); P) = 0
 
-with the columns of G the forces of unit station pressures. The tangent is K - G D J: K holds shell, stops and the follower stiffness of the present
-pressures, J the derivative of the areas, D that of the pressures.
+with the columns of G the forces of unit station pressures. The tangent is K - G D J: K holds shell, stops and the
+follower stiffness of the present pressures, J the derivative of the areas, D that of the pressures.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -17,6 +19,7 @@ import scipy.sparse as sp
 
 from ..case.model import Case
 from ..flow import Channel, RowAreas, UniformLoad
+from ..geometry import ValveMesh
 from ..shell import Section
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_shell
@@ -83,7 +86,8 @@ class ValveModel:
             self.flow = UniformLoad(len(self.mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
         self._stop_slots = dofs.diagonal_slots[self.stops.unknowns]
 
-    # -- layout ---------------------------------------------------------------------------------------------------------------------
+    # -- layout
+    # ----
 
     @property
     def size(self) -> int:
@@ -102,7 +106,8 @@ class ValveModel:
         """Nodal displacements and rotations (nn, 5)."""
         return self.shell.dofs.expand(q)
 
-    # -- statics --------------------------------------------------------------------------------------------------------------------
+    # -- statics
+    # ----
 
     def residual(self, q: np.ndarray, pressure: float) -> np.ndarray:
         """Unbalanced force (n,) at an inlet pressure, Pa."""
@@ -209,7 +214,7 @@ class ValveModel:
         return float(np.finfo(float).eps * np.linalg.norm(stiffness @ self.shell.dofs.restrict(position)))
 
     def pressure_derivative(self, q: np.ndarray, pressure: float) -> np.ndarray:
-        """Derivative (n,) of the residual with respect to the inlet pressure; steady pressures are proportional to it."""
+        """Derivative (n,) of the residual by the inlet pressure; steady pressures are proportional to it."""
         nodal = self.nodal(q)
         unit = self.flow.steady_pressure(self.rows.areas(nodal), 1.0)
         return -self.pressure_force(nodal, unit)
@@ -220,7 +225,8 @@ class ValveModel:
         p = self.flow.steady_pressure(self.rows.areas(nodal), pressure)
         return float(np.linalg.norm(self.pressure_force(nodal, p)))
 
-    # -- dynamics -------------------------------------------------------------------------------------------------------------------
+    # -- dynamics
+    # ----
 
     def mass(self, q: np.ndarray) -> np.ndarray:
         """Values (nnz,) of the mass matrix at a state."""

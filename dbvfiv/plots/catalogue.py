@@ -1,14 +1,16 @@
 """Which figures a result has.
 
-A figure family is a module with ``draw(result, **choices)``, which yields names and functions that draw. A study registers its families here, under
-the kind of its result; choices that a family does not take are not handed to it.
+A figure family is a module with ``draw(result, **choices)``, which yields names and functions that draw. A study
+registers its families here, under the kind of its result; choices that a family does not take are not handed to it.
 """
+
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 from ..errors import CaseError
 
@@ -29,7 +31,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 FORMATS = ("png", "svg")
 
 
-def figures_of(result: "Result", only: Sequence[str] = (), **choices: Any) -> "dict[str, Figure]":
+def figures_of(result: Result, only: Sequence[str] = (), **choices: Any) -> dict[str, Figure]:
     """Figures of a result by name.
 
     Parameters
@@ -56,7 +58,7 @@ def figures_of(result: "Result", only: Sequence[str] = (), **choices: Any) -> "d
         return {name: drawer() for name, drawer in drawers.items() if not only or name in only}
 
 
-def save_figures(result: "Result", folder: str | Path = ".", format: str = "png", **choices: Any) -> list[Path]:
+def save_figures(result: Result, folder: str | Path = ".", format: str = "png", **choices: Any) -> list[Path]:
     """Draw the figures of a result into files NAME.FORMAT of a folder.
 
     Raises
@@ -82,7 +84,7 @@ def save_figures(result: "Result", folder: str | Path = ".", format: str = "png"
     return written
 
 
-def _drawers(result: "Result", choices: dict[str, Any]) -> "Iterator[tuple[str, Callable[[], Figure]]]":
+def _drawers(result: Result, choices: dict[str, Any]) -> Iterator[tuple[str, Callable[[], Figure]]]:
     if not getattr(result, "states", True):
         return
     for family in FAMILIES.get(result.kind, ()):

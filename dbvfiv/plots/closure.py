@@ -1,7 +1,9 @@
 """The valve under back pressure in space: side views, contact on the unrolled wall, the shape it buckles into."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -18,11 +20,12 @@ from .style import MAGNITUDE, kilopascals, new_figure, some_of
 if TYPE_CHECKING:
     from ..results.closure import ClosureResults, PressedState
 
-#: Contact pressures above this multiple of the back pressure share a colour: they stand at single nodes beside the fold of the side edge.
+#: Contact pressures above this multiple of the back pressure share a colour: they stand at single nodes beside the fold
+#: of the side edge.
 _CLIP = 4.0
 
 
-def draw(result: "ClosureResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a closure result, each with its name."""
     yield "side-views", lambda: side_views(result)
     if any(state.contact_nodes for state in result.states):
@@ -31,8 +34,10 @@ def draw(result: "ClosureResults") -> Iterator[tuple[str, Callable[[], Figure]]]
         yield "buckling-shape", lambda: buckling_shape(result)
 
 
-def side_views(result: "ClosureResults") -> Figure:
-    """Valve seen from the side at up to four back pressures, coloured by displacement, with a view in space (compare Fig. 3-21 of the thesis)."""
+def side_views(result: ClosureResults) -> Figure:
+    """Valve seen from the side at up to four back pressures, coloured by displacement, with a view in space (compare
+    Fig. 3-21 of the thesis).
+    """
     states = some_of(sorted(result.states, key=lambda s: s.pressure), 4)
     valve = WholeValve.of(result.mesh)
     rows = -(-len(states) // 2)
@@ -41,9 +46,13 @@ def side_views(result: "ClosureResults") -> Figure:
     scale = Normalize(0.0, max(s.max_displacement for s in states) * 1e3)
     for letter, axes, state in zip("abcd", panels, states):
         _side(axes, valve, state, scale)
-        axes.set_title(f"({letter}) {kilopascals(state.pressure)}, largest {state.max_displacement * 1e3:.1f} mm", loc="left", fontsize=10)
+        axes.set_title(
+            f"({letter}) {kilopascals(state.pressure)}, largest {state.max_displacement * 1e3:.1f} mm",
+            loc="left",
+            fontsize=10,
+        )
         _inset(figure, axes, valve, state, scale)
-    for axes in panels[len(states):]:
+    for axes in panels[len(states) :]:
         axes.set_visible(False)
     for axes in panels[: len(states)][-2:]:
         axes.set_xlabel("Distance from the lip z, mm")
@@ -57,14 +66,16 @@ def side_views(result: "ClosureResults") -> Figure:
     return figure
 
 
-def _side(axes, valve: WholeValve, state: "PressedState", scale: Normalize) -> None:
+def _side(axes, valve: WholeValve, state: PressedState, scale: Normalize) -> None:
     """Projection along x of the half that faces the viewer, far quadrilaterals first."""
     points, size = _moved(valve, state)
     corners = points[valve.quads] * 1e3
     near = np.flatnonzero(valve.points[valve.quads][:, :, 0].mean(axis=1) >= 0)
     order = near[np.argsort(corners[near][:, :, 0].mean(axis=1))]
     colours = COLOURS(scale(size[valve.quads[order]].mean(axis=1)))
-    axes.add_collection(PolyCollection(corners[order][:, :, [2, 1]], facecolors=colours, edgecolors="0.25", linewidths=0.15))
+    axes.add_collection(
+        PolyCollection(corners[order][:, :, [2, 1]], facecolors=colours, edgecolors="0.25", linewidths=0.15)
+    )
     quarter = state.results.mesh
     rest = quarter.nodes[quarter.rows[:, 0]] * 1e3
     axes.plot(rest[:, 2], rest[:, 1], "--", color="0.5", lw=0.9)
@@ -74,7 +85,7 @@ def _side(axes, valve: WholeValve, state: "PressedState", scale: Normalize) -> N
     axes.set_ylim(-155, 195)
 
 
-def _inset(figure: Figure, axes, valve: WholeValve, state: "PressedState", scale: Normalize) -> None:
+def _inset(figure: Figure, axes, valve: WholeValve, state: PressedState, scale: Normalize) -> None:
     points, size = _moved(valve, state)
     corners = points[valve.quads][:, :, [2, 0, 1]]
     small = axes.inset_axes([0.0, 0.56, 0.5, 0.46], projection="3d", computed_zorder=False)
@@ -89,7 +100,7 @@ def _inset(figure: Figure, axes, valve: WholeValve, state: "PressedState", scale
     small.patch.set_alpha(0.0)
 
 
-def contact_map(result: "ClosureResults") -> Figure:
+def contact_map(result: ClosureResults) -> Figure:
     """Contact pressure on the unrolled inner face of a quarter at up to four back pressures."""
     states = some_of(sorted((s for s in result.states if s.contact_nodes), key=lambda s: s.pressure), 4)
     mesh = result.mesh
@@ -101,11 +112,23 @@ def contact_map(result: "ClosureResults") -> Figure:
     scale = Normalize(0.0, _CLIP)
     for axes, state in zip(panels, states):
         ratio = state.contact_pressure[mesh.rows] / state.pressure
-        axes.pcolormesh(arc[: last + 1], z[: last + 1], ratio[: last + 1], shading="gouraud", cmap=MAGNITUDE, norm=scale, rasterized=True)
+        axes.pcolormesh(
+            arc[: last + 1],
+            z[: last + 1],
+            ratio[: last + 1],
+            shading="gouraud",
+            cmap=MAGNITUDE,
+            norm=scale,
+            rasterized=True,
+        )
         touching = ratio > 0
         axes.plot(arc[touching], z[touching], ".", ms=1.6, color="white", alpha=0.7)
         axes.axhline(result.case.valve.duckbill_length * 1e3, color="0.6", lw=0.8, ls=":")
-        axes.set_title(f"{kilopascals(state.pressure)}\n{state.contact_force:.0f} N on {state.sealed_area * 1e4:.0f} cm²", loc="left", fontsize=10)
+        axes.set_title(
+            f"{kilopascals(state.pressure)}\n{state.contact_force:.0f} N on {state.sealed_area * 1e4:.0f} cm²",
+            loc="left",
+            fontsize=10,
+        )
         axes.set_xlabel("Arc from the centre, mm")
         axes.grid(False)
         axes.set_xlim(0, arc[: last + 1].max())
@@ -118,7 +141,7 @@ def contact_map(result: "ClosureResults") -> Figure:
     return figure
 
 
-def buckling_shape(result: "ClosureResults") -> Figure:
+def buckling_shape(result: ClosureResults) -> Figure:
     """The first buckling state and the shape it leaves it by, exaggerated."""
     first, mesh = result.buckling[0], result.mesh
     valve = WholeValve.of(mesh)
@@ -144,21 +167,25 @@ def buckling_shape(result: "ClosureResults") -> Figure:
     right.plot(*moved[:, :2].T * 1e3, color="#1f4e79", label="buckling state")
     for sign in (1, -1):
         there = moved + sign * 0.015 * mode[row]
-        right.plot(*there[:, :2].T * 1e3, color="#c0392b", lw=1.1, ls=":", label="± 15 mm of the shape" if sign > 0 else None)
+        right.plot(
+            *there[:, :2].T * 1e3, color="#c0392b", lw=1.1, ls=":", label="± 15 mm of the shape" if sign > 0 else None
+        )
     right.set_aspect("equal")
     right.set_xlabel("x, mm")
     right.set_ylabel("y, mm")
     right.set_title(f"Section at z = {rest[0, 2] * 1e3:.0f} mm, where the shape is largest", loc="left", fontsize=10)
     right.legend(loc="lower left")
-    figure.suptitle(f"Buckling at {kilopascals(first.pressure)} ({first.kind}), {_supports(result)}", fontweight="bold", fontsize=11)
+    figure.suptitle(
+        f"Buckling at {kilopascals(first.pressure)} ({first.kind}), {_supports(result)}", fontweight="bold", fontsize=11
+    )
     return figure
 
 
-def _moved(valve: WholeValve, state: "PressedState") -> tuple[np.ndarray, np.ndarray]:
+def _moved(valve: WholeValve, state: PressedState) -> tuple[np.ndarray, np.ndarray]:
     """Positions (np, 3), m, and sizes of displacement (np,), mm."""
     shift = valve.vectors(state.nodal[:, :3])
     return valve.points + shift, np.linalg.norm(shift, axis=1) * 1e3
 
 
-def _supports(result: "ClosureResults") -> str:
+def _supports(result: ClosureResults) -> str:
     return "contact of the inner faces" if result.supports == "contact" else "supports of Th. 3.6"

@@ -1,7 +1,9 @@
 """Curves over the back pressure: passage left, sealed length, contact force, stiffness."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,7 +14,7 @@ if TYPE_CHECKING:
     from ..results.closure import ClosureResults
 
 
-def draw(result: "ClosureResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a closure result, each with its name."""
     if result.walk:
         yield "closure-curve", lambda: closure_curve(result)
@@ -23,7 +25,7 @@ def draw(result: "ClosureResults") -> Iterator[tuple[str, Callable[[], Figure]]]
         yield "reversal-in-time", lambda: in_time(result)
 
 
-def closure_curve(result: "ClosureResults") -> Figure:
+def closure_curve(result: ClosureResults) -> Figure:
     """Sealed length, contact force, deepest displacement and lowest stiffness over the back pressure."""
     figure = new_figure(9.0, 6.4)
     panels = figure.subplots(2, 2, sharex=True).ravel()
@@ -50,7 +52,14 @@ def closure_curve(result: "ClosureResults") -> Figure:
     for b in result.buckling[:1]:
         for axes in panels:
             axes.axvline(b.pressure / 1e3, color=PUBLISHED, lw=1.0, ls="--")
-        stiffness.annotate(f"{b.kind}, {kilopascals(b.pressure)}", (b.pressure / 1e3, 0), (6, 8), textcoords="offset points", color=PUBLISHED, fontsize=9)
+        stiffness.annotate(
+            f"{b.kind}, {kilopascals(b.pressure)}",
+            (b.pressure / 1e3, 0),
+            (6, 8),
+            textcoords="offset points",
+            color=PUBLISHED,
+            fontsize=9,
+        )
     for axes in panels:
         for state in result.states:
             axes.axvline(state.pressure / 1e3, color="0.85", lw=0.8, zorder=0)
@@ -60,7 +69,7 @@ def closure_curve(result: "ClosureResults") -> Figure:
     return figure
 
 
-def passage(result: "ClosureResults") -> Figure:
+def passage(result: ClosureResults) -> Figure:
     """Passage left between the inner faces along the axis."""
     figure = new_figure(7.2, 4.4)
     axes = figure.add_subplot()
@@ -68,7 +77,14 @@ def passage(result: "ClosureResults") -> Figure:
     z = result.mesh.z * 1e3
     least = 1e-8  # m2; below that a passage is shut for any purpose
     for state, colour in zip(states, pressure_colours([s.pressure for s in states])):
-        axes.semilogy(z, np.maximum(4 * state.opening, least) * 1e6, color=colour, marker=".", ms=3, label=kilopascals(state.pressure))
+        axes.semilogy(
+            z,
+            np.maximum(4 * state.opening, least) * 1e6,
+            color=colour,
+            marker=".",
+            ms=3,
+            label=kilopascals(state.pressure),
+        )
     axes.axhline(result.reference_opening * 1e6, color=REST, lw=1.0, ls="--", label="lip at rest")
     limit = result.case.closure.shut_fraction * result.reference_opening
     axes.axhline(limit * 1e6, color=ACCENT, lw=1.0, ls=":", label="counts as shut below")
@@ -80,8 +96,8 @@ def passage(result: "ClosureResults") -> Figure:
     return figure
 
 
-def reversal(result: "ClosureResults") -> Figure:
-    """From flow to back pressure: opening of the lips and position of the saddle as the drive is turned round, slowly."""
+def reversal(result: ClosureResults) -> Figure:
+    """From flow to back pressure: opening of the lips and position of the saddle as the drive turns round slowly."""
     figure = new_figure(7.2, 4.6)
     axes = figure.add_subplot()
     opened = sorted(result.opened, key=lambda s: -s.pressure)
@@ -100,7 +116,7 @@ def reversal(result: "ClosureResults") -> Figure:
     return figure
 
 
-def in_time(result: "ClosureResults") -> Figure:
+def in_time(result: ClosureResults) -> Figure:
     """Drive, lip, narrowest passage, flow and contact force while the drive turns round."""
     closing = result.closing
     figure = new_figure(8.4, 8.0)
@@ -111,9 +127,12 @@ def in_time(result: "ClosureResults") -> Figure:
 
     t = values("time", 1.0)
     curves = (
-        ("inlet_pressure", 1e-3, "Drive, kPa"), ("lip_opening", 1e3, "Lip, mm"), ("least_opening", 1e6, "Passage, mm²"),
-        ("mass_flow", 1.0, "Flow, kg/s"), ("contact_force", 1.0, "Contact, N"),
-    )  # fmt: skip
+        ("inlet_pressure", 1e-3, "Drive, kPa"),
+        ("lip_opening", 1e3, "Lip, mm"),
+        ("least_opening", 1e6, "Passage, mm²"),
+        ("mass_flow", 1.0, "Flow, kg/s"),
+        ("contact_force", 1.0, "Contact, N"),
+    )
     for axes, (name, factor, label) in zip(panels, curves):
         axes.plot(t, values(name, factor), color=COMPUTED, lw=1.4)
         axes.set_ylabel(label)
@@ -129,7 +148,7 @@ def in_time(result: "ClosureResults") -> Figure:
     return figure
 
 
-def supports_compared(first: "ClosureResults", second: "ClosureResults") -> Figure:
+def supports_compared(first: ClosureResults, second: ClosureResults) -> Figure:
     """Front of contact, displacement, stiffness and centre line with two kinds of supports."""
     figure = new_figure(9.6, 6.8)
     panels = figure.subplots(2, 2).ravel()
@@ -154,16 +173,33 @@ def supports_compared(first: "ClosureResults", second: "ClosureResults") -> Figu
     line.legend(loc="upper left")
     line.set_xlabel("Distance from the lip z, mm")
     line.set_ylabel("Mid-surface on the centre line y, mm")
-    for axes, label in ((front, "Front of contact on the centre line, mm"), (moved, "Largest displacement, mm"), (stiffness, "Lowest stiffness eigenvalue, 10³ 1/s²")):
+    for axes, label in (
+        (front, "Front of contact on the centre line, mm"),
+        (moved, "Largest displacement, mm"),
+        (stiffness, "Lowest stiffness eigenvalue, 10³ 1/s²"),
+    ):
         axes.set_xlabel("Back pressure, kPa")
         axes.set_ylabel(label)
     front.axvline(21.0, color=REST, lw=0.9, ls=":")
-    front.annotate("saddle touches, Th. 3.6", (21.0, front.get_ylim()[1]), (-4, -4), textcoords="offset points", ha="right", va="top", fontsize=8.5, color="0.35")
+    front.annotate(
+        "saddle touches, Th. 3.6",
+        (21.0, front.get_ylim()[1]),
+        (-4, -4),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=8.5,
+        color="0.35",
+    )
     front.legend(loc="center left")
     pressures = ", ".join(f"{s.pressure / 1e3:g}" for s in first.states)
-    figure.suptitle(f"Contact of the inner faces and the supports of Th. 3.6 (centre lines at {pressures} kPa)", fontweight="bold", fontsize=11)
+    figure.suptitle(
+        f"Contact of the inner faces and the supports of Th. 3.6 (centre lines at {pressures} kPa)",
+        fontweight="bold",
+        fontsize=11,
+    )
     return figure
 
 
-def _supports(result: "ClosureResults") -> str:
+def _supports(result: ClosureResults) -> str:
     return "contact of the inner faces" if result.supports == "contact" else "supports of Th. 3.6"

@@ -1,7 +1,9 @@
 """The deformed valve in space."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -22,13 +24,13 @@ COLOURS = ListedColormap(matplotlib.colormaps["turbo"](np.linspace(0.08, 0.95, 2
 _LIGHT = np.array([-0.35, -0.45, 0.82])
 
 
-def draw(result: "SteadyResults", pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SteadyResults, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
     state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
     yield "deformed", lambda: deformed(state)
 
 
-def deformed(state: "State") -> Figure:
+def deformed(state: State) -> Figure:
     """Whole valve, true to scale, coloured by displacement (compare Fig. 7-11 of the thesis)."""
     valve = WholeValve.of(state.results.mesh)
     shift = valve.vectors(state.nodal[:, :3])
@@ -39,17 +41,20 @@ def deformed(state: "State") -> Figure:
     scale = Normalize(0.0, size.max() or 1.0)
     corners = points[valve.quads]
     colours = shaded(corners, COLOURS(scale(size[valve.quads].mean(axis=1))))
-    axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.3, clip_on=False))
+    axes.add_collection3d(
+        Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.3, clip_on=False)
+    )
     frame(axes, points)
     bar = figure.colorbar(ScalarMappable(scale, COLOURS), ax=axes, shrink=0.62, pad=0.06, aspect=22)
     bar.set_label("Displacement, mm")
     bar.outline.set_visible(False)
     x, y, z = (1e3 * value for value in state.max_displacement_position)
     figure.suptitle(
-        f"Deformed valve at {kilopascals(state.pressure)}: largest displacement {state.max_displacement * 1e3:.1f} mm at "
+        f"Deformed valve at {kilopascals(state.pressure)}: largest displacement "
+        f"{state.max_displacement * 1e3:.1f} mm at "
         f"(x, y, z) = ({x:.0f}, ±{abs(y):.0f}, {z:.0f}) mm",
         fontsize=10,
-    )  # fmt: skip
+    )
     return figure
 
 

@@ -1,7 +1,9 @@
 """Curves over the pressure: discharge, lip area, jet velocity, deflections."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
     from ..results.steady import SteadyResults
 
 
-def draw(result: "SteadyResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SteadyResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name."""
     if result.case.drive.kind == "flow":
         yield "head-discharge", lambda: head_discharge(result)
@@ -23,53 +25,77 @@ def draw(result: "SteadyResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "deflection", lambda: deflection(result)
 
 
-def ordered(result: "SteadyResults") -> "list[State]":
+def ordered(result: SteadyResults) -> list[State]:
     """States from low to high pressure."""
     return sorted(result.states, key=lambda state: state.pressure)
 
 
-def head_discharge(result: "SteadyResults") -> Figure:
+def head_discharge(result: SteadyResults) -> Figure:
     """Pressure drop over mass flow (compare Fig. 7-4 of the thesis)."""
     states = ordered(result)
     figure, axes = _axes("Mass flow, kg/s", "Pressure drop, kPa")
-    axes.plot([s.mass_flow for s in states], [s.pressure / 1e3 for s in states], "o-", color=COMPUTED, label=_name(result))
+    axes.plot(
+        [s.mass_flow for s in states], [s.pressure / 1e3 for s in states], "o-", color=COMPUTED, label=_name(result)
+    )
     if published.applies(result.case):
         data = published.HEAD_DISCHARGE
-        axes.plot(data.mass_flow, np.array(data.pressure) / 1e3, "D", color=PUBLISHED, label=data.label, mfc="none", mew=1.6, ms=7)
+        axes.plot(
+            data.mass_flow,
+            np.array(data.pressure) / 1e3,
+            "D",
+            color=PUBLISHED,
+            label=data.label,
+            mfc="none",
+            mew=1.6,
+            ms=7,
+        )
     return _finish(figure, axes, "Head and discharge")
 
 
-def area_discharge(result: "SteadyResults") -> Figure:
+def area_discharge(result: SteadyResults) -> Figure:
     """Lip area over mass flow (compare Fig. 7-5 of the thesis)."""
     states = ordered(result)
     figure, axes = _axes("Mass flow, kg/s", "Flow area at the lip, cm²")
-    axes.plot([s.mass_flow for s in states], [s.outlet_area * 1e4 for s in states], "o-", color=COMPUTED, label=_name(result))
+    axes.plot(
+        [s.mass_flow for s in states], [s.outlet_area * 1e4 for s in states], "o-", color=COMPUTED, label=_name(result)
+    )
     return _finish(figure, axes, "Lip area and discharge")
 
 
-def jet_velocity(result: "SteadyResults") -> Figure:
+def jet_velocity(result: SteadyResults) -> Figure:
     """Jet velocity over pressure (compare Fig. 7-7 of the thesis)."""
     states = ordered(result)
     figure, axes = _axes("Pressure drop, kPa", "Velocity, m/s")
     p = np.array([s.pressure for s in states])
-    axes.plot(p / 1e3, [s.outlet_velocity for s in states], "o-", color=COMPUTED, label=f"jet at the lip, {_name(result)}")
+    axes.plot(
+        p / 1e3, [s.outlet_velocity for s in states], "o-", color=COMPUTED, label=f"jet at the lip, {_name(result)}"
+    )
     axes.plot(p / 1e3, [s.station_velocity[-1] for s in states], "s-", color=ACCENT, ms=4.5, label="inlet")
     fine = np.linspace(0.0, p.max(), 200)
-    axes.plot(fine / 1e3, np.sqrt(2 * fine / result.case.fluid.density), ":", color="0.35", lw=1.3, label=r"$\sqrt{2\,\Delta p/\rho}$")
+    axes.plot(
+        fine / 1e3,
+        np.sqrt(2 * fine / result.case.fluid.density),
+        ":",
+        color="0.35",
+        lw=1.3,
+        label=r"$\sqrt{2\,\Delta p/\rho}$",
+    )
     return _finish(figure, axes, "Jet velocity")
 
 
-def deflection(result: "SteadyResults") -> Figure:
+def deflection(result: SteadyResults) -> Figure:
     """Lip opening and largest displacement over pressure."""
     states = ordered(result)
     figure, axes = _axes("Pressure, kPa", "Displacement, mm")
     p = [s.pressure / 1e3 for s in states]
-    axes.plot(p, [s.max_displacement * 1e3 for s in states], "s-", color=ACCENT, ms=4.5, label="largest, anywhere on the wall")
+    axes.plot(
+        p, [s.max_displacement * 1e3 for s in states], "s-", color=ACCENT, ms=4.5, label="largest, anywhere on the wall"
+    )
     axes.plot(p, [s.lip_opening * 1e3 for s in states], "o-", color=COMPUTED, label="lip centre, in y")
     return _finish(figure, axes, "Deflection of the wall", from_zero=all(s.lip_opening >= 0 for s in states))
 
 
-def _name(result: "SteadyResults") -> str:
+def _name(result: SteadyResults) -> str:
     return f"dbvfiv, {result.header.name}"
 
 

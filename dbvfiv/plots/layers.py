@@ -1,7 +1,9 @@
 """Stresses of the layers on the unrolled wall."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,14 +16,16 @@ if TYPE_CHECKING:
     from ..results.steady import SteadyResults
 
 
-def draw(result: "SteadyResults", pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SteadyResults, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
     state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
     yield "layer-stress", lambda: layer_stress(state)
 
 
-def layer_stress(state: "State") -> Figure:
-    """Von Mises stress of each layer over the quarter, unrolled: arc length from the centre against the axis (compare Fig. 7-12 of the thesis)."""
+def layer_stress(state: State) -> Figure:
+    """Von Mises stress of each layer over the quarter, unrolled: arc length from the centre against the axis (compare
+    Fig. 7-12 of the thesis).
+    """
     mesh = state.results.mesh
     arc, z = unrolled(mesh)
     values = state.layers.von_mises.T / 1e6
@@ -42,7 +46,7 @@ def layer_stress(state: "State") -> Figure:
         axes.plot(*middle, "+", color="#d62728", ms=9, mew=1.6)
         axes.set_title(f"max {stress[peak]:.3g}", loc="right", fontsize=9, color="#d62728")
         axes.set_xlim(0, arc.max() * 1e3)
-    for axes in panels[len(values):]:
+    for axes in panels[len(values) :]:
         axes.set_visible(False)
     for number, axes in enumerate(panels[: len(values)]):
         axes.tick_params(labelbottom=number + columns >= len(values))
@@ -50,11 +54,15 @@ def layer_stress(state: "State") -> Figure:
             axes.set_ylabel("Distance from the lip z, mm")
         if number + columns >= len(values):
             axes.set_xlabel("Arc from the centre, mm")
-    figure.suptitle(f"Von Mises stress in the layers at {kilopascals(state.pressure)}, MPa (largest in each element)", fontsize=11, fontweight="bold")
+    figure.suptitle(
+        f"Von Mises stress in the layers at {kilopascals(state.pressure)}, MPa (largest in each element)",
+        fontsize=11,
+        fontweight="bold",
+    )
     return figure
 
 
-def unrolled(mesh: "MeshData") -> tuple[np.ndarray, np.ndarray]:
+def unrolled(mesh: MeshData) -> tuple[np.ndarray, np.ndarray]:
     """Arc length from x = 0 and axial position of the nodes, both (rows, columns) in m, at rest."""
     points = mesh.nodes[mesh.rows]
     steps = np.linalg.norm(np.diff(points, axis=1), axis=2)

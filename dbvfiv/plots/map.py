@@ -1,7 +1,9 @@
 """Stability maps: growth rate of the leading mode, onset curves with their frequency, labelled regions."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -20,21 +22,29 @@ if TYPE_CHECKING:
 
 #: Growth below zero in blues, above in warm colours, near zero pale.
 _GROWTH = LinearSegmentedColormap.from_list(
-    "growth", [(0.0, "#29506d"), (0.25, "#7ea3bd"), (0.4999, "#e8f0f4"), (0.5001, "#fdf0dc"), (0.75, "#ee9b54"), (1.0, "#a3261b")]
+    "growth",
+    [
+        (0.0, "#29506d"),
+        (0.25, "#7ea3bd"),
+        (0.4999, "#e8f0f4"),
+        (0.5001, "#fdf0dc"),
+        (0.75, "#ee9b54"),
+        (1.0, "#a3261b"),
+    ],
 )
 _FREQUENCY = "viridis"
 _HALO = [withStroke(linewidth=3.2, foreground="white")]
 _TITLES = {0.0: "Quasi-steady continuity", 1.0: "Storage: moving walls displace fluid"}
 
 
-def draw(result: "MapResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: MapResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a map, each with its name."""
     if any(not column.failure for column in result.columns):
         yield "stability-map", lambda: stability_map(result)
         yield "leading-frequency", lambda: leading_frequency(result)
 
 
-def stability_map(result: "MapResults") -> Figure:
+def stability_map(result: MapResults) -> Figure:
     """The headline: where the valve flutters."""
     growth = result.grid("growth_rate")
     levels = growth_levels(growth)
@@ -55,7 +65,7 @@ def stability_map(result: "MapResults") -> Figure:
     return figure
 
 
-def leading_frequency(result: "MapResults") -> Figure:
+def leading_frequency(result: MapResults) -> Figure:
     """Frequency of the leading mode; it changes with a jump where another mode takes the lead."""
     frequency = np.ma.masked_invalid(result.grid("frequency"))
     top = float(frequency.max()) if frequency.count() else 1.0
@@ -84,7 +94,7 @@ def growth_levels(growth: np.ndarray) -> np.ndarray:
     return np.array([*(-s for s in up[::-1]), 0.0, *up])
 
 
-def _panels(result: "MapResults"):
+def _panels(result: MapResults):
     count = len(result.plan.laws)
     figure = new_figure(8.4 if count == 1 else 13.2, 5.4)
     panels = np.atleast_1d(figure.subplots(1, count, sharex=True, sharey=True))
@@ -109,10 +119,14 @@ def _panels(result: "MapResults"):
     return figure, list(panels)
 
 
-def _headline(figure: Figure, result: "MapResults") -> None:
+def _headline(figure: Figure, result: MapResults) -> None:
     case = result.case
     mesh = case.mesh
-    shown = {"pressure": f"{case.drive.pressure / 1e3:g} kPa", "density": f"{case.fluid.density:g} kg/m³", "alpha": f"α = {case.damping.alpha:g} 1/s"}
+    shown = {
+        "pressure": f"{case.drive.pressure / 1e3:g} kPa",
+        "density": f"{case.fluid.density:g} kg/m³",
+        "alpha": f"α = {case.damping.alpha:g} 1/s",
+    }
     shown["beta"] = f"β = {case.damping.beta:g} s"
     fixed = [text for name, text in shown.items() if name not in (result.plan.x.parameter, result.plan.y.parameter)]
     figure.suptitle(f"Stability of {result.header.name}", x=0.01, ha="left", fontweight="bold", fontsize=12)
@@ -120,7 +134,7 @@ def _headline(figure: Figure, result: "MapResults") -> None:
     figure.supxlabel(" · ".join(w for w in words if w), x=0.01, ha="left", fontsize=8.5, color="0.35")
 
 
-def _vouched(result: "MapResults") -> str:
+def _vouched(result: MapResults) -> str:
     certified, found = result.grid("certified"), result.grid("unstable") >= 0
     text = f"{int(certified.sum())} of {int(found.sum())} cells certified by two counts"
     return text + (f", {len(result.checks)} solved again in full" if result.checks else "")
@@ -139,7 +153,7 @@ def _shown(axis, values):
     return np.asarray(values) / SCALES.get(axis.parameter, 1.0)
 
 
-def _cells(axes, result: "MapResults", values, colours, norm):
+def _cells(axes, result: MapResults, values, colours, norm):
     axes.set_facecolor("#d9d9d9")
     x, y = _edges(result.plan.x), _edges(result.plan.y)
     mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(values), cmap=colours, norm=norm, rasterized=True)
@@ -151,13 +165,13 @@ def _cells(axes, result: "MapResults", values, colours, norm):
     return mesh
 
 
-def _frequency_span(result: "MapResults") -> tuple[float, float]:
+def _frequency_span(result: MapResults) -> tuple[float, float]:
     values = np.concatenate([c.frequency for c in result.curves]) if result.curves else np.array([0.0, 1.0])
     low, high = float(values.min()), float(values.max())
     return (low, high) if high > low else (low - 0.5, high + 0.5)
 
 
-def _curves(axes, result: "MapResults", law: int, span):
+def _curves(axes, result: MapResults, law: int, span):
     lines = None
     for curve in result.curves:
         if curve.law != law:
@@ -168,7 +182,9 @@ def _curves(axes, result: "MapResults", law: int, span):
             continue
         pieces = np.stack([points[:-1], points[1:]], axis=1)
         axes.add_collection(LineCollection([points], colors="black", linewidths=4.4, capstyle="round"))
-        lines = LineCollection(pieces, cmap=_FREQUENCY, norm=matplotlib.colors.Normalize(*span), linewidths=2.6, capstyle="round")
+        lines = LineCollection(
+            pieces, cmap=_FREQUENCY, norm=matplotlib.colors.Normalize(*span), linewidths=2.6, capstyle="round"
+        )
         lines.set_array(0.5 * (curve.frequency[1:] + curve.frequency[:-1]))
         if not curve.exact:
             lines.set_linestyle((0, (3, 1.5)))
@@ -180,8 +196,13 @@ def _curves(axes, result: "MapResults", law: int, span):
 def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:
     """The frequency written at a few places of a curve that is long enough."""
     limits = np.array([axes.get_xlim(), axes.get_ylim()])
-    scale = [np.log10 if axes.get_xscale() == "log" else np.asarray, np.log10 if axes.get_yscale() == "log" else np.asarray]
-    unit = np.column_stack([(s(points[:, k]) - s(limits[k, 0])) / (s(limits[k, 1]) - s(limits[k, 0])) for k, s in enumerate(scale)])
+    scale = [
+        np.log10 if axes.get_xscale() == "log" else np.asarray,
+        np.log10 if axes.get_yscale() == "log" else np.asarray,
+    ]
+    unit = np.column_stack(
+        [(s(points[:, k]) - s(limits[k, 0])) / (s(limits[k, 1]) - s(limits[k, 0])) for k, s in enumerate(scale)]
+    )
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(unit, axis=0), axis=1))])
     if length[-1] < 0.25:
         return
@@ -190,11 +211,18 @@ def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:
         if not (0.03 < unit[i, 0] < 0.95 and 0.04 < unit[i, 1] < 0.95):
             continue
         axes.annotate(
-            f"{frequency[i]:.3g} Hz", points[i], xytext=(7, 5), textcoords="offset points", fontsize=8, color="black", path_effects=_HALO, clip_on=True
+            f"{frequency[i]:.3g} Hz",
+            points[i],
+            xytext=(7, 5),
+            textcoords="offset points",
+            fontsize=8,
+            color="black",
+            path_effects=_HALO,
+            clip_on=True,
         )
 
 
-def _regions(axes, result: "MapResults", unstable: np.ndarray) -> None:
+def _regions(axes, result: MapResults, unstable: np.ndarray) -> None:
     """Words in the middle of each sizeable region."""
     x, y = _edges(result.plan.x), _edges(result.plan.y)
     for mask, word in ((unstable > 0, "unstable"), (unstable == 0, "stable")):
@@ -207,5 +235,17 @@ def _regions(axes, result: "MapResults", unstable: np.ndarray) -> None:
             j, i = np.unravel_index(int(np.argmax(depth)), depth.shape)
             if depth[j, i] < 1.5:
                 continue
-            middle = [np.sqrt(e[k] * e[k + 1]) if axis.log else 0.5 * (e[k] + e[k + 1]) for e, k, axis in ((x, i, result.plan.x), (y, j, result.plan.y))]
-            axes.annotate(word, middle, ha="center", va="center", fontsize=12.5, fontweight="bold", color="0.12", path_effects=_HALO)
+            middle = [
+                np.sqrt(e[k] * e[k + 1]) if axis.log else 0.5 * (e[k] + e[k + 1])
+                for e, k, axis in ((x, i, result.plan.x), (y, j, result.plan.y))
+            ]
+            axes.annotate(
+                word,
+                middle,
+                ha="center",
+                va="center",
+                fontsize=12.5,
+                fontweight="bold",
+                color="0.12",
+                path_effects=_HALO,
+            )

@@ -1,4 +1,5 @@
 """One cycle of a mode as an animated GIF."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -19,8 +20,9 @@ if TYPE_CHECKING:
 _PICTURES_A_SECOND, _DOTS = 15, 90
 
 
-def animate_mode(result: "ModesResults", mode: "ModeShape", path: str | Path, frames: int = 24) -> Path:
-    """Write one cycle of a mode, endlessly repeated, growth or decay left out; of a mode that does not oscillate, a slow to and fro.
+def animate_mode(result: ModesResults, mode: ModeShape, path: str | Path, frames: int = 24) -> Path:
+    """Write one cycle of a mode, endlessly repeated, growth or decay left out; of a mode that does not oscillate, a
+    slow to and fro.
 
     Raises
     ------
@@ -46,5 +48,7 @@ def animate_mode(result: "ModesResults", mode: "ModeShape", path: str | Path, fr
                     surface.move(collection, phase)
                     writer.grab_frame()
         except OSError as error:
-            raise CaseError(f"{str(path)!r} cannot be written ({error.strerror or 'the folder may not be written'}).") from error
+            raise CaseError(
+                f"{str(path)!r} cannot be written ({error.strerror or 'the folder may not be written'})."
+            ) from error
     return path

@@ -1,7 +1,9 @@
 """The centre line of the lips over one cycle of a mode."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -20,15 +22,17 @@ _PHASES, _DRAWN = 10, 3
 _STILL = 0.02
 
 
-def draw(result: "ModesResults", mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ModesResults, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of modes, each with its name: of the first three modes, or of one."""
     chosen = result.modes[:_DRAWN] if mode is None else [result.mode(mode)]
     for each in chosen:
         yield f"centre-line-{each.number}", lambda each=each: centre_line(result, each)
 
 
-def centre_line(result: "ModesResults", mode: "ModeShape") -> Figure:
-    """Line x = 0 over one cycle (compare Fig. 7-16 of Wang 2014): its place, its swing in y, and how the motion lags along it."""
+def centre_line(result: ModesResults, mode: ModeShape) -> Figure:
+    """Line x = 0 over one cycle (compare Fig. 7-16 of Wang 2014): its place, its swing in y, and how the motion lags
+    along it.
+    """
     mesh, state = result.mesh, result.state
     line = mesh.rows[:, 0]
     rest, steady = mesh.nodes[line] * 1e3, state.nodal[line, :3] * 1e3
@@ -57,7 +61,11 @@ def centre_line(result: "ModesResults", mode: "ModeShape") -> Figure:
     lag.set_xlim(min(0.0, float(np.min((rest + steady)[:, 2])) - 2), z.max())
     place.set_ylim(bottom=0)
     place.set_title(f"{mode_title(mode)} ({conditions(result)})", loc="left", fontweight="bold")
-    swing.set_title(f"drawn for a largest displacement of {1e3 * amplitude:.3g} mm; a linear mode has no amplitude of its own", loc="left", fontsize=9)
+    swing.set_title(
+        f"drawn for a largest displacement of {1e3 * amplitude:.3g} mm; a linear mode has no amplitude of its own",
+        loc="left",
+        fontsize=9,
+    )
     lag.set_title("falling towards the lip: a wave that travels downstream", loc="left", fontsize=9)
     place.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
     swing.legend(loc="upper left", bbox_to_anchor=(1.01, 1.05), title="share of\nthe cycle")

@@ -1,7 +1,9 @@
 """Eigenvalues in the complex plane."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,14 +19,16 @@ DANGER = "#c0392b14"
 _RATIOS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7)
 
 
-def draw(result: "ModesResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ModesResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of modes, each with its name."""
     if result.modes:
         yield "eigenvalues", lambda: eigenvalues(result)
 
 
-def eigenvalues(result: "ModesResults") -> Figure:
-    """Growth rate and frequency of each mode, numbered as in the table; rays of constant damping ratio; where eigenvalues accumulate."""
+def eigenvalues(result: ModesResults) -> Figure:
+    """Growth rate and frequency of each mode, numbered as in the table; rays of constant damping ratio; where
+    eigenvalues accumulate.
+    """
     figure = new_figure(7.0, 4.8)
     axes = figure.add_subplot()
     growth = np.array([mode.growth_rate for mode in result.modes])
@@ -43,11 +47,27 @@ def eigenvalues(result: "ModesResults") -> Figure:
     _rays(axes, left, top)
     if beta > 0 and -1.0 / beta > left:
         axes.axvline(-1.0 / beta, color="0.45", lw=1.1, ls="--")
-        axes.text(-1.0 / beta, top, r" $-1/\beta$: eigenvalues accumulate", rotation=90, ha="right", va="top", color="0.35", fontsize=8.5)
+        axes.text(
+            -1.0 / beta,
+            top,
+            r" $-1/\beta$: eigenvalues accumulate",
+            rotation=90,
+            ha="right",
+            va="top",
+            color="0.35",
+            fontsize=8.5,
+        )
     for mode in result.modes:
         colour = UNSTABLE if mode.growth_rate > result.certificate.line else STABLE
         axes.plot(mode.growth_rate, mode.frequency, "o", color=colour, ms=7, clip_on=False, zorder=3)
-        axes.annotate(str(mode.number), (mode.growth_rate, mode.frequency), (6, 5), textcoords="offset points", fontsize=9.5, color=colour)
+        axes.annotate(
+            str(mode.number),
+            (mode.growth_rate, mode.frequency),
+            (6, 5),
+            textcoords="offset points",
+            fontsize=9.5,
+            color=colour,
+        )
     axes.set_xlabel("Growth rate, 1/s")
     axes.set_ylabel("Frequency, Hz")
     axes.set_title(f"Leading modes {conditions(result)}", loc="left", fontweight="bold", pad=15)
@@ -55,14 +75,14 @@ def eigenvalues(result: "ModesResults") -> Figure:
     return figure
 
 
-def conditions(result: "ModesResults") -> str:
+def conditions(result: ModesResults) -> str:
     """Pressure and fluid as they stand in titles."""
     where = "at rest" if result.state.pressure == 0 else f"at {kilopascals(result.state.pressure)}"
     fluid = "in vacuo" if in_vacuo(result) else f"{result.case.fluid.density:g} kg/m³"
     return f"{where}, {fluid}"
 
 
-def in_vacuo(result: "ModesResults") -> bool:
+def in_vacuo(result: ModesResults) -> bool:
     return result.case.modes.in_vacuo or result.case.drive.kind != "flow"
 
 
@@ -87,4 +107,13 @@ def _rays(axes, left: float, top: float) -> None:
         outside = end * slope >= 0.999 * top
         place = (-end, top) if outside else (left, end * slope)
         offset, align = ((0, 2), ("center", "bottom")) if outside else ((3, 1), ("left", "bottom"))
-        axes.annotate(f"{100 * ratio:g} %", place, offset, textcoords="offset points", fontsize=7.5, color="0.55", ha=align[0], va=align[1])
+        axes.annotate(
+            f"{100 * ratio:g} %",
+            place,
+            offset,
+            textcoords="offset points",
+            fontsize=7.5,
+            color="0.55",
+            ha=align[0],
+            va=align[1],
+        )

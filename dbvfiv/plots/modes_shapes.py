@@ -1,7 +1,9 @@
 """Mode shapes in space."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 _PANELS = 6
 
 
-def draw(result: "ModesResults", mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ModesResults, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of modes, each with its name."""
     if mode is not None:
         yield f"mode-shape-{mode}", lambda: mode_shapes(result, [result.mode(mode)])
@@ -29,7 +31,7 @@ def draw(result: "ModesResults", mode: int | None = None) -> Iterator[tuple[str,
         yield "mode-shapes", lambda: mode_shapes(result, result.modes[:_PANELS])
 
 
-def mode_shapes(result: "ModesResults", modes) -> Figure:
+def mode_shapes(result: ModesResults, modes) -> Figure:
     """Modes at the phase of their largest displacement, all quarters, coloured by the amplitude over a cycle."""
     columns = min(2, len(modes))
     rows = -(-len(modes) // columns)
@@ -49,7 +51,9 @@ def mode_shapes(result: "ModesResults", modes) -> Figure:
             axes.set(xlabel="", ylabel="", zlabel="")
             axes.set_box_aspect(np.ptp(surface.limits(), axis=0), zoom=1.3)
         panels.append(axes)
-    bar = figure.colorbar(ScalarMappable(scale, COLOURS), ax=panels, shrink=0.62 if rows == 1 else 0.4, pad=0.03, aspect=26)
+    bar = figure.colorbar(
+        ScalarMappable(scale, COLOURS), ax=panels, shrink=0.62 if rows == 1 else 0.4, pad=0.03, aspect=26
+    )
     bar.set_label("Amplitude, relative to the largest")
     bar.outline.set_visible(False)
     figure.suptitle(f"Mode shapes {conditions(result)}, lips at the front", fontsize=11, fontweight="bold")
@@ -66,7 +70,7 @@ class ModeSurface:
     valve : WholeValve, optional
     """
 
-    def __init__(self, result: "ModesResults", mode: "ModeShape", valve: WholeValve | None = None):
+    def __init__(self, result: ModesResults, mode: ModeShape, valve: WholeValve | None = None):
         self.valve = valve or WholeValve.of(result.mesh)
         self.mode = mode
         self.amplitude = mode.drawn_amplitude(result.state)

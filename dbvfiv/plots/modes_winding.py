@@ -1,7 +1,9 @@
 """The winding of the determinant: evidence for the number of unstable modes."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,13 +15,15 @@ if TYPE_CHECKING:
     from ..results.modes import ModesResults
 
 
-def draw(result: "ModesResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ModesResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of modes, each with its name."""
     yield "winding", lambda: winding(result)
 
 
-def winding(result: "ModesResults") -> Figure:
-    """Winding of the determinant from zero frequency up: it ends at the number of eigenvalues to the right, and rises past those that are unstable."""
+def winding(result: ModesResults) -> Figure:
+    """Winding of the determinant from zero frequency up: it ends at the number of eigenvalues to the right, and rises
+    past those that are unstable.
+    """
     certificate = result.certificate
     figure = new_figure(7.0, 4.4)
     axes = figure.add_subplot()
@@ -35,19 +39,28 @@ def winding(result: "ModesResults") -> Figure:
     _mark_modes(axes, result)
     if np.isfinite(certificate.counted_up_to):
         axes.axvspan(certificate.counted_up_to, axes.get_xlim()[1], color="0.93", lw=0, zorder=0)
-        axes.text(certificate.counted_up_to, 0.02, " to the right, at this frequency", transform=axes.get_xaxis_transform(), fontsize=8.5, color="0.35")
+        axes.text(
+            certificate.counted_up_to,
+            0.02,
+            " to the right, at this frequency",
+            transform=axes.get_xaxis_transform(),
+            fontsize=8.5,
+            color="0.35",
+        )
     axes.set_xlabel("Frequency on the imaginary axis, Hz")
     axes.set_ylabel("Winding of the determinant, half turns")
     axes.set_title(f"Independent count {conditions(result)}", loc="left", fontweight="bold")
     beginning = f" The curve begins at {start:g}, half the degree of the determinant." if start else ""
-    figure.supxlabel(f"{certificate.verdict}\nNumbers: modes found by the search.{beginning}", x=0.01, ha="left", fontsize=9)
+    figure.supxlabel(
+        f"{certificate.verdict}\nNumbers: modes found by the search.{beginning}", x=0.01, ha="left", fontsize=9
+    )
     return figure
 
 
 _TEXT = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "fontsize": 9, "color": "0.3"}
 
 
-def _mark_modes(axes, result: "ModesResults") -> None:
+def _mark_modes(axes, result: ModesResults) -> None:
     """Lines at the frequencies of the modes, their numbers above, staggered where they are close."""
     step = np.diff(np.log10(axes.get_xlim()))[0] / 35
     last, level = -np.inf, 0
@@ -58,4 +71,13 @@ def _mark_modes(axes, result: "ModesResults") -> None:
         colour = UNSTABLE if mode.growth_rate > result.certificate.line else STABLE
         height = 0.99 - 0.055 * level
         axes.axvline(mode.frequency, color=colour, lw=1.0, alpha=0.5, ymax=height - 0.055)
-        axes.text(mode.frequency, height, str(mode.number), transform=axes.get_xaxis_transform(), ha="center", va="top", fontsize=9, color=colour)
+        axes.text(
+            mode.frequency,
+            height,
+            str(mode.number),
+            transform=axes.get_xaxis_transform(),
+            ha="center",
+            va="top",
+            fontsize=9,
+            color=colour,
+        )

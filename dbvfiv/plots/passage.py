@@ -1,7 +1,9 @@
 """Pressure, velocity and area along the passage."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
@@ -20,13 +22,13 @@ _PANELS = (
 )
 
 
-def draw(result: "SteadyResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SteadyResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name."""
     if result.case.drive.kind == "flow":
         yield "passage", lambda: passage(result)
 
 
-def passage(result: "SteadyResults") -> Figure:
+def passage(result: SteadyResults) -> Figure:
     """Pressure, velocity and flow area over the distance from the lip; the fluid flows from right to left."""
     figure = new_figure(7.2, 7.4)
     panels = figure.subplots(3, 1, sharex=True)

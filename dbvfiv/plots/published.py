@@ -1,4 +1,5 @@
 """Published numbers that figures of the reference valve show beside the computed ones."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -35,6 +36,8 @@ HEAD_DISCHARGE = Published(
 
 
 def applies(case: Case) -> bool:
-    """Whether a case is the 12-inch valve with water flowing through it: layers and materials may differ, shape and wall may not."""
+    """Whether a case is the 12-inch valve with water flowing through it: layers and materials may differ, shape and
+    wall may not.
+    """
     same_shape = case.valve.model_copy(update={"saddle": "ruled"}) == Valve()
     return same_shape and case.drive.kind == "flow" and case.fluid.density == _WATER

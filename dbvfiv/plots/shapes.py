@@ -1,7 +1,9 @@
 """Deformed shapes in sections: the lip seen from downstream, the centre line seen from the side."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,13 +15,13 @@ if TYPE_CHECKING:
     from ..results.steady import SteadyResults
 
 
-def draw(result: "SteadyResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SteadyResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name."""
     yield "lip-shapes", lambda: lip_shapes(result)
     yield "centre-line", lambda: centre_line(result)
 
 
-def lip_shapes(result: "SteadyResults") -> Figure:
+def lip_shapes(result: SteadyResults) -> Figure:
     """Mid-surface of the lip at several pressures, all four quarters (compare Fig. 7-10 of the thesis)."""
     figure = new_figure(7.2, 4.4)
     axes = figure.add_subplot()
@@ -37,7 +39,7 @@ def lip_shapes(result: "SteadyResults") -> Figure:
     return figure
 
 
-def centre_line(result: "SteadyResults") -> Figure:
+def centre_line(result: SteadyResults) -> Figure:
     """Deformed lines of the two symmetry planes: y over z at x = 0 and x over z at y = 0."""
     figure = new_figure(7.2, 6.2)
     upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1, 1]})
@@ -59,7 +61,7 @@ def centre_line(result: "SteadyResults") -> Figure:
     return figure
 
 
-def mark_pieces(result: "SteadyResults", *panels) -> None:
+def mark_pieces(result: SteadyResults, *panels) -> None:
     """Thin lines where duckbill, saddle and flange meet."""
     valve = result.case.valve
     if valve.key_points is not None:

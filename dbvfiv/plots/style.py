@@ -1,8 +1,10 @@
 """How figures look: fonts, colours, sizes; drawn without a display."""
+
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Iterator
+from typing import Any
 
 import matplotlib
 import numpy as np

@@ -1,7 +1,9 @@
 """Damping and frequency of tracked modes over the parameter."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -20,24 +22,37 @@ DOUBTFUL = 0.5
 _STABLE_GROUND = "#1f4e790d"
 
 
-def draw(result: "SweepResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SweepResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a sweep, each with its name."""
     if len(result.values) > 1 and result.branches:
         yield "sweep", lambda: curves(result)
 
 
-def curves(result: "SweepResults") -> Figure:
-    """Growth rate, frequency and damping ratio of each branch; crossings of zero growth marked, spans with unstable modes shaded."""
+def curves(result: SweepResults) -> Figure:
+    """Growth rate, frequency and damping ratio of each branch; crossings of zero growth marked, spans with unstable
+    modes shaded.
+    """
     name, unit, factor = SHOWN[result.parameter]
     figure = new_figure(7.6, 8.6)
-    growth, frequency, ratio = panels = figure.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": [1.25, 1.0, 0.9]})
+    growth, frequency, ratio = panels = figure.subplots(
+        3, 1, sharex=True, gridspec_kw={"height_ratios": [1.25, 1.0, 0.9]}
+    )
     x = result.values * factor
     for branch, colour in zip(result.branches, branch_colours(result)):
         size = np.hypot(branch.growth_rate, branch.angular_frequency)
         second = (branch.angular_frequency < 0).any()  # of a pair that two real modes became: both are seen
         series = (branch.growth_rate, branch.frequency, -100 * branch.growth_rate / np.where(size > 0, size, 1.0))
         for axes, values in zip(panels, series):
-            axes.plot(x, values, color=colour, lw=1.7, ls="--" if second else "-", marker="o" if len(x) <= 60 else None, ms=2.8, label=f"{branch.id}")
+            axes.plot(
+                x,
+                values,
+                color=colour,
+                lw=1.7,
+                ls="--" if second else "-",
+                marker="o" if len(x) <= 60 else None,
+                ms=2.8,
+                label=f"{branch.id}",
+            )
             doubtful = branch.confidence < DOUBTFUL
             axes.plot(x[doubtful], values[doubtful], "x", color=colour, ms=7, mew=1.6)
     for crossing in result.crossings():
@@ -45,8 +60,20 @@ def curves(result: "SweepResults") -> Figure:
         growth.plot(at, 0.0, "D", color=UNSTABLE, ms=6, zorder=4)
         # beside the point where there is room
         side = -1 if _share(at, x, result.axis.log) > 0.7 else 1
-        text = f"{at:.4g} {unit}, {crossing.frequency:.3g} Hz" if crossing.frequency > 0 else f"{at:.4g} {unit}, no oscillation"
-        growth.annotate(text, (at, 0.0), (7 * side, 7), textcoords="offset points", fontsize=9, color=UNSTABLE, ha="left" if side > 0 else "right")
+        text = (
+            f"{at:.4g} {unit}, {crossing.frequency:.3g} Hz"
+            if crossing.frequency > 0
+            else f"{at:.4g} {unit}, no oscillation"
+        )
+        growth.annotate(
+            text,
+            (at, 0.0),
+            (7 * side, 7),
+            textcoords="offset points",
+            fontsize=9,
+            color=UNSTABLE,
+            ha="left" if side > 0 else "right",
+        )
     for axes in panels:
         _shade(axes, result, x)
         if result.axis.log:
@@ -59,7 +86,9 @@ def curves(result: "SweepResults") -> Figure:
     frequency.set_ylabel("Frequency, Hz")
     ratio.set_ylabel("Damping ratio, %")
     ratio.set_xlabel(f"{name}, {unit}")
-    growth.set_title(f"Modes over {name[0].lower()}{name[1:]}, {surroundings_of(result)}", loc="left", fontweight="bold")
+    growth.set_title(
+        f"Modes over {name[0].lower()}{name[1:]}, {surroundings_of(result)}", loc="left", fontweight="bold"
+    )
     handles, labels = growth.get_legend_handles_labels()
     if any(np.nanmin(b.confidence, initial=1.0) < DOUBTFUL for b in result.branches):
         handles.append(Line2D([], [], ls="", marker="x", color="0.3", ms=7, mew=1.6))
@@ -70,13 +99,13 @@ def curves(result: "SweepResults") -> Figure:
     return figure
 
 
-def branch_colours(result: "SweepResults") -> list:
+def branch_colours(result: SweepResults) -> list:
     """A colour for each branch, the same in all figures."""
     wheel = list(matplotlib.colormaps["tab10"].colors) + list(matplotlib.colormaps["Dark2"].colors)
     return [wheel[i % len(wheel)] for i in range(len(result.branches))]
 
 
-def surroundings_of(result: "SweepResults") -> str:
+def surroundings_of(result: SweepResults) -> str:
     """What is not swept, as it stands in titles."""
     case = result.case
     parts = []
@@ -84,7 +113,11 @@ def surroundings_of(result: "SweepResults") -> str:
         parts.append(kilopascals(result.points[0]["pressure"]))
     if result.parameter != "density" and case.drive.kind == "flow":
         parts.append(f"{case.fluid.density:g} kg/m³")
-    parts += [f"{symbol} = {getattr(case.damping, key):g} {unit}" for key, symbol, unit in (("alpha", "α", "1/s"), ("beta", "β", "s")) if key != result.parameter]
+    parts += [
+        f"{symbol} = {getattr(case.damping, key):g} {unit}"
+        for key, symbol, unit in (("alpha", "α", "1/s"), ("beta", "β", "s"))
+        if key != result.parameter
+    ]
     return ", ".join(parts)
 
 
@@ -93,10 +126,12 @@ def _share(at: float, x: np.ndarray, log: bool) -> float:
     return float((place(at) - place(x[0])) / (place(x[-1]) - place(x[0])))
 
 
-def _shade(axes, result: "SweepResults", x: np.ndarray) -> None:
+def _shade(axes, result: SweepResults, x: np.ndarray) -> None:
     """Ground red where a mode is unstable, its edges at the crossings."""
     factor = SHOWN[result.parameter][2]
-    edges = sorted({float(x[0]), float(x[-1]), *(factor * c.value for c in result.crossings() if x[0] < factor * c.value < x[-1])})
+    edges = sorted(
+        {float(x[0]), float(x[-1]), *(factor * c.value for c in result.crossings() if x[0] < factor * c.value < x[-1])}
+    )
     for low, high in zip(edges[:-1], edges[1:]):
         inside = result.unstable_count[(x >= low) & (x <= high)]
         unstable = bool(inside.size) and (inside > 0).mean() > 0.5

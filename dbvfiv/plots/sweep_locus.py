@@ -1,7 +1,9 @@
 """Root locus: eigenvalues in the complex plane as the parameter moves."""
+
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -19,14 +21,16 @@ if TYPE_CHECKING:
     from ..results.sweep import SweepResults
 
 
-def draw(result: "SweepResults") -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SweepResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a sweep, each with its name."""
     if len(result.values) > 1 and result.branches:
         yield "root-locus", lambda: root_locus(result)
 
 
-def root_locus(result: "SweepResults") -> Figure:
-    """Growth rate and frequency of each branch, coloured by the parameter; a ring where it begins, crossings of the axis marked."""
+def root_locus(result: SweepResults) -> Figure:
+    """Growth rate and frequency of each branch, coloured by the parameter; a ring where it begins, crossings of the
+    axis marked.
+    """
     name, unit, factor = SHOWN[result.parameter]
     figure = new_figure(7.6, 5.4)
     axes = figure.add_subplot()
@@ -41,7 +45,9 @@ def root_locus(result: "SweepResults") -> Figure:
             continue
         joined = there[:-1] & there[1:]
         pieces = np.stack([points[:-1], points[1:]], axis=1)[joined]
-        axes.add_collection(LineCollection(pieces, colors=colours(scale(0.5 * (x[:-1] + x[1:])[joined])), linewidths=1.8))
+        axes.add_collection(
+            LineCollection(pieces, colors=colours(scale(0.5 * (x[:-1] + x[1:])[joined])), linewidths=1.8)
+        )
         axes.scatter(*points[there].T, c=x[there], cmap=colours, norm=scale, s=13, zorder=3)
         first, last = np.flatnonzero(there)[[0, -1]]
         axes.plot(*points[first], "o", mfc="white", mec=colours(scale(x[first])), mew=1.6, ms=7, zorder=4)
@@ -51,7 +57,12 @@ def root_locus(result: "SweepResults") -> Figure:
     for crossing in result.crossings():
         axes.plot(0.0, crossing.frequency, "D", color=UNSTABLE, ms=6, zorder=5)
         axes.annotate(
-            f"{factor * crossing.value:.4g} {unit}", (0.0, crossing.frequency), (9, 6), textcoords="offset points", fontsize=9, color=UNSTABLE
+            f"{factor * crossing.value:.4g} {unit}",
+            (0.0, crossing.frequency),
+            (9, 6),
+            textcoords="offset points",
+            fontsize=9,
+            color=UNSTABLE,
         )
     axes.margins(0.06)
     axes.autoscale_view()

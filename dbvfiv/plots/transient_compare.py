@@ -1,8 +1,10 @@
 """Several runs in one figure."""
+
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Sequence
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -15,17 +17,19 @@ if TYPE_CHECKING:
     from ..transient.result import TransientResults
 
 
-_QUIET = tuple(f"transient.{key}" for key in ("save_every", "restart_every", "stop_when", "duration", "start_file", "start_state"))
+_QUIET = tuple(
+    f"transient.{key}" for key in ("save_every", "restart_every", "stop_when", "duration", "start_file", "start_state")
+)
 
 
-def differing_keys(results: "Sequence[TransientResults]") -> list[str]:
+def differing_keys(results: Sequence[TransientResults]) -> list[str]:
     """Keys of the cases that are not the same in all runs, those that only steer the run left out."""
     flat = [_flat(result.case.to_dict()) for result in results]
     keys = [key for key in flat[0] if any(case.get(key) != flat[0][key] for case in flat)]
     return [key for key in keys if key not in _QUIET]
 
 
-def labels(results: "Sequence[TransientResults]") -> list[str]:
+def labels(results: Sequence[TransientResults]) -> list[str]:
     """Legend entries that say what tells the runs apart."""
     keys = differing_keys(results)[:3]
     if not keys:
@@ -37,11 +41,15 @@ def labels(results: "Sequence[TransientResults]") -> list[str]:
     return found
 
 
-def compare(results: "Sequence[TransientResults]") -> Figure:
-    """Mass flow and lip opening of several runs over time (compare Figs. 5-3 to 5-10, 7-13 and 7-14 of Wang 2014); where all end in cycles, these in phase."""
+def compare(results: Sequence[TransientResults]) -> Figure:
+    """Mass flow and lip opening of several runs over time (compare Figs. 5-3 to 5-10, 7-13 and 7-14 of Wang 2014);
+    where all end in cycles, these in phase.
+    """
     cycles = all(result.cycle for result in results)
     figure = new_figure(10.0 if cycles else 8.0, 5.6 + 0.22 * len(results))
-    panels = figure.subplots(2, 2 if cycles else 1, sharex="col", squeeze=False, gridspec_kw={"width_ratios": [3, 2] if cycles else [1]})
+    panels = figure.subplots(
+        2, 2 if cycles else 1, sharex="col", squeeze=False, gridspec_kw={"width_ratios": [3, 2] if cycles else [1]}
+    )
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(results)))
     styles = ["-", "--", "-.", ":"]
     for i, (result, label, colour) in enumerate(zip(results, labels(results), colours)):
@@ -50,13 +58,20 @@ def compare(results: "Sequence[TransientResults]") -> Figure:
         if cycles:
             parts.append(_last_cycles(result))
         for column, (rows, time) in enumerate(parts):
-            panels[0, column].plot(time, h["mass_flow"][rows], label=f"{label}: {result.verdict['verdict']}" if column == 0 else None, **look)
+            panels[0, column].plot(
+                time,
+                h["mass_flow"][rows],
+                label=f"{label}: {result.verdict['verdict']}" if column == 0 else None,
+                **look,
+            )
             panels[1, column].plot(time, 1e3 * h["lip_opening"][rows], **look)
             look["lw"] = 1.5
     panels[0, 0].set_ylabel("Mass flow, kg/s")
     panels[1, 0].set_ylabel("Lip opening, mm")
     panels[1, 0].set_xlabel("Time, s")
-    panels[1, 0].set_xlim(left=min(r.history["time"][0] for r in results), right=max(r.history["time"][-1] for r in results))
+    panels[1, 0].set_xlim(
+        left=min(r.history["time"][0] for r in results), right=max(r.history["time"][-1] for r in results)
+    )
     panels[0, 0].set_title("Comparison of runs", loc="left", fontweight="bold")
     if cycles:
         panels[0, 1].set_title("Last two cycles, in phase", loc="left")
@@ -65,7 +80,7 @@ def compare(results: "Sequence[TransientResults]") -> Figure:
     return figure
 
 
-def _last_cycles(result: "TransientResults", count: int = 2) -> tuple[slice, np.ndarray]:
+def _last_cycles(result: TransientResults, count: int = 2) -> tuple[slice, np.ndarray]:
     """Rows of the last cycles, and times, ms, from the instant at which the lip's opening rises through its mean."""
     h = result.history
     t, x = h["time"], h["lip_opening"] - result.verdict["lip_opening"]["mean"]
@@ -80,7 +95,7 @@ def _last_cycles(result: "TransientResults", count: int = 2) -> tuple[slice, np.
     return slice(at, end), 1e3 * (t[at:end] - begin)
 
 
-def save_comparison(results: "Sequence[TransientResults]", path: Path) -> Path:
+def save_comparison(results: Sequence[TransientResults], path: Path) -> Path:
     """Draw a comparison into a file.
 
     Raises

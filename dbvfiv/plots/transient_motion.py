@@ -1,4 +1,5 @@
 """Animation of a run: lip, centre line and history, side by side."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from ..transient.result import TransientResults
 
 
-def animate(result: "TransientResults", path: Path, frames: int = 48, duration: float | None = None) -> Path:
+def animate(result: TransientResults, path: Path, frames: int = 48, duration: float | None = None) -> Path:
     """Write a GIF of the centre line, the passage and the history over the last cycle.
 
     Parameters
@@ -53,7 +54,12 @@ def animate(result: "TransientResults", path: Path, frames: int = 48, duration: 
         bar = middle.plot(z, area[rows[0]], color=COMPUTED)[0]
         low, high = area[rows][:, moving].min(), area[rows][:, moving].max()
         middle.axhline(0.0, color=REST, lw=0.8)
-        middle.set(xlim=(0, z[moving][-1]), ylim=(min(0.0, 1.1 * low), 1.05 * high), xlabel="Distance from the lip z, mm", ylabel="Flow area, cm²")
+        middle.set(
+            xlim=(0, z[moving][-1]),
+            ylim=(min(0.0, 1.1 * low), 1.05 * high),
+            xlabel="Distance from the lip z, mm",
+            ylabel="Flow area, cm²",
+        )
         lower.set_xlim(t[shown][0], t[shown][-1])
         lower.plot(t[shown], 1e3 * h["lip_opening"][shown], color=COMPUTED, lw=1.2)
         dot = lower.plot([], [], "o", color=ACCENT)[0]
@@ -76,7 +82,9 @@ def animate(result: "TransientResults", path: Path, frames: int = 48, duration: 
 
 
 def _moving(line: np.ndarray) -> slice:
-    """Rows from the lip to the last one that swings by more than a seventh of the largest swing, of the times (k, m) shown."""
+    """Rows from the lip to the last one that swings by more than a seventh of the largest swing, of the times (k, m)
+    shown.
+    """
     swing = np.ptp(line, axis=0)
     reach = np.flatnonzero(swing > 0.15 * swing.max()) if swing.max() > 0 else np.arange(line.shape[1])
     return slice(0, max(int(reach[-1]) + 1, 2))

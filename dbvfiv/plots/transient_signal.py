@@ -1,4 +1,5 @@
 """A measured or computed signal with its spectrum, as a laboratory's panel shows it."""
+
 from __future__ import annotations
 
 import re
@@ -28,7 +29,12 @@ def signal(name: str, time: np.ndarray, values: np.ndarray, verdict: Verdict) ->
     if verdict.period > 0:
         lower.axvline(verdict.frequency, color=ACCENT, lw=0.9, ls="--")
     lower.set(xlabel="Frequency, Hz", ylabel="Amplitude")
-    numbers = [("mean", verdict.mean), ("rms", verdict.rms), ("smallest", verdict.smallest), ("largest", verdict.largest)]
+    numbers = [
+        ("mean", verdict.mean),
+        ("rms", verdict.rms),
+        ("smallest", verdict.smallest),
+        ("largest", verdict.largest),
+    ]
     if verdict.period > 0:
         numbers += [("amplitude", verdict.amplitude), ("frequency, Hz", verdict.frequency)]
     lower.set_title("   ".join(f"{label} {value:.5g}" for label, value in numbers), loc="left", fontsize=9)

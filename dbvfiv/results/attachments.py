@@ -1,10 +1,14 @@
-"""Files that a case names (key points, tension tests): kept in the result, so that the model can be rebuilt without them."""
+"""Files that a case names (key points, tension tests): kept in the result, so that the model can be rebuilt without
+them.
+"""
+
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Iterator
+from typing import Any
 
 from ..case.model import Case
 from ..runtime import cache_directory

@@ -1,4 +1,5 @@
 """Why a verdict on stability can be trusted: two counts of the unstable eigenvalues, and how far the search reached."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -13,9 +14,21 @@ if TYPE_CHECKING:
     from ..studies.modes import ModesResult
 
 _ATTRIBUTES = (
-    "agrees", "unstable_count", "unstable_count_independent", "statement", "certain", "line", "counted_up_to", "distance", "response_error", "status", "asked",
-    "complete_above", "band", "rejected",
-)  # fmt: skip
+    "agrees",
+    "unstable_count",
+    "unstable_count_independent",
+    "statement",
+    "certain",
+    "line",
+    "counted_up_to",
+    "distance",
+    "response_error",
+    "status",
+    "asked",
+    "complete_above",
+    "band",
+    "rejected",
+)
 _CURVE = (
     Column("frequency", "Hz", "Points on the line at which the determinant was evaluated"),
     Column("phase", "rad", "Continuous phase of the determinant against that of a stable structure"),
@@ -76,16 +89,28 @@ class Certificate:
     phase: np.ndarray
 
     @classmethod
-    def of(cls, result: "ModesResult") -> "Certificate":
+    def of(cls, result: ModesResult) -> Certificate:
         certified, spectrum, count = result.certified, result.spectrum, result.certified.count
         error = certified.response_error
         return cls(
-            stable=result.stable, agrees=certified.agrees, unstable_count=certified.unstable_count,
-            unstable_count_independent=certified.unstable_count_independent, statement=certified.statement, certain=count.certain,
-            line=float(count.line), counted_up_to=float(count.band), distance=count.distance, response_error=float("nan") if error is None else float(error),
-            status=spectrum.status, asked=spectrum.asked, complete_above=float(spectrum.complete_above), band=float(spectrum.band),
-            rejected=spectrum.rejected, frequency=count.frequencies, phase=count.phase,
-        )  # fmt: skip
+            stable=result.stable,
+            agrees=certified.agrees,
+            unstable_count=certified.unstable_count,
+            unstable_count_independent=certified.unstable_count_independent,
+            statement=certified.statement,
+            certain=count.certain,
+            line=float(count.line),
+            counted_up_to=float(count.band),
+            distance=count.distance,
+            response_error=float("nan") if error is None else float(error),
+            status=spectrum.status,
+            asked=spectrum.asked,
+            complete_above=float(spectrum.complete_above),
+            band=float(spectrum.band),
+            rejected=spectrum.rejected,
+            frequency=count.frequencies,
+            phase=count.phase,
+        )
 
     def write(self, group: h5py.Group) -> None:
         group.attrs["stable"] = {True: "yes", False: "no", None: "unknown"}[self.stable]
@@ -95,7 +120,7 @@ class Certificate:
             write_array(group, column, getattr(self, column.name))
 
     @classmethod
-    def read(cls, group: h5py.Group) -> "Certificate":
+    def read(cls, group: h5py.Group) -> Certificate:
         attributes = {name: group.attrs[name] for name in _ATTRIBUTES}
         plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
         stable = {"yes": True, "no": False, "unknown": None}[group.attrs["stable"]]

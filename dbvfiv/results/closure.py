@@ -1,11 +1,13 @@
 """Back-pressure states: the result, in memory or in a file."""
+
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -42,7 +44,7 @@ class PressedState:
     results : ClosureResults
     """
 
-    def __init__(self, results: "ClosureResults", values: Mapping[str, Any], read_layers: Callable[[], LayerData]):
+    def __init__(self, results: ClosureResults, values: Mapping[str, Any], read_layers: Callable[[], LayerData]):
         vars(self).update(values)
         self.results = results
         self._read_layers = read_layers
@@ -98,7 +100,20 @@ class ClosureResults(Result):
 
     kind = "closure"
 
-    def __init__(self, header, mesh, rows, read_layers, path_rows, buckling_rows, opened_rows, supports, reference_opening, closing=None, **common):
+    def __init__(
+        self,
+        header,
+        mesh,
+        rows,
+        read_layers,
+        path_rows,
+        buckling_rows,
+        opened_rows,
+        supports,
+        reference_opening,
+        closing=None,
+        **common,
+    ):
         super().__init__(header, mesh, **common)
         self.states = tuple(PressedState(self, row, lambda i=i: read_layers(i)) for i, row in enumerate(rows))
         self.walk = tuple(SimpleNamespace(**row) for row in path_rows)
@@ -109,7 +124,9 @@ class ClosureResults(Result):
         self.reference_opening = float(reference_opening)
 
     @classmethod
-    def of(cls, result: "ClosureResult", header: Header | None = None, closing: "ClosingResult | None" = None) -> "ClosureResults":
+    def of(
+        cls, result: ClosureResult, header: Header | None = None, closing: ClosingResult | None = None
+    ) -> ClosureResults:
         """From a run that has just ended, and the turn of the drive if that was followed."""
         model = result.model
         header = header or Header.of("closure", model.case)
@@ -118,13 +135,19 @@ class ClosureResults(Result):
             MeshData.of(model),
             [row_from(model, state) for state in result.states],
             lambda i: layers_of(model, result.states[i].q),
-            path_rows(result.path), buckling_rows(model, result.buckling), opened_rows(result.opened),
-            model.supports, reference_opening(model),
-            closing=closing, warnings=result.warnings, failures=result.failures, model=model,
-        )  # fmt: skip
+            path_rows(result.path),
+            buckling_rows(model, result.buckling),
+            opened_rows(result.opened),
+            model.supports,
+            reference_opening(model),
+            closing=closing,
+            warnings=result.warnings,
+            failures=result.failures,
+            model=model,
+        )
 
     @classmethod
-    def read(cls, file: h5py.File, path: Path) -> "ClosureResults":
+    def read(cls, file: h5py.File, path: Path) -> ClosureResults:
         names = tuple(file["mesh/layer_names"].asstr()[:])
 
         def read_layers(row: int) -> LayerData:
@@ -133,14 +156,23 @@ class ClosureResults(Result):
                 return LayerData(names, **{c.name.split("/")[1]: layers.read(c.name, row) for c in LAYERS})
 
         return cls(
-            read_header(file), read_mesh(file), _rows(file["states"], (*SUMMARY, *FIELDS)), read_layers,
-            _rows(file["path"], PATH), _rows(file["buckling"], BUCKLING), _rows(file["opened"], OPENED),
-            str(file.attrs["supports"]), float(file.attrs["reference_opening"]), _read_closing(file),
-            warnings=read_texts(file, "messages/warnings"), failures=read_texts(file, "messages/failures"), path=path,
-        )  # fmt: skip
+            read_header(file),
+            read_mesh(file),
+            _rows(file["states"], (*SUMMARY, *FIELDS)),
+            read_layers,
+            _rows(file["path"], PATH),
+            _rows(file["buckling"], BUCKLING),
+            _rows(file["opened"], OPENED),
+            str(file.attrs["supports"]),
+            float(file.attrs["reference_opening"]),
+            _read_closing(file),
+            warnings=read_texts(file, "messages/warnings"),
+            failures=read_texts(file, "messages/failures"),
+            path=path,
+        )
 
     @cached_property
-    def model(self) -> "ClosureModel":
+    def model(self) -> ClosureModel:
         """The model under back pressure; rebuilt on first use if the result comes from a file."""
         from ..studies.closure_model import closure_model
 
@@ -184,7 +216,9 @@ class ClosureResults(Result):
             "closing_pressure": self.closing_pressure,
             "buckling": [{"kind": b.kind, "pressure": b.pressure, "eigenvalue": b.eigenvalue} for b in self.buckling],
             "critical_pressure": first.pressure if first else None,
-            "softest": {"pressure": softest.pressure, "lowest_stiffness_eigenvalue": softest.lowest_eigenvalue} if softest else None,
+            "softest": {"pressure": softest.pressure, "lowest_stiffness_eigenvalue": softest.lowest_eigenvalue}
+            if softest
+            else None,
             "path": {c.name: [_plain(getattr(point, c.name)) for point in self.walk] for c in PATH},
             "opened": [vars(point) for point in self.opened],
             "reversal": None if self.closing is None else self.closing.summary(),
@@ -204,19 +238,26 @@ class ClosureResults(Result):
     def _balance_verdict(self) -> list[str]:
         if not self.states:
             return []
-        force, energy = (max(getattr(state, name) for state in self.states) for name in ("force_balance", "energy_balance"))
+        force, energy = (
+            max(getattr(state, name) for state in self.states) for name in ("force_balance", "energy_balance")
+        )
         return [f"Forces balance to {force:.1g} of their sizes, work and energies to {energy:.1g} of the work."]
 
     def _closing_verdict(self) -> list[str]:
         if self.closing is None:
             return []
         told = self.closing.summary()
-        turn = f"Drive turned from {told['open_pressure'] / 1e3:g} to {-told['open_pressure'] / 1e3:g} kPa in {told['reversal_time']:g} s:"
+        turn = (
+            f"Drive turned from {told['open_pressure'] / 1e3:g} to {-told['open_pressure'] / 1e3:g} kPa "
+            f"in {told['reversal_time']:g} s:"
+        )
         if told["closing_time"] is None:
             return [f"{turn} open at the end, {told['duration']:.4g} s."]
         return [
-            f"{turn} shut for good {told['closing_time']:.4g} s after it began to turn ({told['closing_time_after_sign_change']:.4g} s after it changed "
-            f"sign), fluid pressure between {told['lowest_pressure'] / 1e3:.4g} and {told['highest_pressure'] / 1e3:.4g} kPa."
+            f"{turn} shut for good {told['closing_time']:.4g} s after it began to turn "
+            f"({told['closing_time_after_sign_change']:.4g} s after it changed "
+            f"sign), fluid pressure between {told['lowest_pressure'] / 1e3:.4g} and "
+            f"{told['highest_pressure'] / 1e3:.4g} kPa."
         ]
 
     def _buckling_verdict(self) -> list[str]:
@@ -227,42 +268,52 @@ class ClosureResults(Result):
             return []
         softest = min(followed, key=lambda point: point.lowest_eigenvalue)
         return [
-            f"No buckling within the symmetry of the model up to {max(p.pressure for p in followed) / 1e3:.4g} kPa; the stiffness is least at "
-            f"{softest.pressure / 1e3:.4g} kPa, {softest.lowest_eigenvalue / followed[0].lowest_eigenvalue:.0%} of that at the start."
+            f"No buckling within the symmetry of the model up to "
+            f"{max(p.pressure for p in followed) / 1e3:.4g} kPa; the stiffness is least at "
+            f"{softest.pressure / 1e3:.4g} kPa, "
+            f"{softest.lowest_eigenvalue / followed[0].lowest_eigenvalue:.0%} of that at the start."
         ]
 
-    def steps(self, valve: "WholeValve") -> "Sequence[Step]":
+    def steps(self, valve: WholeValve) -> Sequence[Step]:
         from .closure_export import closure_steps
 
         return closure_steps(self, valve)
 
 
-def row_from(model: "ClosureModel", state: "ClosureState") -> dict[str, Any]:
+def row_from(model: ClosureModel, state: ClosureState) -> dict[str, Any]:
     """Columns of a state of a model."""
     row = {c.name: getattr(state, c.name) for c in (*SUMMARY, *FIELDS) if c.name != "nodal"}
     return row | {"nodal": model.pressed.nodal(state.q)}
 
 
-def path_rows(points: "Sequence[PathPoint]") -> list[dict[str, Any]]:
+def path_rows(points: Sequence[PathPoint]) -> list[dict[str, Any]]:
     names = [c.name for c in PATH if c.name != "lowest_eigenvalue"]
     return [
-        {name: getattr(point, name) for name in names} | {"lowest_eigenvalue": float(point.eigenvalues[0]) if len(point.eigenvalues) else np.nan}
+        {name: getattr(point, name) for name in names}
+        | {"lowest_eigenvalue": float(point.eigenvalues[0]) if len(point.eigenvalues) else np.nan}
         for point in points
     ]
 
 
-def buckling_rows(model: "ClosureModel", found: "Sequence[Buckling]") -> list[dict[str, Any]]:
+def buckling_rows(model: ClosureModel, found: Sequence[Buckling]) -> list[dict[str, Any]]:
     nodal = model.pressed.nodal
     return [
-        {"pressure": b.pressure, "kind": b.kind, "eigenvalue": b.eigenvalue, "nodal": nodal(b.q), "shape": nodal(b.shape)} for b in found
+        {
+            "pressure": b.pressure,
+            "kind": b.kind,
+            "eigenvalue": b.eigenvalue,
+            "nodal": nodal(b.q),
+            "shape": nodal(b.shape),
+        }
+        for b in found
     ]
 
 
-def opened_rows(states: "Sequence[SteadyState]") -> list[dict[str, Any]]:
+def opened_rows(states: Sequence[SteadyState]) -> list[dict[str, Any]]:
     return [{c.name: getattr(state, c.name) for c in OPENED} for state in states]
 
 
-def reference_opening(model: "ClosureModel") -> float:
+def reference_opening(model: ClosureModel) -> float:
     """Passage between the inner faces of the lip at rest, whole valve, m2."""
     from ..studies.closure_opening import opening
 
@@ -275,7 +326,7 @@ def _rows(group: h5py.Group, columns) -> list[dict[str, Any]]:
     return [{name: _scalar(values[i]) for name, values in data.items()} for i in range(table.rows)]
 
 
-def _read_closing(file: h5py.File) -> "ClosingResult | None":
+def _read_closing(file: h5py.File) -> ClosingResult | None:
     if "reversal" not in file:
         return None
     from ..studies.closing import ClosingResult, ClosingSample, Turn
@@ -285,7 +336,12 @@ def _read_closing(file: h5py.File) -> "ClosingResult | None":
     samples = tuple(ClosingSample(**row) for row in _rows(group, REVERSAL))
     turn = Turn(*(float(facts[name]) for name in ("open_pressure", "turn_start", "turn_duration")))
     return ClosingResult(
-        samples, turn, float(facts["shut_below"]), int(facts["halvings"]), str(facts["failure"]), bool(facts["interrupted"])
+        samples,
+        turn,
+        float(facts["shut_below"]),
+        int(facts["halvings"]),
+        str(facts["failure"]),
+        bool(facts["interrupted"]),
     )
 
 

@@ -1,8 +1,10 @@
 """The result file of a back-pressure run, written state by state while the run goes on, and read again to go on."""
+
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from ..studies.closure_buckling import Buckling
 from ..studies.closure_path import PathRestart
@@ -25,7 +27,8 @@ _TABLES = {"path": PATH, "buckling": BUCKLING, "opened": OPENED, "restart": REST
 
 
 class ClosureFile(KeptFile, Observer):
-    """Keeps every state as soon as it is found, with the path to it and what it takes to go on from there; a context manager.
+    """Keeps every state as soon as it is found, with the path to it and what it takes to go on from there; a context
+    manager.
 
     It is the `Keeper` of a run and, for warnings, an observer.
 
@@ -45,7 +48,14 @@ class ClosureFile(KeptFile, Observer):
         If the file cannot be written.
     """
 
-    def __init__(self, path: str | Path, model: "ClosureModel", header: Header | None = None, in_time: bool = False, again: bool = False):
+    def __init__(
+        self,
+        path: str | Path,
+        model: ClosureModel,
+        header: Header | None = None,
+        in_time: bool = False,
+        again: bool = False,
+    ):
         self.model = model
         self.path = Path(path)
         self._mesh = MeshData.of(model)
@@ -65,7 +75,13 @@ class ClosureFile(KeptFile, Observer):
         replace_texts(self._messages, "warnings", ())
         replace_texts(self._messages, "failures", ())
         nodes = len(self._mesh.nodes)
-        shapes = {"nodal": (nodes, 5), "shape": (nodes, 5), "slope": (model.size,), "multiplier": (model.pressed.contact.count,), "energy": (6,)}
+        shapes = {
+            "nodal": (nodes, 5),
+            "shape": (nodes, 5),
+            "slope": (model.size,),
+            "multiplier": (model.pressed.contact.count,),
+            "energy": (6,),
+        }
         self._tables = {
             name: Table.create(self._file.create_group(name), columns, shapes) for name, columns in _TABLES.items()
         }
@@ -91,19 +107,29 @@ class ClosureFile(KeptFile, Observer):
         found = self._tables["buckling"]
         buckling = [
             Buckling(
-                str(found.read("kind", i)), float(found.read("pressure", i)), restrict(found.read("nodal", i)), restrict(found.read("shape", i)),
+                str(found.read("kind", i)),
+                float(found.read("pressure", i)),
+                restrict(found.read("nodal", i)),
+                restrict(found.read("shape", i)),
                 float(found.read("eigenvalue", i)),
             )
             for i in range(found.rows)
-        ]  # fmt: skip
+        ]
         self._kept["buckling"] = len(buckling)
         return PathRestart(
-            float(self._states.read("pressure", last)), restrict(self._states.read("nodal", last)), table.read("slope", last),
-            table.read("multiplier", last), float(table.read("step", last)), bool(self._states.read("beyond_limit", last)),
-            float(self._states.read("lowest_stiffness_eigenvalue", last)), tuple(table.read("energy", last)), tuple(buckling),
-        )  # fmt: skip
+            float(self._states.read("pressure", last)),
+            restrict(self._states.read("nodal", last)),
+            table.read("slope", last),
+            table.read("multiplier", last),
+            float(table.read("step", last)),
+            bool(self._states.read("beyond_limit", last)),
+            float(self._states.read("lowest_stiffness_eigenvalue", last)),
+            tuple(table.read("energy", last)),
+            tuple(buckling),
+        )
 
-    # -- while the run goes on ------------------------------------------------------------------------------------------------------
+    # -- while the run goes on
+    # ----
 
     def turned_back(self, opened) -> None:
         """Keep the states of an open start."""
@@ -111,7 +137,9 @@ class ClosureFile(KeptFile, Observer):
             self._tables["opened"].append(row)
 
     def reached(self, path, state: Any) -> None:
-        """Keep a state (`dbvfiv.studies.closure_state.ClosureState`); what led to it goes first, so that the state vouches for it."""
+        """Keep a state (`dbvfiv.studies.closure_state.ClosureState`); what led to it goes first, so that the state
+        vouches for it.
+        """
         self._follow(path.points, path.buckling)
         at = path.restart(state.lowest_stiffness_eigenvalue)
         counts = {f"{name}_rows": self._tables[name].rows for name in self._kept}
@@ -122,7 +150,10 @@ class ClosureFile(KeptFile, Observer):
 
     def _follow(self, points, buckling) -> None:
         """Keep what is new on the path."""
-        new = {"path": path_rows(points[self._kept["path"] :]), "buckling": buckling_rows(self.model, buckling[self._kept["buckling"] :])}
+        new = {
+            "path": path_rows(points[self._kept["path"] :]),
+            "buckling": buckling_rows(self.model, buckling[self._kept["buckling"] :]),
+        }
         for name, rows in new.items():
             for row in rows:
                 self._tables[name].append(row)
@@ -142,13 +173,13 @@ class ClosureFile(KeptFile, Observer):
             replace_texts(self._messages, "warnings", self._warnings)
             self._file.flush()
 
-    def conclude(self, result: "ClosureResult", complete: bool) -> None:
+    def conclude(self, result: ClosureResult, complete: bool) -> None:
         """Note the rest of the path, the messages, and whether nothing is left to do."""
         self._follow(result.path, result.buckling)
         self._close_messages(result.warnings, result.failures, complete)
 
     def finish(self, path, buckling, opened, warnings: Sequence[str], failures: Sequence[str], complete: bool) -> None:
-        """Write path, buckling and opened states from their columns, the messages, and whether the run went to its end."""
+        """Write path, buckling and opened states from their columns, messages, and whether the run went to its end."""
         for name, rows in (("path", path), ("buckling", buckling), ("opened", opened)):
             for row in rows:
                 self._tables[name].append(row)
@@ -161,14 +192,19 @@ class ClosureFile(KeptFile, Observer):
         self._file.attrs["complete"] = bool(complete)
         self._file.flush()
 
-    def keep_closing(self, closing: "ClosingResult") -> None:
+    def keep_closing(self, closing: ClosingResult) -> None:
         """Write the history of the valve while its drive turned round."""
         group = self._file.create_group("reversal")
         table = Table.create(group, REVERSAL, {}, chunk=256)
         for sample in closing.samples:
             table.append(vars(sample))
         turn = closing.turn
-        facts = {"open_pressure": turn.pressure, "turn_start": turn.start, "turn_duration": turn.duration, "shut_below": closing.shut_below}
+        facts = {
+            "open_pressure": turn.pressure,
+            "turn_start": turn.start,
+            "turn_duration": turn.duration,
+            "shut_below": closing.shut_below,
+        }
         facts |= {"halvings": closing.halvings, "failure": closing.failure, "interrupted": closing.interrupted}
         for name, value in facts.items():
             group.attrs[name] = value

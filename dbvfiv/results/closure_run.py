@@ -1,4 +1,5 @@
 """Back-pressure runs from a case, with or without a file, and their continuation."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -17,7 +18,9 @@ from .layout import read_texts
 from .registry import load_result
 
 
-def start_closure(case: Case, name: str, in_time: bool = False, output: str | Path | None = None, observer: Observer | None = None) -> ClosureResults:
+def start_closure(
+    case: Case, name: str, in_time: bool = False, output: str | Path | None = None, observer: Observer | None = None
+) -> ClosureResults:
     """States at the back pressures of a case and, with `in_time`, the turn of its drive.
 
     Parameters
@@ -34,7 +37,9 @@ def start_closure(case: Case, name: str, in_time: bool = False, output: str | Pa
     model, header = _model(case), Header.of("closure", case, name)
     if output is None:
         result = run_closure(case, observer=observer, model=model)
-        return ClosureResults.of(result, header, run_closing(case, observer) if in_time and not result.interrupted else None)
+        return ClosureResults.of(
+            result, header, run_closing(case, observer) if in_time and not result.interrupted else None
+        )
     closing = None
     with ClosureFile(output, model, header, in_time) as file:
         result = run_closure(case, observer=Observers(file, observer), model=model, keeper=file)
@@ -46,7 +51,8 @@ def start_closure(case: Case, name: str, in_time: bool = False, output: str | Pa
 
 
 def resume_closure(path: str | Path, observer: Observer | None = None) -> ClosureResults:
-    """Continue an interrupted or killed run from its last state; a turn of the drive in time that was cut short begins anew.
+    """Continue an interrupted or killed run from its last state; a turn of the drive in time that was cut short begins
+    anew.
 
     The states are those of an uninterrupted run.
 
@@ -71,7 +77,9 @@ def resume_closure(path: str | Path, observer: Observer | None = None) -> Closur
     model, interrupted = _model(case), False
     with ClosureFile(path, model, again=True) as file:
         if left:
-            result = run_closure(case, left, observer=Observers(file, observer), model=model, keeper=file, restart=file.restart())
+            result = run_closure(
+                case, left, observer=Observers(file, observer), model=model, keeper=file, restart=file.restart()
+            )
             interrupted = result.interrupted
             file.conclude(result, complete=not (interrupted or in_time))
         else:

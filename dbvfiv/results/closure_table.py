@@ -1,4 +1,5 @@
 """Columns of back-pressure results, and their states as lines of a table for people."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -80,7 +81,11 @@ RESTART = (
     Column("step", "Pa", "Load step to try next"),
     Column("slope", "m/Pa, rad/Pa", "Derivative of the unknowns by the pressure"),
     Column("multiplier", "Pa", "Contact multipliers"),
-    Column("energy", "J", "Work, work of renewing multipliers, contact potential, strain energy, defect; number of equilibria in between"),
+    Column(
+        "energy",
+        "J",
+        "Work, work of renewing multipliers, contact potential, strain energy, defect; number of equilibria in between",
+    ),
     Column("path_rows", "", "Points of the path up to the state", "i8"),
     Column("buckling_rows", "", "Buckling states up to it", "i8"),
 )
@@ -103,7 +108,12 @@ _COLUMNS = (
     ("front", "mm", 7, lambda s: f"{s.contact_front * 1e3:.1f}"),
     ("contact", "N", 8, lambda s: f"{s.contact_force:.1f}"),
     ("opening left", "mm2 at z", 14, lambda s: f"{s.least_opening * 1e6:.2f} at {s.least_opening_position * 1e3:.0f}"),
-    ("displacement", "mm at z", 14, lambda s: f"{s.max_displacement * 1e3:.2f} at {s.max_displacement_position[2] * 1e3:.0f}"),
+    (
+        "displacement",
+        "mm at z",
+        14,
+        lambda s: f"{s.max_displacement * 1e3:.2f} at {s.max_displacement_position[2] * 1e3:.0f}",
+    ),
     ("strain", "%", 7, lambda s: f"{s.largest_strain * 100:.2f}"),
     ("stiffness", "1/s2", 10, lambda s: f"{s.lowest_stiffness_eigenvalue:.4g}"),
     ("residual", "", 9, lambda s: f"{s.residual:.1e}"),

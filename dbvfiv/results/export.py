@@ -1,11 +1,13 @@
 """Results as fields on the valve for ParaView."""
+
 from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,7 +23,9 @@ if TYPE_CHECKING:
 _UNITS = {"displacement": "m", "rotation": "rad", "thickness": "m", "pressure": "Pa", "velocity": "m/s"}
 
 
-def export_result(result: "Result", path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any) -> Path:
+def export_result(
+    result: Result, path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any
+) -> Path:
     """Write a result as one VTKHDF file with a step for each state.
 
     Parameters
@@ -31,7 +35,8 @@ def export_result(result: "Result", path: str | Path, quarter: bool = False, def
     quarter : bool
         Only the quarter that was computed.
     deformed : bool
-        Points move with the states; otherwise they stay at rest, for ParaView's "Warp By Vector" along ``displacement``.
+        Points move with the states; otherwise they stay at rest, for ParaView's "Warp By Vector" along
+        ``displacement``.
     choices
         What results of some kinds may be told, such as ``mode`` for one cycle of a mode.
 
@@ -59,7 +64,9 @@ def export_result(result: "Result", path: str | Path, quarter: bool = False, def
         path.parent.mkdir(parents=True, exist_ok=True)
         write_vtkhdf(path, valve.points, valve.quads, _moved(steps, valve, deformed), units)
     except OSError as error:
-        raise CaseError(f"{str(path)!r} cannot be written ({error.strerror or 'the folder may not be written'}).") from error
+        raise CaseError(
+            f"{str(path)!r} cannot be written ({error.strerror or 'the folder may not be written'})."
+        ) from error
     return path
 
 
@@ -76,7 +83,7 @@ def _moved(steps: Sequence[Step], valve: WholeValve, deformed: bool) -> Iterator
 class _SteadySteps(Sequence):
     """States as steps, made one at a time; "time" is the pressure in Pa."""
 
-    result: "SteadyResults"
+    result: SteadyResults
     valve: WholeValve
 
     def __len__(self) -> int:
@@ -102,7 +109,7 @@ class _SteadySteps(Sequence):
         )
 
 
-def steady_steps(result: "SteadyResults", valve: WholeValve) -> Sequence[Step]:
+def steady_steps(result: SteadyResults, valve: WholeValve) -> Sequence[Step]:
     """States of a steady result in the order of their pressures, as ParaView wants its times."""
     ordered = sorted({state.pressure: state for state in result.states}.values(), key=lambda state: state.pressure)
     return _SteadySteps(result.only(*ordered), valve)
@@ -110,7 +117,10 @@ def steady_steps(result: "SteadyResults", valve: WholeValve) -> Sequence[Step]:
 
 def motion(mesh: MeshData, valve: WholeValve, nodal: np.ndarray) -> dict[str, np.ndarray]:
     """Displacement, rotation vector and director at the points from nodal unknowns (nn, 5)."""
-    directors, towards = valve.vectors(mesh.directors), valve.vectors(np.einsum("na,nai->ni", nodal[:, 3:], mesh.frames))
+    directors, towards = (
+        valve.vectors(mesh.directors),
+        valve.vectors(np.einsum("na,nai->ni", nodal[:, 3:], mesh.frames)),
+    )
     angle = np.linalg.norm(towards, axis=1, keepdims=True)
     return {
         "displacement": valve.vectors(nodal[:, :3]),

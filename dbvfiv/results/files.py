@@ -1,10 +1,12 @@
 """Opening result files, for writing and for reading; whatever is wrong with one is told in a sentence."""
+
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Iterator, Self
+from typing import Self
 
 import h5py
 
@@ -37,7 +39,9 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
         if "truncated" in str(error):
             raise CaseError(f"{str(path)!r} is cut short, so nothing can be read from it.") from error
         if h5py.is_hdf5(path):
-            raise CaseError(f"The result file {str(path)!r} cannot be opened; it is damaged or open for writing in this process.") from error
+            raise CaseError(
+                f"The result file {str(path)!r} cannot be opened; it is damaged or open for writing in this process."
+            ) from error
         raise CaseError(f"{str(path)!r} is not a result file, because it is not HDF5.") from error
     with file:
         try:
@@ -55,7 +59,9 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
             raise
         except _BROKEN as error:
             detail = " ".join(str(error).split())[:120].rstrip(".")
-            raise CaseError(f"The {kind} result {str(path)!r} is damaged or cut short ({type(error).__name__}: {detail}).") from error
+            raise CaseError(
+                f"The {kind} result {str(path)!r} is damaged or cut short ({type(error).__name__}: {detail})."
+            ) from error
 
 
 class KeptFile:
@@ -178,7 +184,9 @@ def reopen(path: str | Path) -> h5py.File:
     try:
         file = h5py.File(path, "r+")
     except OSError as error:
-        raise CaseError(f"The result file {str(path)!r} cannot be opened for writing ({error.strerror or error}).") from error
+        raise CaseError(
+            f"The result file {str(path)!r} cannot be opened for writing ({error.strerror or error})."
+        ) from error
     _hold_back_metadata(file)
     return file
 
@@ -194,7 +202,9 @@ def refuse_foreign(path: Path) -> None:
     if path.is_dir():
         raise CaseError(f"{str(path)!r} is a folder; the result needs the name of a file.")
     if path.exists() and path.stat().st_size and not _replaceable(path):
-        raise CaseError(f"{str(path)!r} exists and is not a result of dbvfiv, so it is not overwritten; choose another name.")
+        raise CaseError(
+            f"{str(path)!r} exists and is not a result of dbvfiv, so it is not overwritten; choose another name."
+        )
 
 
 def _replaceable(path: Path) -> bool:

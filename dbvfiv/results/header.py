@@ -1,4 +1,5 @@
 """What every result file begins with: kind, case, versions and whether the run went to its end."""
+
 from __future__ import annotations
 
 import json
@@ -6,7 +7,7 @@ import platform
 import shlex
 import sys
 from dataclasses import dataclass, field
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from importlib import metadata
 
 import h5py
@@ -52,7 +53,7 @@ class Header:
     case: Case
     name: str = "case"
     program: str = f"dbvfiv {__version__}"
-    created: str = field(default_factory=lambda: datetime.now(timezone.utc).isoformat(timespec="seconds"))
+    created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     command: str = field(default_factory=lambda: shlex.join(["dbvfiv", *sys.argv[1:]]))
     versions: dict[str, str] = field(default_factory=lambda: versions())
     attachments: tuple[Attachment, ...] = ()
@@ -60,7 +61,7 @@ class Header:
     layout: int = LAYOUT
 
     @classmethod
-    def of(cls, kind: str, case: Case, name: str = "case", complete: bool = False) -> "Header":
+    def of(cls, kind: str, case: Case, name: str = "case", complete: bool = False) -> Header:
         """Header of a run that happens now."""
         return cls(kind, case, name, attachments=attachments_of(case), complete=complete)
 

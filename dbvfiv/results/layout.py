@@ -1,12 +1,15 @@
 """How result files are laid out: tables of columns that grow by a row, units beside every number.
 
-The numbers of a run stand in tables, one HDF5 dataset per column with its ``units`` and ``description``. A row counts only once the table's ``rows``
-attribute says so, which is written last and followed by a flush: a run that is killed leaves a file that ends at its last whole row.
+The numbers of a run stand in tables, one HDF5 dataset per column with its ``units`` and ``description``. A row counts
+only once the table's ``rows`` attribute says so, which is written last and followed by a flush: a run that is killed
+leaves a file that ends at its last whole row.
 """
+
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Iterable, Mapping
+from typing import Any
 
 import h5py
 import numpy as np
@@ -56,7 +59,9 @@ class Table:
         self.columns = tuple(columns)
 
     @classmethod
-    def create(cls, group: h5py.Group, columns: Iterable[Column], shapes: Mapping[str, tuple[int, ...]], chunk: int = 1) -> "Table":
+    def create(
+        cls, group: h5py.Group, columns: Iterable[Column], shapes: Mapping[str, tuple[int, ...]], chunk: int = 1
+    ) -> Table:
         """Make empty columns.
 
         Parameters

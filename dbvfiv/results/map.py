@@ -1,4 +1,5 @@
 """Stability maps: the result, in memory or in a file."""
+
 from __future__ import annotations
 
 from dataclasses import fields, replace
@@ -20,7 +21,7 @@ from .result import Result
 from .stability_tables import CHECKS, CURVE_POINTS
 
 if TYPE_CHECKING:
-    from ..model import ValveModel
+    pass
 
 LAWS = {0.0: "quasi-steady", 1.0: "storage"}
 
@@ -47,16 +48,33 @@ class MapResults(Result):
         self.checks: tuple[Check, ...] = tuple(checks)
 
     @classmethod
-    def of(cls, result: MapResult, header: Header, mesh: MeshData) -> "MapResults":
+    def of(cls, result: MapResult, header: Header, mesh: MeshData) -> MapResults:
         """From a run that has just ended."""
         header = replace(header, complete=not result.interrupted)
-        return cls(header, mesh, result.columns, result.curves, result.checks, warnings=result.warnings, failures=result.failures)
+        return cls(
+            header,
+            mesh,
+            result.columns,
+            result.curves,
+            result.checks,
+            warnings=result.warnings,
+            failures=result.failures,
+        )
 
     @classmethod
-    def read(cls, file: h5py.File, path: Path) -> "MapResults":
+    def read(cls, file: h5py.File, path: Path) -> MapResults:
         warnings, failures = read_messages(file)
         curves, checks = _curves(file), _checks(file)
-        return cls(read_header(file), read_mesh(file), read_columns(file), curves, checks, warnings=warnings, failures=failures, path=path)
+        return cls(
+            read_header(file),
+            read_mesh(file),
+            read_columns(file),
+            curves,
+            checks,
+            warnings=warnings,
+            failures=failures,
+            path=path,
+        )
 
     def save(self, path: str | Path) -> Path:
         with MapFile(path, self.plan, self.header, self.mesh) as file:
@@ -64,11 +82,15 @@ class MapResults(Result):
                 file.item(column)
             for sentence in self.warnings:
                 file.warn(sentence)
-            file.conclude(MapResult(self.plan, self.columns, self.curves, self.checks, self.failures, self.warnings, not self.complete))
+            file.conclude(
+                MapResult(
+                    self.plan, self.columns, self.curves, self.checks, self.failures, self.warnings, not self.complete
+                )
+            )
         return Path(path)
 
     def grid(self, name: str) -> np.ndarray:
-        """growth_rate, frequency, second, unstable, counted, certified or how on the grid, (laws, y values, x values)."""
+        """growth_rate, frequency, second, unstable, counted, certified or how on the grid (laws, y, x)."""
         return grid(self.plan, self.columns, name)
 
     def summary(self) -> dict[str, Any]:
@@ -108,20 +130,30 @@ class MapResults(Result):
             cells, gaps = unstable.size, int((unstable < 0).sum())
             name = LAWS.get(law, f"blend {law:g}")
             lines.append(
-                f"{name}: {unstable.shape[1]} x {unstable.shape[0]} cells, {int((unstable > 0).sum())} unstable, {int(certified.sum())} of {cells} certified"
-                + (f", {int((how == 1).sum())} solved directly" if (how == 1).any() else "") + (f", {gaps} in gaps" if gaps else "") + "."
-            )  # fmt: skip
+                (
+                    f"{name}: {unstable.shape[1]} x {unstable.shape[0]} cells, {int((unstable > 0).sum())} "
+                    f"unstable, {int(certified.sum())} of {cells} certified"
+                )
+                + (f", {int((how == 1).sum())} solved directly" if (how == 1).any() else "")
+                + (f", {gaps} in gaps" if gaps else "")
+                + "."
+            )
             for curve in self.curves:
                 if curve.law == i:
                     kind = "exact" if curve.exact else "between columns"
                     lines.append(
-                        f"  onset curve, {kind}, {len(curve.x)} points: {self.plan.x.parameter} {min(curve.x):.6g} to {max(curve.x):.6g}, "
-                        f"{self.plan.y.parameter} {min(curve.y):.6g} to {max(curve.y):.6g}, {min(curve.frequency):.4g} to {max(curve.frequency):.4g} Hz"
+                        f"  onset curve, {kind}, {len(curve.x)} points: {self.plan.x.parameter} "
+                        f"{min(curve.x):.6g} to {max(curve.x):.6g}, "
+                        f"{self.plan.y.parameter} {min(curve.y):.6g} to {max(curve.y):.6g}, "
+                        f"{min(curve.frequency):.4g} to {max(curve.frequency):.4g} Hz"
                     )
         if self.checks:
             worst = max(check.error for check in self.checks)
             agreeing = sum(check.agrees for check in self.checks)
-            lines.append(f"{agreeing} of {len(self.checks)} cells solved again with the full pencil agree; largest difference {worst:.1e}.")
+            lines.append(
+                f"{agreeing} of {len(self.checks)} cells solved again with the full pencil agree; largest "
+                f"difference {worst:.1e}."
+            )
         return lines
 
 
@@ -138,7 +170,14 @@ def _curves(file: h5py.File) -> list[OnsetCurve]:
     for number in np.unique(data["curve"]):
         rows = np.flatnonzero(data["curve"] == number)
         one = {name: data[name][rows] for name in ("x", "y", "frequency")}
-        found.append(OnsetCurve(int(data["law"][rows[0]]), **one, exact=bool(data["exact"][rows[0]]), mismatch=float(data["mismatch"][rows[0]])))
+        found.append(
+            OnsetCurve(
+                int(data["law"][rows[0]]),
+                **one,
+                exact=bool(data["exact"][rows[0]]),
+                mismatch=float(data["mismatch"][rows[0]]),
+            )
+        )
     return found
 
 

@@ -1,4 +1,5 @@
 """The result file of a stability map, written column by column, and read again to go on."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -65,7 +66,15 @@ class MapFile(KeptFile, Observer):
         """Keep a finished `MapColumn`; its onsets go first, so that a row of the table vouches for them."""
         column: MapColumn = result
         for law, along, frequency, direction in column.onsets:
-            self._onsets.append({"across": column.value, "law": int(law), "along": along, "frequency": frequency, "direction": int(direction)})
+            self._onsets.append(
+                {
+                    "across": column.value,
+                    "law": int(law),
+                    "along": along,
+                    "frequency": frequency,
+                    "direction": int(direction),
+                }
+            )
         row = {name: column.cells[name] for name in CELLS}
         row |= {"value": column.value, "level": column.level, "onset_count": len(column.onsets), "error": column.error}
         self._columns.append(row | {"failure": column.failure, "seconds": column.seconds})
@@ -75,7 +84,7 @@ class MapFile(KeptFile, Observer):
         replace_texts(self._messages, "warnings", self._warnings)
         self._file.flush()
 
-    def conclude(self, result: "MapResult") -> None:
+    def conclude(self, result: MapResult) -> None:
         """Write curves, checks and messages, and whether the run went to its end."""
         for name, columns in _LAST.items():
             if name in self._file:
@@ -85,7 +94,15 @@ class MapFile(KeptFile, Observer):
         for number, curve in enumerate(result.curves):
             for x, y, frequency in zip(curve.x, curve.y, curve.frequency):
                 points.append(
-                    {"curve": number, "law": curve.law, "x": x, "y": y, "frequency": frequency, "exact": curve.exact, "mismatch": curve.mismatch}
+                    {
+                        "curve": number,
+                        "law": curve.law,
+                        "x": x,
+                        "y": y,
+                        "frequency": frequency,
+                        "exact": curve.exact,
+                        "mismatch": curve.mismatch,
+                    }
                 )
         checks = Table(self._file["checks"], CHECKS)
         for check in result.checks:
@@ -106,10 +123,22 @@ def read_columns(file: h5py.File) -> list[MapColumn]:
         mine = np.flatnonzero(found["across"] == data["value"][i])
         # a run killed between the onsets of a column and its row has written them twice
         mine = mine[len(mine) - int(data["onset_count"][i]) :] if len(mine) else mine
-        rows = np.column_stack([found[name][mine] for name in ("law", "along", "frequency", "direction")]).astype(float).reshape(-1, 4)
+        rows = (
+            np.column_stack([found[name][mine] for name in ("law", "along", "frequency", "direction")])
+            .astype(float)
+            .reshape(-1, 4)
+        )
         cells = {name: data[name][i] for name in CELLS}
         columns.append(
-            MapColumn(float(data["value"][i]), int(data["level"][i]), cells, rows, float(data["error"][i]), str(data["failure"][i]), float(data["seconds"][i]))
+            MapColumn(
+                float(data["value"][i]),
+                int(data["level"][i]),
+                cells,
+                rows,
+                float(data["error"][i]),
+                str(data["failure"][i]),
+                float(data["seconds"][i]),
+            )
         )
     return columns
 

@@ -1,4 +1,5 @@
 """The quarter valve's mesh as results keep it."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -57,16 +58,21 @@ class MeshData:
     layer_fractions: np.ndarray
 
     @classmethod
-    def of(cls, model: ValveModel) -> "MeshData":
+    def of(cls, model: ValveModel) -> MeshData:
         """Mesh of a model."""
         surface, section = model.shell.mesh, model.shell.section
         return cls(
-            nodes=model.mesh.nodes, quads=model.mesh.quads, rows=model.mesh.rows, z=model.mesh.z,
-            directors=surface.directors, frames=surface.frames, thickness=surface.thickness,
+            nodes=model.mesh.nodes,
+            quads=model.mesh.quads,
+            rows=model.mesh.rows,
+            z=model.mesh.z,
+            directors=surface.directors,
+            frames=surface.frames,
+            thickness=surface.thickness,
             layer_names=tuple(layer.name or f"layer {i + 1}" for i, layer in enumerate(section.layers)),
             layer_angles=np.array([layer.angle for layer in section.layers], float),
             layer_fractions=np.asarray(section.fractions),
-        )  # fmt: skip
+        )
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -77,7 +83,8 @@ class MeshData:
         """Names of the layers that tell equal materials apart by their angle: "CR", "fibre +54°"."""
         repeated = {name for name in self.layer_names if self.layer_names.count(name) > 1}
         return tuple(
-            f"{name} {angle:+g}°" if name in repeated or angle else name for name, angle in zip(self.layer_names, self.layer_angles)
+            f"{name} {angle:+g}°" if name in repeated or angle else name
+            for name, angle in zip(self.layer_names, self.layer_angles)
         )
 
     def element_rows(self) -> np.ndarray:

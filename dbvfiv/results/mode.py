@@ -1,4 +1,5 @@
 """One mode as results hold it: eigenvalue, shape, and what the flow does."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -18,12 +19,18 @@ MODE = (
     Column("angular_frequency", "rad/s", "Imaginary part of the eigenvalue, not negative"),
     Column("residual", "", "Relative residual of the full pencil"),
     Column("backward_error", "", "The same against matrix norms"),
-    Column("shape", "1, rad/m", "Displacements and rotations of the nodes, the largest displacement being 1 and real", "c16"),
+    Column(
+        "shape",
+        "1, rad/m",
+        "Displacements and rotations of the nodes, the largest displacement being 1 and real",
+        "c16",
+    ),
     Column("area", "m", "Change of the flow area of a quarter at each row, m2 for 1 m of largest displacement", "c16"),
     Column("pressure", "Pa/m", "Change of the pressure at each row for 1 m of largest displacement", "c16"),
     Column("inlet_velocity", "1/s", "Change of the inlet velocity for 1 m of largest displacement", "c16"),
 )
-#: Largest displacement at which shapes are drawn, as a fraction of the valve's length, and as one of the opening that must not close.
+#: Largest displacement at which shapes are drawn, as a fraction of the valve's length, and as one of the opening that
+#: must not close.
 _DRAWN, _OPEN = 0.035, 0.85
 
 
@@ -86,7 +93,7 @@ class ModeShape:
         """(nn, 5) displacements and rotations at a phase of the cycle, rad; growth or decay left out."""
         return (self.shape * np.exp(1j * phase)).real
 
-    def drawn_amplitude(self, state: "State") -> float:
+    def drawn_amplitude(self, state: State) -> float:
         """Largest displacement, m, at which the mode shows well and the centre line of the duckbill stays open."""
         mesh = state.results.mesh
         line = mesh.rows[:, 0]
@@ -107,16 +114,23 @@ class ModeShape:
         }
 
 
-def rows_of(result: "ModesResult") -> list[dict[str, Any]]:
+def rows_of(result: ModesResult) -> list[dict[str, Any]]:
     """Columns of the modes of a run."""
     spectrum = result.spectrum
     stations = result.areas.shape[1:]
     rows = []
     for i, value in enumerate(spectrum.eigenvalues):
         pressure = result.pressures[i] if result.pressures.shape[1:] == stations else np.full(stations, np.nan, complex)
-        rows.append({
-            "growth_rate": float(value.real), "angular_frequency": float(value.imag), "residual": float(spectrum.residual[i]),
-            "backward_error": float(spectrum.backward_error[i]), "shape": result.shapes[i], "area": result.areas[i],
-            "pressure": pressure, "inlet_velocity": complex(result.inlet_velocities[i]),
-        })  # fmt: skip
+        rows.append(
+            {
+                "growth_rate": float(value.real),
+                "angular_frequency": float(value.imag),
+                "residual": float(spectrum.residual[i]),
+                "backward_error": float(spectrum.backward_error[i]),
+                "shape": result.shapes[i],
+                "area": result.areas[i],
+                "pressure": pressure,
+                "inlet_velocity": complex(result.inlet_velocities[i]),
+            }
+        )
     return rows

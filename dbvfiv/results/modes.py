@@ -1,10 +1,12 @@
 """Leading modes of one state: the result, in memory or in a file."""
+
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import h5py
 
@@ -73,12 +75,15 @@ class ModesResults(Result):
         return self.certificate.stable
 
     @cached_property
-    def state(self) -> "State":
+    def state(self) -> State:
         """The equilibrium, with its layers and figures."""
         steady = SteadyResults(
-            replace(self.header, kind="steady"), self.mesh, [self._row], lambda i: layers_of(self.model, self.model.shell.dofs.restrict(self._row["nodal"])),
+            replace(self.header, kind="steady"),
+            self.mesh,
+            [self._row],
+            lambda i: layers_of(self.model, self.model.shell.dofs.restrict(self._row["nodal"])),
             model=self.__dict__.get("model"),
-        )  # fmt: skip
+        )
         return steady.states[0]
 
     def mode(self, number: int) -> ModeShape:
@@ -89,11 +94,14 @@ class ModesResults(Result):
         CaseError
         """
         if not 1 <= number <= len(self.modes):
-            raise CaseError(f"There is no mode {number} in the {self.kind} result of {self.header.name!r}; it has {len(self.modes)}.")
+            raise CaseError(
+                f"There is no mode {number} in the {self.kind} result of {self.header.name!r}; it has "
+                f"{len(self.modes)}."
+            )
         return self.modes[number - 1]
 
     @classmethod
-    def of(cls, result: "ModesResult", header: Header | None = None, warnings: Sequence[str] = ()) -> "ModesResults":
+    def of(cls, result: ModesResult, header: Header | None = None, warnings: Sequence[str] = ()) -> ModesResults:
         """From a run that has just ended.
 
         Parameters
@@ -107,28 +115,43 @@ class ModesResults(Result):
         model = result.model
         header = header or Header.of("modes", case_of(result))
         return cls(
-            replace(header, complete=True), MeshData.of(model), row_from(model, result.state), rows_of(result), Certificate.of(result),
-            notes=result.notes, warnings=warnings, model=model,
-        )  # fmt: skip
+            replace(header, complete=True),
+            MeshData.of(model),
+            row_from(model, result.state),
+            rows_of(result),
+            Certificate.of(result),
+            notes=result.notes,
+            warnings=warnings,
+            model=model,
+        )
 
     @classmethod
-    def read(cls, file: h5py.File, path: Path) -> "ModesResults":
+    def read(cls, file: h5py.File, path: Path) -> ModesResults:
         state = Table(file["state"], (*SUMMARY, *FIELDS))
         modes = Table(file["modes"], MODE)
         rows = [{c.name: _plain(modes.read(c.name, i)) for c in modes.columns} for i in range(modes.rows)]
         row = {c.name: _plain(state.read(c.name, 0)) for c in state.columns}
         row["max_displacement_position"] = tuple(row["max_displacement_position"].tolist())
         return cls(
-            read_header(file), read_mesh(file), row, rows, Certificate.read(file["certificate"]),
-            notes=read_texts(file, "messages/notes"), warnings=read_texts(file, "messages/warnings"), path=path,
-        )  # fmt: skip
+            read_header(file),
+            read_mesh(file),
+            row,
+            rows,
+            Certificate.read(file["certificate"]),
+            notes=read_texts(file, "messages/notes"),
+            warnings=read_texts(file, "messages/warnings"),
+            path=path,
+        )
 
     def save(self, path: str | Path) -> Path:
         with writing(path) as file:
             write_header(file, self.header)
             write_mesh(file, self.mesh)
             stations, nodes = len(self.mesh.z), len(self.mesh.nodes)
-            shapes = dict.fromkeys((c.name for c in FIELDS), (stations,)) | {"max_displacement_position": (3,), "nodal": (nodes, 5)}
+            shapes = dict.fromkeys((c.name for c in FIELDS), (stations,)) | {
+                "max_displacement_position": (3,),
+                "nodal": (nodes, 5),
+            }
             Table.create(file.create_group("state"), (*SUMMARY, *FIELDS), shapes).append(self._row)
             shapes = {"shape": (nodes, 5), "area": (stations,), "pressure": (stations,)}
             modes = Table.create(file.create_group("modes"), MODE, shapes)
@@ -154,11 +177,12 @@ class ModesResults(Result):
 
     def lines(self) -> list[str]:
         rows = [
-            f"{m.number:6d}{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:16.4f}{m.residual:11.1e}" for m in self.modes
+            f"{m.number:6d}{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:16.4f}{m.residual:11.1e}"
+            for m in self.modes
         ]
         return [*HEAD, *rows, "", self.certificate.verdict, *(f"Note: {note}" for note in self.notes)]
 
-    def steps(self, valve: "WholeValve", mode: int | None = None, phases: int = 24) -> "Sequence[Step]":
+    def steps(self, valve: WholeValve, mode: int | None = None, phases: int = 24) -> Sequence[Step]:
         """The modes one after the other, or one cycle of one of them; see `dbvfiv.results.modes_export`."""
         from .modes_export import cycle_steps, mode_steps
 
@@ -181,13 +205,19 @@ def surroundings(case) -> dict[str, Any]:
     }
 
 
-def case_of(result: "ModesResult"):
+def case_of(result: ModesResult):
     """Case of the model with the conditions of a run."""
     given = result.conditions
-    return result.model.case.replace({
-        "fluid.density": given.density, "damping.alpha": given.alpha, "damping.beta": given.beta, "drive.pressure": result.state.pressure,
-        "modes.count": result.spectrum.asked, "modes.in_vacuo": result.in_vacuo,
-    })  # fmt: skip
+    return result.model.case.replace(
+        {
+            "fluid.density": given.density,
+            "damping.alpha": given.alpha,
+            "damping.beta": given.beta,
+            "drive.pressure": result.state.pressure,
+            "modes.count": result.spectrum.asked,
+            "modes.in_vacuo": result.in_vacuo,
+        }
+    )
 
 
 def _plain(value: Any) -> Any:

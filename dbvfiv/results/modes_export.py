@@ -1,8 +1,12 @@
-"""Modes as fields on the valve for ParaView: real and imaginary parts mode by mode, or one cycle of one mode in steps of its phase."""
+"""Modes as fields on the valve for ParaView: real and imaginary parts mode by mode, or one cycle of one mode in steps
+of its phase.
+"""
+
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,8 +23,8 @@ if TYPE_CHECKING:
 class _ModeSteps(Sequence):
     """Modes as steps, made one at a time; "time" is the number of the mode."""
 
-    result: "ModesResults"
-    valve: "WholeValve"
+    result: ModesResults
+    valve: WholeValve
 
     def __len__(self) -> int:
         return len(self.result.modes)
@@ -44,11 +48,13 @@ class _ModeSteps(Sequence):
 
 @dataclass(frozen=True)
 class _CycleSteps(Sequence):
-    """Phases of one cycle as steps, the first repeated at the end; "time" is time in s, or the share of a cycle where nothing oscillates."""
+    """Phases of one cycle as steps, the first repeated at the end; "time" is time in s, or the share of a cycle where
+    nothing oscillates.
+    """
 
-    result: "ModesResults"
-    valve: "WholeValve"
-    mode: "ModeShape"
+    result: ModesResults
+    valve: WholeValve
+    mode: ModeShape
     phases: int
 
     def __len__(self) -> int:
@@ -63,11 +69,13 @@ class _CycleSteps(Sequence):
         return Step(value, points, {"thickness": self.valve.cells(mesh.thickness)})
 
 
-def mode_steps(result: "ModesResults", valve: "WholeValve") -> Sequence[Step]:
-    """All modes: the equilibrium as ``displacement``, shapes as ``mode_real``, ``mode_imag`` and ``mode_amplitude`` (largest 1)."""
+def mode_steps(result: ModesResults, valve: WholeValve) -> Sequence[Step]:
+    """All modes: the equilibrium as ``displacement``, shapes as ``mode_real``, ``mode_imag`` and ``mode_amplitude``
+    (largest 1).
+    """
     return _ModeSteps(result, valve)
 
 
-def cycle_steps(result: "ModesResults", valve: "WholeValve", mode: "ModeShape", phases: int = 24) -> Sequence[Step]:
+def cycle_steps(result: ModesResults, valve: WholeValve, mode: ModeShape, phases: int = 24) -> Sequence[Step]:
     """One cycle of a mode about the equilibrium, at an amplitude that shows well; growth or decay is left out."""
     return _CycleSteps(result, valve, mode, phases)

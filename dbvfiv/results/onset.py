@@ -1,4 +1,5 @@
 """Onsets along one parameter: the result, in memory or in a file."""
+
 from __future__ import annotations
 
 import math
@@ -21,7 +22,13 @@ if TYPE_CHECKING:
     from ..model import ValveModel
     from ..studies.onset import OnsetResult
 
-_UNITS = {"pressure": ("kPa", 1e3), "density": ("kg/m3", 1.0), "alpha": ("1/s", 1.0), "beta": ("s", 1.0), "angle": ("deg", 1.0)}
+_UNITS = {
+    "pressure": ("kPa", 1e3),
+    "density": ("kg/m3", 1.0),
+    "alpha": ("1/s", 1.0),
+    "beta": ("s", 1.0),
+    "angle": ("deg", 1.0),
+}
 
 
 class OnsetResults(Result):
@@ -48,22 +55,31 @@ class OnsetResults(Result):
         self.parameter = self.case.onset.axis.parameter
 
     @classmethod
-    def of(cls, result: "OnsetResult", header: Header, model: "ValveModel") -> "OnsetResults":
+    def of(cls, result: OnsetResult, header: Header, model: ValveModel) -> OnsetResults:
         """From a run that has just ended."""
         points = [row_of_point(p) for p in result.points]
         header = replace(header, complete=not result.interrupted)
         rows = zip(result.values, result.growth_rates, result.frequencies)
         scan = [{"value": float(v), "growth_rates": g, "frequencies": f} for v, g, f in rows]
-        return cls(header, MeshData.of(model), points, scan, warnings=result.warnings, failures=result.failures, model=model)
+        return cls(
+            header, MeshData.of(model), points, scan, warnings=result.warnings, failures=result.failures, model=model
+        )
 
     @classmethod
-    def read(cls, file: h5py.File, path: Path) -> "OnsetResults":
+    def read(cls, file: h5py.File, path: Path) -> OnsetResults:
         # the second mesh and values without a state belong to the run and not to its result
-        scan = {row["value"]: row for row in read_rows(file["scan"], SCAN) if row["mesh"] == FINE and not row["failure"]}
+        scan = {
+            row["value"]: row for row in read_rows(file["scan"], SCAN) if row["mesh"] == FINE and not row["failure"]
+        }
         return cls(
-            read_header(file), read_mesh(file), latest_points(file), scan.values(),
-            warnings=read_texts(file, "messages/warnings"), failures=read_texts(file, "messages/failures"), path=path,
-        )  # fmt: skip
+            read_header(file),
+            read_mesh(file),
+            latest_points(file),
+            scan.values(),
+            warnings=read_texts(file, "messages/warnings"),
+            failures=read_texts(file, "messages/failures"),
+            path=path,
+        )
 
     def save(self, path: str | Path) -> Path:
         rows = zip(self.values, self.growth_rates, self.frequencies)
@@ -76,7 +92,11 @@ class OnsetResults(Result):
         return {
             "parameter": self.parameter,
             "points": [self._point(row) for row in self.points],
-            "scan": {"values": self.values.tolist(), "growth_rate": self.growth_rates[:, 0].tolist(), "frequency": self.frequencies[:, 0].tolist()},
+            "scan": {
+                "values": self.values.tolist(),
+                "growth_rate": self.growth_rates[:, 0].tolist(),
+                "frequency": self.frequencies[:, 0].tolist(),
+            },
             "failures": list(self.failures),
             "warnings": list(self.warnings),
             "interrupted": not self.complete,
@@ -98,7 +118,12 @@ class OnsetResults(Result):
             low, high = (self.values[[0, -1]] / scale) if len(self.values) else (math.nan, math.nan)
             state = "unstable" if len(self.values) and self.growth_rates[0, 0] > 0 else "stable"
             return [f"No onset: the valve is {state} from {low:.6g} to {high:.6g} {unit}."]
-        lines = [f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  {'':<28}{'below, 1/s':>11}{'above, 1/s':>11}"]
+        lines = [
+            (
+                f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  "
+                f"{'':<28}{'below, 1/s':>11}{'above, 1/s':>11}"
+            )
+        ]
         for row in self.points:
             becomes = "unstable above" if row["gains"] else "stable above"
             which = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], row["criticality"])
@@ -106,7 +131,10 @@ class OnsetResults(Result):
             spread = f"{row['uncertainty'] / scale:9.2g}" if math.isfinite(row["uncertainty"]) else " " * 9
             below, above = row["sides/growth_rate"]
             mark = "" if row["confirmed"] else "  not confirmed"
-            lines.append(f"{row['value'] / scale:16.8g} {spread} {row['frequency']:8.3f}  {words:<28}{below:11.4g}{above:11.4g}{mark}")
+            lines.append(
+                f"{row['value'] / scale:16.8g} {spread} {row['frequency']:8.3f}  "
+                f"{words:<28}{below:11.4g}{above:11.4g}{mark}"
+            )
         return lines
 
 

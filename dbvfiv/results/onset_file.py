@@ -1,11 +1,14 @@
 """The result file of an onset run: a journal of samples and points, written as they come and read again to go on.
 
-Nothing in it is ever changed. Of a point that more became known about, the last row counts; they share bracket and `ahead`.
+Nothing in it is ever changed. Of a point that more became known about, the last row counts; they share bracket and
+`ahead`.
 """
+
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Mapping
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -61,7 +64,9 @@ class OnsetFile(KeptFile, Observer):
         replace_texts(self._messages, "failures", ())
         sides = {c.name: (2,) for c in ONSETS if c.name.startswith("sides/")}
         self._points = Table.create(self._file.create_group("onsets"), ONSETS, {"bracket": (2,)} | sides)
-        self._scan = Table.create(self._file.create_group("scan"), SCAN, {"growth_rates": (MODES,), "frequencies": (MODES,)}, chunk=64)
+        self._scan = Table.create(
+            self._file.create_group("scan"), SCAN, {"growth_rates": (MODES,), "frequencies": (MODES,)}, chunk=64
+        )
         self._file.flush()
 
     def item(self, result: Any) -> None:
@@ -71,7 +76,7 @@ class OnsetFile(KeptFile, Observer):
         elif isinstance(result, OnsetPoint):
             self._points.append(row_of_point(result))
 
-    def conclude(self, result: "OnsetResult") -> None:
+    def conclude(self, result: OnsetResult) -> None:
         """Write the messages, and whether the run went to its end."""
         self.finish(result.warnings, result.failures, not result.interrupted)
 
@@ -106,7 +111,13 @@ def row_of_sample(sample: OnsetSample) -> dict[str, Any]:
     modes = np.full(MODES, np.nan + 0j)
     kept = sample.eigenvalues[:MODES]
     modes[: len(kept)] = kept
-    return {"value": sample.value, "growth_rates": modes.real, "frequencies": modes.imag / (2 * np.pi), "mesh": sample.mesh, "failure": sample.failure}
+    return {
+        "value": sample.value,
+        "growth_rates": modes.real,
+        "frequencies": modes.imag / (2 * np.pi),
+        "mesh": sample.mesh,
+        "failure": sample.failure,
+    }
 
 
 def read_rows(group: h5py.Group, columns: tuple[Column, ...]) -> list[dict[str, Any]]:
@@ -145,14 +156,28 @@ def _sample(row: Mapping[str, Any]) -> OnsetSample:
     return OnsetSample(float(row["value"]), modes[np.isfinite(modes)], int(row["mesh"]), str(row["failure"]))
 
 
-def _point(row: Mapping[str, Any], case: "Case") -> OnsetPoint:
+def _point(row: Mapping[str, Any], case: Case) -> OnsetPoint:
     parameter, value = case.onset.axis.parameter, float(row["value"])
     names = [name for name in row if name.startswith("sides/")]
     below, above = (Side.of({name.split("/")[1]: row[name][i] for name in names}) for i in (0, 1))
-    maybe = {name: float(row[name]) for name in ("first_lyapunov_coefficient", "crossing_speed", "uncertainty", "coarse_value") if np.isfinite(row[name])}
+    maybe = {
+        name: float(row[name])
+        for name in ("first_lyapunov_coefficient", "crossing_speed", "uncertainty", "coarse_value")
+        if np.isfinite(row[name])
+    }
     flags = {name: bool(row[name]) for name in ("gains", "edge", "confirmed")}
     plain = {name: float(row[name]) for name in ("frequency", "growth_rate")}
     return OnsetPoint(
-        parameter, value, below=below, above=above, place=Place.of(case).at(**{parameter: value}), bracket=tuple(map(float, row["bracket"])),
-        ahead=int(row["ahead"]), criticality=str(row["criticality"]) or None, note=str(row["note"]), **plain, **flags, **maybe,
-    )  # fmt: skip
+        parameter,
+        value,
+        below=below,
+        above=above,
+        place=Place.of(case).at(**{parameter: value}),
+        bracket=tuple(map(float, row["bracket"])),
+        ahead=int(row["ahead"]),
+        criticality=str(row["criticality"]) or None,
+        note=str(row["note"]),
+        **plain,
+        **flags,
+        **maybe,
+    )

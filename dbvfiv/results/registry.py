@@ -1,8 +1,10 @@
 """Kinds of result files and the classes that read them.
 
-A study registers here with one line: the kind that its files carry and ``module:class`` of its result, which is imported when such a file is read. The
-class derives from `dbvfiv.results.result.Result`. Its figures are registered the same way in `dbvfiv.plots.catalogue`.
+A study registers here with one line: the kind that its files carry and ``module:class`` of its result, which is
+imported when such a file is read. The class derives from `dbvfiv.results.result.Result`. Its figures are registered the
+same way in `dbvfiv.plots.catalogue`.
 """
+
 from __future__ import annotations
 
 from importlib import import_module
@@ -26,7 +28,7 @@ READERS: dict[str, str] = {
 }
 
 
-def load_result(path: str | Path) -> "Result":
+def load_result(path: str | Path) -> Result:
     """Read a result file of any kind.
 
     Raises
@@ -47,7 +49,7 @@ def load_result(path: str | Path) -> "Result":
         return reader(kind).read(file, Path(path))
 
 
-def reader(kind: str) -> "type[Result]":
+def reader(kind: str) -> type[Result]:
     """The class of a kind of result."""
     module, name = READERS[kind].split(":")
     return getattr(import_module(module), name)

@@ -1,9 +1,11 @@
 """What results of all studies have in common."""
+
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import h5py
 
@@ -22,7 +24,8 @@ if TYPE_CHECKING:
 class Result:
     """A finished or interrupted run, in memory or read from a file; nothing is computed again.
 
-    Derived classes set `kind` and define `read`, `summary`, `lines` and `save`, and `steps` if they have something to show in space.
+    Derived classes set `kind` and define `read`, `summary`, `lines` and `save`, and `steps` if they have something to
+    show in space.
 
     Parameters
     ----------
@@ -45,7 +48,7 @@ class Result:
         warnings: Sequence[str] = (),
         failures: Sequence[str] = (),
         path: Path | None = None,
-        model: "ValveModel | None" = None,
+        model: ValveModel | None = None,
     ):
         self.header = header
         self.mesh = mesh
@@ -65,14 +68,14 @@ class Result:
         return self.header.complete
 
     @cached_property
-    def model(self) -> "ValveModel":
+    def model(self) -> ValveModel:
         """The coupled model of the case; rebuilt on first use if the result comes from a file."""
         from ..model import ValveModel
 
         return ValveModel(self.header.rebuildable_case())
 
     @classmethod
-    def read(cls, file: h5py.File, path: Path) -> "Result":
+    def read(cls, file: h5py.File, path: Path) -> Result:
         """Read an open result file."""
         raise NotImplementedError
 
@@ -88,11 +91,11 @@ class Result:
         """The numbers as a table for people."""
         raise NotImplementedError
 
-    def steps(self, valve: "WholeValve") -> "Sequence[Step]":
+    def steps(self, valve: WholeValve) -> Sequence[Step]:
         """Fields on the valve for ParaView; empty if the result has none."""
         return ()
 
-    def figures(self, **choices: Any) -> "dict[str, Figure]":
+    def figures(self, **choices: Any) -> dict[str, Figure]:
         """Figures by name."""
         from ..plots import figures_of
 

@@ -1,4 +1,5 @@
 """Columns of the tables in which onset and map results are kept."""
+
 from __future__ import annotations
 
 from .layout import TEXT, Column
@@ -11,7 +12,11 @@ ONSETS = (
     Column("edge", "", "Whether no other mode is unstable there.", "?"),
     Column("confirmed", "", "Whether direct eigenvalues and independent counts on both sides agree with it.", "?"),
     Column("criticality", "", "super, sub or degenerate; empty where it is not known.", TEXT),
-    Column("first_lyapunov_coefficient", "1/s", "For eigenvectors of unit norm in displacements, velocities and inlet velocity."),
+    Column(
+        "first_lyapunov_coefficient",
+        "1/s",
+        "For eigenvectors of unit norm in displacements, velocities and inlet velocity.",
+    ),
     Column("crossing_speed", "1/s per unit", "Derivative of the growth rate with respect to the parameter."),
     Column("uncertainty", "of the parameter", "From a second mesh by Richardson's rule with second order."),
     Column("coarse_value", "of the parameter", "The onset on the second mesh."),
@@ -26,7 +31,11 @@ ONSETS = (
     Column("ahead", "", "Modes that grow faster there.", "i4"),
 )
 SCAN = (
-    Column("value", "of the parameter", "Values of the scan, those of narrow tongues and of the search for onsets included."),
+    Column(
+        "value",
+        "of the parameter",
+        "Values of the scan, those of narrow tongues and of the search for onsets included.",
+    ),
     Column("growth_rates", "1/s", "Of the leading modes."),
     Column("frequencies", "Hz", "Of the leading modes."),
     Column("mesh", "", "0 for the mesh of the case, 1 for the coarser one.", "i4"),

@@ -1,10 +1,12 @@
 """A steady state as results hold it: what a user reads off it, its shape, its layers."""
+
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -70,7 +72,7 @@ class LayerData:
     stretch: np.ndarray
 
 
-def layers_of(model: "ValveModel", q: np.ndarray) -> LayerData:
+def layers_of(model: ValveModel, q: np.ndarray) -> LayerData:
     """Strains and stresses of a state (n,) of a model."""
     from ..shell.recovery import layer_fields
 
@@ -121,7 +123,7 @@ class State:
     station_area: np.ndarray = field(repr=False)
     station_velocity: np.ndarray = field(repr=False)
     station_pressure: np.ndarray = field(repr=False)
-    results: "SteadyResults" = field(repr=False)
+    results: SteadyResults = field(repr=False)
     _read_layers: Callable[[], LayerData] = field(repr=False)
 
     @cached_property
@@ -130,7 +132,7 @@ class State:
         return self._read_layers()
 
     @property
-    def model(self) -> "ValveModel":
+    def model(self) -> ValveModel:
         """The coupled model it is a state of."""
         return self.results.model
 
@@ -139,7 +141,7 @@ class State:
         """Free unknowns (n,) of the model."""
         return self.model.shell.dofs.restrict(self.nodal)
 
-    def solution(self) -> "SteadyState":
+    def solution(self) -> SteadyState:
         """The state as studies take it, to start from for instance."""
         from ..studies.state import SteadyState
 
@@ -150,8 +152,11 @@ class State:
         """Plain SI numbers for JSON."""
         return {c.name: _plain(getattr(self, c.name)) for c in SUMMARY}
 
-    def modes(self, *, count: int | None = None, output: str | Path | None = None, observer: Any = None, **changes: Any) -> "ModesResults":
-        """Leading modes of this state; fluid and damping may differ from those it was found with, see `dbvfiv.api.Valve.modes`.
+    def modes(
+        self, *, count: int | None = None, output: str | Path | None = None, observer: Any = None, **changes: Any
+    ) -> ModesResults:
+        """Leading modes of this state; fluid and damping may differ from those it was found with, see
+        `dbvfiv.api.Valve.modes`.
 
         Examples
         --------
@@ -161,11 +166,23 @@ class State:
 
         return modes_of(changed(self._valve(), changes, {"modes.count": count}), self, output, observer)
 
-    def sweep(self, over: str | None = None, *, count: int | None = None, output: str | Path | None = None, observer: Any = None, **changes: Any) -> "SweepResults":
-        """Modes of this state tracked along density, alpha or beta, such as "density=1:1000:40:log"; see `dbvfiv.api.Valve.sweep`."""
+    def sweep(
+        self,
+        over: str | None = None,
+        *,
+        count: int | None = None,
+        output: str | Path | None = None,
+        observer: Any = None,
+        **changes: Any,
+    ) -> SweepResults:
+        """Modes of this state tracked along density, alpha or beta, such as "density=1:1000:40:log"; see
+        `dbvfiv.api.Valve.sweep`.
+        """
         from ..api_modes import changed, sweep_of
 
-        return sweep_of(changed(self._valve(), changes, {"sweep.over": over, "sweep.count": count}), self, output, observer)
+        return sweep_of(
+            changed(self._valve(), changes, {"sweep.over": over, "sweep.count": count}), self, output, observer
+        )
 
     def _valve(self):
         from ..api import Valve

@@ -1,9 +1,11 @@
 """Equilibria over a list of pressures: the result, in memory or in a file."""
+
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -47,7 +49,7 @@ class SteadyResults(Result):
         )
 
     @classmethod
-    def of(cls, result: "SteadyResult", header: Header | None = None) -> "SteadyResults":
+    def of(cls, result: SteadyResult, header: Header | None = None) -> SteadyResults:
         """From a run that has just ended.
 
         Parameters
@@ -69,7 +71,7 @@ class SteadyResults(Result):
         )
 
     @classmethod
-    def read(cls, file: h5py.File, path: Path) -> "SteadyResults":
+    def read(cls, file: h5py.File, path: Path) -> SteadyResults:
         table = Table(file["states"], (*SUMMARY, *FIELDS))
         columns = {c.name: table.read(c.name) for c in table.columns}
         rows = [{name: _scalar(values[i]) for name, values in columns.items()} for i in range(table.rows)]
@@ -81,9 +83,14 @@ class SteadyResults(Result):
                 return LayerData(names, **{c.name.split("/")[1]: layers.read(c.name, row) for c in LAYERS})
 
         return cls(
-            read_header(file), read_mesh(file), rows, read_layers,
-            warnings=read_texts(file, "messages/warnings"), failures=read_texts(file, "messages/failures"), path=path,
-        )  # fmt: skip
+            read_header(file),
+            read_mesh(file),
+            rows,
+            read_layers,
+            warnings=read_texts(file, "messages/warnings"),
+            failures=read_texts(file, "messages/failures"),
+            path=path,
+        )
 
     def save(self, path: str | Path) -> Path:
         from .steady_file import SteadyFile
@@ -96,13 +103,18 @@ class SteadyResults(Result):
             file.conclude(self.failures, complete=self.complete)
         return Path(path)
 
-    def only(self, *states: State) -> "SteadyResults":
+    def only(self, *states: State) -> SteadyResults:
         """A result with some of its states."""
         chosen = [{c.name: getattr(state, c.name) for c in (*SUMMARY, *FIELDS)} for state in states]
         return SteadyResults(
-            replace(self.header), self.mesh, chosen, lambda i: states[i].layers,
-            warnings=self.warnings, path=self.path, model=self.__dict__.get("model"),
-        )  # fmt: skip
+            replace(self.header),
+            self.mesh,
+            chosen,
+            lambda i: states[i].layers,
+            warnings=self.warnings,
+            path=self.path,
+            model=self.__dict__.get("model"),
+        )
 
     def nearest(self, pressure: float) -> State:
         """State at the pressure closest to a given one, Pa."""
@@ -119,13 +131,13 @@ class SteadyResults(Result):
     def lines(self) -> list[str]:
         return [*HEAD, *(row_of(state) for state in self.states)]
 
-    def steps(self, valve: "WholeValve") -> "Sequence[Step]":
+    def steps(self, valve: WholeValve) -> Sequence[Step]:
         from .export import steady_steps
 
         return steady_steps(self, valve)
 
 
-def row_from(model: "ValveModel", state: Any) -> dict[str, Any]:
+def row_from(model: ValveModel, state: Any) -> dict[str, Any]:
     """Columns of a state (`dbvfiv.studies.state.SteadyState`) of a model."""
     row = {c.name: getattr(state, c.name) for c in (*SUMMARY, *FIELDS) if c.name != "nodal"}
     return row | {"nodal": model.nodal(state.q)}

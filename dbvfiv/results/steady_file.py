@@ -1,8 +1,10 @@
 """The result file of a steady run, written state by state while the run goes on."""
+
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Sequence
+from typing import TYPE_CHECKING, Any
 
 from ..studies.observer import Observer
 from .files import KeptFile, create
@@ -31,7 +33,7 @@ class SteadyFile(KeptFile, Observer):
         If the file cannot be written.
     """
 
-    def __init__(self, path: str | Path, model: "ValveModel", header: Header | None = None):
+    def __init__(self, path: str | Path, model: ValveModel, header: Header | None = None):
         self.model = model
         self.path = Path(path)
         self._warnings: list[str] = []

@@ -1,4 +1,5 @@
 """Steady states as lines of a table for people."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -9,7 +10,12 @@ _COLUMNS = (
     ("lip area", "cm2", 9, lambda s: f"{s.outlet_area * 1e4:.3f}"),
     ("jet", "m/s", 7, lambda s: f"{s.outlet_velocity:.3f}"),
     ("lip opening", "mm", 12, lambda s: f"{s.lip_opening * 1e3:.3f}"),
-    ("largest displacement", "mm at z", 21, lambda s: f"{s.max_displacement * 1e3:.3f} at {s.max_displacement_position[2] * 1e3:.0f}"),
+    (
+        "largest displacement",
+        "mm at z",
+        21,
+        lambda s: f"{s.max_displacement * 1e3:.3f} at {s.max_displacement_position[2] * 1e3:.0f}",
+    ),
     ("iterations", "", 11, lambda s: f"{s.iterations}"),
     ("residual", "", 9, lambda s: f"{s.residual:.1e}"),
 )

@@ -1,9 +1,11 @@
 """Modes along a parameter: the result, in memory or in a file."""
+
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Sequence
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -24,7 +26,11 @@ if TYPE_CHECKING:
 _BRANCHES = (
     Column("id", "", "Number of each branch, by falling largest growth rate", "i8"),
     Column("growth_rate", "1/s", "Of each branch (first axis) at each value; NaN where it does not exist"),
-    Column("angular_frequency", "rad/s", "Imaginary part of the eigenvalue; negative for the second of two real modes that have merged"),
+    Column(
+        "angular_frequency",
+        "rad/s",
+        "Imaginary part of the eigenvalue; negative for the second of two real modes that have merged",
+    ),
     Column("confidence", "", "0 to 1, of the match with the value before"),
 )
 _CHECKS = (
@@ -64,7 +70,9 @@ class Branch:
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON; None where the branch does not exist."""
         columns = {"growth_rate": self.growth_rate, "frequency": self.frequency, "confidence": self.confidence}
-        return {"id": self.id} | {name: [float(v) if np.isfinite(v) else None for v in values] for name, values in columns.items()}
+        return {"id": self.id} | {
+            name: [float(v) if np.isfinite(v) else None for v in values] for name, values in columns.items()
+        }
 
 
 @dataclass(frozen=True)
@@ -136,7 +144,7 @@ class SweepResults(Result):
         return units_of(self.parameter)
 
     @classmethod
-    def of(cls, result: "SweepResult", header: Header | None = None, warnings: Sequence[str] = ()) -> "SweepResults":
+    def of(cls, result: SweepResult, header: Header | None = None, warnings: Sequence[str] = ()) -> SweepResults:
         """From a run that has just ended.
 
         Parameters
@@ -149,26 +157,46 @@ class SweepResults(Result):
         model, found = result.model, result.branches
         header = header or Header.of("sweep", model.case)
         table = {
-            "id": found.ids, "growth_rate": found.eigenvalues.real, "angular_frequency": found.eigenvalues.imag, "confidence": found.confidence,
-        }  # fmt: skip
+            "id": found.ids,
+            "growth_rate": found.eigenvalues.real,
+            "angular_frequency": found.eigenvalues.imag,
+            "confidence": found.confidence,
+        }
         missing = ~np.isfinite(found.eigenvalues.real)
         table["angular_frequency"] = np.where(missing, np.nan, table["angular_frequency"])
         states = [{c.name: getattr(state, c.name) for c in SUMMARY} for state in result.states]
         return cls(
-            replace(header, complete=not (result.interrupted or result.failures)), MeshData.of(model), result.values, table, result.unstable_count,
-            [{f.name: getattr(check, f.name) for f in fields(check)} for check in result.checks], result.certified, states,
-            notes=result.notes, warnings=warnings, failures=result.failures, model=model,
-        )  # fmt: skip
+            replace(header, complete=not (result.interrupted or result.failures)),
+            MeshData.of(model),
+            result.values,
+            table,
+            result.unstable_count,
+            [{f.name: getattr(check, f.name) for f in fields(check)} for check in result.checks],
+            result.certified,
+            states,
+            notes=result.notes,
+            warnings=warnings,
+            failures=result.failures,
+            model=model,
+        )
 
     @classmethod
-    def read(cls, file: h5py.File, path: Path) -> "SweepResults":
+    def read(cls, file: h5py.File, path: Path) -> SweepResults:
         group = file["sweep"]
         branches = {c.name: read_array(group["branches"], c) for c in _BRANCHES}
         messages = {name: read_texts(file, f"messages/{name}") for name in _MESSAGES}
         return cls(
-            read_header(file), read_mesh(file), group["values"][...], branches, group["unstable_count"][...].astype(int),
-            _rows(Table(group["checks"], _CHECKS)), bool(group.attrs["certified"]), _rows(Table(file["states"], SUMMARY)), path=path, **messages,
-        )  # fmt: skip
+            read_header(file),
+            read_mesh(file),
+            group["values"][...],
+            branches,
+            group["unstable_count"][...].astype(int),
+            _rows(Table(group["checks"], _CHECKS)),
+            bool(group.attrs["certified"]),
+            _rows(Table(file["states"], SUMMARY)),
+            path=path,
+            **messages,
+        )
 
     def save(self, path: str | Path) -> Path:
         with writing(path) as file:
@@ -177,7 +205,11 @@ class SweepResults(Result):
             group = file.create_group("sweep")
             group.attrs["certified"] = self.certified
             write_array(group, Column("values", self.units, f"Values of {KEYS[self.parameter]}"), self.values)
-            write_array(group, Column("unstable_count", "", "Unstable eigenvalues, both of a pair counted", "i8"), self.unstable_count)
+            write_array(
+                group,
+                Column("unstable_count", "", "Unstable eigenvalues, both of a pair counted", "i8"),
+                self.unstable_count,
+            )
             for column in _BRANCHES:
                 write_array(group.require_group("branches"), column, self._table[column.name])
             checks = Table.create(group.create_group("checks"), _CHECKS, {})
@@ -192,7 +224,9 @@ class SweepResults(Result):
         return Path(path)
 
     def crossings(self) -> tuple[Crossing, ...]:
-        """Where branches cross zero growth, interpolated between neighbouring values; two real ones that have merged count once."""
+        """Where branches cross zero growth, interpolated between neighbouring values; two real ones that have merged
+        count once.
+        """
         scale = np.log if self.axis.log else np.asarray
         place = scale(self.values)
         found = []
@@ -203,11 +237,18 @@ class SweepResults(Result):
                 at = place[i] + share * (place[i + 1] - place[i])
                 frequency = branch.frequency[i] + share * (branch.frequency[i + 1] - branch.frequency[i])
                 if branch.angular_frequency[i] >= 0:
-                    found.append(Crossing(branch.id, float(np.exp(at) if self.axis.log else at), float(frequency), bool(growth[i] < 0)))
+                    found.append(
+                        Crossing(
+                            branch.id, float(np.exp(at) if self.axis.log else at), float(frequency), bool(growth[i] < 0)
+                        )
+                    )
         return tuple(sorted(found, key=lambda c: c.value))
 
     def summary(self) -> dict[str, Any]:
-        states = [{name: list(v) if isinstance(v, (tuple, np.ndarray)) else v for name, v in row.items()} for row in self.points]
+        states = [
+            {name: list(v) if isinstance(v, (tuple, np.ndarray)) else v for name, v in row.items()}
+            for row in self.points
+        ]
         return {
             "parameter": self.parameter,
             "values": self.values.tolist(),
@@ -227,8 +268,19 @@ class SweepResults(Result):
         crossings = [crossing_line(self, crossing) for crossing in self.crossings()]
         places = ", ".join(f"{check['value']:.4g}" for check in self.checks)
         word = "Certified" if self.certified else "Not certified"
-        checked = [f"{word}: checked at {self.parameter} {places} {self.units}."] if self.checks else ["Not certified: no value was checked."]
-        return [*head(self.parameter), *rows_of_sweep(self), "", *crossings, *checked, *(f"Note: {note}" for note in self.notes)]
+        checked = (
+            [f"{word}: checked at {self.parameter} {places} {self.units}."]
+            if self.checks
+            else ["Not certified: no value was checked."]
+        )
+        return [
+            *head(self.parameter),
+            *rows_of_sweep(self),
+            "",
+            *crossings,
+            *checked,
+            *(f"Note: {note}" for note in self.notes),
+        ]
 
 
 def _rows(table: Table) -> list[dict[str, Any]]:

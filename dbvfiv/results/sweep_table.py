@@ -1,4 +1,5 @@
 """Sweeps as lines of a table for people."""
+
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
@@ -32,12 +33,14 @@ def head(parameter: str) -> tuple[str, str]:
 
 
 def row_of(point: Any) -> str:
-    """One line for a value just solved (`dbvfiv.studies.sweep.SweepPoint`): the leading mode and the number of unstable eigenvalues."""
+    """One line for a value just solved (`dbvfiv.studies.sweep.SweepPoint`): the leading mode and the number of unstable
+    eigenvalues.
+    """
     leading = point.eigenvalues[0] if len(point.eigenvalues) else complex(np.nan, np.nan)
     return _row(point.value, leading.real, abs(leading.imag) / (2 * np.pi), point.unstable_count)
 
 
-def rows_of_sweep(result: "SweepResults") -> list[str]:
+def rows_of_sweep(result: SweepResults) -> list[str]:
     """One line for each value: the leading branch."""
     rows = []
     for i, value in enumerate(result.values):
@@ -48,12 +51,15 @@ def rows_of_sweep(result: "SweepResults") -> list[str]:
     return rows
 
 
-def crossing_line(result: "SweepResults", crossing: "Crossing") -> str:
+def crossing_line(result: SweepResults, crossing: Crossing) -> str:
     """One sentence on a crossing of zero growth."""
     _, unit, factor = SHOWN[result.parameter]
     becomes = "unstable" if crossing.to_unstable else "stable"
     how = f"at {crossing.frequency:.4g} Hz" if crossing.frequency > 0 else "without oscillation"
-    return f"Branch {crossing.branch} becomes {becomes} near {result.parameter} {factor * crossing.value:.4g} {unit} {how} (interpolated)."
+    return (
+        f"Branch {crossing.branch} becomes {becomes} near {result.parameter} "
+        f"{factor * crossing.value:.4g} {unit} {how} (interpolated)."
+    )
 
 
 def _row(value: float, growth: float, frequency: float, unstable: int) -> str:

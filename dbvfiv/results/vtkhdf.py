@@ -1,12 +1,14 @@
 """VTKHDF files: quadrilaterals with point and cell data over steps, as ParaView 5.12 and later read them.
 
-Written to the VTKHDF 2.0 description of temporal unstructured grids. A mesh that does not move is stored once, and every step points to it.
+Written to the VTKHDF 2.0 description of temporal unstructured grids. A mesh that does not move is stored once, and
+every step points to it.
 """
+
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Iterable, Mapping
 
 import h5py
 import numpy as np
@@ -33,7 +35,9 @@ class Step:
     points: np.ndarray | None = None
 
 
-def write_vtkhdf(path: str | Path, points: np.ndarray, quads: np.ndarray, steps: Iterable[Step], units: Mapping[str, str] = {}) -> None:
+def write_vtkhdf(
+    path: str | Path, points: np.ndarray, quads: np.ndarray, steps: Iterable[Step], units: Mapping[str, str] = {}
+) -> None:
     """Write quadrilaterals and their fields.
 
     Parameters

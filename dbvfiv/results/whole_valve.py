@@ -1,4 +1,5 @@
 """From the quarter model to the whole valve: four mirror images joined along the planes of symmetry."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -32,7 +33,7 @@ class WholeValve:
     sign: np.ndarray
 
     @classmethod
-    def of(cls, mesh: MeshData, quarter: bool = False) -> "WholeValve":
+    def of(cls, mesh: MeshData, quarter: bool = False) -> WholeValve:
         """All four quarters, or the one that was computed."""
         images = [(1, 1)] if quarter else [(1, 1), (-1, 1), (-1, -1), (1, -1)]
         on_centre, on_side = np.zeros((2, len(mesh.nodes)), bool)

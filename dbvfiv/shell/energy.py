@@ -1,13 +1,14 @@
 """The element is its energy: the one definition of the shell's mechanics, differentiated automatically.
 
-Strains are covariant Green-Lagrange coefficients of a first-order (thick shell) kinematics x(t) = x + t d, with the transverse shear of Dvorkin &
-Bathe (1984). Two through-thickness treatments:
+Strains are covariant Green-Lagrange coefficients of a first-order (thick shell) kinematics x(t) = x + t d, with the
+transverse shear of Dvorkin & Bathe (1984). Two through-thickness treatments:
 
 ``first-order``
     Mid-surface metric and area; E(t) = c0 + t (c1 - sym(kappa c0)), Budiansky-Sanders' best first-order theory.
 ``true``
     Metric, area and quadratic strain of each parallel surface; valid while half the wall stays below the radius.
 """
+
 from __future__ import annotations
 
 from functools import partial
@@ -18,7 +19,7 @@ import numpy as np
 
 from ..materials.incompressible import mooney_rivlin_energy
 from ..materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, linear_elastic_energy
-from .reference import SHAPE, SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE, ReferenceGeometry, strain_map, thickness_over_radius
+from .reference import SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE, ReferenceGeometry, strain_map, thickness_over_radius
 from .rotation import director
 from .section import Section
 
@@ -56,12 +57,15 @@ def element_arrays(mesh, geometry: ReferenceGeometry, section: Section, metric: 
         t = geometry.thickness[:, None] * section.points[:, 0]  # (ne, np)
         shift = np.eye(2) + t[:, None, :, None, None] * geometry.curvature[:, :, None]
         jacobian = np.linalg.det(shift)
-        folded = thickness_over_radius(geometry).max(axis=1)  # at the faces: the points inside the layers may still be sound
+        folded = thickness_over_radius(geometry).max(
+            axis=1
+        )  # at the faces: the points inside the layers may still be sound
         if folded.max() >= 1:
             element = int(np.argmax(folded))
             place = ", ".join(f"{value:.4g}" for value in geometry.position[element].mean(axis=0))
             raise ValueError(
-                f"The true metric is not valid at ({place}) m: half the wall exceeds the radius there, so the inner face folds over itself; "
+                f"The true metric is not valid at ({place}) m: half the wall exceeds the radius there, so "
+                f"the inner face folds over itself; "
                 "use the first-order metric."
             )
         p = np.einsum("epac,eplcd->eplad", geometry.p, np.linalg.inv(shift))
@@ -89,7 +93,9 @@ def local_strains(unknowns, element, layers, metric):
     turn = jnp.einsum("pac,ai->pci", SLOPE, d)
     c0 = _voigt(basis, basis, 0.5) - element["m0"]
     c1 = _voigt(basis, turn, 1.0) - element["m1"]
-    edge = 0.25 * jnp.sum((x[SHEAR_EDGES[:, 1]] - x[SHEAR_EDGES[:, 0]]) * (d[SHEAR_EDGES[:, 1]] + d[SHEAR_EDGES[:, 0]]), axis=1)
+    edge = 0.25 * jnp.sum(
+        (x[SHEAR_EDGES[:, 1]] - x[SHEAR_EDGES[:, 0]]) * (d[SHEAR_EDGES[:, 1]] + d[SHEAR_EDGES[:, 0]]), axis=1
+    )
     shear = SHEAR_WEIGHTS * (edge - element["s0"])
     gamma = jnp.stack([shear[:, 0] + shear[:, 1], shear[:, 2] + shear[:, 3]], axis=1)
     t = element["h"] * layers["zeta"]
@@ -107,9 +113,13 @@ def local_strains(unknowns, element, layers, metric):
 
 
 def _voigt(a, b, factor):
-    """Symmetric products of two pairs of vectors (4, 2, 3) as [11, 22, 12 + 21], scaled so that a = b gives metric strains."""
+    """Symmetric products of two pairs of vectors (4, 2, 3) as [11, 22, 12 + 21], scaled so that a = b gives metric
+    strains.
+    """
     cross = jnp.einsum("pi,pi->p", a[:, 0], b[:, 1]) + jnp.einsum("pi,pi->p", a[:, 1], b[:, 0])
-    return factor * jnp.stack([jnp.einsum("pi,pi->p", a[:, 0], b[:, 0]), jnp.einsum("pi,pi->p", a[:, 1], b[:, 1]), cross], axis=-1)
+    return factor * jnp.stack(
+        [jnp.einsum("pi,pi->p", a[:, 0], b[:, 0]), jnp.einsum("pi,pi->p", a[:, 1], b[:, 1]), cross], axis=-1
+    )
 
 
 def material_strains(strains, layers):
@@ -130,7 +140,9 @@ def material_strains(strains, layers):
 
 
 def point_energies(kinds, parameters, strains):
-    """Energy densities (..., np) of strains (..., np, 5); `kinds` is static, so each law is traced once, and only if it occurs."""
+    """Energy densities (..., np) of strains (..., np, 5); `kinds` is static, so each law is traced once, and only if it
+    occurs.
+    """
     kinds = np.asarray(kinds)
     parts, chosen = [], []
     for kind in np.unique(kinds):
@@ -164,7 +176,8 @@ def element_energy(kinds, metric, unknowns, element, layers):
 class EnergyFunctions:
     """Compiled maps of the element energy and its derivatives over all elements of one mesh.
 
-    The layer data are arguments of the compiled functions, not constants in them, so a change of material or thickness does not compile anew.
+    The layer data are arguments of the compiled functions, not constants in them, so a change of material or thickness
+    does not compile anew.
     """
 
     def __init__(self, mesh, geometry: ReferenceGeometry, section: Section, metric: str = FIRST_ORDER):

@@ -1,11 +1,13 @@
 """Compiled element loop: force and tangent of the first-order shell, the hot path of every solve.
 
-The mechanics are defined once, by the energy in `energy.py`; this loop evaluates its first and second derivative with the structure used: covariant
-strains are quadratic in positions and directors, so their first derivative is linear and the second constant, and the layers integrate to an
-8 x 8 section tangent before the strain-displacement product. It agrees with automatic differentiation to rounding.
+The mechanics are defined once, by the energy in `energy.py`; this loop evaluates its first and second derivative with
+the structure used: covariant strains are quadratic in positions and directors, so their first derivative is linear and
+the second constant, and the layers integrate to an 8 x 8 section tangent before the strain-displacement product. It
+agrees with automatic differentiation to rounding.
 
 Element unknowns are node-major: three displacements and two rotations of each of the four nodes.
 """
+
 from __future__ import annotations
 
 import numba
@@ -72,9 +74,7 @@ def strains(point, basis, turn, edge, shear0, metric0, metric1, q, qk, p, strain
         c12 += basis[0, i] * turn[1, i] + basis[1, i] * turn[0, i]
     for i in range(3):
         strain[i] = q[i, 0] * c00 + q[i, 1] * c01 + q[i, 2] * c02
-        strain[3 + i] = (
-            q[i, 0] * c10 + q[i, 1] * c11 + q[i, 2] * c12 - qk[i, 0] * c00 - qk[i, 1] * c01 - qk[i, 2] * c02
-        )
+        strain[3 + i] = q[i, 0] * c10 + q[i, 1] * c11 + q[i, 2] * c12 - qk[i, 0] * c00 - qk[i, 1] * c01 - qk[i, 2] * c02
     g0 = _EDGE_WEIGHTS[point, 0] * (edge[0] - shear0[0]) + _EDGE_WEIGHTS[point, 1] * (edge[1] - shear0[1])
     g1 = _EDGE_WEIGHTS[point, 2] * (edge[2] - shear0[2]) + _EDGE_WEIGHTS[point, 3] * (edge[3] - shear0[3])
     strain[6] = p[0, 0] * g0 + p[0, 1] * g1
@@ -123,8 +123,26 @@ def _add_forces(point, n, m, g, basis, turn, x, d, fx, fd):
 
 
 @numba.njit(cache=True, fastmath=FAST)
-def shell_force(quads, nodes, q, director, director1, shear0, metric0, metric1, mq, mqk, mp, area, thickness,
-                stiffness, points, constants, scales, out):  # fmt: skip
+def shell_force(
+    quads,
+    nodes,
+    q,
+    director,
+    director1,
+    shear0,
+    metric0,
+    metric1,
+    mq,
+    mqk,
+    mp,
+    area,
+    thickness,
+    stiffness,
+    points,
+    constants,
+    scales,
+    out,
+):
     """Add the internal force to out (nn, 5); unknowns q (nn, 5)."""
     x = np.empty((4, 3))
     d = np.empty((4, 3))
@@ -150,7 +168,19 @@ def shell_force(quads, nodes, q, director, director1, shear0, metric0, metric1, 
                 fd[a, i] = 0.0
         for point in range(4):
             bases(point, x, d, basis, turn)
-            strains(point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], mq[el, point], mqk[el, point], mp[el, point], strain)
+            strains(
+                point,
+                basis,
+                turn,
+                edge,
+                shear0[el],
+                metric0[el, point],
+                metric1[el, point],
+                mq[el, point],
+                mqk[el, point],
+                mp[el, point],
+                strain,
+            )
             section_stress(stiffness, points, constants, scales, thickness[el], strain, stress, e, s)
             _covariant_stress(mq[el, point], mqk[el, point], mp[el, point], area[el, point], stress, n, m, g)
             _add_forces(point, n, m, g, basis, turn, x, d, fx, fd)
@@ -166,8 +196,29 @@ def shell_force(quads, nodes, q, director, director1, shear0, metric0, metric1, 
 
 
 @numba.njit(cache=True, fastmath=FAST)
-def shell_tangent(quads, nodes, q, director, director1, director2, shear0, metric0, metric1, mq, mqk, mp, area, thickness,
-                  stiffness, points, constants, scales, slots, out, data):  # fmt: skip
+def shell_tangent(
+    quads,
+    nodes,
+    q,
+    director,
+    director1,
+    director2,
+    shear0,
+    metric0,
+    metric1,
+    mq,
+    mqk,
+    mp,
+    area,
+    thickness,
+    stiffness,
+    points,
+    constants,
+    scales,
+    slots,
+    out,
+    data,
+):
     """Add the internal force to out (nn, 5) and the tangent to the matrix values data (nnz,).
 
     Parameters
@@ -277,9 +328,13 @@ def shell_tangent(quads, nodes, q, director, director1, director2, shear0, metri
                 for j in range(20):
                     rows[i, j] = ql[i, 0] * cov[0, j] + ql[i, 1] * cov[1, j] + ql[i, 2] * cov[2, j]
                     rows[3 + i, j] = (
-                        ql[i, 0] * cov[3, j] + ql[i, 1] * cov[4, j] + ql[i, 2] * cov[5, j]
-                        - qkl[i, 0] * cov[0, j] - qkl[i, 1] * cov[1, j] - qkl[i, 2] * cov[2, j]
-                    )  # fmt: skip
+                        ql[i, 0] * cov[3, j]
+                        + ql[i, 1] * cov[4, j]
+                        + ql[i, 2] * cov[5, j]
+                        - qkl[i, 0] * cov[0, j]
+                        - qkl[i, 1] * cov[1, j]
+                        - qkl[i, 2] * cov[2, j]
+                    )
             for i in range(2):
                 for j in range(20):
                     rows[6 + i, j] = pl[i, 0] * cov[6, j] + pl[i, 1] * cov[7, j]

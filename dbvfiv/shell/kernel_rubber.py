@@ -1,8 +1,9 @@
 """Stress and tangent of the incompressible Mooney-Rivlin law in plane stress, in closed form for compiled loops.
 
-The law is defined by its energy in `dbvfiv.materials`; this is its first and second derivative with respect to [E11, E22, 2E12, 2E13, 2E23],
-checked against automatic differentiation of that energy.
+The law is defined by its energy in `dbvfiv.materials`; this is its first and second derivative with respect to [E11,
+E22, 2E12, 2E13, 2E23], checked against automatic differentiation of that energy.
 """
+
 from __future__ import annotations
 
 import numba

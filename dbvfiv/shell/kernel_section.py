@@ -1,8 +1,9 @@
 """Compiled section response: what the layers of a wall answer to membrane strains, curvatures and shears.
 
-Plies answer linearly by their integrated stiffness; rubber is integrated over points through the thickness. Strains and resultants are ordered
-membrane (3), bending (3), transverse shear (2).
+Plies answer linearly by their integrated stiffness; rubber is integrated over points through the thickness. Strains and
+resultants are ordered membrane (3), bending (3), transverse shear (2).
 """
+
 from __future__ import annotations
 
 import numba

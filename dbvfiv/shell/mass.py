@@ -1,4 +1,5 @@
 """Consistent mass: translation, rotation of the wall and, for unequal layers, the coupling of the two."""
+
 from __future__ import annotations
 
 import numba
@@ -51,8 +52,8 @@ def assemble_mass(quads, integrals, director1, slots, data):
 def convective_inertia(quads, integrals, director1, director2, rate, out):
     """Add the inertia forces quadratic in the velocities, M_dot-type terms of turning directors, to out (nn, 5).
 
-    The kinetic energy depends on the rotations through the directors; with velocities `rate` (nn, 5) the acceleration of a director at zero
-    rotational acceleration is d2 applied to the rotation rates twice.
+    The kinetic energy depends on the rotations through the directors; with velocities `rate` (nn, 5) the acceleration
+    of a director at zero rotational acceleration is d2 applied to the rotation rates twice.
     """
     turn = np.empty((4, 3))
     for el in range(quads.shape[0]):
@@ -61,7 +62,9 @@ def convective_inertia(quads, integrals, director1, director2, rate, out):
             r0 = rate[n, 3]
             r1 = rate[n, 4]
             for i in range(3):
-                turn[b, i] = director2[n, 0, i] * r0 * r0 + director2[n, 1, i] * r1 * r1 + 2 * director2[n, 2, i] * r0 * r1
+                turn[b, i] = (
+                    director2[n, 0, i] * r0 * r0 + director2[n, 1, i] * r1 * r1 + 2 * director2[n, 2, i] * r0 * r1
+                )
         for a in range(4):
             na = quads[el, a]
             for i in range(3):

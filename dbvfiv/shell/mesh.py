@@ -1,4 +1,5 @@
 """Quadrilateral mid-surface mesh with nodal directors: what a shell is made of before it has a wall."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -46,9 +47,13 @@ class ShellMesh:
     def __post_init__(self):
         nn, ne = len(self.nodes), len(self.quads)
         if self.directors.shape != (nn, 3) or self.frames.shape != (nn, 2, 3):
-            raise ValueError(f"A mesh of {nn} nodes needs directors of shape ({nn}, 3) and frames of shape ({nn}, 2, 3).")
+            raise ValueError(
+                f"A mesh of {nn} nodes needs directors of shape ({nn}, 3) and frames of shape ({nn}, 2, 3)."
+            )
         if self.thickness.shape != (ne,):
-            raise ValueError(f"A mesh of {ne} elements needs {ne} thicknesses, not an array of shape {self.thickness.shape}.")
+            raise ValueError(
+                f"A mesh of {ne} elements needs {ne} thicknesses, not an array of shape {self.thickness.shape}."
+            )
 
     @property
     def node_count(self) -> int:
@@ -81,7 +86,9 @@ class ShellMesh:
         axis = material_axis if frame_axis is None else np.asarray(frame_axis, float)
         if axis.ndim > 1:
             raise ValueError("A material axis per element needs a frame_axis of shape (3,).")
-        return cls(nodes, quads, np.asarray(directors, float), tangent_frames(directors, axis), thickness, material_axis)
+        return cls(
+            nodes, quads, np.asarray(directors, float), tangent_frames(directors, axis), thickness, material_axis
+        )
 
 
 def nodal_directors(nodes: np.ndarray, quads: np.ndarray, planes=()) -> np.ndarray:

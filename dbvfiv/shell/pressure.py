@@ -1,4 +1,5 @@
 """Follower pressure on the mid-surface, linear in a few station pressures, with its unsymmetric stiffness."""
+
 from __future__ import annotations
 
 import numba

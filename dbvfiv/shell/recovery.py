@@ -1,4 +1,5 @@
 """Strains and stresses of every layer, in the layer's own axes."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -78,8 +79,9 @@ _stresses = jax.jit(_stresses, static_argnums=(0,))
 def von_mises_stress(strain: np.ndarray, stress: np.ndarray, incompressible: np.ndarray) -> np.ndarray:
     """Von Mises value of the Cauchy stress, Pa, from strains and second Piola-Kirchhoff stresses (..., np, 5).
 
-    Invariants of the Cauchy stress follow from S and C without the rotation: tr(sigma) = tr(S C)/J, tr(sigma^2) = tr(S C S C)/J^2. The thickness
-    stretch follows from incompressibility in rubber (`incompressible` (np,) is true) and is taken as one in the nearly inextensible plies.
+    Invariants of the Cauchy stress follow from S and C without the rotation: tr(sigma) = tr(S C)/J, tr(sigma^2) = tr(S
+    C S C)/J^2. The thickness stretch follows from incompressibility in rubber (`incompressible` (np,) is true) and is
+    taken as one in the nearly inextensible plies.
     """
     c = np.zeros(strain.shape[:-1] + (3, 3))
     s = np.zeros_like(c)
@@ -90,7 +92,11 @@ def von_mises_stress(strain: np.ndarray, stress: np.ndarray, incompressible: np.
     c[..., 0, 0] = 1 + 2 * strain[..., 0]
     c[..., 1, 1] = 1 + 2 * strain[..., 1]
     plane = c[..., 0, 0] * c[..., 1, 1] - c[..., 0, 1] ** 2
-    across = c[..., 1, 1] * c[..., 0, 2] ** 2 - 2 * c[..., 0, 1] * c[..., 0, 2] * c[..., 1, 2] + c[..., 0, 0] * c[..., 1, 2] ** 2
+    across = (
+        c[..., 1, 1] * c[..., 0, 2] ** 2
+        - 2 * c[..., 0, 1] * c[..., 0, 2] * c[..., 1, 2]
+        + c[..., 0, 0] * c[..., 1, 2] ** 2
+    )
     c[..., 2, 2] = np.where(incompressible, (1 + across) / plane, 1.0)
     volume = np.where(incompressible, 1.0, np.sqrt(np.abs(plane)))
     product = s @ c

@@ -1,4 +1,5 @@
 """Reference geometry at the in-plane integration points: metrics, curvature and the maps to local axes."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -11,7 +12,8 @@ GAUSS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) / np.sqrt
 SHAPE = np.array([shape_functions(*point)[0] for point in GAUSS])  # (4, 4): point, node
 SLOPE = np.array([shape_functions(*point)[1] for point in GAUSS])  # (4, 4, 2): point, node, direction
 
-#: Mid-edge sampling of the transverse shear (Dvorkin & Bathe 1984): first and second node of the edges along which the shears
+#: Mid-edge sampling of the transverse shear (Dvorkin & Bathe 1984): first and second node of the edges along which the
+#: shears
 #: gamma_1 (first two) and gamma_2 (last two) are taken, and their weights at the integration points.
 SHEAR_EDGES = np.array([[0, 1], [3, 2], [0, 3], [1, 2]])
 SHEAR_WEIGHTS = np.stack(
@@ -23,8 +25,8 @@ SHEAR_WEIGHTS = np.stack(
 class ReferenceGeometry:
     """Arrays over elements and in-plane points (ne, 4, ...).
 
-    Strains are ordered [11, 22, 2 * 12]. With covariant strain coefficients c0 and c1 and mixed curvature kappa the local strain at thickness
-    coordinate t is E = q c0 + t (q c1 - qk c0), qk standing for sym(kappa c0).
+    Strains are ordered [11, 22, 2 * 12]. With covariant strain coefficients c0 and c1 and mixed curvature kappa the
+    local strain at thickness coordinate t is E = q c0 + t (q c1 - qk c0), qk standing for sym(kappa c0).
 
     Attributes
     ----------
@@ -113,7 +115,9 @@ def reference_geometry(mesh: ShellMesh) -> ReferenceGeometry:
     q = strain_map(p)
     mixed = np.einsum("epci,epdi->epcd", basis, turn)
     edge = 0.25 * np.einsum(
-        "egi,egi->eg", x[:, SHEAR_EDGES[:, 1]] - x[:, SHEAR_EDGES[:, 0]], d[:, SHEAR_EDGES[:, 1]] + d[:, SHEAR_EDGES[:, 0]]
+        "egi,egi->eg",
+        x[:, SHEAR_EDGES[:, 1]] - x[:, SHEAR_EDGES[:, 0]],
+        d[:, SHEAR_EDGES[:, 1]] + d[:, SHEAR_EDGES[:, 0]],
     )
     return ReferenceGeometry(
         area=area,

@@ -1,7 +1,9 @@
 """Directors from two rotation unknowns: the exponential map in the tangent plane of the reference director.
 
-d(theta) = cos(r) D + sin(r)/r (theta_1 T_1 + theta_2 T_2), r^2 = theta_1^2 + theta_2^2: total, free of history and regular for r < pi.
+d(theta) = cos(r) D + sin(r)/r (theta_1 T_1 + theta_2 T_2), r^2 = theta_1^2 + theta_2^2: total, free of history and
+regular for r < pi.
 """
+
 from __future__ import annotations
 
 import jax.numpy as jnp
@@ -18,7 +20,9 @@ def director(theta, reference, frame):
     safe = jnp.where(small, 1.0, s)
     root = jnp.sqrt(safe)
     cos = jnp.where(small, 1 - s / 2 * (1 - s / 12 * (1 - s / 30 * (1 - s / 56 * (1 - s / 90)))), jnp.cos(root))
-    sinc = jnp.where(small, 1 - s / 6 * (1 - s / 20 * (1 - s / 42 * (1 - s / 72 * (1 - s / 110)))), jnp.sin(root) / root)
+    sinc = jnp.where(
+        small, 1 - s / 6 * (1 - s / 20 * (1 - s / 42 * (1 - s / 72 * (1 - s / 110)))), jnp.sin(root) / root
+    )
     return cos * reference + sinc * (theta @ frame)
 
 

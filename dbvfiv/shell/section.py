@@ -1,4 +1,5 @@
 """The wall: layers from inside to outside and how they are integrated through the thickness."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -19,7 +20,8 @@ class Layer:
     thickness : float
         Nominal thickness, m; a section scales all layers so that they fill the local wall.
     angle : float
-        Angle of the first material direction from the mesh's material axis, degrees, counter-clockwise about the outward normal.
+        Angle of the first material direction from the mesh's material axis, degrees, counter-clockwise about the
+        outward normal.
     shear_correction : float
         Factor on the transverse shear energy.
     name : str
@@ -36,8 +38,8 @@ class Layer:
 class Section:
     """Layers, inside to outside, with Gauss points in each.
 
-    Through-thickness coordinate and weights are normalised: zeta in (-1/2, 1/2), weights summing to one; a wall of thickness h
-    has t = h zeta.
+    Through-thickness coordinate and weights are normalised: zeta in (-1/2, 1/2), weights summing to one; a wall of
+    thickness h has t = h zeta.
     """
 
     layers: tuple[Layer, ...]
@@ -102,8 +104,8 @@ class Section:
     def linear_stiffness(self) -> np.ndarray:
         """(8, 8) stiffness of the linear layers for a wall of unit thickness.
 
-        Rows: membrane (11, 22, 12), bending (11, 22, 12), transverse shear (13, 23). For a wall of thickness h the membrane and shear
-        blocks scale with h, the coupling with h^2, the bending block with h^3.
+        Rows: membrane (11, 22, 12), bending (11, 22, 12), transverse shear (13, 23). For a wall of thickness h the
+        membrane and shear blocks scale with h, the coupling with h^2, the bending block with h^3.
         """
         total = np.zeros((8, 8))
         for (zeta, weight), kind, par, (c, s), shear in zip(

@@ -1,4 +1,5 @@
 """The shell as a structure: internal force, tangent and mass of any mesh with any wall."""
+
 from __future__ import annotations
 
 from functools import cached_property
@@ -25,8 +26,8 @@ class Shell:
     free : (nn, 5) bool array, optional
         Free unknowns of each node; all by default.
     metric : "first-order" or "true"
-        Through-thickness treatment, see `dbvfiv.shell.energy`. Only the first-order treatment has a compiled element loop; the other is
-        evaluated by automatic differentiation of its energy, several times slower.
+        Through-thickness treatment, see `dbvfiv.shell.energy`. Only the first-order treatment has a compiled element
+        loop; the other is evaluated by automatic differentiation of its energy, several times slower.
 
     All states are vectors of the free unknowns (n,): displacements in m, rotations in rad. Forces are in N and N m.
     """
@@ -90,7 +91,17 @@ class Shell:
         d, d1, d2 = self.directors(nodal)
         out = np.zeros_like(nodal)
         shell_tangent(
-            self.mesh.quads, self.mesh.nodes, nodal, d, d1, d2, *self._reference, *self._wall, self.dofs.slots, out, data
+            self.mesh.quads,
+            self.mesh.nodes,
+            nodal,
+            d,
+            d1,
+            d2,
+            *self._reference,
+            *self._wall,
+            self.dofs.slots,
+            out,
+            data,
         )
         return self.dofs.restrict(out), data
 

@@ -1,4 +1,5 @@
 """Which of the nodal unknowns are free, and the sparsity that follows from it."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

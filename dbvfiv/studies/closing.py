@@ -1,4 +1,7 @@
-"""From open to shut in time: the drive turns from flow to back pressure, and the valve follows with its inertia and that of the fluid."""
+"""From open to shut in time: the drive turns from flow to back pressure, and the valve follows with its inertia and
+that of the fluid.
+"""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -11,7 +14,7 @@ from ..transient.control import ControlOptions, FixedSteps
 from ..transient.scheme import scheme
 from ..transient.start import steady_positions
 from ..transient.state import consistent_state
-from ..transient.stepper import Stepper, StepFailure, StepOptions
+from ..transient.stepper import StepFailure, StepOptions, Stepper
 from .closing_motion import ClosingMotion, ContactValve
 from .closure_opening import FACES, measure
 from .closure_state import QUARTERS
@@ -109,7 +112,9 @@ class ClosingResult:
 
     @property
     def closing_time(self) -> float | None:
-        """Time from the start of the turn to the first instant from which on it is shut to the end of the run, s; None if it ends open."""
+        """Time from the start of the turn to the first instant from which on it is shut to the end of the run, s; None
+        if it ends open.
+        """
         since = None
         for sample in reversed(self.samples):
             if sample.least_opening > self.shut_below:
@@ -150,7 +155,14 @@ def run_closing(case: Case, observer: Observer | None = None) -> ClosingResult:
     observer = Observer() if observer is None else observer
     closure = case.closure
     model = ContactValve(
-        case.replace({"drive.kind": "flow", "drive.side": "inside", "fluid.continuity": closure.reversal_continuity, "fluid.unsteady": True})
+        case.replace(
+            {
+                "drive.kind": "flow",
+                "drive.side": "inside",
+                "fluid.continuity": closure.reversal_continuity,
+                "fluid.unsteady": True,
+            }
+        )
     )
     motion = ClosingMotion(model)
     turn = Turn(closure.open_pressure, LEAD * closure.reversal_time, closure.reversal_time)
@@ -162,7 +174,12 @@ def run_closing(case: Case, observer: Observer | None = None) -> ClosingResult:
     area = model.rows.areas(model.nodal(q))
     speed = model.flow.inlet_velocity(area, turn.pressure, motion.conditions.density)
     state = consistent_state(motion, 0.0, q, np.zeros(model.size), speed, turn.pressure)
-    stepper = Stepper(motion, scheme("generalised-alpha", max(DAMPING, case.transient.numerical_damping)), turn, StepOptions(backward=True))
+    stepper = Stepper(
+        motion,
+        scheme("generalised-alpha", max(DAMPING, case.transient.numerical_damping)),
+        turn,
+        StepOptions(backward=True),
+    )
     control = FixedSteps(stepper, ControlOptions(case.transient.step))
     still = motion._instant(state.speed, state.psi_rate, turn.pressure)
     load = motion.load(state.q, state.v, state.q, state.v, still, state.speed)

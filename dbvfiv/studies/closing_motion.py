@@ -1,4 +1,5 @@
 """The valve with contact of its inner faces in motion."""
+
 from __future__ import annotations
 
 from functools import cached_property
@@ -21,9 +22,16 @@ class ContactValve(ValveModel):
     def __init__(self, case: Case):
         super().__init__(case.replace({"supports.lip_stop": False}))
         closure, nodes = case.closure, np.arange(len(self.mesh.nodes))
-        law = ContactLaw(max(*closure.pressures, closure.open_pressure) / closure.contact_depth, ROUNDING * closure.contact_depth)
+        law = ContactLaw(
+            max(*closure.pressures, closure.open_pressure) / closure.contact_depth, ROUNDING * closure.contact_depth
+        )
         self.contact = PlaneContact(
-            self.shell, nodes, 0.5 * nodal_thickness(self.shell), tributary_area(self.shell), law, least_gap=case.valve.initial_gap
+            self.shell,
+            nodes,
+            0.5 * nodal_thickness(self.shell),
+            tributary_area(self.shell),
+            law,
+            least_gap=case.valve.initial_gap,
         )
 
     @cached_property

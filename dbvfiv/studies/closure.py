@@ -1,8 +1,9 @@
 """Back pressure: does the valve shut, where and how firmly, and how far is its wall from buckling inwards? (Th. 3.6)"""
+
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Iterable, Iterator
 
 import numpy as np
 
@@ -76,8 +77,8 @@ def run_closure(
 ) -> ClosureResult:
     """Equilibria of a case at a list of back pressures, Pa, each reached from the one before.
 
-    A pressure that is not reached ends the list, for those after it lie beyond it; an interrupt keeps what was found. With a `restart` the walk goes on
-    from there and the result holds what came after it.
+    A pressure that is not reached ends the list, for those after it lie beyond it; an interrupt keeps what was found.
+    With a `restart` the walk goes on from there and the result holds what came after it.
 
     Examples
     --------
@@ -118,11 +119,20 @@ def run_closure(
     warn([*state_warnings(model, states), *result_warnings(path, states)])
     observer.end(interrupted)
     return ClosureResult(
-        model, tuple(states), tuple(path.points), tuple(path.buckling), opened, tuple(failures), tuple(warnings), interrupted
+        model,
+        tuple(states),
+        tuple(path.points),
+        tuple(path.buckling),
+        opened,
+        tuple(failures),
+        tuple(warnings),
+        interrupted,
     )
 
 
-def _states(path: ClosurePath, pressures: list[float], failures: list[str], observer: Observer) -> Iterator[ClosureState]:
+def _states(
+    path: ClosurePath, pressures: list[float], failures: list[str], observer: Observer
+) -> Iterator[ClosureState]:
     for pressure in pressures:
         try:
             yield path.go_to(pressure)
@@ -133,7 +143,9 @@ def _states(path: ClosurePath, pressures: list[float], failures: list[str], obse
 
 
 def _turned_back(case: Case, observer: Observer) -> tuple[SteadyState, ...]:
-    """Steady states of the open valve as the inlet pressure falls; at zero pressure it is at rest, where the back pressure begins."""
+    """Steady states of the open valve as the inlet pressure falls; at zero pressure it is at rest, where the back
+    pressure begins.
+    """
     flowing = case.replace({"drive.kind": "flow", "drive.side": "inside"})
     pressures = np.geomspace(case.closure.open_pressure, case.closure.open_pressure / 50, OPEN_STATES)
     quiet = _Progress(observer)
@@ -160,12 +172,17 @@ def start_warnings(model: ClosureModel) -> Iterator[str]:
         z = mesh.nodes[near, 2]
         deepest = float(-model.face.start.min())
         yield (
-            f"The inner face starts beyond the closing plane at {len(beyond)} nodes, by up to {max(0.0, deepest) * 1e3:.2g} mm, and nearer to it than "
-            f"the initial gap at {len(near)} (z {z.min():.3f} to {z.max():.3f} m, of {model.face.count} nodes): there half the wall is thicker than "
+            f"The inner face starts beyond the closing plane at {len(beyond)} nodes, by up to "
+            f"{max(0.0, deepest) * 1e3:.2g} mm, and nearer to it than "
+            f"the initial gap at {len(near)} (z {z.min():.3f} to {z.max():.3f} m, of {model.face.count} "
+            f"nodes): there half the wall is thicker than "
             "the mid-surface is high, and contact resists further closing by more than the initial gap only."
         )
     if model.supports == HELD_LIPS:
-        yield "The duckbill is held shut by its supports, as in Th. 3.6, so that nothing is found out about whether its lips seal."
+        yield (
+            "The duckbill is held shut by its supports, as in Th. 3.6, so that nothing is found out about "
+            "whether its lips seal."
+        )
 
 
 def result_warnings(path: ClosurePath, states: list[ClosureState]) -> Iterator[str]:
@@ -177,6 +194,7 @@ def result_warnings(path: ClosurePath, states: list[ClosureState]) -> Iterator[s
     if deep:
         worst = max(deep, key=lambda s: s.overlap)
         yield (
-            f"The inner faces overlap by up to {worst.overlap * 1e3:.2g} mm at {worst.pressure:.6g} Pa, because these supports stop the mid-surface and "
+            f"The inner faces overlap by up to {worst.overlap * 1e3:.2g} mm at {worst.pressure:.6g} Pa, "
+            f"because these supports stop the mid-surface and "
             "not the faces."
         )

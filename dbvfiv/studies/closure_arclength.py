@@ -1,4 +1,5 @@
 """The pressed shell as a System for `continuation`: equilibrium paths past limit points in pressure."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -20,8 +21,9 @@ PARAMETER = "pressure"
 class PressedSystem(SystemBase):
     """M u' = -r(u; P): motion so slow that only resistance counts, with the mass matrix for the resistance.
 
-    Its equilibria are those of the shell, and the eigenvalues of its linearisation are the stiffness eigenvalues of `closure_stability` with the
-    sign turned, so that a positive one means an unstable equilibrium. The contact multipliers stay as they are.
+    Its equilibria are those of the shell, and the eigenvalues of its linearisation are the stiffness eigenvalues of
+    `closure_stability` with the sign turned, so that a positive one means an unstable equilibrium. The contact
+    multipliers stay as they are.
 
     Parameters
     ----------
@@ -111,9 +113,16 @@ class ArclengthPath:
 
 
 def arclength_path(
-    pressed: PressedShell, q: np.ndarray, pressure: float, target: float, tolerance: float = 1e-8, max_points: int = 400,
-    observer: Observer | None = None, step: float = 0.05, max_step: float = 0.25,
-) -> ArclengthPath:  # fmt: skip
+    pressed: PressedShell,
+    q: np.ndarray,
+    pressure: float,
+    target: float,
+    tolerance: float = 1e-8,
+    max_points: int = 400,
+    observer: Observer | None = None,
+    step: float = 0.05,
+    max_step: float = 0.25,
+) -> ArclengthPath:
     """Follow equilibria from a state by pseudo-arclength until the pressure is `target`, or falls to zero.
 
     `step` and `max_step` are lengths in wall thicknesses of mean displacement.
@@ -126,10 +135,16 @@ def arclength_path(
     observer = Observer() if observer is None else observer
     system = PressedSystem(pressed, max(target, pressure))
     options = ContinuationOptions(
-        step=step, min_step=1e-6, max_step=max_step, max_points=max_points, limits={PARAMETER: (0.0, target)},
-        parameter_scales={PARAMETER: max(target, pressure)}, branch_points=False, newton=ContinuationNewton(tolerance=tolerance),
+        step=step,
+        min_step=1e-6,
+        max_step=max_step,
+        max_points=max_points,
+        limits={PARAMETER: (0.0, target)},
+        parameter_scales={PARAMETER: max(target, pressure)},
+        branch_points=False,
+        newton=ContinuationNewton(tolerance=tolerance),
         max_angle=0.5,
-    )  # fmt: skip
+    )
 
     def tell(branch, *rest):
         point = branch.points[-1]

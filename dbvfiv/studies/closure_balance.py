@@ -1,4 +1,5 @@
 """Do the forces of a pressed state balance? A check that knows nothing of how the state was found."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""The watch for buckling along a path of equilibria: where the lowest stiffness eigenvalue passes zero, and with which shape."""
+"""The watch for buckling along a path of equilibria: where the lowest stiffness eigenvalue passes zero, and with which
+shape.
+"""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -40,8 +43,8 @@ class Buckling:
 class BucklingWatch:
     """Looks at the equilibria of a path one after the other.
 
-    A path that is walked by rising pressure turns back at a limit point, so that an eigenvalue which passes zero on the way belongs to a
-    bifurcation.
+    A path that is walked by rising pressure turns back at a limit point, so that an eigenvalue which passes zero on the
+    way belongs to a bifurcation.
 
     Attributes
     ----------
@@ -74,7 +77,9 @@ class BucklingWatch:
         self._stable = None
 
     def _locate(self, low: float, start: np.ndarray, at_low: float, high: float, at_high: float) -> Buckling:
-        """The state between two pressures where the lowest eigenvalue vanishes, by the secant rule kept within its bracket."""
+        """The state between two pressures where the lowest eigenvalue vanishes, by the secant rule kept within its
+        bracket.
+        """
         scale, steps = at_low, LoadSteps(self.pressed, self.steps, low, start)
         while True:
             aim = low + (high - low) * min(max(at_low / (at_low - at_high), 0.02), 0.98)

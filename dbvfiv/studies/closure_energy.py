@@ -1,4 +1,5 @@
 """The energy balance of a path of equilibria: work of the pressure against what shell and contact have stored."""
+
 from __future__ import annotations
 
 from copy import copy
@@ -9,7 +10,8 @@ import numpy as np
 from ..contact import PressedShell
 from ..model.linear import DirectFactor, SingularMatrix
 
-#: Gauss points of a stretch, exact for the work of a load that is quadratic in the positions along a cubic path while the pressure rises linearly.
+#: Gauss points of a stretch, exact for the work of a load that is quadratic in the positions along a cubic path while
+#: the pressure rises linearly.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 #: Most halvings of a stretch, and halvings in a row that do not help.
 _DEEPEST, _STUBBORN = 16, 5
@@ -49,12 +51,14 @@ class EnergyLedger:
 
         int P f(q) dq + int (dC/dlambda) dlambda = gain of strain energy + gain of the contact's potential C(q, lambda),
 
-    for the path is one of equilibria under loads P and multipliers lambda that change linearly. The second integral is the work of renewing multipliers,
-    which change the potential. The path in between is taken as a cubic through both ends with the tangents dq/dP where these are known, else as straight.
-    A follower pressure on a surface with a free edge has no potential, so that its work is one along the path and not a function of its ends.
+    for the path is one of equilibria under loads P and multipliers lambda that change linearly. The second integral is
+    the work of renewing multipliers, which change the potential. The path in between is taken as a cubic through both
+    ends with the tangents dq/dP where these are known, else as straight. A follower pressure on a surface with a free
+    edge has no potential, so that its work is one along the path and not a function of its ends.
 
-    With a `tolerance`, `settle` halves stretches whose balance misses their share of it and solves for the equilibrium in between, so that what comes
-    into touch within a load step is found. Forces that were not the derivative of the energies would leave a defect that no halving removes.
+    With a `tolerance`, `settle` halves stretches whose balance misses their share of it and solves for the equilibrium
+    in between, so that what comes into touch within a load step is found. Forces that were not the derivative of the
+    energies would leave a defect that no halving removes.
 
     Parameters
     ----------
@@ -137,7 +141,8 @@ class EnergyLedger:
     def settle(self) -> None:
         """Count the stretches since the last time, halved as often as the tolerance asks for.
 
-        It is shared out between load steps by their rise; every renewal of multipliers gets as much as a tenth of all of them.
+        It is shared out between load steps by their rise; every renewal of multipliers gets as much as a tenth of all
+        of them.
         """
         waiting, self._waiting = self._waiting, []
         work = abs(self.work + sum(self._works(*stretch)[0] for stretch in waiting))
@@ -146,7 +151,8 @@ class EnergyLedger:
             share = 0.5 * abs(loads.rise) / total if loads.rise else 0.05
             self._refined(loads, start, stop, share * self.tolerance * work)
 
-    # -- a stretch ------------------------------------------------------------------------------------------------------------------
+    # -- a stretch
+    # ----
 
     def _refined(self, loads: _Loads, start: _Place, stop: _Place, allowed: float) -> None:
         """Count a stretch, in parts if its balance misses what is allowed, J."""
@@ -191,7 +197,8 @@ class EnergyLedger:
             work += w * float(self.pressed.pressure_force(self.pressed.nodal(place), pressure) @ rate)
         return work, renewal
 
-    # -- equilibria -----------------------------------------------------------------------------------------------------------------
+    # -- equilibria
+    # ----
 
     def _place(self, loads: _Loads, s: float, q: np.ndarray, rate: np.ndarray | None) -> _Place:
         _, self._own.multiplier = loads.at(s)

@@ -1,4 +1,5 @@
-"""The valve under back pressure: shell, supports and contact of a case, and the opening that is left between its walls."""
+"""The valve under back pressure: shell, supports and contact of a case, and the opening left between its walls."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -27,8 +28,8 @@ class ClosureModel:
     ----------
     case : Case
     supports : str
-        "contact": the inner faces touch the closing plane; "held-lips": the duckbill cannot move across the plane and one-sided stops
-        keep the mid-surface of the saddle from crossing it (Th. 3.6).
+        "contact": the inner faces touch the closing plane; "held-lips": the duckbill cannot move across the plane and
+        one-sided stops keep the mid-surface of the saddle from crossing it (Th. 3.6).
     mesh : ValveMesh
     pressed : PressedShell
     face : PlaneContact
@@ -72,7 +73,8 @@ def closure_model(case: Case, supports: str | None = None, contact_depth: float 
     supports : "contact" or "held-lips", optional
         As the case says by default.
     contact_depth : float, m, optional
-        Depth to which the largest pressure of the case presses the faces in before multipliers push them back; from the case by default.
+        Depth to which the largest pressure of the case presses the faces in before multipliers push them back; from the
+        case by default.
     """
     supports = case.closure.supports if supports is None else supports
     depth = case.closure.contact_depth if contact_depth is None else contact_depth

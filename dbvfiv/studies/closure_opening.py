@@ -1,4 +1,5 @@
 """What stays open between the inner faces, row by row, and over which length the valve is shut."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -54,7 +55,8 @@ class Opening:
     def shut_intervals(self, fraction: float) -> list[tuple[float, float]]:
         """Intervals of z, m, on which the valve is shut in that sense.
 
-        Between rows the roots of the areas are taken as linear, because walls that touch part from each other with at least the square of the distance.
+        Between rows the roots of the areas are taken as linear, because walls that touch part from each other with at
+        least the square of the distance.
         """
         excess = np.sqrt(self.area) - np.sqrt(fraction * self.reference)
         cuts: list[tuple[float, float]] = []
@@ -76,7 +78,9 @@ def opening(model: ClosureModel, q: np.ndarray) -> Opening:
     return measure(model.mesh, model.pressed.shell, model.face, model.pressed.nodal(q), model.held)
 
 
-def measure(mesh: ValveMesh, shell: Shell, face: PlaneContact, nodal: np.ndarray, held: np.ndarray | None = None) -> Opening:
+def measure(
+    mesh: ValveMesh, shell: Shell, face: PlaneContact, nodal: np.ndarray, held: np.ndarray | None = None
+) -> Opening:
     """Opening for nodal unknowns (nn, 5); `held` (rows,) are rows shut by their supports."""
     rows = mesh.rows
     gap, reach = _gaps(shell, face, nodal, shell.directors(nodal)[0])
@@ -94,7 +98,9 @@ def measure(mesh: ValveMesh, shell: Shell, face: PlaneContact, nodal: np.ndarray
 
 
 def _gaps(shell: Shell, face: PlaneContact, nodal, directors) -> tuple[np.ndarray, np.ndarray]:
-    """Gap (nn,) and x position (nn,) of the inner face at all nodes; the clamped flange is no contact node but has a face all the same."""
+    """Gap (nn,) and x position (nn,) of the inner face at all nodes; the clamped flange is no contact node but has a
+    face all the same.
+    """
     depth = 0.5 * nodal_thickness(shell)
     point = shell.mesh.nodes + nodal[:, :3] - depth[:, None] * directors
     lift = np.zeros(len(depth))

@@ -1,4 +1,7 @@
-"""The walk along back-pressure equilibria: load steps, multiplier updates, the watch for buckling, arclength past limit points."""
+"""The walk along back-pressure equilibria: load steps, multiplier updates, the watch for buckling, arclength past limit
+points.
+"""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -55,14 +58,18 @@ class ClosureOptions:
     balance_tolerance: float = 0.0
 
     @classmethod
-    def of(cls, case) -> "ClosureOptions":
+    def of(cls, case) -> ClosureOptions:
         """Options of a case file."""
         steady, closure = case.steady, case.closure
         return cls(
-            NewtonOptions(steady.tolerance, steady.max_iterations), closure.max_step, closure.max_step / 20,
-            penetration=closure.penetration, eigenvalues=closure.eigenvalues, arclength=closure.arclength,
+            NewtonOptions(steady.tolerance, steady.max_iterations),
+            closure.max_step,
+            closure.max_step / 20,
+            penetration=closure.penetration,
+            eigenvalues=closure.eigenvalues,
+            arclength=closure.arclength,
             balance_tolerance=closure.balance_tolerance,
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)
@@ -154,9 +161,16 @@ class ClosurePath:
         """Where the walk stands; `eigenvalue` is the lowest stiffness eigenvalue of the state just reached."""
         steps = self.steps
         return PathRestart(
-            steps.pressure, steps.q, steps.slope, self.model.pressed.multiplier, steps._step, self.beyond_limit, eigenvalue, self.energy.totals,
+            steps.pressure,
+            steps.q,
+            steps.slope,
+            self.model.pressed.multiplier,
+            steps._step,
+            self.beyond_limit,
+            eigenvalue,
+            self.energy.totals,
             tuple(self.buckling),
-        )  # fmt: skip
+        )
 
     def resume(self, at: PathRestart) -> None:
         """Stand where another walk stood."""
@@ -199,12 +213,23 @@ class ClosurePath:
         self.energy.settle()
         spectrum = self.watch.see(target, self.steps.q)
         return describe_closure(
-            self.model, self.steps.q, target, spectrum, beyond_limit=self.beyond_limit, energy_balance=self.energy.error,
-            converged=True, iterations=iterations, load_steps=count, multiplier_updates=updates,
-            residual=last.residual, rounding=last.rounding, reason=last.reason,
-        )  # fmt: skip
+            self.model,
+            self.steps.q,
+            target,
+            spectrum,
+            beyond_limit=self.beyond_limit,
+            energy_balance=self.energy.error,
+            converged=True,
+            iterations=iterations,
+            load_steps=count,
+            multiplier_updates=updates,
+            residual=last.residual,
+            rounding=last.rounding,
+            reason=last.reason,
+        )
 
-    # -- on the way -----------------------------------------------------------------------------------------------------------------
+    # -- on the way
+    # ----
 
     def _accepted(self, pressure: float, q: np.ndarray) -> None:
         self.energy.add(q, pressure, self.steps.slope)
@@ -215,7 +240,9 @@ class ClosurePath:
         start = self.steps.pressure
         self.observer.progress(f"arclength from {start:.6g} Pa")
         try:
-            path = arclength_path(self.model.pressed, self.steps.q, start, target, self.options.newton.tolerance, observer=self.observer)
+            path = arclength_path(
+                self.model.pressed, self.steps.q, start, target, self.options.newton.tolerance, observer=self.observer
+            )
         except NotConverged as reason:
             raise SolveError(f"{error} Arclength did not get under way either: {reason}") from reason
         for point in path.branch.points[1:]:
@@ -227,7 +254,10 @@ class ClosurePath:
         self.watch.forget()
         self.steps.q, self.steps.pressure, self.steps.slope = path.q, path.pressure, None
         if not path.reached:
-            raise SolveError(f"{error} Arclength ended at {path.pressure:.6g} Pa after {len(path.branch)} points ({path.branch.reason}).")
+            raise SolveError(
+                f"{error} Arclength ended at {path.pressure:.6g} Pa after {len(path.branch)} points "
+                f"({path.branch.reason})."
+            )
 
     def _point(self, pressure: float, q: np.ndarray, eigenvalues: np.ndarray, arclength: bool = False) -> PathPoint:
         model = self.model

@@ -1,10 +1,12 @@
 """Lowest eigenvalues of the tangent stiffness of a pressed shell: how far it is from buckling, and into which shape.
 
-The eigenvalues are those of K x = mu M x with the mass matrix M, in 1/s2, which do not depend on the mesh as those of K alone would; K is singular
-where one vanishes. A follower pressure on a surface with a free edge makes K unsymmetric, so two answers are given: eigenvalues of K itself,
-of which a real one passes zero where the equilibrium stops being unique, and those of its symmetric part, whose smallest is a
-lower bound (Bromwich) and which alone decide where the load has a potential.
+The eigenvalues are those of K x = mu M x with the mass matrix M, in 1/s2, which do not depend on the mesh as those of K
+alone would; K is singular where one vanishes. A follower pressure on a surface with a free edge makes K unsymmetric, so
+two answers are given: eigenvalues of K itself, of which a real one passes zero where the equilibrium stops being
+unique, and those of its symmetric part, whose smallest is a lower bound (Bromwich) and which alone decide where the
+load has a potential.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -58,7 +60,9 @@ class StiffnessSpectrum:
         return int(np.count_nonzero(self.values.real < 0))
 
 
-def stiffness_spectrum(pressed: PressedShell, q: np.ndarray, pressure: float, count: int = 4, tolerance: float = 1e-8) -> StiffnessSpectrum:
+def stiffness_spectrum(
+    pressed: PressedShell, q: np.ndarray, pressure: float, count: int = 4, tolerance: float = 1e-8
+) -> StiffnessSpectrum:
     """Eigenvalues nearest to zero by shift-and-invert Arnoldi (ARPACK) with sparse LU factors.
 
     Raises
@@ -80,7 +84,8 @@ def stiffness_spectrum(pressed: PressedShell, q: np.ndarray, pressure: float, co
         raise SolveError(f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were not found ({error}).") from error
     if residuals.max() > tolerance:
         raise SolveError(
-            f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were found to a relative residual of {residuals.max():.2g} only, "
+            f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were found to a relative residual of "
+            f"{residuals.max():.2g} only, "
             f"not to {tolerance:.2g}."
         )
     skew = abs(stiffness - stiffness.T).max() / abs(stiffness).max()
@@ -89,7 +94,9 @@ def stiffness_spectrum(pressed: PressedShell, q: np.ndarray, pressure: float, co
 
 def _nearest(stiffness, mass, count, shift):
     """Eigenvalues next to a shift with vectors and residuals, by real part."""
-    values, vectors = spla.eigs(stiffness, count, mass, sigma=shift, OPinv=_inverse(stiffness - shift * mass), v0=_start(stiffness), tol=1e-13)
+    values, vectors = spla.eigs(
+        stiffness, count, mass, sigma=shift, OPinv=_inverse(stiffness - shift * mass), v0=_start(stiffness), tol=1e-13
+    )
     order = np.argsort(values.real)
     values, vectors = values[order], vectors[:, order]
     # Measured against the size of the terms that cancel, for an eigenvalue may be zero.
@@ -99,7 +106,14 @@ def _nearest(stiffness, mass, count, shift):
 
 def _symmetric(symmetric, mass, count):
     values = spla.eigsh(
-        symmetric, count, mass, sigma=0.0, OPinv=_inverse(symmetric), v0=_start(symmetric), tol=1e-12, return_eigenvectors=False
+        symmetric,
+        count,
+        mass,
+        sigma=0.0,
+        OPinv=_inverse(symmetric),
+        v0=_start(symmetric),
+        tol=1e-12,
+        return_eigenvectors=False,
     )
     return np.sort(values)
 

@@ -1,4 +1,5 @@
 """One state under back pressure and what a user reads off it."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -129,8 +130,12 @@ class ClosureState:
         }
 
 
-def describe_closure(model: ClosureModel, q: np.ndarray, pressure: float, spectrum: StiffnessSpectrum, **known) -> ClosureState:
-    """State of a model from its unknowns; `known` holds how it was found, the energy balance and whether it lies beyond a limit point."""
+def describe_closure(
+    model: ClosureModel, q: np.ndarray, pressure: float, spectrum: StiffnessSpectrum, **known
+) -> ClosureState:
+    """State of a model from its unknowns; `known` holds how it was found, the energy balance and whether it lies beyond
+    a limit point.
+    """
     pressed, face = model.pressed, model.face
     nodal = pressed.nodal(q)
     state, passage = pressed.contact_state(q), opening(model, q)
@@ -188,7 +193,9 @@ def describe_closure(model: ClosureModel, q: np.ndarray, pressure: float, spectr
 
 
 def contact_front(passage: Opening, model: ClosureModel) -> float:
-    """How far from the lip, m, the walls have met along the centre line, to within the initial gap; linear between rows."""
+    """How far from the lip, m, the walls have met along the centre line, to within the initial gap; linear between
+    rows.
+    """
     # just less than the gap that lifted rows have at rest
     gap = np.where(model.held, 0.0, passage.gap[:, 0]) - 0.999 * model.case.valve.initial_gap
     met = np.flatnonzero(gap <= 0)

@@ -1,8 +1,9 @@
-"""Growth rates, and counts of unstable eigenvalues, of one steady state at many conditions, with what vouches for them."""
+"""Growth rates, and counts of unstable eigenvalues, of a steady state at many conditions, and what vouches for them."""
+
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Callable
 
 import numpy as np
 
@@ -41,7 +42,8 @@ class Column:
     how : (cells,) int array
         `REDUCED` or `DIRECT`.
     eigenvalues : callable or None
-        From any condition (density, alpha, beta, storage) at the same state to its leading eigenvalues on the small model, sorted by growth rate.
+        From any condition (density, alpha, beta, storage) at the same state to its leading eigenvalues on the small
+        model, sorted by growth rate.
     leading : tuple of arrays
         Those of the cells.
     """
@@ -91,7 +93,9 @@ class ColumnSolver:
         family = StateFamily(linear, self._static)
         floor = np.array([floor_of(c[2]) for c in conditions])
         places = _spread(conditions, self.snapshots)
-        fine = family.fine([conditions[i] for i in places], -np.inf if not np.isfinite(floor).all() else 0.75 * float(floor.min()))
+        fine = family.fine(
+            [conditions[i] for i in places], -np.inf if not np.isfinite(floor).all() else 0.75 * float(floor.min())
+        )
         values = fine.eigenvalues(conditions)
         leading = [_leading(row, low) for row, low in zip(values, floor)]
         counts = phase_counts(family.coarse, conditions, [row[:2] for row in leading])
@@ -99,14 +103,18 @@ class ColumnSolver:
         column = _column(leading, values, counts, error)
         doubtful = np.flatnonzero(~column.certified)
         column = replace(
-            column, leading=tuple(row[:8] for row in leading), eigenvalues=lambda c: _leading(fine.eigenvalues([c])[0], floor_of(c[2]))[:8]
+            column,
+            leading=tuple(row[:8] for row in leading),
+            eigenvalues=lambda c: _leading(fine.eigenvalues([c])[0], floor_of(c[2]))[:8],
         )
         return self._repaired(column, linear, conditions, doubtful) if doubtful.size else column
 
     def _error(self, family, fine, conditions, floor, places) -> float:
-        """Relative change of leading eigenvalues under a correction with the full matrices, at conditions the space was not made for.
+        """Relative change of leading eigenvalues under a correction with the full matrices, at conditions the space was
+        not made for.
 
-        The two-sided quotient w^H T x / (w^H T' x) of corrected vectors is Newton's correction of the eigenvalue; what the space lacks shows in it.
+        The two-sided quotient w^H T x / (w^H T' x) of corrected vectors is Newton's correction of the eigenvalue; what
+        the space lacks shows in it.
         """
         worst = 0.0
         for i in places:
@@ -126,14 +134,25 @@ class ColumnSolver:
         family = StateFamily(linear, self._static)
         cells = len(conditions)
         blank = np.full(cells, np.nan)
-        column = Column(blank, blank.copy(), blank.copy(), np.zeros(cells, int), np.zeros(cells, int), np.zeros(cells, bool), 0.0, np.full(cells, DIRECT))
+        column = Column(
+            blank,
+            blank.copy(),
+            blank.copy(),
+            np.zeros(cells, int),
+            np.zeros(cells, int),
+            np.zeros(cells, bool),
+            0.0,
+            np.full(cells, DIRECT),
+        )
         column = self._repaired(column, linear, conditions, np.arange(cells))
         hints = [np.array([complex(g, 2 * np.pi * f)]) for g, f in zip(column.growth_rate, column.frequency)]
         counts = phase_counts(family.coarse, conditions, hints)
         return replace(column, counted=counts.number, certain=counts.certain)
 
     def _repaired(self, column: Column, linear, conditions, cells) -> Column:
-        fields = {name: getattr(column, name).copy() for name in ("growth_rate", "frequency", "second", "unstable", "how")}
+        fields = {
+            name: getattr(column, name).copy() for name in ("growth_rate", "frequency", "second", "unstable", "how")
+        }
         for i in cells:
             spectrum = self.direct(linear, conditions[i])
             if not len(spectrum):
@@ -152,13 +171,17 @@ def newton_correction(family: StateFamily, pairs, condition) -> np.ndarray:
     # T' by a difference quotient, good enough for the size of a correction
     step = 1e-3 * np.maximum(np.abs(pairs.values), 1.0)
     ahead = family.residual(pairs.values + step, right, pairs.u, condition)
-    slope = (np.einsum("ij,ij->j", left.conj(), ahead[0] - force) + np.einsum("ij,ij->j", pairs.c.conj(), ahead[1] - inner)) / step
+    slope = (
+        np.einsum("ij,ij->j", left.conj(), ahead[0] - force) + np.einsum("ij,ij->j", pairs.c.conj(), ahead[1] - inner)
+    ) / step
     return np.abs(top / slope) / np.maximum(np.abs(pairs.values), 1.0)
 
 
 def search_options(beta: float, left: bool = False) -> SearchOptions:
     """How leading modes of the full pencil are searched for at a stiffness damping."""
-    return SearchOptions(limit_point=-1.0 / beta if beta > 0 else None, max_frequency=None if beta > 0 else 80.0, left=left)
+    return SearchOptions(
+        limit_point=-1.0 / beta if beta > 0 else None, max_frequency=None if beta > 0 else 80.0, left=left
+    )
 
 
 def _leading(values: np.ndarray, floor: float) -> np.ndarray:

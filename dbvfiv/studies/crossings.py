@@ -1,13 +1,15 @@
 """Every value of one parameter at which an eigenvalue of the coupled valve reaches the imaginary axis.
 
-The k-th largest growth rate g_k is a continuous function of the parameter wherever the spectrum is, so crossings are its zeros. Between the values of a
-scan they are bracketed by the number of unstable modes; where the parabola through three values of g_k reaches zero between them although no number
-changes, the scan is refined, so that narrow tongues of instability or stability are not stepped over.
+The k-th largest growth rate g_k is a continuous function of the parameter wherever the spectrum is, so crossings are
+its zeros. Between the values of a scan they are bracketed by the number of unstable modes; where the parabola through
+three values of g_k reaches zero between them although no number changes, the scan is refined, so that narrow tongues of
+instability or stability are not stepped over.
 """
+
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Callable
 
 import numpy as np
 from scipy.optimize import brentq
@@ -65,7 +67,9 @@ class Scan:
         Called with each new sample.
     """
 
-    def __init__(self, sample: Callable[[float], np.ndarray], log: bool = False, told: Callable[[Sample], None] | None = None):
+    def __init__(
+        self, sample: Callable[[float], np.ndarray], log: bool = False, told: Callable[[Sample], None] | None = None
+    ):
         self._sample, self.log, self._told = sample, log, told
         self.samples: dict[float, Sample] = {}
         self.failures: dict[float, str] = {}

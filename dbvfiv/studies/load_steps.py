@@ -1,8 +1,10 @@
 """Load steps: from one equilibrium to the next in pressure, for any model that an equilibrium solver takes."""
+
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Callable
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +37,9 @@ class LoadStepOptions:
 
 @dataclass(frozen=True)
 class Way:
-    """How a pressure was reached: Newton iterations over all load steps, load steps, and the last equilibrium iteration."""
+    """How a pressure was reached: Newton iterations over all load steps, load steps, and the last equilibrium
+    iteration.
+    """
 
     iterations: int
     steps: int
@@ -46,7 +50,8 @@ class Way:
 class LoadSteps:
     """Walks a model from one equilibrium to the next in pressure.
 
-    Steps are predicted along the tangent of the equilibrium path, tried whole first, halved when Newton fails and doubled when it succeeds.
+    Steps are predicted along the tangent of the equilibrium path, tried whole first, halved when Newton fails and
+    doubled when it succeeds.
 
     Parameters
     ----------
@@ -101,10 +106,13 @@ class LoadSteps:
                 self.observer.progress(f"equilibrium at {aim:.6g} Pa, {result.iterations} iterations")
                 continue
             step = (aim - self.pressure) / 2
-            self.observer.progress(f"no equilibrium at {aim:.6g} Pa ({result.reason}), step halved to {abs(step):.3g} Pa")
+            self.observer.progress(
+                f"no equilibrium at {aim:.6g} Pa ({result.reason}), step halved to {abs(step):.3g} Pa"
+            )
             if abs(step) < smallest:
                 raise SolveError(
-                    f"No equilibrium was found between {self.pressure:.6g} Pa, the last one, and {aim:.6g} Pa on the way to {target:.6g} Pa: "
+                    f"No equilibrium was found between {self.pressure:.6g} Pa, the last one, and {aim:.6g} "
+                    f"Pa on the way to {target:.6g} Pa: "
                     f"{result.reason}; load steps down to {2 * abs(step):.3g} Pa and two line searches were tried."
                 )
 
@@ -139,7 +147,9 @@ class LoadSteps:
         jump = float(np.abs(self.model.nodal(result.q - predicted)[:, :3]).max())
         if jump <= limit:
             return result
-        return replace(result, converged=False, reason=f"the equilibrium found lies {jump:.2g} m from the predicted one")
+        return replace(
+            result, converged=False, reason=f"the equilibrium found lies {jump:.2g} m from the predicted one"
+        )
 
     def _accept(self, result: NewtonResult, pressure: float) -> None:
         self._take(result, pressure)

@@ -1,4 +1,5 @@
 """Stability over two parameters: columns of cells, refined near onset, and exact onset curves on top."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -77,7 +78,9 @@ class _Run:
         wanted = []
         for a, b in zip(ordered[:-1], ordered[1:]):
             if _pattern(a) != _pattern(b) and max(a.level, b.level) == level - 1:
-                middle = 0.5 * (self.plan.coordinate(self.plan.across, a.value) + self.plan.coordinate(self.plan.across, b.value))
+                middle = 0.5 * (
+                    self.plan.coordinate(self.plan.across, a.value) + self.plan.coordinate(self.plan.across, b.value)
+                )
                 wanted.append((self.plan.value(self.plan.across, middle), level))
         return wanted
 
@@ -86,7 +89,9 @@ def _pattern(column: MapColumn) -> tuple:
     return tuple((int(row[0]), int(row[3])) for row in column.onsets)
 
 
-def run_map(case: Case, observer: Observer | None = None, workers: int | None = None, known=(), plan: MapPlan | None = None) -> MapResult:
+def run_map(
+    case: Case, observer: Observer | None = None, workers: int | None = None, known=(), plan: MapPlan | None = None
+) -> MapResult:
     """A stability map of a case.
 
     Parameters
@@ -148,7 +153,10 @@ def _doubts(plan: MapPlan, ordered, checks) -> list[str]:
         said.append(f"In {doubtful} cells the spectrum and the independent count disagree or the count is uncertain.")
     for check in checks:
         if not check.agrees:
-            said.append(f"At {plan.x.parameter} = {check.x:.6g}, {plan.y.parameter} = {check.y:.6g} the full pencil differs by {check.error:.1e}.")
+            said.append(
+                f"At {plan.x.parameter} = {check.x:.6g}, {plan.y.parameter} = {check.y:.6g} the full pencil "
+                f"differs by {check.error:.1e}."
+            )
     return said
 
 

@@ -1,4 +1,5 @@
 """Cells of a map solved again with the full pencil."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -47,7 +48,10 @@ def check_cells(plan: MapPlan, columns: tuple[MapColumn, ...], walk: StabilityWa
         return ()
     cells, laws = len(plan.along.values), len(plan.laws)
     # steps of the golden section in both directions (Roberts' sequence)
-    picks = sorted((int((0.5 + 0.7548776662 * i) % 1 * len(usable)), int((0.5 + 0.5698402910 * i) % 1 * cells), i % laws) for i in range(number))
+    picks = sorted(
+        (int((0.5 + 0.7548776662 * i) % 1 * len(usable)), int((0.5 + 0.5698402910 * i) % 1 * cells), i % laws)
+        for i in range(number)
+    )
     return tuple(_check(plan, usable[i], j, law, walk) for i, j, law in picks)
 
 

@@ -1,4 +1,5 @@
 """One column of a stability map: all its cells, and where along it modes reach the imaginary axis."""
+
 from __future__ import annotations
 
 import math
@@ -43,7 +44,7 @@ class MapPlan:
     refine: int = 2
 
     @classmethod
-    def of(cls, case: Case) -> "MapPlan":
+    def of(cls, case: Case) -> MapPlan:
         """The map of a case file."""
         x, y = case.map.axes
         storage = Place.of(case).storage
@@ -98,7 +99,8 @@ class MapColumn:
     cells : dict of (laws, cells) arrays
         See `CELLS`.
     onsets : (k, 4) array
-        Law (its number), value along the column, frequency in Hz, and +1 where a mode becomes unstable along the column, -1 where it ceases to be.
+        Law (its number), value along the column, frequency in Hz, and +1 where a mode becomes unstable along the
+        column, -1 where it ceases to be.
     error : float
         Largest estimated relative error of a leading eigenvalue.
     failure : str
@@ -116,11 +118,16 @@ class MapColumn:
     seconds: float = 0.0
 
     @classmethod
-    def missing(cls, plan: MapPlan, value: float, level: int, sentence: str, seconds: float = 0.0) -> "MapColumn":
+    def missing(cls, plan: MapPlan, value: float, level: int, sentence: str, seconds: float = 0.0) -> MapColumn:
         """A marked gap."""
         shape = (len(plan.laws), len(plan.along.values))
         cells = {name: np.full(shape, np.nan) for name in CELLS[:3]}
-        cells |= {"unstable": np.full(shape, -1), "counted": np.full(shape, -1), "certified": np.zeros(shape, bool), "how": np.full(shape, MISSING)}
+        cells |= {
+            "unstable": np.full(shape, -1),
+            "counted": np.full(shape, -1),
+            "certified": np.zeros(shape, bool),
+            "how": np.full(shape, MISSING),
+        }
         return cls(value, level, cells, np.zeros((0, 4)), np.nan, sentence, seconds)
 
 
@@ -137,17 +144,29 @@ def solve_column(plan: MapPlan, walk: StabilityWalk, value: float, level: int = 
         return MapColumn.missing(plan, value, level, str(error), time.process_time() - started)
     cells = {name: np.array([getattr(column, name) for column in columns]) for name in CELLS}
     return MapColumn(
-        value, level, cells, np.array(onsets, float).reshape(-1, 4), max(column.error for column in columns), "", time.process_time() - started
+        value,
+        level,
+        cells,
+        np.array(onsets, float).reshape(-1, 4),
+        max(column.error for column in columns),
+        "",
+        time.process_time() - started,
     )
 
 
-def _law(plan: MapPlan, walk: StabilityWalk, value: float, law: float) -> tuple[Column, list[tuple[float, float, float]]]:
+def _law(
+    plan: MapPlan, walk: StabilityWalk, value: float, law: float
+) -> tuple[Column, list[tuple[float, float, float]]]:
     along = plan.along
     places = [plan.place(value, other, law) for other in along.values]
     if not is_surrounding(along.parameter):
         return _state_by_state(plan, walk, places)
     column = walk.column(places)
-    sample = column.eigenvalues or (lambda condition: walk.spectrum(places[0].at(**dict(zip(("density", "alpha", "beta", "storage"), condition)))).eigenvalues)
+    sample = column.eigenvalues or (
+        lambda condition: (
+            walk.spectrum(places[0].at(**dict(zip(("density", "alpha", "beta", "storage"), condition)))).eigenvalues
+        )
+    )
     scan = Scan(lambda other: sample(plan.place(value, other, law).condition), along.log)
     # what the cells know need not be found again
     scan.samples.update({float(v): Sample(float(v), row) for v, row in zip(along.values, column.leading)})
@@ -161,7 +180,10 @@ def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):
     column = Column(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names}, error=0.0)
     by_value = dict(zip(plan.along.values, places))
     parameter = plan.along.parameter
-    scan = Scan(lambda other: walk.spectrum(by_value.get(other) or places[0].at(**{parameter: other})).eigenvalues, plan.along.log)
+    scan = Scan(
+        lambda other: walk.spectrum(by_value.get(other) or places[0].at(**{parameter: other})).eigenvalues,
+        plan.along.log,
+    )
     return column, _onsets(scan, plan.along)
 
 

@@ -1,4 +1,7 @@
-"""Onset curves of a stability map: linked through the onsets of its columns, and followed exactly by continuation of Hopf points."""
+"""Onset curves of a stability map: linked through the onsets of its columns, and followed exactly by continuation of
+Hopf points.
+"""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -16,7 +19,8 @@ from .onset_normal_form import system_of
 from .plane_system import RATE, PlaneSystem
 from .stability_walk import StabilityWalk
 
-#: Distance in the unit square, frequencies counted relatively, up to which onsets of neighbouring columns belong together.
+#: Distance in the unit square, frequencies counted relatively, up to which onsets of neighbouring columns belong
+#: together.
 NEIGHBOURS = 0.7
 #: Distance from a curve, in the unit square, up to which an onset of a column counts as on it.
 ON_CURVE = 2e-3
@@ -57,13 +61,22 @@ class OnsetCurve:
 
 
 def linked(plan: MapPlan, columns: tuple[MapColumn, ...]) -> tuple[OnsetCurve, ...]:
-    """Curves through the onsets of neighbouring columns; chains of opposite direction that end at one column meet in the tip of a tongue."""
+    """Curves through the onsets of neighbouring columns; chains of opposite direction that end at one column meet in
+    the tip of a tongue.
+    """
     usable = [column for column in columns if not column.failure]
     chains: list[list[tuple[int, tuple]]] = []
     open_: list[list[tuple[int, tuple]]] = []
     for i, column in enumerate(usable):
         left, kept = [tuple(row) for row in column.onsets], []
-        pairs = sorted(((_apart(plan, chain[-1][1], point), a, b) for a, chain in enumerate(open_) for b, point in enumerate(left)), key=lambda t: t[0])
+        pairs = sorted(
+            (
+                (_apart(plan, chain[-1][1], point), a, b)
+                for a, chain in enumerate(open_)
+                for b, point in enumerate(left)
+            ),
+            key=lambda t: t[0],
+        )
         taken_a, taken_b = set(), set()
         for distance, a, b in pairs:
             if distance > NEIGHBOURS or a in taken_a or b in taken_b:
@@ -101,7 +114,12 @@ def _joined(plan: MapPlan, chains):
                 for b in range(a + 1, len(chains)):
                     one, two = chains[a][end], chains[b][end]
                     opposite = one[0] == two[0] and one[1][0] == two[1][0] and one[1][3] != two[1][3]
-                    close = abs(plan.coordinate(plan.along, one[1][1]) - plan.coordinate(plan.along, two[1][1])) < NEIGHBOURS if opposite else False
+                    close = (
+                        abs(plan.coordinate(plan.along, one[1][1]) - plan.coordinate(plan.along, two[1][1]))
+                        < NEIGHBOURS
+                        if opposite
+                        else False
+                    )
                     if close and abs(one[1][2] - two[1][2]) < 0.25 * max(one[1][2], two[1][2], 1.0):
                         first, second = (chains[a][::-1], chains[b]) if end == 0 else (chains[a], chains[b][::-1])
                         chains[a] = first + second
@@ -120,13 +138,19 @@ def _curve(plan: MapPlan, columns, chain) -> OnsetCurve:
     return OnsetCurve(int(chain[0][1][0]), x, y, np.array([point[2] for _, point in chain]))
 
 
-def continued(plan: MapPlan, walk: StabilityWalk, curves: tuple[OnsetCurve, ...], observer: Observer, warnings: list[str]) -> tuple[OnsetCurve, ...]:
+def continued(
+    plan: MapPlan, walk: StabilityWalk, curves: tuple[OnsetCurve, ...], observer: Observer, warnings: list[str]
+) -> tuple[OnsetCurve, ...]:
     """Replace curves by exact ones; a curve that cannot be followed stays as it is, with a sentence in `warnings`."""
     done: list[OnsetCurve] = []
     for curve in sorted(curves, key=lambda c: -len(c.x)):
         points = _unit(plan, curve.x, curve.y)
         others = [known for known in done if known.exact and known.law == curve.law]
-        distance = np.min([_distances(points, _unit(plan, k.x, k.y)) for k in others], axis=0) if others else np.full(len(points), np.inf)
+        distance = (
+            np.min([_distances(points, _unit(plan, k.x, k.y)) for k in others], axis=0)
+            if others
+            else np.full(len(points), np.inf)
+        )
         if np.all(distance < 5 * ON_CURVE):
             continue  # another curve goes through all its points
         if not np.all(curve.frequency > 0):
@@ -136,7 +160,10 @@ def continued(plan: MapPlan, walk: StabilityWalk, curves: tuple[OnsetCurve, ...]
         try:
             done.append(follow(plan, walk, curve))
         except (ContinuationError, SolveError, CaseError, ArithmeticError, ValueError) as error:
-            warnings.append(f"An onset curve near {plan.x.parameter} = {curve.x[0]:.6g} was not followed exactly: {str(error).rstrip('.')}.")
+            warnings.append(
+                f"An onset curve near {plan.x.parameter} = {curve.x[0]:.6g} was not followed exactly: "
+                f"{str(error).rstrip('.')}."
+            )
             done.append(curve)
     return tuple(done)
 
@@ -154,11 +181,20 @@ def follow(plan: MapPlan, walk: StabilityWalk, curve: OnsetCurve) -> OnsetCurve:
     parts, reasons = [], []
     for direction in (1, -1):
         options = ContinuationOptions(
-            step=STEPS[0], min_step=STEPS[1], max_step=STEPS[2], max_points=400, limits={"x": (0.0, 1.0), "y": (0.0, 1.0)}, direction=direction,
-            location_tolerance=2e-5, newton=NewtonOptions(tolerance=1e-4, max_iterations=10), state_scale=10.0,
-        )  # fmt: skip
+            step=STEPS[0],
+            min_step=STEPS[1],
+            max_step=STEPS[2],
+            max_points=400,
+            limits={"x": (0.0, 1.0), "y": (0.0, 1.0)},
+            direction=direction,
+            location_tolerance=2e-5,
+            newton=NewtonOptions(tolerance=1e-4, max_iterations=10),
+            state_scale=10.0,
+        )
         branch = continue_hopf(system, special, ("x", "y"), options, lyapunov=False)
-        part = np.column_stack([branch.values("x"), branch.values("y"), RATE * np.abs(branch.values("omega")) / (2 * np.pi)])
+        part = np.column_stack(
+            [branch.values("x"), branch.values("y"), RATE * np.abs(branch.values("omega")) / (2 * np.pi)]
+        )
         parts.append(part)
         reasons.append(branch.reason)
         if "closed" in branch.reason:
@@ -172,7 +208,9 @@ def follow(plan: MapPlan, walk: StabilityWalk, curve: OnsetCurve) -> OnsetCurve:
 
 
 def merged(curve: np.ndarray, onsets: np.ndarray) -> tuple[np.ndarray, float]:
-    """Points (k, 3) of a continued curve and onsets (p, 3) of columns on it, in order; and the largest distance of the latter from a spline through the former."""
+    """Points (k, 3) of a continued curve and onsets (p, 3) of columns on it, in order; and the largest distance of the
+    latter from a spline through the former.
+    """
     points = curve[np.concatenate([[True], np.linalg.norm(np.diff(curve[:, :2], axis=0), axis=1) > 1e-9])]
     if len(points) < 4:
         return curve, float(_distances(onsets[:, :2], curve[:, :2]).max())
@@ -199,7 +237,9 @@ def hopf_at(plan: MapPlan, walk: StabilityWalk, law: float, x: float, y: float, 
     nearest = int(np.argmin(np.abs(spectrum.eigenvalues - 2j * np.pi * frequency)))
     value = complex(spectrum.eigenvalues[nearest])
     if abs(value - 2j * np.pi * frequency) > 1e-3 * abs(value):
-        raise SolveError(f"The full pencil has no neutral mode at {plan.x.parameter} = {x:.6g}, {plan.y.parameter} = {y:.6g}.")
+        raise SolveError(
+            f"The full pencil has no neutral mode at {plan.x.parameter} = {x:.6g}, {plan.y.parameter} = {y:.6g}."
+        )
     omega, q = abs(value.imag), spectrum.q[:, nearest]
     vector = np.concatenate([q, 1j * omega * q, spectrum.u[:, nearest]])
     linear = system.linear(u, plane)
@@ -207,7 +247,9 @@ def hopf_at(plan: MapPlan, walk: StabilityWalk, law: float, x: float, y: float, 
     slope = -linear.solve(system.d_parameter(u, plane, "x"))
     tangent = np.append(slope, 1.0)
     z = np.append(u, plane["x"])
-    special = SpecialPoint("hopf", 0, u, plane, z, tangent, True, "", {"omega": omega / RATE}, {"right": right, "left": left})
+    special = SpecialPoint(
+        "hopf", 0, u, plane, z, tangent, True, "", {"omega": omega / RATE}, {"right": right, "left": left}
+    )
     return special, system
 
 

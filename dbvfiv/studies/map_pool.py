@@ -1,11 +1,12 @@
 """Columns shared among processes: of this machine, or of several under ``mpiexec`` where mpi4py is installed."""
+
 from __future__ import annotations
 
 import multiprocessing
 import os
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import Callable, Iterable, Iterator
 
 from ..case.model import Case
 from ..runtime import mpi_size
@@ -19,7 +20,13 @@ _walk: StabilityWalk | None = None
 _plan: MapPlan | None = None
 
 
-def columns(plan: MapPlan, wanted: Iterable[tuple[float, int]], workers: int, warn: Callable[[str], None], walk: StabilityWalk | None = None) -> Iterator[MapColumn]:
+def columns(
+    plan: MapPlan,
+    wanted: Iterable[tuple[float, int]],
+    workers: int,
+    warn: Callable[[str], None],
+    walk: StabilityWalk | None = None,
+) -> Iterator[MapColumn]:
     """Columns as they are finished, in any order.
 
     Parameters
@@ -62,7 +69,9 @@ def columns(plan: MapPlan, wanted: Iterable[tuple[float, int]], workers: int, wa
             warn(f"A worker was lost; {len(left)} columns are given to new ones.")
 
 
-def _round(pool: Executor, tasks: list[tuple[float, int]], workers: int) -> Iterator[tuple[tuple[float, int], MapColumn | None]]:
+def _round(
+    pool: Executor, tasks: list[tuple[float, int]], workers: int
+) -> Iterator[tuple[tuple[float, int], MapColumn | None]]:
     """Finished columns, and None for those in flight when a worker died; the round then ends."""
     queue, running = list(tasks), {}
     while queue or running:

@@ -1,4 +1,5 @@
 """Leading modes of the coupled valve at one steady state, with an independent count of the unstable ones."""
+
 from __future__ import annotations
 
 import math
@@ -6,7 +7,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eigen import CertifiedSpectrum, CoupledPencil, SearchOptions, SingularShiftError, Spectrum, TransferBasis, certified_spectrum
+from eigen import (
+    CertifiedSpectrum,
+    CoupledPencil,
+    SearchOptions,
+    SingularShiftError,
+    Spectrum,
+    TransferBasis,
+    certified_spectrum,
+)
 
 from ..errors import CaseError, SolveError
 from ..flow import Channel
@@ -41,11 +50,13 @@ class ModesOptions:
     search: SearchOptions = field(default_factory=SearchOptions)
 
     @classmethod
-    def of(cls, case) -> "ModesOptions":
+    def of(cls, case) -> ModesOptions:
         """Options of a case file."""
         modes = case.modes
         shift = None if modes.shift is None else (complex(modes.shift, 2 * math.pi * modes.shift_frequency),)
-        return cls(modes.count, modes.in_vacuo, SearchOptions(modes.max_frequency, shifts=shift, tolerance=modes.tolerance))
+        return cls(
+            modes.count, modes.in_vacuo, SearchOptions(modes.max_frequency, shifts=shift, tolerance=modes.tolerance)
+        )
 
 
 @dataclass(frozen=True)
@@ -63,7 +74,8 @@ class ModesResult:
     shapes : (k, nn, 5) complex
         Displacements and rotations of the nodes, the largest displacement being 1 and real.
     areas, pressures : (k, m) complex
-        Changes of the row areas (m2, a quarter) and station pressures (Pa) for a largest displacement of 1 m; no pressures in vacuo.
+        Changes of the row areas (m2, a quarter) and station pressures (Pa) for a largest displacement of 1 m; no
+        pressures in vacuo.
     inlet_velocities : (k,) complex, m/s
         Likewise.
     notes : tuple of str
@@ -93,8 +105,8 @@ class ModesResult:
     def stable(self) -> bool | None:
         """Whether all modes decay.
 
-        One unstable pair that satisfies the equations is proof that they do not. If none is listed and the independent count does not confirm it, or
-        only up to some frequency: None.
+        One unstable pair that satisfies the equations is proof that they do not. If none is listed and the independent
+        count does not confirm it, or only up to some frequency: None.
         """
         if self.certified.unstable_count:
             return False
@@ -134,7 +146,8 @@ def run_modes(
     without_fluid = options.in_vacuo or not isinstance(model.flow, Channel)
     if not without_fluid and state.pressure <= 0:
         raise CaseError(
-            "Coupled modes need an inlet pressure greater than 0, because without one the velocity of an ideal fluid is undetermined; "
+            "Coupled modes need an inlet pressure greater than 0, because without one the velocity of an "
+            "ideal fluid is undetermined; "
             "modes.in_vacuo gives those of the structure at rest."
         )
     observer.begin("modes", 1)
@@ -149,10 +162,14 @@ def run_modes(
         certified = certified_spectrum(pencil, options.count, search, basis=basis)
     certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))
     if np.isfinite(certified.count.band):
-        notes = (*notes, (
-            f"The independent count ends at {certified.count.band:.4g} Hz with the search; without that end it differs, so that "
-            "modes of higher frequency may be unstable: modes.max_frequency moves the end."
-        ))  # fmt: skip
+        notes = (
+            *notes,
+            (
+                f"The independent count ends at {certified.count.band:.4g} Hz with the search; without that "
+                f"end it differs, so that "
+                "modes of higher frequency may be unstable: modes.max_frequency moves the end."
+            ),
+        )
     notes = (*notes, *certified.spectrum.notes)
     result = _described(model, state, conditions, without_fluid, certified, pencil, linear, notes)
     observer.item(result)
@@ -162,7 +179,9 @@ def run_modes(
     return result
 
 
-def _described(model, state, conditions, in_vacuo, certified: CertifiedSpectrum, pencil: CoupledPencil, linear, notes) -> ModesResult:
+def _described(
+    model, state, conditions, in_vacuo, certified: CertifiedSpectrum, pencil: CoupledPencil, linear, notes
+) -> ModesResult:
     """Shapes, areas and pressures of the eigenvectors, scaled to a largest displacement of 1."""
     spectrum = certified.spectrum
     shapes, scales = [], []
@@ -178,10 +197,17 @@ def _described(model, state, conditions, in_vacuo, certified: CertifiedSpectrum,
         pressure[:, i] = by_area @ change[:, i] + by_velocity @ spectrum.u[:, i]
     velocity = spectrum.u[0] if pencil.b else np.zeros(len(spectrum), complex)
     return ModesResult(
-        model, state, conditions, in_vacuo, certified,
+        model,
+        state,
+        conditions,
+        in_vacuo,
+        certified,
         shapes=np.array(shapes, complex).reshape(len(spectrum), len(model.mesh.nodes), 5),
-        areas=(change / scale).T, pressures=(pressure / scale).T, inlet_velocities=velocity / scale, notes=tuple(notes),
-    )  # fmt: skip
+        areas=(change / scale).T,
+        pressures=(pressure / scale).T,
+        inlet_velocities=velocity / scale,
+        notes=tuple(notes),
+    )
 
 
 def _ties_by_frequency(spectrum: Spectrum) -> Spectrum:
@@ -211,16 +237,20 @@ def require_equilibrium(model: ValveModel, state: SteadyState) -> None:
     """
     if not state.converged:
         raise SolveError(
-            f"The steady state at {state.pressure:.6g} Pa has not converged (residual {state.residual:.1e}), so it has no modes; find the equilibrium first."
+            f"The steady state at {state.pressure:.6g} Pa has not converged (residual "
+            f"{state.residual:.1e}), so it has no modes; find the equilibrium first."
         )
     if len(state.q) != model.size:
-        raise SolveError(f"The steady state at {state.pressure:.6g} Pa belongs to another mesh, so it has no modes in this model.")
+        raise SolveError(
+            f"The steady state at {state.pressure:.6g} Pa belongs to another mesh, so it has no modes in this model."
+        )
     scale = model.force_scale(state.q, state.pressure)
     unbalanced = float(np.linalg.norm(model.residual(state.q, state.pressure)))
     allowed = max(_UNBALANCED * scale, 1e3 * model.rounding(state.q, model.tangent(state.q, state.pressure)))
     if not unbalanced <= allowed:
         raise SolveError(
-            f"The state at {state.pressure:.6g} Pa is no equilibrium of this model: its unbalanced force is {unbalanced:.2g} N against "
+            f"The state at {state.pressure:.6g} Pa is no equilibrium of this model: its unbalanced force is "
+            f"{unbalanced:.2g} N against "
             f"{scale:.2g} N of pressure, so it has no modes; find the equilibrium first."
         )
 
@@ -228,7 +258,15 @@ def require_equilibrium(model: ValveModel, state: SteadyState) -> None:
 def rest_state(model: ValveModel) -> SteadyState:
     """The valve at rest without pressure, as a state."""
     return describe_state(
-        model, model.rest(), 0.0, converged=True, iterations=0, load_steps=0, residual=0.0, rounding=0.0, reason="at rest without pressure"
+        model,
+        model.rest(),
+        0.0,
+        converged=True,
+        iterations=0,
+        load_steps=0,
+        residual=0.0,
+        rounding=0.0,
+        reason="at rest without pressure",
     )
 
 

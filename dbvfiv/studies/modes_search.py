@@ -1,4 +1,5 @@
 """How leading modes of the valve are searched for: what the damping says about where they end."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -18,11 +19,14 @@ def limit_point(conditions: Conditions) -> float | None:
     return -1.0 / conditions.beta if conditions.beta > 0 else None
 
 
-def suited(search: SearchOptions, conditions: Conditions, basis: TransferBasis, count: int) -> tuple[SearchOptions, tuple[str, ...]]:
+def suited(
+    search: SearchOptions, conditions: Conditions, basis: TransferBasis, count: int
+) -> tuple[SearchOptions, tuple[str, ...]]:
     """Search options that suit the damping, and sentences about them.
 
-    Stiffness damping orders modes by frequency until they reach the limit point -1/beta. Without it growth rates of high modes do not fall, so that
-    "leading" has a meaning within a band of frequencies only: one that holds as many structural frequencies as modes are wanted.
+    Stiffness damping orders modes by frequency until they reach the limit point -1/beta. Without it growth rates of
+    high modes do not fall, so that "leading" has a meaning within a band of frequencies only: one that holds as many
+    structural frequencies as modes are wanted.
 
     Parameters
     ----------
@@ -42,7 +46,8 @@ def suited(search: SearchOptions, conditions: Conditions, basis: TransferBasis, 
         return search, ()
     band = _ROOM * highest
     sentence = (
-        f"Without stiffness damping growth rates do not order the modes, so the search covers the band up to {band:.4g} Hz, which holds "
+        f"Without stiffness damping growth rates do not order the modes, so the search covers the band up "
+        f"to {band:.4g} Hz, which holds "
         f"{min(count, len(known))} structural frequencies in vacuo; modes.max_frequency chooses another."
     )
     return replace(search, max_frequency=band), (sentence,)

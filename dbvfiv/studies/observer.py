@@ -1,9 +1,12 @@
 """What a running study tells the outside: progress bars, files and plots are observers."""
+
 from __future__ import annotations
 
 
 class Observer:
-    """Does nothing; override what is of interest. Any method may raise KeyboardInterrupt to stop a run between two steps."""
+    """Does nothing; override what is of interest. Any method may raise KeyboardInterrupt to stop a run between two
+    steps.
+    """
 
     def begin(self, study: str, total: int | None) -> None:
         """A study starts; `total` items are expected if that is known."""

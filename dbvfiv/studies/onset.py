@@ -1,9 +1,10 @@
 """Where a valve loses or regains stability along one parameter."""
+
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Iterable
 
 import numpy as np
 
@@ -59,9 +60,12 @@ class OnsetResult:
 
 
 def run_onset(
-    case: Case, options: OnsetOptions | None = None, observer: Observer | None = None, known: Iterable[OnsetSample | OnsetPoint] = (),
+    case: Case,
+    options: OnsetOptions | None = None,
+    observer: Observer | None = None,
+    known: Iterable[OnsetSample | OnsetPoint] = (),
     walk: StabilityWalk | None = None,
-) -> OnsetResult:  # fmt: skip
+) -> OnsetResult:
     """All onsets of a case along one parameter.
 
     Parameters
@@ -70,7 +74,8 @@ def run_onset(
     options : OnsetOptions, optional
         Those of the case by default.
     observer : Observer, optional
-        `item` is told of every `OnsetSample` and `OnsetPoint` as it is found, and of a point again when more is known about it.
+        `item` is told of every `OnsetSample` and `OnsetPoint` as it is found, and of a point again when more is known
+        about it.
     known : iterable of OnsetSample and OnsetPoint
         What an interrupted run had found, in its order; it is not solved again.
     walk : StabilityWalk, optional
@@ -95,7 +100,10 @@ def run_onset(
         crossings = search.scan.run(options.values)
         failures += search.scan.failures.values()
         if not search.scan.samples:
-            raise SolveError(f"No state of the scan over {options.parameter} was found: {failures[0] if failures else 'the range is empty.'}")
+            raise SolveError(
+                f"No state of the scan over {options.parameter} was found: "
+                f"{failures[0] if failures else 'the range is empty.'}"
+            )
         for crossing in crossings:
             observer.progress(f"onset between {crossing.low.value:.6g} and {crossing.high.value:.6g}")
             try:
@@ -119,9 +127,16 @@ def run_onset(
     for row, sample in zip(table, samples):
         row[: len(sample.eigenvalues)] = sample.eigenvalues
     return OnsetResult(
-        case, options, tuple(sorted(points, key=lambda p: p.value)), np.array([s.value for s in samples]), table.real,
-        table.imag / (2 * np.pi), tuple(failures), tuple(warnings), interrupted,
-    )  # fmt: skip
+        case,
+        options,
+        tuple(sorted(points, key=lambda p: p.value)),
+        np.array([s.value for s in samples]),
+        table.real,
+        table.imag / (2 * np.pi),
+        tuple(failures),
+        tuple(warnings),
+        interrupted,
+    )
 
 
 __all__ = ["OnsetOptions", "OnsetPoint", "OnsetResult", "OnsetSample", "OnsetSearch", "run_onset"]

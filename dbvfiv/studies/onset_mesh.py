@@ -1,4 +1,5 @@
 """The uncertainty that the mesh leaves in an onset, from a second, coarser one."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -26,11 +27,16 @@ def coarse_case(case: Case, share: float) -> tuple[Case, float]:
     """The case on fewer elements, and the ratio of mesh widths."""
     mesh = case.mesh
     around, along = (max(6, int(round(share * n))) for n in (mesh.around, mesh.along))
-    return case.replace({"mesh.around": around, "mesh.along": along}), float(np.sqrt(mesh.around * mesh.along / (around * along)))
+    return case.replace({"mesh.around": around, "mesh.along": along}), float(
+        np.sqrt(mesh.around * mesh.along / (around * along))
+    )
 
 
-def with_uncertainty(case: Case, options: OnsetOptions, points: list[OnsetPoint], observer: Observer, warnings: list[str], known=()) -> list[OnsetPoint]:
-    """Onsets again on a coarser mesh, matched by frequency and direction; Richardson's rule with the order of the element.
+def with_uncertainty(
+    case: Case, options: OnsetOptions, points: list[OnsetPoint], observer: Observer, warnings: list[str], known=()
+) -> list[OnsetPoint]:
+    """Onsets again on a coarser mesh, matched by frequency and direction; Richardson's rule with the order of the
+    element.
 
     Parameters
     ----------
@@ -56,7 +62,9 @@ def with_uncertainty(case: Case, options: OnsetOptions, points: list[OnsetPoint]
         found.append((value, abs(eigenvalue.imag) / (2 * np.pi), crossing.high.unstable > crossing.low.unstable))
     done = []
     for point in points:
-        alike = [c for c in found if c[2] == point.gains and abs(c[1] - point.frequency) <= ALIKE * max(point.frequency, 1.0)]
+        alike = [
+            c for c in found if c[2] == point.gains and abs(c[1] - point.frequency) <= ALIKE * max(point.frequency, 1.0)
+        ]
         if alike:
             value = min(alike, key=lambda c: abs(c[0] - point.value))[0]
             found = [c for c in found if c[0] != value]

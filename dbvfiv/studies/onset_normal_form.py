@@ -1,4 +1,5 @@
 """Super- or subcritical: the Hopf normal form of a located onset."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -22,7 +23,9 @@ MISSING = "No normal form:"
 
 
 def described(point: OnsetPoint, case: Case, walk: StabilityWalk, mode) -> OnsetPoint:
-    """A point with its criticality, by the multilinear forms of the coupled residual; with the reason in its note where there is none."""
+    """A point with its criticality, by the multilinear forms of the coupled residual; with the reason in its note where
+    there is none.
+    """
     try:
         form = normal_form(case, walk, point.place, mode, point.parameter)
     except (ContinuationError, SolveError, ArithmeticError, ValueError) as error:

@@ -1,4 +1,5 @@
 """What a run over one parameter finds: samples of its scan, and crossings of the imaginary axis."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -56,12 +57,16 @@ class Side:
     def summary(self) -> dict:
         """Plain numbers for JSON, frequencies in Hz."""
         return {
-            "value": self.value, "growth_rate": self.eigenvalue.real, "frequency": self.eigenvalue.imag / (2 * np.pi),
-            "leading_growth_rate": self.leading, "unstable_count": self.unstable, "unstable_count_independent": self.counted,
-        }  # fmt: skip
+            "value": self.value,
+            "growth_rate": self.eigenvalue.real,
+            "frequency": self.eigenvalue.imag / (2 * np.pi),
+            "leading_growth_rate": self.leading,
+            "unstable_count": self.unstable,
+            "unstable_count_independent": self.counted,
+        }
 
     @classmethod
-    def of(cls, summary) -> "Side":
+    def of(cls, summary) -> Side:
         """From what `summary` gave."""
         eigenvalue = complex(summary["growth_rate"], 2 * np.pi * summary["frequency"])
         counts = (int(summary[name]) for name in ("unstable_count", "unstable_count_independent"))
@@ -127,7 +132,7 @@ class OnsetPoint:
 
     @property
     def kind(self) -> str:
-        """"Hopf" or "divergence"."""
+        """ "Hopf" or "divergence"."""
         return "Hopf" if self.frequency > 0 else "divergence"
 
     @property
@@ -138,9 +143,22 @@ class OnsetPoint:
     def summary(self) -> dict:
         """Plain SI numbers for JSON."""
         return {
-            "parameter": self.parameter, "value": self.value, "frequency": self.frequency, "growth_rate": self.growth_rate,
-            "criticality": self.criticality, "first_lyapunov_coefficient": self.first_lyapunov_coefficient, "uncertainty": self.uncertainty,
-            "kind": self.kind, "gains": self.gains, "edge": self.edge, "confirmed": self.confirmed, "crossing_speed": self.crossing_speed,
-            "coarse_value": self.coarse_value, "below": self.below.summary(), "above": self.above.summary(), "note": self.note,
-            "bracket": list(self.bracket), "ahead": self.ahead,
-        }  # fmt: skip
+            "parameter": self.parameter,
+            "value": self.value,
+            "frequency": self.frequency,
+            "growth_rate": self.growth_rate,
+            "criticality": self.criticality,
+            "first_lyapunov_coefficient": self.first_lyapunov_coefficient,
+            "uncertainty": self.uncertainty,
+            "kind": self.kind,
+            "gains": self.gains,
+            "edge": self.edge,
+            "confirmed": self.confirmed,
+            "crossing_speed": self.crossing_speed,
+            "coarse_value": self.coarse_value,
+            "below": self.below.summary(),
+            "above": self.above.summary(),
+            "note": self.note,
+            "bracket": list(self.bracket),
+            "ahead": self.ahead,
+        }

@@ -1,8 +1,9 @@
 """Scan, location and confirmation of onsets along one parameter of a case."""
+
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Iterable
 
 import numpy as np
 
@@ -47,17 +48,19 @@ class OnsetOptions:
     coarse_mesh: float = 0.5
 
     @classmethod
-    def of(cls, case: Case) -> "OnsetOptions":
+    def of(cls, case: Case) -> OnsetOptions:
         """Options of a case file."""
         axis = case.onset.axis
-        return cls(axis.parameter, axis.values, axis.log, case.onset.tolerance, case.onset.normal_form, case.onset.coarse_mesh)
+        return cls(
+            axis.parameter, axis.values, axis.log, case.onset.tolerance, case.onset.normal_form, case.onset.coarse_mesh
+        )
 
 
 class OnsetSearch:
     """Onsets along one parameter.
 
-    The order in which values are asked for follows from their eigenvalues alone, so a search that is given what an interrupted one had found repeats its
-    steps without solving anything, and goes on where it ended.
+    The order in which values are asked for follows from their eigenvalues alone, so a search that is given what an
+    interrupted one had found repeats its steps without solving anything, and goes on where it ended.
 
     Parameters
     ----------
@@ -69,15 +72,22 @@ class OnsetSearch:
     place : Place, optional
         The other parameters; those of the case by default.
     known : iterable of OnsetSample and OnsetPoint
-        What is not to be solved again; a later point takes the place of an earlier one. Samples of other meshes are left aside.
+        What is not to be solved again; a later point takes the place of an earlier one. Samples of other meshes are
+        left aside.
     mesh : int
         `FINE` or `COARSE`, for the samples.
     """
 
     def __init__(
-        self, case: Case, options: OnsetOptions, observer: Observer | None = None, walk: StabilityWalk | None = None, place: Place | None = None,
-        known: Iterable[OnsetSample | OnsetPoint] = (), mesh: int = FINE,
-    ):  # fmt: skip
+        self,
+        case: Case,
+        options: OnsetOptions,
+        observer: Observer | None = None,
+        walk: StabilityWalk | None = None,
+        place: Place | None = None,
+        known: Iterable[OnsetSample | OnsetPoint] = (),
+        mesh: int = FINE,
+    ):
         self.case, self.options, self.mesh = case, options, mesh
         self.observer = observer or Observer()
         self.walk = walk or StabilityWalk(case, self.observer)
@@ -92,7 +102,8 @@ class OnsetSearch:
     def place(self, value: float) -> Place:
         return self.base.at(**{self.options.parameter: value})
 
-    # -- samples --------------------------------------------------------------------------------------------------------------------
+    # -- samples
+    # ----
 
     def _eigenvalues(self, value: float) -> np.ndarray:
         known = self._samples.get(value)
@@ -106,7 +117,11 @@ class OnsetSearch:
     def _solved(self, value: float) -> OnsetSample:
         place = self.place(value)
         try:
-            found = self._reduced(place) if is_surrounding(self.options.parameter) else self.walk.spectrum(place).eigenvalues
+            found = (
+                self._reduced(place)
+                if is_surrounding(self.options.parameter)
+                else self.walk.spectrum(place).eigenvalues
+            )
         except (SolveError, CaseError) as error:
             return OnsetSample(value, np.zeros(0, complex), self.mesh, str(error))
         if len(found):
@@ -127,7 +142,8 @@ class OnsetSearch:
         upper = values[(values.imag >= 0) & (values.real > floor_of(place.beta))]
         return upper[np.argsort(-upper.real)][:8]
 
-    # -- points ---------------------------------------------------------------------------------------------------------------------
+    # -- points
+    # ----
 
     def point(self, crossing: Crossing) -> OnsetPoint:
         """Locate, confirm and describe one crossing.
@@ -171,7 +187,21 @@ class OnsetSearch:
         edge = min(below.unstable, above.unstable) == 0
         bracket = (crossing.low.value, crossing.high.value)
         frequency = abs(eigenvalue.imag) / (2 * np.pi)
-        return OnsetPoint(parameter, value, frequency, eigenvalue.real, gains, edge, below, above, confirmed, place, bracket, crossing.index, note=note), mode
+        return OnsetPoint(
+            parameter,
+            value,
+            frequency,
+            eigenvalue.real,
+            gains,
+            edge,
+            below,
+            above,
+            confirmed,
+            place,
+            bracket,
+            crossing.index,
+            note=note,
+        ), mode
 
     def _polished(self, value: float, crossing: Crossing) -> float:
         """Secant steps with the full pencil from the root on the small model."""
@@ -198,7 +228,12 @@ class OnsetSearch:
         """The mode of a place that is neutral, the one with `index` faster ones if that one is."""
         spectrum = self.walk.spectrum(place)
         near = int(np.argmin(np.abs(spectrum.eigenvalues.real)))
-        chosen = index if index < len(spectrum) and abs(spectrum.eigenvalues[index].real) < 2 * abs(spectrum.eigenvalues[near].real) + 1e-3 else near
+        chosen = (
+            index
+            if index < len(spectrum)
+            and abs(spectrum.eigenvalues[index].real) < 2 * abs(spectrum.eigenvalues[near].real) + 1e-3
+            else near
+        )
         return spectrum.mode(chosen)
 
     def _side(self, value: float, eigenvalue: complex) -> Side:
@@ -213,8 +248,17 @@ class OnsetSearch:
 def _confirmed(below: Side, above: Side, gains: bool) -> tuple[bool, str]:
     for side in (below, above):
         if side.unstable != side.counted:
-            return False, f"at {side.value:.6g} the spectrum lists {side.unstable} unstable eigenvalues and the independent count finds {side.counted}."
+            return (
+                False,
+                (
+                    f"at {side.value:.6g} the spectrum lists {side.unstable} unstable eigenvalues and the "
+                    f"independent count finds {side.counted}."
+                ),
+            )
     first, second = (below, above) if gains else (above, below)
     if not (first.eigenvalue.real < 0 < second.eigenvalue.real and first.unstable < second.unstable):
-        return False, f"the eigenvalues {below.eigenvalue:.5g} and {above.eigenvalue:.5g} 1/s on both sides do not show it."
+        return (
+            False,
+            f"the eigenvalues {below.eigenvalue:.5g} and {above.eigenvalue:.5g} 1/s on both sides do not show it.",
+        )
     return True, ""

@@ -1,8 +1,9 @@
 """Parameters that stability is asked over: of the load, of the surroundings, of the design."""
+
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Callable, Mapping
 
 from ..case.model import Case
 from ..errors import SolveError
@@ -17,11 +18,25 @@ DESIGN = ("thickness", "angle", "strain")
 SYSTEM_NAMES = {"pressure": "inlet"}
 #: Labels with units.
 LABELS = {
-    "pressure": "Inlet pressure, kPa", "density": "Fluid density, kg/m³", "alpha": "Mass damping α, 1/s", "beta": "Stiffness damping β, s",
-    "storage": "Continuity law (0 quasi-steady, 1 storage)", "thickness": "Wall thickness factor", "angle": "Fibre angle, degrees",
+    "pressure": "Inlet pressure, kPa",
+    "density": "Fluid density, kg/m³",
+    "alpha": ("Mass damping α, 1/s"),
+    "beta": "Stiffness damping β, s",
+    "storage": "Continuity law (0 quasi-steady, 1 storage)",
+    "thickness": "Wall thickness factor",
+    "angle": "Fibre angle, degrees",
     "strain": "Strain level of the rubbers",
-}  # fmt: skip
-UNITS = {"pressure": "Pa", "density": "kg/m3", "alpha": "1/s", "beta": "s", "storage": "", "thickness": "", "angle": "degrees", "strain": ""}
+}
+UNITS = {
+    "pressure": "Pa",
+    "density": "kg/m3",
+    "alpha": "1/s",
+    "beta": "s",
+    "storage": "",
+    "thickness": "",
+    "angle": "degrees",
+    "strain": "",
+}
 #: What figures divide a parameter by.
 SCALES = {"pressure": 1e3}
 
@@ -49,12 +64,12 @@ class Place:
     design: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, case: Case) -> "Place":
+    def of(cls, case: Case) -> Place:
         """The parameters of a case."""
         storage = 1.0 if case.fluid.continuity == "storage" else 0.0
         return cls(case.drive.pressure, case.fluid.density, case.damping.alpha, case.damping.beta, storage)
 
-    def at(self, **values: float) -> "Place":
+    def at(self, **values: float) -> Place:
         """With some parameters changed."""
         own = {name: float(value) for name, value in values.items() if name not in DESIGN}
         design = {name: float(value) for name, value in values.items() if name in DESIGN}
@@ -74,7 +89,14 @@ class Place:
 
     def mu(self) -> dict[str, float]:
         """Parameters of a `ValveSystem`."""
-        return {"inlet": self.pressure, "density": self.density, "alpha": self.alpha, "beta": self.beta, "storage": self.storage, **self.design}
+        return {
+            "inlet": self.pressure,
+            "density": self.density,
+            "alpha": self.alpha,
+            "beta": self.beta,
+            "storage": self.storage,
+            **self.design,
+        }
 
 
 def is_surrounding(name: str) -> bool:
@@ -90,11 +112,15 @@ def check_flow(case: Case) -> None:
     SolveError
     """
     if case.drive.kind != "flow":
-        raise SolveError("Without flow nothing couples the fluid to the wall, so there is no onset to look for; drive.kind must be 'flow'.")
+        raise SolveError(
+            "Without flow nothing couples the fluid to the wall, so there is no onset to look for; "
+            "drive.kind must be 'flow'."
+        )
 
 
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:
-    """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain level (0.1 for 10 %).
+    """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
+    level (0.1 for 10 %).
 
     Raises
     ------

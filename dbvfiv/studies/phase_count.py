@@ -1,12 +1,15 @@
 """How many unstable eigenvalues a reduced state has, by the argument principle, for many conditions at once.
 
-The response h(s) = J (s^2 M + s C + K)^-1 G of the structure is condensed to the few patterns of area and pressure that matter; then
+The response h(s) = J (s^2 M + s C + K)^-1 G of the structure is condensed to the few patterns of area and pressure that
+matter; then
 
     d(s) = det [ I - h A, -h B ; R, S ]
 
-is analytic right of the imaginary axis apart from unstable poles of the structure itself, and grows like s at most. Its phase along the imaginary axis is
-followed for every density, with points added where it turns fast. No eigenvalue of the coupled pencil is used except as a hint where to look.
+is analytic right of the imaginary axis apart from unstable poles of the structure itself, and grows like s at most. Its
+phase along the imaginary axis is followed for every density, with points added where it turns fast. No eigenvalue of
+the coupled pencil is used except as a hint where to look.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -62,7 +65,9 @@ class Response:
         form[:k, k:] = np.eye(k)
         form[k:] = -np.linalg.solve(reduced.M, np.hstack([reduced.K, damping]))
         self.poles, right = la.eig(form)
-        left = np.linalg.solve(right, np.vstack([np.zeros_like(reduced.G), np.linalg.solve(reduced.M, reduced.G)]).astype(complex))
+        left = np.linalg.solve(
+            right, np.vstack([np.zeros_like(reduced.G), np.linalg.solve(reduced.M, reduced.G)]).astype(complex)
+        )
         self._out, self._in = reduced.J @ right[:k], left
         self.unstable = int(np.sum(self.poles.real > 0))
         scale = self.scale = float(np.abs(self.poles[np.abs(self.poles.imag) > 0]).min(initial=np.inf))
@@ -162,7 +167,9 @@ class _Walk:
         """Phase of det [h^-1 - A, -B; R, S]."""
         r, b = inverse.shape[1], self.order
         z = (1j * omega * self.root[cells])[:, None, None]
-        parts = self._parts[0] if self._same else {name: np.stack([self._parts[i][name] for i in cells]) for name in POWERS}
+        parts = (
+            self._parts[0] if self._same else {name: np.stack([self._parts[i][name] for i in cells]) for name in POWERS}
+        )
         A = z * parts["A2"]
         A += parts["A1"]
         A *= z
@@ -199,7 +206,11 @@ class _Walk:
             own = list(base)
             for value in np.asarray(hint, complex):
                 width, middle = max(abs(value.real), 1e-6 * abs(value)), abs(value.imag)
-                own += [_shared(middle + f * width, 0.3 * width) for f in (-1.0, 0.0, 1.0) if middle + f * width > 0.3 * width]
+                own += [
+                    _shared(middle + f * width, 0.3 * width)
+                    for f in (-1.0, 0.0, 1.0)
+                    if middle + f * width > 0.3 * width
+                ]
             cells += [i] * len(own)
             omega += own
         self._add(cells, omega)
@@ -232,13 +243,20 @@ class _Walk:
 
     def counts(self):
         number, certain = [], []
-        for i, (omega, phase) in enumerate(zip(self.omega, self.phase)):
+        for i, (_omega, phase) in enumerate(zip(self.omega, self.phase)):
             steps = principal(np.diff(phase))
             turned = steps.sum()
             gap = self._gap(phase[-1])
             found = 0.5 * self.order - (turned - gap) / np.pi + self.response.unstable
             number.append(int(round(found)))
-            certain.append(bool(abs(found - round(found)) < CERTAIN and abs(gap) < 2 * LATE and np.abs(steps).max() <= LARGEST_STEP + 1e-9 and not self._cut[i]))
+            certain.append(
+                bool(
+                    abs(found - round(found)) < CERTAIN
+                    and abs(gap) < 2 * LATE
+                    and np.abs(steps).max() <= LARGEST_STEP + 1e-9
+                    and not self._cut[i]
+                )
+            )
         return np.array(number), np.array(certain)
 
 

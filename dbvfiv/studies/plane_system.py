@@ -1,7 +1,10 @@
-"""The valve as a System whose two parameters are the coordinates of a stability map, 0..1 along each axis, logarithmic where the axis is.
+"""The valve as a System whose two parameters are the coordinates of a stability map, 0..1 along each axis, logarithmic
+where the axis is.
 
-Time is counted in units of 1/`RATE`, so that angular frequencies are of the size of the coordinates and arclength weighs them alike.
+Time is counted in units of 1/`RATE`, so that angular frequencies are of the size of the coordinates and arclength
+weighs them alike.
 """
+
 from __future__ import annotations
 
 import gc
@@ -14,7 +17,6 @@ from continuation import SystemBase
 from ..model.system import ValveSystem
 from .map_column import MapPlan
 from .parameters import DESIGN, SYSTEM_NAMES
-
 
 #: Angular frequency that counts as 1, rad/s.
 RATE = 2 * math.pi * 100.0
@@ -88,7 +90,11 @@ class PlaneSystem(SystemBase):
 
     def d_parameter(self, u, mu, name):
         inner, rate = self._rate(mu, name)
-        return super().d_parameter(u, mu, name) if inner in DESIGN else rate * self.valve.d_parameter(u, self.mu(mu), inner)
+        return (
+            super().d_parameter(u, mu, name)
+            if inner in DESIGN
+            else rate * self.valve.d_parameter(u, self.mu(mu), inner)
+        )
 
     def d2(self, u, mu, a, b):
         return self.valve.d2(u, self.mu(mu), a, b)
@@ -98,7 +104,11 @@ class PlaneSystem(SystemBase):
 
     def d2_parameter(self, u, mu, name, a):
         inner, rate = self._rate(mu, name)
-        return super().d2_parameter(u, mu, name, a) if inner in DESIGN else rate * self.valve.d2_parameter(u, self.mu(mu), inner, a)
+        return (
+            super().d2_parameter(u, mu, name, a)
+            if inner in DESIGN
+            else rate * self.valve.d2_parameter(u, self.mu(mu), inner, a)
+        )
 
     def mass_d(self, u, mu, c, a):
         return RATE * self.valve.mass_d(u, self.mu(mu), c, a)

@@ -1,9 +1,11 @@
 """Small models of one linearised state, for any density, damping and continuity law.
 
-Two stages. The first space holds what station pressures and area changes do statically, K^-1 G and K^-T J^T, and what its own inertia does, K^-1 M X. The
-second holds the leading eigenvectors of the first at a few conditions after one correction with the full matrices, so that eigenvalues of forty vectors
-carry seven digits. With the inlet velocity scaled by sqrt(density) the fluid's parts are powers of sqrt(density) times those of unit density.
+Two stages. The first space holds what station pressures and area changes do statically, K^-1 G and K^-T J^T, and what
+its own inertia does, K^-1 M X. The second holds the leading eigenvectors of the first at a few conditions after one
+correction with the full matrices, so that eigenvalues of forty vectors carry seven digits. With the inlet velocity
+scaled by sqrt(density) the fluid's parts are powers of sqrt(density) times those of unit density.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -105,7 +107,12 @@ class UnitFluid:
     def at(self, s: complex, density: float, storage: float):
         """A, B, R, S (s) at a density, inlet velocity scaled."""
         p, z = self.parts(storage), s * np.sqrt(density)
-        return p["A0"] + z * (p["A1"] + z * p["A2"]), p["B0"] + z * p["B1"], p["R0"] + z * (p["R1"] + z * p["R2"]), p["S0"] + z * p["S1"]
+        return (
+            p["A0"] + z * (p["A1"] + z * p["A2"]),
+            p["B0"] + z * p["B1"],
+            p["R0"] + z * (p["R1"] + z * p["R2"]),
+            p["S0"] + z * p["S1"],
+        )
 
 
 @dataclass(frozen=True)
@@ -149,7 +156,10 @@ class Reduced:
         if key not in self._fluid:
             if len(self._fluid) > 256:
                 self._fluid.clear()
-            p, side = self.fluid.parts(key), {"A": (self.G, self.J), "B": (self.G, None), "R": (None, self.J), "S": (None, None)}
+            p, side = (
+                self.fluid.parts(key),
+                {"A": (self.G, self.J), "B": (self.G, None), "R": (None, self.J), "S": (None, None)},
+            )
             parts = {}
             for name, value in p.items():
                 left, right = side[name[0]]
@@ -205,7 +215,9 @@ class Reduced:
 
 
 def orthonormal(mass, X: np.ndarray, compression: float, passes: int = 2) -> tuple[np.ndarray, np.ndarray]:
-    """Mass-orthonormal basis of the span of columns, and mass times it; directions weaker than `compression` left out, each column counts alike."""
+    """Mass-orthonormal basis of the span of columns, and mass times it; directions weaker than `compression` left out,
+    each column counts alike.
+    """
     MX = mass @ X
     size = np.sqrt(np.einsum("ij,ij->j", X, MX))
     X, MX = X[:, size > 0] / size[size > 0], MX[:, size > 0] / size[size > 0]
@@ -239,7 +251,10 @@ class StateFamily:
     def coarse(self) -> Reduced:
         """First stage."""
         linear = self.linear
-        still = [self.solver.solve(linear.forces.toarray()), self.solver.solve_transposed(linear.slope.toarray().T.copy())]
+        still = [
+            self.solver.solve(linear.forces.toarray()),
+            self.solver.solve_transposed(linear.slope.toarray().T.copy()),
+        ]
         first, inertia = orthonormal(linear.mass, np.hstack(still), COMPRESSION, passes=1)
         # one step of subspace iteration on the lowest motions found there
         stiffness = first.T @ (linear.stiffness @ first)

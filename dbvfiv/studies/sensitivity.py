@@ -1,13 +1,15 @@
 """How an eigenvalue answers to a parameter: of the load, of the surroundings, of the wall.
 
-d lambda = - w^H dT x / (w^H T' x) with left and right vectors of the coupled pencil (`eigen.eigenvalue_derivative`). The change of the pencil is taken through the
-equilibrium: parameters that move it are stepped by a small amount to either side and the steady state is found anew. Left and right vectors are needed at the state
-itself only, so one mode costs two warm-started equilibria for each parameter and no further eigenvalue search.
+d lambda = - w^H dT x / (w^H T' x) with left and right vectors of the coupled pencil (`eigen.eigenvalue_derivative`).
+The change of the pencil is taken through the equilibrium: parameters that move it are stepped by a small amount to
+either side and the steady state is found anew. Left and right vectors are needed at the state itself only, so one mode
+costs two warm-started equilibria for each parameter and no further eigenvalue search.
 """
+
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
-from typing import Iterable
 
 import numpy as np
 
@@ -57,7 +59,8 @@ class Sensitivity:
 def parameters_of(model: ValveModel) -> tuple[str, ...]:
     """Every parameter an eigenvalue of this valve can be differentiated by.
 
-    Layers count from 1, inside to outside: "layer 3 angle", "layer 1 thickness" (its share of the wall), "layer 1 c10" (a constant of its law).
+    Layers count from 1, inside to outside: "layer 3 angle", "layer 1 thickness" (its share of the wall), "layer 1 c10"
+    (a constant of its law).
     """
     names = ["pressure", *SURROUNDINGS, "thickness_factor"]
     for i, layer in enumerate(model.shell.section.layers, 1):
@@ -67,7 +70,13 @@ def parameters_of(model: ValveModel) -> tuple[str, ...]:
 
 
 def eigenvalue_sensitivities(
-    model: ValveModel, q: np.ndarray, pressure: float, conditions: Conditions, mode: Mode, parameters: Iterable[str], step: float = 1e-4
+    model: ValveModel,
+    q: np.ndarray,
+    pressure: float,
+    conditions: Conditions,
+    mode: Mode,
+    parameters: Iterable[str],
+    step: float = 1e-4,
 ) -> list[Sensitivity]:
     """Derivatives of one eigenvalue of a steady state.
 

@@ -1,4 +1,7 @@
-"""Steady states and leading eigenvalues anywhere in the space of parameters, each state found from the nearest one known."""
+"""Steady states and leading eigenvalues anywhere in the space of parameters, each state found from the nearest one
+known.
+"""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -26,10 +29,14 @@ class _Built:
     path: LoadPath
     solver: ColumnSolver
     known: dict[float, np.ndarray]
-    trail: list[tuple[float, np.ndarray, np.ndarray]] = field(default_factory=list)  # pressure, state and slope of the last two
+    trail: list[tuple[float, np.ndarray, np.ndarray]] = field(
+        default_factory=list
+    )  # pressure, state and slope of the last two
 
     def aim(self, target: float) -> None:
-        """Predict the next state by the cubic through the last two and their slopes; along the tangent alone where it reaches too far ahead."""
+        """Predict the next state by the cubic through the last two and their slopes; along the tangent alone where it
+        reaches too far ahead.
+        """
         if len(self.trail) < 2 or self.path.slope is None or self.trail[-1][0] != self.path.pressure:
             return
         (p0, q0, s0), (p1, q1, s1) = self.trail
@@ -73,7 +80,7 @@ class StabilityWalk:
         key = tuple(sorted(place.design.items()))
         if key not in self._built:
             if len(self._built) > 4:
-                self._built = {k: v for k, v in list(self._built.items())[-2:]}
+                self._built = dict(list(self._built.items())[-2:])
             self._built[key] = self._new(self._rebuild(place.design))
         return self._built[key]
 
@@ -122,7 +129,9 @@ class StabilityWalk:
         try:
             return self.built(place).solver.direct(linear, place.condition, count)
         except (ArithmeticError, ValueError) as error:
-            raise SolveError(f"The modes at {place.pressure:.6g} Pa were not found: {str(error).rstrip('.')}.") from error
+            raise SolveError(
+                f"The modes at {place.pressure:.6g} Pa were not found: {str(error).rstrip('.')}."
+            ) from error
 
     def column(self, places: list[Place]) -> Column:
         """Cells that share a steady state."""

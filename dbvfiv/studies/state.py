@@ -1,4 +1,5 @@
 """One steady state of the valve and what a user reads off it."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,8 +1,9 @@
 """Equilibria over a list of pressures, by load steps from rest or from a given state."""
+
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Iterable, Iterator
 
 import numpy as np
 
@@ -19,7 +20,7 @@ class SteadyOptions(LoadStepOptions):
     """Options of a list of equilibria."""
 
     @classmethod
-    def of(cls, case) -> "SteadyOptions":
+    def of(cls, case) -> SteadyOptions:
         """Options of a case file."""
         steady = case.steady
         return cls(NewtonOptions(steady.tolerance, steady.max_iterations), steady.min_step)
@@ -71,9 +72,16 @@ class LoadPath(LoadSteps):
         way = self.reach(target)
         last = way.result
         return describe_state(
-            self.model, self.q, target, converged=True, iterations=way.iterations, load_steps=way.steps,
-            residual=last.residual, rounding=last.rounding, reason=last.reason,
-        )  # fmt: skip
+            self.model,
+            self.q,
+            target,
+            converged=True,
+            iterations=way.iterations,
+            load_steps=way.steps,
+            residual=last.residual,
+            rounding=last.rounding,
+            reason=last.reason,
+        )
 
 
 def run_steady(
@@ -85,8 +93,8 @@ def run_steady(
 ) -> SteadyResult:
     """Equilibria at a list of inlet pressures, Pa, each reached from the one before.
 
-    A pressure that is not reached is reported in `failures` and the list goes on from the last equilibrium; an interrupt ends the list and
-    keeps what was found.
+    A pressure that is not reached is reported in `failures` and the list goes on from the last equilibrium; an
+    interrupt ends the list and keeps what was found.
     """
     options = SteadyOptions.of(model.case) if options is None else options
     observer = Observer() if observer is None else observer
@@ -127,9 +135,10 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
     """Sentences about the model that hold whatever the load."""
     folded = model.shell.folded_places()
     if len(folded):
-        (xa, ya, za), (xb, yb, zb) = folded.min(axis=0), folded.max(axis=0)
+        (xa, _ya, za), (xb, _yb, zb) = folded.min(axis=0), folded.max(axis=0)
         yield (
-            f"Half the wall exceeds the radius of the mid-surface at {len(folded)} points (x {xa:.3f} to {xb:.3f} m, z {za:.3f} to {zb:.3f} m): "
+            f"Half the wall exceeds the radius of the mid-surface at {len(folded)} points (x {xa:.3f} to "
+            f"{xb:.3f} m, z {za:.3f} to {zb:.3f} m): "
             "the inner face folds over itself there and first-order shell theory is only an approximation."
         )
 
@@ -151,6 +160,7 @@ def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str
                 worst[layer.name] = (margin, state.pressure)
     for name, (margin, pressure) in worst.items():
         yield (
-            f"The constants of {name} lose stability within the strains that occur: at {pressure:.6g} Pa the smallest eigenvalue of its tangent falls to "
+            f"The constants of {name} lose stability within the strains that occur: at {pressure:.6g} Pa "
+            f"the smallest eigenvalue of its tangent falls to "
             f"{margin:.2g} of the value at rest; choose a higher strain level or fit the constants over a wider range."
         )

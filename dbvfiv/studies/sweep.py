@@ -1,9 +1,10 @@
 """Modes tracked along one parameter: fluid density, damping, or inlet pressure."""
+
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Callable
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from .modes_search import CLEAR, limit_point
 from .observer import Observer
 from .state import SteadyState
 from .sweep_family import Check, Family, FluidFamily, PressureFamily
-
 
 #: Writing what is done may take this share of the time; a sweep of small cost is written once.
 _KEEPING = 0.05
@@ -37,7 +37,8 @@ class SweepOptions:
     margin : int
         Further modes computed, so that a mode that changes its rank is not lost.
     checks : int
-        Values at which the reduced basis is compared with the full pencil and the unstable eigenvalues are counted independently.
+        Values at which the reduced basis is compared with the full pencil and the unstable eigenvalues are counted
+        independently.
     tolerance : float
         Accepted relative error of eigenvalues on the reduced basis.
     least_confidence : float
@@ -54,11 +55,17 @@ class SweepOptions:
     search: SearchOptions = field(default_factory=SearchOptions)
 
     @classmethod
-    def of(cls, case) -> "SweepOptions":
+    def of(cls, case) -> SweepOptions:
         """Options of a case file."""
         sweep, modes = case.sweep, case.modes
         search = SearchOptions(modes.max_frequency, tolerance=modes.tolerance)
-        return cls(sweep.count, checks=sweep.checks, tolerance=sweep.tolerance, least_confidence=sweep.least_confidence, search=search)
+        return cls(
+            sweep.count,
+            checks=sweep.checks,
+            tolerance=sweep.tolerance,
+            least_confidence=sweep.least_confidence,
+            search=search,
+        )
 
 
 @dataclass(frozen=True)
@@ -117,9 +124,9 @@ def run_sweep(
 ) -> SweepResult:
     """Follow the leading modes along a parameter.
 
-    Over density, alpha or beta the state stays, so modes are found on a basis that is certified against full solves; over pressure every value has its own
-    equilibrium, found from the nearest one known, and its own full solve. An interrupt, or a pressure that is not reached, ends the sweep and keeps
-    what was found.
+    Over density, alpha or beta the state stays, so modes are found on a basis that is certified against full solves;
+    over pressure every value has its own equilibrium, found from the nearest one known, and its own full solve. An
+    interrupt, or a pressure that is not reached, ends the sweep and keeps what was found.
 
     Parameters
     ----------
@@ -147,7 +154,10 @@ def run_sweep(
     options = SweepOptions.of(model.case) if options is None else options
     observer = Observer() if observer is None else observer
     if axis.parameter == "density" and not isinstance(model.flow, Channel):
-        raise CaseError("sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose pressure, alpha or beta.")
+        raise CaseError(
+            "sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose "
+            "pressure, alpha or beta."
+        )
     if axis.parameter == "pressure":
         family: Family = PressureFamily(model, conditions, options, observer)
     else:
@@ -219,14 +229,27 @@ class _Run:
         points, solves, found = tuple(self.points), len(self.spectra), self.branches
         if found is None and len(values):  # as far as it came, from the spectra kept
             found = track(self._pencil, values, self.track, solver=self._solve)
-        branches = _shown(found, self.family, values) if len(values) else Branches(np.zeros(0, int), values, *np.zeros((2, 0, 0)), 0)
+        branches = (
+            _shown(found, self.family, values)
+            if len(values)
+            else Branches(np.zeros(0, int), values, *np.zeros((2, 0, 0)), 0)
+        )
         checks, notes = self.family.checks(values) if len(values) and not interrupted else (self.family.done, ())
         certified = bool(checks) and not interrupted and all(check.holds for check in checks)
         counts = np.array([point.unstable_count for point in points], int)
         return SweepResult(
-            self.model, self.axis, values, Branches(branches.ids, values, branches.eigenvalues, branches.confidence, solves), counts, tuple(checks),
-            certified, self.family.states(values), tuple(notes), tuple(failures), interrupted,
-        )  # fmt: skip
+            self.model,
+            self.axis,
+            values,
+            Branches(branches.ids, values, branches.eigenvalues, branches.confidence, solves),
+            counts,
+            tuple(checks),
+            certified,
+            self.family.states(values),
+            tuple(notes),
+            tuple(failures),
+            interrupted,
+        )
 
 
 def _shown(branches: Branches, family: Family, values: np.ndarray) -> Branches:

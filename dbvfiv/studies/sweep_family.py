@@ -1,4 +1,5 @@
 """Pencils along a parameter: on one reduced basis where the state stays, in full where it moves."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -6,7 +7,16 @@ from typing import Protocol
 
 import numpy as np
 
-from eigen import CoupledPencil, SearchOptions, Spectrum, TransferBasis, Workspace, certified_spectrum, leading_modes, unstable_count
+from eigen import (
+    CoupledPencil,
+    SearchOptions,
+    Spectrum,
+    TransferBasis,
+    Workspace,
+    certified_spectrum,
+    leading_modes,
+    unstable_count,
+)
 
 from ..case.axis import Axis
 from ..model import ValveModel
@@ -16,7 +26,8 @@ from .observer import Observer
 from .state import SteadyState
 from .steady import LoadPath, SteadyOptions
 
-#: Static corrections below this share of the largest are left to the eigenvectors of the check points, which gives a smaller basis.
+#: Static corrections below this share of the largest are left to the eigenvectors of the check points, which gives a
+#: smaller basis.
 _COMPRESSION = 1e-3
 #: Further places at most at which an enlarged basis is checked.
 _FRESH = 4
@@ -30,7 +41,8 @@ class Check:
     ----------
     value : float
     error : float
-        Largest relative difference of the leading eigenvalues between basis and full pencil; largest residual where every value is solved in full.
+        Largest relative difference of the leading eigenvalues between basis and full pencil; largest residual where
+        every value is solved in full.
     unstable_count, unstable_count_independent : int
         Both eigenvalues of a pair count.
     agrees : bool
@@ -73,7 +85,9 @@ class Family(Protocol):
 class FluidFamily:
     """One state; density, alpha or beta moves."""
 
-    def __init__(self, model: ValveModel, state: SteadyState, axis: Axis, conditions: Conditions, options, observer: Observer):
+    def __init__(
+        self, model: ValveModel, state: SteadyState, axis: Axis, conditions: Conditions, options, observer: Observer
+    ):
         self.state, self.axis, self.conditions, self.options, self.observer = state, axis, conditions, options, observer
         self.linear = linearise(model, state.q, state.pressure)
         self.pressure = state.pressure
@@ -104,19 +118,30 @@ class FluidFamily:
             fresh += 1
         linear = self.linear
         self.small = LinearisedState(
-            linear.model, linear.q, linear.inlet, basis.project(linear.mass), basis.project(linear.structure), basis.project(linear.stiffness),
-            basis.V.T @ linear.forces, linear.slope @ basis.V, linear.area,
-        )  # fmt: skip
+            linear.model,
+            linear.q,
+            linear.inlet,
+            basis.project(linear.mass),
+            basis.project(linear.structure),
+            basis.project(linear.stiffness),
+            basis.V.T @ linear.forces,
+            linear.slope @ basis.V,
+            linear.area,
+        )
 
     def _confirmed(self, value: float, basis: TransferBasis) -> bool:
-        """Compare with a full solve, and enlarge the basis where it misses the tolerance; whether it was good enough before."""
+        """Compare with a full solve, and enlarge the basis where it misses the tolerance; whether it was good enough
+        before.
+        """
         conditions, count = self.conditions_at(value), self.options.count
         search, self.notes = suited(self.options.search, conditions, basis, count)
         self.search = replace(search, limit_point=None)
         pencil = self._full(value)
 
         def error(full: Spectrum) -> float:
-            damping = conditions.alpha * basis.project(pencil.M) + conditions.beta * basis.project(self.linear.structure)
+            damping = conditions.alpha * basis.project(pencil.M) + conditions.beta * basis.project(
+                self.linear.structure
+            )
             small = self._reduced(basis.reduced(pencil, damping=damping), count + 4, left=False).eigenvalues
             return max((float(np.abs(small - x).min() / abs(x)) for x in full.eigenvalues), default=0.0)
 
@@ -132,7 +157,11 @@ class FluidFamily:
         return False
 
     def _reduced(self, pencil: CoupledPencil, count: int, left: bool) -> Spectrum:
-        return leading_modes(pencil, count, SearchOptions(self.search.max_frequency, tolerance=self.search.tolerance, method="dense", left=left))
+        return leading_modes(
+            pencil,
+            count,
+            SearchOptions(self.search.max_frequency, tolerance=self.search.tolerance, method="dense", left=left),
+        )
 
     def _full(self, value: float) -> CoupledPencil:
         return self.linear.pencil(self.conditions_at(value))
@@ -153,7 +182,16 @@ class FluidFamily:
             listed = spectrum.count_right_of(count.line)
             if listed < count.number:
                 listed = self.solve(pencil, pencil.n).count_right_of(count.line)
-            checks.append(Check(value, error, listed, count.number, count.certain and listed == count.number, error <= self.options.tolerance))
+            checks.append(
+                Check(
+                    value,
+                    error,
+                    listed,
+                    count.number,
+                    count.certain and listed == count.number,
+                    error <= self.options.tolerance,
+                )
+            )
         self.done = tuple(checks)
         return self.done, self.notes
 
@@ -204,7 +242,9 @@ class PressureFamily:
             found = certified_spectrum(self.pencil(value), self.options.count, self.search, workspace=self.workspace)
             error = float(found.spectrum.residual.max(initial=0.0))
             accurate = error <= self.options.search.tolerance
-            checks.append(Check(value, error, found.unstable_count, found.unstable_count_independent, found.agrees, accurate))
+            checks.append(
+                Check(value, error, found.unstable_count, found.unstable_count_independent, found.agrees, accurate)
+            )
         self.done = tuple(checks)
         return self.done, self.notes
 

@@ -1,4 +1,5 @@
 """Runs from a case, with or without a file, and their continuation."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
     from ..model import ValveModel
 
 
-def transient(model: "ValveModel", name: str = "case", output: str | Path | None = None, observer: Observer | None = None) -> TransientResults:
+def transient(
+    model: ValveModel, name: str = "case", output: str | Path | None = None, observer: Observer | None = None
+) -> TransientResults:
     """Run the case of a model; see `dbvfiv.transient.run`.
 
     Parameters
@@ -67,14 +70,20 @@ def resume(path: str | Path, duration: float | None = None, observer: Observer |
         header = read_header(file)
         if restart is None:  # killed before its first step was safe
             case = header.rebuildable_case()
-            return transient(ValveModel(case if duration is None else case.replace({"transient.duration": duration})), header.name, path, observer)
+            return transient(
+                ValveModel(case if duration is None else case.replace({"transient.duration": duration})),
+                header.name,
+                path,
+                observer,
+            )
         columns = {c.name: file["history"][c.name][: restart.rows] for c in (*SCALARS, *PROFILES)}
     case = header.rebuildable_case()
     if duration is not None:
         case = case.replace({"transient.duration": duration})
     if columns["time"][-1] >= case.transient.duration * (1 - 1e-12) - 1e-9 * case.transient.step:
         raise CaseError(
-            f"The run in {str(path)!r} has reached its end at {columns['time'][-1]:.6g} s; give a later one with --duration."
+            f"The run in {str(path)!r} has reached its end at {columns['time'][-1]:.6g} s; give a later one "
+            f"with --duration."
         )
     model = ValveModel(case)
     history = History(model.stations)

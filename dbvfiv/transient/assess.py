@@ -1,4 +1,5 @@
 """The verdict on a run: on its mass flow and its lip opening, with the equilibrium's residual at hand."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -70,7 +71,9 @@ class RunVerdict:
 _LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undecided", "irregular")
 
 
-def assess(history: History, gap: float, residual: float = np.nan, options: JudgeOptions = JudgeOptions(), since: float = 0.0) -> RunVerdict:
+def assess(
+    history: History, gap: float, residual: float = np.nan, options: JudgeOptions = JudgeOptions(), since: float = 0.0
+) -> RunVerdict:
     """Verdict on a history.
 
     Parameters
@@ -85,7 +88,9 @@ def assess(history: History, gap: float, residual: float = np.nan, options: Judg
     time = history["time"]
     chosen = time >= since
     known = residual if np.isfinite(residual) else None
-    found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in ("mass_flow", "lip_opening")]
+    found = [
+        judge(time[chosen], history[name][chosen], options, residual=known) for name in ("mass_flow", "lip_opening")
+    ]
     closed = judge(time[chosen], history["smallest_area"][chosen], options, closed_below=CLOSED * gap)
     if closed.name == "closed":
         reason = "The smallest flow area stays at that of the lip gap at rest."
@@ -96,8 +101,8 @@ def assess(history: History, gap: float, residual: float = np.nan, options: Judg
 def beyond_model(history: History) -> str | None:
     """Sentence on pressures that no fluid could have, None without any.
 
-    An ideal incompressible fluid pays any price for passing a gap that shuts; a real one separates, cavitates or is compressed. What follows such an instant
-    is the solution of the equations and no prediction.
+    An ideal incompressible fluid pays any price for passing a gap that shuts; a real one separates, cavitates or is
+    compressed. What follows such an instant is the solution of the equations and no prediction.
     """
     lowest = np.min(history["station_pressure"], axis=1)
     beyond = np.flatnonzero(lowest < -ATMOSPHERE)
@@ -105,6 +110,7 @@ def beyond_model(history: History) -> str | None:
         return None
     time, share = history["time"][beyond[0]], len(beyond) / len(lowest)
     return (
-        f"Pressures fall below vacuum from {time:.4g} s on, in {100 * share:.2g} % of the steps and down to {1e-3 * lowest.min():.4g} kPa, where the valve slams "
+        f"Pressures fall below vacuum from {time:.4g} s on, in {100 * share:.2g} % of the steps and down to "
+        f"{1e-3 * lowest.min():.4g} kPa, where the valve slams "
         "shut: the fluid's equations are beyond their range there, and the motion afterwards is no prediction."
     )

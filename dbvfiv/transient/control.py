@@ -1,10 +1,11 @@
 """Length of the steps: a fixed grid with halvings where the iteration fails, or by the estimated local error."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from .state import MotionState
-from .stepper import Stepper, StepFailure, StepResult
+from .stepper import StepFailure, Stepper, StepResult
 
 
 @dataclass(frozen=True)

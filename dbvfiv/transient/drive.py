@@ -1,4 +1,5 @@
 """Inlet pressure as a function of time."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -32,10 +33,13 @@ class Drive:
 
     def constant_after(self, time: float) -> bool:
         """Whether the pressure does not change any more from a time on."""
-        return all(p == self.pressures[-1] for t, p in zip(self.times, self.pressures) if t > time) and self(time) == self.pressures[-1]
+        return (
+            all(p == self.pressures[-1] for t, p in zip(self.times, self.pressures) if t > time)
+            and self(time) == self.pressures[-1]
+        )
 
     @classmethod
-    def of(cls, case: Case) -> "Drive":
+    def of(cls, case: Case) -> Drive:
         """Drive of a case: constant, a ramp, or a table."""
         transient = case.transient
         if transient.drive_table is not None:

@@ -2,9 +2,11 @@
 
     M(q) a + h(q, v) + alpha M v + beta w + F - G(q) p = 0,     p_outlet = 0
 
-F is the internal force of shell and stops and w its rate. F and the flow's psi (see `fluid`) are kept in the state as quantities of first order, so that
-stiffness damping beta K_s(q) v = beta dF/dt is consistent with the tangent without an evaluation of it.
+F is the internal force of shell and stops and w its rate. F and the flow's psi (see `fluid`) are kept in the state as
+quantities of first order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent with the tangent without
+an evaluation of it.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -131,7 +133,8 @@ class ValveMotion:
         self._scale = scale[free]
         self._rotations = np.flatnonzero(np.broadcast_to(np.arange(5) >= 3, free.shape)[free])
 
-    # -- forces ---------------------------------------------------------------------------------------------------------------------
+    # -- forces
+    # ----
 
     def internal_force(self, q: np.ndarray) -> np.ndarray:
         """Force (n,) of shell and stops."""
@@ -179,17 +182,31 @@ class ValveMotion:
         area, area_new, inlet = mid[0], new[0], step.inlet
         if self.moving_fluid:
             if speed is None:
-                speed = self.fluid.velocity(mid, new, inlet, step.speed, step.theta, step.psi_weight, float(step.psi_known[0]))
+                speed = self.fluid.velocity(
+                    mid, new, inlet, step.speed, step.theta, step.psi_weight, float(step.psi_known[0])
+                )
             mid_speed = step.speed + step.theta * (speed - step.speed)
             flow = self.fluid.state(*new, speed)
             psi_rate = step.psi_weight * flow.psi + step.psi_known
             p = self.fluid.pressure(self.fluid.state(*mid, mid_speed), psi_rate, inlet)
             outlet, p[0] = float(p[0]), 0.0
-            return Load(model.pressure_force(nodal, p), outlet, p, area_new, flow.speed, flow.psi, psi_rate, inlet, mid_speed)
+            return Load(
+                model.pressure_force(nodal, p), outlet, p, area_new, flow.speed, flow.psi, psi_rate, inlet, mid_speed
+            )
         p = model.flow.steady_pressure(area, inlet)
         speed = model.flow.inlet_velocity(area_new, inlet, self.conditions.density) if inlet > 0 else 0.0
         zero = np.zeros(self.stations)
-        return Load(model.pressure_force(nodal, p), 0.0, p, area_new, model.flow.velocities(area_new, speed), zero, zero, inlet, speed)
+        return Load(
+            model.pressure_force(nodal, p),
+            0.0,
+            p,
+            area_new,
+            model.flow.velocities(area_new, speed),
+            zero,
+            zero,
+            inlet,
+            speed,
+        )
 
     def _passage(self, nodal: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Areas (m,) and their rates (m,)."""
@@ -217,7 +234,8 @@ class ValveMotion:
         """Largest rotation in a change (n,) of the unknowns, rad."""
         return float(np.max(np.abs(dq[self._rotations])))
 
-    # -- linear algebra -------------------------------------------------------------------------------------------------------------
+    # -- linear algebra
+    # ----
 
     def linearise(self, q_new, v_new, q, v, load: Load, weights: Weights, q_load=None, v_load=None) -> None:
         """Factor the iteration matrix.
@@ -250,7 +268,9 @@ class ValveMotion:
             self._solver(0).refactor(values, forces, slope, weights.theta * gradient)
             return
         new = self._passage(model.nodal(q_new), v_new)
-        found = self.fluid.pressure_slopes(mid, new, load.mid_speed, load.speed[-1], weights.theta, weights.velocity, weights.psi)
+        found = self.fluid.pressure_slopes(
+            mid, new, load.mid_speed, load.speed[-1], weights.theta, weights.velocity, weights.psi
+        )
         self._refactor_moving(values, forces, slope, *found)
 
     def _refactor_moving(self, values, forces, slope, by_area, by_speed):
@@ -284,13 +304,14 @@ class ValveMotion:
         return self._factor
 
     def accelerations(self, q, v, speed: float, inlet: float) -> tuple[np.ndarray, Load]:
-        """Accelerations (n,) that the equations ask for at positions, velocities and inlet velocity, and the fluid with them.
+        """Accelerations (n,) that the equations ask for at positions, velocities and inlet velocity, and the fluid with
+        them.
 
         The equations are linear in the accelerations and the rate of the inlet velocity: one solve.
         """
         model, alpha, beta = self.model, self.conditions.alpha, self.conditions.beta
         nodal = model.nodal(q)
-        zero = np.zeros(self.size)
+        np.zeros(self.size)
         forces = self.internal_force(q) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
         mass = model.mass(q)
         if not self.moving_fluid:
@@ -317,7 +338,8 @@ class ValveMotion:
         """A step of no length, with a given rate of psi."""
         return Step(1.0, speed, 0.0, psi_rate, inlet)
 
-    # -- energies -------------------------------------------------------------------------------------------------------------------
+    # -- energies
+    # ----
 
     def energies(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float, float]:
         """Kinetic, strain and stop energy of the quarter model, J."""

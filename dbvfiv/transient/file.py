@@ -1,17 +1,20 @@
 """The result file of a run, written while it goes on and never broken by being killed.
 
-The file is in HDF5's single-writer mode: whatever has been written, in whatever order the process ends, can be read. All its datasets exist from the start,
-as nothing can be added in that mode. Two restart slots are written in turn, each with a checksum, so that one of them is whole at any time.
+The file is in HDF5's single-writer mode: whatever has been written, in whatever order the process ends, can be read.
+All its datasets exist from the start, as nothing can be added in that mode. Two restart slots are written in turn, each
+with a checksum, so that one of them is whole at any time.
 """
+
 from __future__ import annotations
 
 import json
 import os
 import zlib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
-from typing import Any, Mapping
+from typing import Any
 
 import h5py
 import numpy as np
@@ -86,7 +89,8 @@ class TransientFile(Observer):
         self._file.swmr_mode = True
         self._history, self._states = self._file["history"], self._file["states"]
 
-    # -- what a run tells -----------------------------------------------------------------------------------------------------------
+    # -- what a run tells
+    # ----
 
     def rows(self, columns: Mapping[str, np.ndarray]) -> None:
         _append(self._history, columns)
@@ -124,7 +128,8 @@ class TransientFile(Observer):
         if sentence not in self._warnings:
             self._warnings.append(sentence)
 
-    # -- the end --------------------------------------------------------------------------------------------------------------------
+    # -- the end
+    # ----
 
     def conclude(self, run: TransientRun) -> None:
         """Note how the run ended."""
@@ -138,16 +143,19 @@ class TransientFile(Observer):
         if self._file:
             self._file.close()
 
-    def __enter__(self) -> "TransientFile":
+    def __enter__(self) -> TransientFile:
         return self
 
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    # -- going on -------------------------------------------------------------------------------------------------------------------
+    # -- going on
+    # ----
 
     @classmethod
-    def reopen(cls, path: str | Path, model: ValveModel, header: Header, seconds: float = 5.0) -> "tuple[TransientFile, Restart]":
+    def reopen(
+        cls, path: str | Path, model: ValveModel, header: Header, seconds: float = 5.0
+    ) -> tuple[TransientFile, Restart]:
         """Open the file of an earlier run at its last restart point.
 
         The file is copied up to there and then replaced, so that being killed meanwhile does no harm either.
@@ -165,7 +173,9 @@ class TransientFile(Observer):
                 for slot in ("0", "1"):
                     new[f"restart/{slot}"][:] = old[f"restart/{slot}"][:]
                 # sentences on the part that is done are made anew at the end
-                warnings = [text for text in read_texts(old, "messages/warnings") if not text.startswith("Pressures fall")]
+                warnings = [
+                    text for text in read_texts(old, "messages/warnings") if not text.startswith("Pressures fall")
+                ]
             os.replace(copy, path)
         finally:
             copy.unlink(missing_ok=True)
@@ -204,7 +214,10 @@ def read_restart(path: str | Path) -> Restart | None:
     """
     with reading(path) as file:
         if str(file.attrs["dbvfiv_kind"]) != "transient":
-            raise CaseError(f"{str(path)!r} holds a result of kind {str(file.attrs['dbvfiv_kind'])!r}; only transient runs can be resumed.")
+            raise CaseError(
+                f"{str(path)!r} holds a result of kind {str(file.attrs['dbvfiv_kind'])!r}; only transient "
+                f"runs can be resumed."
+            )
         slots = [file[f"restart/{slot}"][:] for slot in ("0", "1")]
     whole = [slot for slot in slots if _whole(slot)]
     return Restart(max(whole, key=lambda slot: slot[0])) if whole else None
@@ -234,7 +247,12 @@ def _write_empty(file: h5py.File, model: ValveModel, header: Header) -> None:
     for column in (*SCALARS, *PROFILES):
         _empty(history, column, (stations,) if column in PROFILES else (), _CHUNK)
     states = file.create_group("states")
-    shapes = {"nodal": (nodes, 5), "nodal_rate": (nodes, 5), "station_pressure": (stations,), "station_area": (stations,)}
+    shapes = {
+        "nodal": (nodes, 5),
+        "nodal_rate": (nodes, 5),
+        "station_pressure": (stations,),
+        "station_area": (stations,),
+    }
     for column in STATES:
         _empty(states, column, shapes.get(column.name, ()), 1 if column.name.startswith("nodal") else 64)
     zero = np.zeros(model.size)
@@ -246,7 +264,9 @@ def _write_empty(file: h5py.File, model: ValveModel, header: Header) -> None:
 
 
 def _empty(group: h5py.Group, column: Column, shape: tuple[int, ...], chunk: int) -> None:
-    dataset = group.create_dataset(column.name, (0, *shape), column.dtype, maxshape=(None, *shape), chunks=(chunk, *shape))
+    dataset = group.create_dataset(
+        column.name, (0, *shape), column.dtype, maxshape=(None, *shape), chunks=(chunk, *shape)
+    )
     column.mark(dataset)
 
 

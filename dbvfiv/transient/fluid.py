@@ -2,9 +2,11 @@
 
     p_k = P_in - rho [ (U_k^2 - U^2)/2 + d psi_k/dt ],      psi_k = integral_in^k U ds
 
-psi rather than U is differentiated in time. Its value at the outlet is a momentum: it changes by bounded forces only, whereas U falls by orders of
-magnitude within a step when lips slam, and a scheme for U then throws it to negative values, at which the ideal jet runs away.
+psi rather than U is differentiated in time. Its value at the outlet is a momentum: it changes by bounded forces only,
+whereas U falls by orders of magnitude within a step when lips slam, and a scheme for U then throws it to negative
+values, at which the ideal jet runs away.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -57,11 +59,13 @@ class MovingFluid:
         speed = discharge / open_
         return FlowState(speed, self._upstream @ speed)
 
-    def velocity(self, mid: tuple, new: tuple, inlet: float, old: float, theta: float, psi_weight: float, psi_known: float) -> float:
+    def velocity(
+        self, mid: tuple, new: tuple, inlet: float, old: float, theta: float, psi_weight: float, psi_known: float
+    ) -> float:
         """New inlet velocity at which the outlet pressure vanishes.
 
-        Quadratic in the velocity; the root is taken at which more velocity means less pressure. The other one is a reversed jet, which would run away.
-        Not a number if there is none.
+        Quadratic in the velocity; the root is taken at which more velocity means less pressure. The other one is a
+        reversed jet, which would run away. Not a number if there is none.
 
         Parameters
         ----------
@@ -125,7 +129,9 @@ class MovingFluid:
         """Integral from the inlet to each station of values (m,) or of each column (m, l)."""
         return self._upstream @ values
 
-    def pressure_slopes(self, mid: tuple, new: tuple, speed: float, new_speed: float, theta: float, velocity: float, psi_weight: float):
+    def pressure_slopes(
+        self, mid: tuple, new: tuple, speed: float, new_speed: float, theta: float, velocity: float, psi_weight: float
+    ):
         """Derivatives of the pressures with respect to the new areas (m, m) and the new inlet velocity (m,).
 
         Parameters

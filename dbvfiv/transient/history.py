@@ -1,4 +1,5 @@
 """What is read off every step."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -29,13 +30,23 @@ SCALARS = (
     Column("stop_energy", "J", "Energy of the lip stops"),
     Column("pressure_work", "J", "Work of the pressure on the wall since the start"),
     Column("dissipation", "J", "Energy lost to Rayleigh damping since the start"),
-    Column("balance", "J", "Energy gained since the start less work plus dissipation: what the scheme itself adds or takes"),
+    Column(
+        "balance", "J", "Energy gained since the start less work plus dissipation: what the scheme itself adds or takes"
+    ),
     Column("step", "s", "Length of the step"),
     Column("evaluations", "", "Residuals evaluated in the step"),
 )
 #: One number a row of the mesh and step; of a quarter.
 PROFILES = (
-    Column("station_pressure", "Pa", "Pressure at each row, lip first, where the step meets the equations: halfway through it without numerical damping", "f4"),
+    Column(
+        "station_pressure",
+        "Pa",
+        (
+            "Pressure at each row, lip first, where the step meets the equations: halfway through it without "
+            "numerical damping"
+        ),
+        "f4",
+    ),
     Column("station_area", "m^2", "Flow area at each row", "f4"),
     Column("centre_line", "m", "Displacement in y of the line x = 0 at each row", "f4"),
 )
@@ -63,7 +74,9 @@ class Reader:
     def first(self, state, inlet: float) -> dict[str, Any]:
         """Row of the start."""
         motion = self.motion
-        load = motion.load(state.q, state.v, state.q, state.v, Step(1.0, state.speed, 0.0, state.psi_rate, inlet), state.speed)
+        load = motion.load(
+            state.q, state.v, state.q, state.v, Step(1.0, state.speed, 0.0, state.psi_rate, inlet), state.speed
+        )
         return self._row(state, load, 0.0, 0)
 
     def row(self, result: StepResult, h: float) -> dict[str, Any]:
@@ -139,4 +152,8 @@ class History:
         self.rows = len(columns["time"])
         for name in self._columns:
             kept = columns[name].astype(self._columns[name].dtype)
-            self._columns[name] = np.concatenate([kept, np.empty_like(kept[:1].repeat(1024, axis=0))]) if len(kept) else self._columns[name]
+            self._columns[name] = (
+                np.concatenate([kept, np.empty_like(kept[:1].repeat(1024, axis=0))])
+                if len(kept)
+                else self._columns[name]
+            )

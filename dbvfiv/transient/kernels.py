@@ -1,4 +1,5 @@
 """Compiled element loops of a time step: inertia, kinetic and strain energy without assembling a matrix."""
+
 from __future__ import annotations
 
 import numba
@@ -11,7 +12,9 @@ from ..shell.kernel_section import linear_response, point_strain
 
 @numba.njit(cache=True, fastmath=FAST)
 def inertia_force(quads, integrals, director1, director2, rate, acceleration, out):
-    """Add M a + h to out (nn, 5): inertia at nodal velocities and accelerations (nn, 5), h the part quadratic in the velocities."""
+    """Add M a + h to out (nn, 5): inertia at nodal velocities and accelerations (nn, 5), h the part quadratic in the
+    velocities.
+    """
     count = director1.shape[0]
     turn = np.empty((count, 3))
     for n in range(count):
@@ -42,7 +45,9 @@ def inertia_force(quads, integrals, director1, director2, rate, acceleration, ou
                 out[na, i] += push
                 moment[i] = twist
             for r in range(2):
-                out[na, 3 + r] += director1[na, r, 0] * moment[0] + director1[na, r, 1] * moment[1] + director1[na, r, 2] * moment[2]
+                out[na, 3 + r] += (
+                    director1[na, r, 0] * moment[0] + director1[na, r, 1] * moment[1] + director1[na, r, 2] * moment[2]
+                )
 
 
 @numba.njit(cache=True, fastmath=FAST)
@@ -72,7 +77,9 @@ def kinetic_energy(quads, integrals, director1, rate):
 
 @numba.njit(cache=True)
 def row_motion(rows, nodes, nodal, rate, area, area_rate):
-    """Areas (m,) under the deformed rows (m, k) of nodes and their rates; see `dbvfiv.flow.rows.RowAreas`, whose offset is not added."""
+    """Areas (m,) under the deformed rows (m, k) of nodes and their rates; see `dbvfiv.flow.rows.RowAreas`, whose offset
+    is not added.
+    """
     for k in range(rows.shape[0]):
         total = 0.0
         change = 0.0
@@ -106,7 +113,22 @@ def _rubber_energy(c10, c01, c11, e):
 
 @numba.njit(cache=True, fastmath=FAST)
 def strain_energy(
-    quads, nodes, displacement, director, shear0, metric0, metric1, mq, mqk, mp, area, thickness, stiffness, points, constants, scales
+    quads,
+    nodes,
+    displacement,
+    director,
+    shear0,
+    metric0,
+    metric1,
+    mq,
+    mqk,
+    mp,
+    area,
+    thickness,
+    stiffness,
+    points,
+    constants,
+    scales,
 ):
     """Strain energy, J; arguments as `dbvfiv.shell.kernel.shell_force` has them."""
     x = np.empty((4, 3))
@@ -125,7 +147,17 @@ def strain_energy(
         for point in range(4):
             bases(point, x, d, basis, turn)
             strains(
-                point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], mq[el, point], mqk[el, point], mp[el, point], strain
+                point,
+                basis,
+                turn,
+                edge,
+                shear0[el],
+                metric0[el, point],
+                metric1[el, point],
+                mq[el, point],
+                mqk[el, point],
+                mp[el, point],
+                strain,
             )
             linear_response(stiffness, h, strain, stress)
             density = 0.0

@@ -1,4 +1,5 @@
 """Options of a transient run."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -39,7 +40,7 @@ class RunOptions:
     judge_every: int = 100
 
     @classmethod
-    def of(cls, case: Case) -> "RunOptions":
+    def of(cls, case: Case) -> RunOptions:
         """Options of a case file."""
         t = case.transient
         return cls(

@@ -1,12 +1,14 @@
 """A transient run as a result: histories, states, verdict; in memory or in a file."""
+
 from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Sequence
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -93,33 +95,54 @@ class TransientResults(Result):
 
     kind = "transient"
 
-    def __init__(self, header: Header, mesh: MeshData, history: dict[str, np.ndarray], states: Sequence, verdict: dict[str, Any], **common: Any):
+    def __init__(
+        self,
+        header: Header,
+        mesh: MeshData,
+        history: dict[str, np.ndarray],
+        states: Sequence,
+        verdict: dict[str, Any],
+        **common: Any,
+    ):
         super().__init__(header, mesh, **common)
         self.history, self.states, self.verdict = history, states, verdict
 
     @classmethod
-    def of(cls, run: "TransientRun", header: Header | None = None, path: Path | None = None) -> "TransientResults":
+    def of(cls, run: TransientRun, header: Header | None = None, path: Path | None = None) -> TransientResults:
         """From a run that has just ended."""
         header = header or Header.of("transient", run.model.case)
         return cls(
-            replace(header, complete=not run.interrupted and not run.failures), MeshData.of(run.model),
+            replace(header, complete=not run.interrupted and not run.failures),
+            MeshData.of(run.model),
             {c.name: run.history[c.name].copy() for c in (*SCALARS, *PROFILES)},
             StateList(path, run.progress.saved) if path else (_last_state(run),),
-            run.verdict.summary(), warnings=run.warnings, failures=run.failures, path=path, model=run.model,
-        )  # fmt: skip
+            run.verdict.summary(),
+            warnings=run.warnings,
+            failures=run.failures,
+            path=path,
+            model=run.model,
+        )
 
     @classmethod
-    def read(cls, file: h5py.File, path: Path) -> "TransientResults":
+    def read(cls, file: h5py.File, path: Path) -> TransientResults:
         history = file["history"]
         rows = len(history["time"])
         if rows == 0:
-            raise CaseError(f"{str(path)!r} holds no steps yet: the run has just begun, or was killed before anything was written.")
+            raise CaseError(
+                f"{str(path)!r} holds no steps yet: the run has just begun, or was killed before anything was written."
+            )
         columns = {c.name: history[c.name][:rows] for c in (*SCALARS, *PROFILES)}
         verdict = json.loads(bytes(file["verdict"][()]) or b"{}")
         result = cls(
-            read_header(file), read_mesh(file), columns, StateList(path, len(file["states/time"])), verdict,
-            warnings=read_texts(file, "messages/warnings"), failures=read_texts(file, "messages/failures"), path=path,
-        )  # fmt: skip
+            read_header(file),
+            read_mesh(file),
+            columns,
+            StateList(path, len(file["states/time"])),
+            verdict,
+            warnings=read_texts(file, "messages/warnings"),
+            failures=read_texts(file, "messages/failures"),
+            path=path,
+        )
         if rows > 1 and verdict.get("steps") != rows - 1:
             result.verdict = result._reassessed().summary()
         return result
@@ -148,7 +171,10 @@ class TransientResults(Result):
 
     def summary(self) -> dict[str, Any]:
         h = self.history
-        last = {name: float(h[name][-1]) for name in ("mass_flow", "lip_opening", "outlet_area", "inlet_pressure", "balance")}
+        last = {
+            name: float(h[name][-1])
+            for name in ("mass_flow", "lip_opening", "outlet_area", "inlet_pressure", "balance")
+        }
         return {
             **self.verdict,
             "last": last,
@@ -161,17 +187,29 @@ class TransientResults(Result):
     def lines(self) -> list[str]:
         verdict, h = self.verdict, self.history
         lines = [
-            f"{verdict['verdict']}{'' if verdict['decided'] else ' (not certain)'} after {verdict['time']:.4g} s and {verdict['steps']} steps",
+            (
+                f"{verdict['verdict']}{'' if verdict['decided'] else ' (not certain)'} after "
+                f"{verdict['time']:.4g} s and {verdict['steps']} steps"
+            ),
             verdict["reason"],
             "",
             "                     last         mean    amplitude    frequency   cycles   periodicity error",
         ]
         for name, unit, factor in (("mass_flow", "kg/s", 1.0), ("lip_opening", "mm", 1e3)):
             found = verdict[name]
-            numbers = (factor * h[name][-1], *(None if found[k] is None else f * found[k] for k, f in (("mean", factor), ("amplitude", factor), ("frequency", 1.0))))
+            numbers = (
+                factor * h[name][-1],
+                *(
+                    None if found[k] is None else f * found[k]
+                    for k, f in (("mean", factor), ("amplitude", factor), ("frequency", 1.0))
+                ),
+            )
             cells = "".join(f"{'-' if value is None else f'{value:.5g}':>13}" for value in numbers)
             error = found["periodicity_error"]
-            lines.append(f"{name.replace('_', ' '):<12}{cells}{found['cycles_observed']:>9}{'-' if error is None else f'{error:.2g}':>20}   {unit}, Hz")
+            lines.append(
+                f"{name.replace('_', ' '):<12}{cells}{found['cycles_observed']:>9}"
+                f"{'-' if error is None else f'{error:.2g}':>20}   {unit}, Hz"
+            )
         return lines
 
     @cached_property
@@ -183,7 +221,7 @@ class TransientResults(Result):
         end = float(self.history["time"][-1])
         return max(end - 1.0 / frequency, float(self.history["time"][0])), end
 
-    def steps(self, valve: "WholeValve") -> "Sequence[Step]":
+    def steps(self, valve: WholeValve) -> Sequence[Step]:
         return _TransientSteps(self, valve)
 
     def animate(self, path: str | Path, frames: int = 48, duration: float | None = None) -> Path:
@@ -193,7 +231,7 @@ class TransientResults(Result):
         return animate(self, Path(path), frames, duration)
 
 
-def _last_state(run: "TransientRun") -> TransientState:
+def _last_state(run: TransientRun) -> TransientState:
     """The state that a run ended in, which is all that is kept without a file."""
     model, state, h = run.model, run.progress.state, run.history
     velocity = np.full(model.stations, np.nan)
@@ -205,7 +243,7 @@ def _last_state(run: "TransientRun") -> TransientState:
 class _TransientSteps(Sequence):
     """States as steps over the time in s."""
 
-    def __init__(self, result: TransientResults, valve: "WholeValve"):
+    def __init__(self, result: TransientResults, valve: WholeValve):
         self.result, self.valve = result, valve
 
     def __len__(self) -> int:

@@ -1,4 +1,5 @@
 """The unsteady flow when it may turn round, as a whole or in a part of the valve."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -9,9 +10,10 @@ from .fluid import MovingFluid
 class ReversibleFluid(MovingFluid):
     """Flow that may run backwards.
 
-    Outwards it is that of the ordinary fluid. Drawn in through the lips, it starts from rest outside, where the pressure vanishes, gains speed at the cost
-    of pressure as far as sections get narrower, and wherever they widen it goes on as a jet whose velocity head is lost. The ordinary law would give that
-    head back at the inlet, so that a reversed flow gained pressure where it should lose it, and ran away.
+    Outwards it is that of the ordinary fluid. Drawn in through the lips, it starts from rest outside, where the
+    pressure vanishes, gains speed at the cost of pressure as far as sections get narrower, and wherever they widen it
+    goes on as a jet whose velocity head is lost. The ordinary law would give that head back at the inlet, so that a
+    reversed flow gained pressure where it should lose it, and ran away.
     """
 
     def open_area(self, area: np.ndarray) -> np.ndarray:
@@ -39,7 +41,8 @@ class ReversibleFluid(MovingFluid):
         return slope
 
     def velocity(self, mid, new, inlet, old, theta, psi_weight, psi_known) -> float:
-        """New inlet velocity at which the pressure outside vanishes: that of the ordinary fluid if all speeds are outward with it, else the one next to
+        """New inlet velocity at which the pressure outside vanishes: that of the ordinary fluid if all speeds are
+        outward with it, else the one next to
         the old one, in the direction in which that misses it."""
         outward = super().velocity(mid, new, inlet, old, theta, psi_weight, psi_known)
         still, unit = self._affine(*mid)
@@ -67,7 +70,8 @@ def _upstream(values: np.ndarray) -> np.ndarray:
 
 
 def _zero(function, start: float) -> float:
-    """Zero of a function that grows from minus to plus infinity, next to a start; `function` returns value and slope. Not a number if there is none.
+    """Zero of a function that grows from minus to plus infinity, next to a start; `function` returns value and slope.
+    Not a number if there is none.
 
     Newton's method within a bracket, bisection where it leaves it or slackens.
     """

@@ -1,4 +1,5 @@
 """A transient run: steps until the end or until the verdict is certain, told to whoever keeps or watches it."""
+
 from __future__ import annotations
 
 import math
@@ -21,7 +22,7 @@ from .options import RunOptions
 from .staggered import StaggeredMotion
 from .start import first_state
 from .state import MotionState
-from .stepper import Stepper, StepFailure
+from .stepper import StepFailure, Stepper
 
 
 class Keeper(Protocol):
@@ -72,11 +73,20 @@ class Progress:
 
     def pack(self) -> np.ndarray:
         """One vector for a file."""
-        head = [self.steps, self.saved, self.work, self.dissipation, self.energy, self.eigenvalue.real, self.eigenvalue.imag, *self.control]
+        head = [
+            self.steps,
+            self.saved,
+            self.work,
+            self.dissipation,
+            self.energy,
+            self.eigenvalue.real,
+            self.eigenvalue.imag,
+            *self.control,
+        ]
         return np.concatenate([[len(head)], head, self.state.pack()])
 
     @classmethod
-    def unpack(cls, numbers: np.ndarray, stations: int) -> "Progress":
+    def unpack(cls, numbers: np.ndarray, stations: int) -> Progress:
         """Undo `pack`."""
         count = int(numbers[0])
         head = numbers[1 : count + 1]
@@ -129,7 +139,13 @@ class Runner:
     keeper : Keeper, optional
     """
 
-    def __init__(self, model: ValveModel, options: RunOptions | None = None, observer: Observer | None = None, keeper: Keeper | None = None):
+    def __init__(
+        self,
+        model: ValveModel,
+        options: RunOptions | None = None,
+        observer: Observer | None = None,
+        keeper: Keeper | None = None,
+    ):
         self.model = model
         self.options = RunOptions.of(model.case) if options is None else options
         self.observer = Observer() if observer is None else observer
@@ -150,8 +166,12 @@ class Runner:
         """
         self._begin(0)
         inlet = self.drive(0.0)
-        state, kick = (first, None) if first is not None else first_state(self.motion, self.model.case, inlet, self.observer)
-        progress = Progress(state, energy=sum(self.motion.energies(state.q, state.v)), control=tuple(self.control.pack()))
+        state, kick = (
+            (first, None) if first is not None else first_state(self.motion, self.model.case, inlet, self.observer)
+        )
+        progress = Progress(
+            state, energy=sum(self.motion.energies(state.q, state.v)), control=tuple(self.control.pack())
+        )
         if kick is not None:
             progress.eigenvalue = kick.eigenvalue
         self._reader = Reader(self.motion, progress.energy)
@@ -173,7 +193,8 @@ class Runner:
         self.stepper.forget()
         return self._go(history, progress)
 
-    # -- the loop -------------------------------------------------------------------------------------------------------------------
+    # -- the loop
+    # ----
 
     def _begin(self, done: int) -> None:
         total = max(done, math.ceil(self.options.duration / self.options.control.step * (1 - 1e-9)))
@@ -217,7 +238,9 @@ class Runner:
             self.observer.warn(sentence)
         self.observer.end(interrupted)
         work = (self.stepper.residuals, self.stepper.solves, self.stepper.factorisations, self.control.halvings)
-        return TransientRun(self.model, history, progress, verdict, self._warnings, failures, interrupted, stopped, *work)
+        return TransientRun(
+            self.model, history, progress, verdict, self._warnings, failures, interrupted, stopped, *work
+        )
 
     def _step(self, history: History, progress: Progress) -> dict[str, Any]:
         options = self.options
@@ -228,7 +251,10 @@ class Runner:
         history.append(row)
         progress.steps += 1
         progress.work, progress.dissipation = self._reader.work, self._reader.dissipation
-        if options.save_every and result.state.time >= (progress.saved * options.save_every) - 1e-9 * options.control.step:
+        if (
+            options.save_every
+            and result.state.time >= (progress.saved * options.save_every) - 1e-9 * options.control.step
+        ):
             self._save(progress, row)
         if progress.steps % options.restart_every == 0:
             self._checkpoint(history, progress)
@@ -259,14 +285,17 @@ class Runner:
             self.keeper.restart(progress.pack(), history.rows)
         self._kept = history.rows
 
-    # -- what the run amounts to ----------------------------------------------------------------------------------------------------
+    # -- what the run amounts to
+    # ----
 
     def _verdict(self, history: History, progress: Progress) -> RunVerdict:
         state, inlet = progress.state, self.drive(progress.state.time)
         residual = np.nan
         constant = self.drive.constant_after(state.time)
         if constant and inlet > 0:
-            residual = float(np.linalg.norm(self.model.residual(state.q, inlet)) / self.model.force_scale(state.q, inlet))
+            residual = float(
+                np.linalg.norm(self.model.residual(state.q, inlet)) / self.model.force_scale(state.q, inlet)
+            )
         since = self.drive.times[-1] if constant else 0.0
         if np.count_nonzero(history["time"] >= since) < 2:
             since = 0.0
@@ -280,7 +309,8 @@ class Runner:
         time, smallest = progress.state.time, self.options.control.step * self.options.control.smallest
         return str(
             SolveError(
-                f"No step was found from {time:.6g} s on, after {progress.steps} steps: {str(failure).rstrip('.')}; steps down to "
+                f"No step was found from {time:.6g} s on, after {progress.steps} steps: "
+                f"{str(failure).rstrip('.')}; steps down to "
                 f"{smallest:.3g} s and a line search were tried."
             )
         )
@@ -291,7 +321,8 @@ def run_transient(
 ) -> TransientRun:
     """Run the case of a model; see `Runner`.
 
-    A step that is not found ends the run, which keeps everything up to there and says so in `failures`; so does an interrupt.
+    A step that is not found ends the run, which keeps everything up to there and says so in `failures`; so does an
+    interrupt.
     """
     return Runner(model, options, observer, keeper).start()
 

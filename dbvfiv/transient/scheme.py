@@ -1,12 +1,16 @@
-"""One-step schemes of the generalised-alpha family: Chung & Hulbert (1993), Hilber, Hughes & Taylor (1977), Newmark (1959).
+"""One-step schemes of the generalised-alpha family: Chung & Hulbert (1993), Hilber, Hughes & Taylor (1977), Newmark
+(1959).
 
-Second-order unknowns (the wall) follow Newmark's formulas. First-order ones (inlet velocity, internal force) follow Jansen, Whiting & Hulbert (2000):
-y_{n+1} = y_n + h ((1 - g) y'_n + g y'_{n+1}), the rate taken at t_n + am h with am = g - 1/2 + 1 - af, which puts it at the instant 1 - af of everything else
-to second order for any g. Here g = 1: rates are plain differences y_{n+1} - y_n over h, extrapolated to that instant. Their usual choice ties g to the
-spectral radius; without numerical damping its rates then alternate in sign for ever, and stiff modes with stiffness damping grow linearly.
+Second-order unknowns (the wall) follow Newmark's formulas. First-order ones (inlet velocity, internal force) follow
+Jansen, Whiting & Hulbert (2000): y_{n+1} = y_n + h ((1 - g) y'_n + g y'_{n+1}), the rate taken at t_n + am h with am =
+g - 1/2 + 1 - af, which puts it at the instant 1 - af of everything else to second order for any g. Here g = 1: rates
+are plain differences y_{n+1} - y_n over h, extrapolated to that instant. Their usual choice ties g to the spectral
+radius; without numerical damping its rates then alternate in sign for ever, and stiff modes with stiffness damping grow
+linearly.
 
 Equations are met at t_{n+1-af}, accelerations are taken at t_{n+1-am}.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -50,8 +54,9 @@ class Scheme:
 def scheme(name: str, numerical_damping: float = 0.0) -> Scheme:
     """Member of the family for a "numerical damping" nd in the thesis's sense (Th. 5.3, 0 to 0.5).
 
-    nd is the shift of gamma from 1/2. It sets the spectral radius at infinite frequency, r = (1 - nd)/(1 + nd), of generalised-alpha and HHT; Newmark
-    takes gamma = 1/2 + nd, beta = (1/2 + gamma)^2 / 4 and is then of first order only.
+    nd is the shift of gamma from 1/2. It sets the spectral radius at infinite frequency, r = (1 - nd)/(1 + nd), of
+    generalised-alpha and HHT; Newmark takes gamma = 1/2 + nd, beta = (1/2 + gamma)^2 / 4 and is then of first order
+    only.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""The thesis's coupling (App. A), for comparison: the fluid first, in the passage of the last state, then the wall under its pressures."""
+"""The thesis's coupling (App. A), for comparison: the fluid first, in the passage of the last state, then the wall
+under its pressures.
+"""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -11,7 +14,8 @@ from .equations import Load, Step, ValveMotion
 class StaggeredMotion(ValveMotion):
     """Equations of the wall under pressures that do not follow it within a step.
 
-    The inlet velocity takes a backward difference in the areas of the last state; the pressures act on the wall as it moves, but are not changed by it.
+    The inlet velocity takes a backward difference in the areas of the last state; the pressures act on the wall as it
+    moves, but are not changed by it.
     """
 
     def __init__(self, model, conditions=None):
@@ -30,7 +34,9 @@ class StaggeredMotion(ValveMotion):
         if self._frozen is None:
             return super().load(q, v, q_new, v_new, step, speed)
         kept = self._frozen
-        return replace(kept, force=self.model.pressure_force(self.model.nodal(q), kept.pressure), outlet=0.0, inlet=step.inlet)
+        return replace(
+            kept, force=self.model.pressure_force(self.model.nodal(q), kept.pressure), outlet=0.0, inlet=step.inlet
+        )
 
     def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None) -> None:
         model = self.model

@@ -1,4 +1,5 @@
 """First states of runs: at rest, steady, kicked along a mode, or taken from a result file."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -44,7 +45,11 @@ def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observe
         return stored_state(motion, case, inlet), None
     observer.progress(f"steady state at {inlet:.6g} Pa")
     q = steady_positions(model, inlet)
-    speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(q)), inlet, motion.conditions.density) if inlet > 0 else 0.0
+    speed = (
+        model.flow.inlet_velocity(model.rows.areas(model.nodal(q)), inlet, motion.conditions.density)
+        if inlet > 0
+        else 0.0
+    )
     still = np.zeros(model.size)
     if transient.start == "steady":
         return consistent_state(motion, 0.0, q, still, speed, inlet), None
@@ -62,8 +67,10 @@ def steady_positions(model, inlet: float) -> np.ndarray:
     return path.q
 
 
-def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, number: int, opening: float) -> tuple[MotionState, Kick]:
-    """Steady state pushed along its oscillating mode of a number, counted by growth rate from 1, by a lip opening, m."""
+def kicked(
+    motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, number: int, opening: float
+) -> tuple[MotionState, Kick]:
+    """Steady state pushed along its oscillating mode of a number, counted by growth rate from 1, by a lip opening."""
     from eigen import leading_modes
 
     model = motion.model
@@ -75,7 +82,10 @@ def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, numbe
         if len(oscillating) >= number:
             break
         if len(found) < count or count > 100:
-            raise SolveError(f"Only {len(oscillating)} oscillating modes were found, so there is no mode {number} to push the valve along.")
+            raise SolveError(
+                f"Only {len(oscillating)} oscillating modes were found, so there is no mode {number} to "
+                f"push the valve along."
+            )
         count *= 2
     mode = found.mode(oscillating[number - 1])
     nodal = model.nodal(mode.q)
@@ -107,7 +117,10 @@ def stored_state(motion: ValveMotion, case: Case, inlet: float) -> MotionState:
     state, model = states[index], motion.model
     nodal = np.asarray(state.nodal, float)
     if nodal.shape != (len(model.mesh.nodes), 5):
-        raise CaseError(f"The states of {str(path)!r} belong to a mesh of {len(nodal)} nodes and this case's has {len(model.mesh.nodes)}.")
+        raise CaseError(
+            f"The states of {str(path)!r} belong to a mesh of {len(nodal)} nodes and this case's has "
+            f"{len(model.mesh.nodes)}."
+        )
     q = model.shell.dofs.restrict(nodal)
     rate = getattr(state, "nodal_rate", None)
     v = np.zeros(model.size) if rate is None else model.shell.dofs.restrict(np.asarray(rate, float))

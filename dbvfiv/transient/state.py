@@ -1,4 +1,5 @@
 """State of a run between two steps, and how a first one is made."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -38,20 +39,41 @@ class MotionState:
 
     def pack(self) -> np.ndarray:
         """One vector (6 n + 2 m + 2,) for a file."""
-        parts = [[self.time, self.speed], self.q, self.v, self.a, self.force, self.force_rate, self.load, self.psi, self.psi_rate]
+        parts = [
+            [self.time, self.speed],
+            self.q,
+            self.v,
+            self.a,
+            self.force,
+            self.force_rate,
+            self.load,
+            self.psi,
+            self.psi_rate,
+        ]
         return np.concatenate(parts)
 
     @classmethod
-    def unpack(cls, packed: np.ndarray, stations: int) -> "MotionState":
+    def unpack(cls, packed: np.ndarray, stations: int) -> MotionState:
         """Undo `pack` for a number m of stations."""
         wall, fluid = np.split(np.array(packed[2:], float), [len(packed) - 2 - 2 * stations])
         return cls(float(packed[0]), float(packed[1]), *np.split(wall, 6), *np.split(fluid, 2))
 
 
 def consistent_state(motion, time: float, q, v, speed: float, inlet: float) -> MotionState:
-    """State at given positions, velocities and inlet velocity with the accelerations that the equations of motion ask for."""
+    """State at given positions, velocities and inlet velocity with the accelerations that the equations of motion ask
+    for.
+    """
     q, v = np.asarray(q, float), np.asarray(v, float)
     a, load = motion.accelerations(q, v, speed, inlet)
     return MotionState(
-        float(time), float(load.speed[-1]), q, v, a, motion.internal_force(q), motion.force_rate(q, v), load.force, load.psi, load.psi_rate
-    )  # fmt: skip
+        float(time),
+        float(load.speed[-1]),
+        q,
+        v,
+        a,
+        motion.internal_force(q),
+        motion.force_rate(q, v),
+        load.force,
+        load.psi,
+        load.psi_rate,
+    )

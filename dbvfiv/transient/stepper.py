@@ -1,13 +1,15 @@
 """One implicit step: prediction, simplified Newton iterations with a kept factorisation, and a natural line search.
 
-PETSc factors and solves; the iteration is our own. TSALPHA2 knows neither a weighted internal force with its rate nor an inlet velocity of first order,
-and the convergence test wanted here, on the size of the next correction rather than on a residual that stiff membrane modes dominate, with
-factors kept over many steps, would leave nothing of SNES but the loop.
+PETSc factors and solves; the iteration is our own. TSALPHA2 knows neither a weighted internal force with its rate nor
+an inlet velocity of first order, and the convergence test wanted here, on the size of the next correction rather than
+on a residual that stiff membrane modes dominate, with factors kept over many steps, would leave nothing of SNES but the
+loop.
 """
+
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Callable
 
 import numpy as np
 
@@ -19,7 +21,8 @@ from .state import MotionState
 
 #: Speed inwards, relative to the largest speed, that is none.
 INWARD = 1e-6
-#: Least numerical damping of steps that start with fluid drawn in: without any, the kicks that walls get then alternate from step to step for good.
+#: Least numerical damping of steps that start with fluid drawn in: without any, the kicks that walls get then alternate
+#: from step to step for good.
 DAMPING = 0.2
 
 
@@ -42,10 +45,11 @@ class StepOptions:
     smallest_fraction : float
         Of a Newton correction in the line search.
     largest_turn : float
-        Largest change of a rotation in a step, rad. Directors that turn further between two instants can gain energy from stiffness damping.
+        Largest change of a rotation in a step, rad. Directors that turn further between two instants can gain energy
+        from stiffness damping.
     backward : bool
-        Meet the fluid's equations at the end of every step, not of those alone in which momentum is lost or fluid is drawn in: for walls that shut in
-        several places.
+        Meet the fluid's equations at the end of every step, not of those alone in which momentum is lost or fluid is
+        drawn in: for walls that shut in several places.
     """
 
     tolerance: float = 1e-4
@@ -103,20 +107,25 @@ class Stepper:
     options : StepOptions
     """
 
-    def __init__(self, motion, scheme: Scheme, pressure: Callable[[float], float], options: StepOptions = StepOptions()):
+    def __init__(
+        self, motion, scheme: Scheme, pressure: Callable[[float], float], options: StepOptions = StepOptions()
+    ):
         self.motion, self.scheme, self.pressure, self.options = motion, scheme, pressure, options
         self._damped = member("generalised-alpha", max(DAMPING, scheme.gamma - 0.5))
         self.residuals = self.solves = self.factorisations = 0
         self.forget()
 
     def forget(self, all: bool = True) -> None:
-        """Drop factors and the memory of the predictor; with `all` the factorisation's analysis too, so that the next step depends on the state alone."""
+        """Drop factors and the memory of the predictor; with `all` the factorisation's analysis too, so that the next
+        step depends on the state alone.
+        """
         if all:
             self.motion.drop_factors()
         self._factored: tuple[float, bool, float] | None = None
         self._history: list[tuple[float, np.ndarray]] = []
 
-    # -- the step -------------------------------------------------------------------------------------------------------------------
+    # -- the step
+    # ----
 
     def step(self, state: MotionState, h: float) -> StepResult:
         """Advance a state by h, s.
@@ -152,7 +161,8 @@ class Stepper:
 
     @staticmethod
     def _smooth(state: MotionState, h: float) -> bool:
-        """Whether the fluid flowed outwards before the last step, and the momentum of its sections changed little in that.
+        """Whether the fluid flowed outwards before the last step, and the momentum of its sections changed little in
+        that.
 
         Sections, as what one loses another may gain; before too, as flow that has just turned round rings.
         """
@@ -160,12 +170,14 @@ class Stepper:
         return bool(np.abs(change).sum() <= 0.34 * np.abs(now).sum()) and _outward(now - change)
 
     @staticmethod
-    def _kept_momentum(trial: "_Trial") -> bool:
-        """Whether the fluid's sections kept most of their momentum in a step and none turned round; if not, its equations are better met at the end."""
+    def _kept_momentum(trial: _Trial) -> bool:
+        """Whether the fluid's sections kept most of their momentum in a step and none turned round; if not, its
+        equations are better met at the end.
+        """
         new, old = _sections(trial.load.psi), _sections(trial.old.psi)
         return bool(np.clip(old - new, 0.0, old).sum() <= 0.5 * old.sum()) and _outward(trial.load.speed)
 
-    def _works(self, trial: "_Trial") -> tuple[float, float]:
+    def _works(self, trial: _Trial) -> tuple[float, float]:
         """Work of the pressure and dissipation of a step, by the scheme's own weights."""
         way = trial.q - trial.old.q
         alpha = self.motion.conditions.alpha
@@ -174,13 +186,15 @@ class Stepper:
             lost += alpha * (self.motion.momentum(trial.q_mid, trial.v_mid) @ way)
         return float(trial.push @ way), float(lost)
 
-    # -- the iteration --------------------------------------------------------------------------------------------------------------
+    # -- the iteration
+    # ----
 
-    def _iterate(self, trial: "_Trial") -> None:
+    def _iterate(self, trial: _Trial) -> None:
         """Correct a trial until the next correction would be below what is allowed.
 
-        Three attempts, each for what defeats the one before: kept factors as long as they contract; full corrections with factors renewed, which
-        serve shells best, as membrane forces that follow bending make residuals rise before they fall; and from the prediction again, a line search.
+        Three attempts, each for what defeats the one before: kept factors as long as they contract; full corrections
+        with factors renewed, which serve shells best, as membrane forces that follow bending make residuals rise before
+        they fall; and from the prediction again, a line search.
         """
         norm = self._start(trial)
         if self._factored == trial.kind and self._full(trial, norm, renew=False):
@@ -191,7 +205,7 @@ class Stepper:
             return
         raise StepFailure("Newton's corrections did not converge, neither whole nor with a line search.")
 
-    def _full(self, trial: "_Trial", norm: float, renew: bool) -> bool:
+    def _full(self, trial: _Trial, norm: float, renew: bool) -> bool:
         """Whole corrections. Factors that contract too slowly are renewed, or end the attempt."""
         options = self.options
         if renew:
@@ -223,8 +237,10 @@ class Stepper:
                     return False
         return False
 
-    def _searched(self, trial: "_Trial", norm: float) -> bool:
-        """Parts of corrections such that the next one by the same factors is smaller: the natural monotonicity test (Deuflhard 2011)."""
+    def _searched(self, trial: _Trial, norm: float) -> bool:
+        """Parts of corrections such that the next one by the same factors is smaller: the natural monotonicity test
+        (Deuflhard 2011).
+        """
         options = self.options
         for _ in range(options.max_iterations):
             self._factor(trial)
@@ -246,11 +262,11 @@ class Stepper:
                 return True
         return False
 
-    def _start(self, trial: "_Trial") -> float:
+    def _start(self, trial: _Trial) -> float:
         """Predict the accelerations at the instant where they are taken.
 
-        Those at the ends of steps would not do: without numerical damping they alternate about the true ones. From a state without a past, the step
-        goes on at its velocities.
+        Those at the ends of steps would not do: without numerical damping they alternate about the true ones. From a
+        state without a past, the step goes on at its velocities.
         """
         state, s, h = trial.old, trial.scheme, trial.h
         if self._history:
@@ -268,8 +284,9 @@ class Stepper:
     def _extrapolated(self, time: float) -> np.ndarray:
         """Accelerations at a later instant.
 
-        On even steps by formulas that are exact for a parabola (or a straight line) plus a part of alternating sign: without numerical damping,
-        stiff modes with much stiffness damping alternate, and a parabola alone would throw that part up sevenfold.
+        On even steps by formulas that are exact for a parabola (or a straight line) plus a part of alternating sign:
+        without numerical damping, stiff modes with much stiffness damping alternate, and a parabola alone would throw
+        that part up sevenfold.
         """
         points = self._history
         gaps = np.diff([t for t, _ in points] + [time])
@@ -281,23 +298,23 @@ class Stepper:
         (before, old), (here, new) = points[-2:] if len(points) > 1 else (points[0], (points[0][0] + 1.0, points[0][1]))
         return new + (time - here) / (here - before) * (new - old)
 
-    def _residual(self, trial: "_Trial") -> float:
+    def _residual(self, trial: _Trial) -> float:
         self.residuals += 1
         return trial.evaluate()
 
-    def _factor(self, trial: "_Trial") -> None:
+    def _factor(self, trial: _Trial) -> None:
         self.factorisations += 1
         self._factored = None
         trial.linearise()
         self._factored = trial.kind
 
-    def _solve(self, trial: "_Trial") -> np.ndarray:
+    def _solve(self, trial: _Trial) -> np.ndarray:
         self.solves += 1
         return self.motion.solve(-trial.residual, -trial.load.outlet)[0]
 
 
 def _sections(psi: np.ndarray) -> np.ndarray:
-    """Integral of the speed over each section between two stations (m - 1,), m2/s: its momentum per density and area."""
+    """Integral of the speed over each section between stations (m - 1,), m2/s: its momentum per density and area."""
     return -np.diff(psi)
 
 
@@ -309,12 +326,15 @@ def _outward(speed: np.ndarray) -> bool:
 class _Trial:
     """A candidate for the new state; its unknowns are the accelerations. The inlet velocity follows from them.
 
-    With `robust` the fluid's equations are met at the end of the step, psi by a backward difference: of first order, but momentum that is lost within a
-    step, when lips slam, does not come back with the opposite sign. Its force is then the weighted mean of this and the last one, as spikes that change
-    their sign from step to step would otherwise do work on stops that ring.
+    With `robust` the fluid's equations are met at the end of the step, psi by a backward difference: of first order,
+    but momentum that is lost within a step, when lips slam, does not come back with the opposite sign. Its force is
+    then the weighted mean of this and the last one, as spikes that change their sign from step to step would otherwise
+    do work on stops that ring.
     """
 
-    def __init__(self, motion, scheme: Scheme, old: MotionState, h: float, pressure: Callable[[float], float], robust: bool):
+    def __init__(
+        self, motion, scheme: Scheme, old: MotionState, h: float, pressure: Callable[[float], float], robust: bool
+    ):
         self.motion, self.scheme, self.old, self.h = motion, scheme, old, h
         s, now = scheme, scheme.now
         theta, rate = (1.0, 1.0) if robust else (now, s.rate)
@@ -327,7 +347,13 @@ class _Trial:
             velocity=s.gamma / (s.beta * h),
             psi=rate / h,
         )
-        self.fluid = Step(theta, old.speed, rate / h, (1.0 - rate) * old.psi_rate - (rate / h) * old.psi, pressure(old.time + theta * h))
+        self.fluid = Step(
+            theta,
+            old.speed,
+            rate / h,
+            (1.0 - rate) * old.psi_rate - (rate / h) * old.psi,
+            pressure(old.time + theta * h),
+        )
 
     def set(self, a: np.ndarray) -> None:
         """Start from new accelerations."""
@@ -375,4 +401,15 @@ class _Trial:
     def state(self) -> MotionState:
         old, load = self.old, self.load
         rate = (load.psi - old.psi) / self.h if self.motion.moving_fluid else load.psi_rate
-        return MotionState(old.time + self.h, float(load.speed[-1]), self.q, self.v, self.a, self.force, self.force_rate, load.force, load.psi, rate)
+        return MotionState(
+            old.time + self.h,
+            float(load.speed[-1]),
+            self.q,
+            self.v,
+            self.a,
+            self.force,
+            self.force_rate,
+            load.force,
+            load.psi,
+            rate,
+        )

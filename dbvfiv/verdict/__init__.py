@@ -1,4 +1,7 @@
-"""What a time series does in the end: steady, decaying, limit cycle, growing, closed or irregular. Knows nothing of valves."""
+"""What a time series does in the end: steady, decaying, limit cycle, growing, closed or irregular. Knows nothing of
+valves.
+"""
+
 from .judge import JudgeOptions, judge
 from .series import Series, spectrum
 from .verdict import NAMES, Verdict

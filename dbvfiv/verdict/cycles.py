@@ -1,4 +1,5 @@
 """Cycles of a known period, counted back from the end: amplitudes, means, mismatch from one to the next, harmonics."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -20,10 +21,12 @@ class Cycles:
     shape : (k, 128) array
         The signal over each cycle.
     spread : (k,) array
-        sqrt(2) times the root mean square about the cycle's own mean: the amplitude of a sine, and far less touched by noise than extremes.
+        sqrt(2) times the root mean square about the cycle's own mean: the amplitude of a sine, and far less touched by
+        noise than extremes.
     mean : (k,) array
     error : (k - 1,) array
-        Root mean square of the difference of two neighbours about their means, over sqrt(2) times their root mean square.
+        Root mean square of the difference of two neighbours about their means, over sqrt(2) times their root mean
+        square.
     """
 
     period: float
@@ -33,7 +36,7 @@ class Cycles:
     error: np.ndarray
 
     @classmethod
-    def of(cls, series: Series, period: float) -> "Cycles":
+    def of(cls, series: Series, period: float) -> Cycles:
         count = int(np.floor(series.duration / period * (1 + 1e-9)))
         spline = series.spline()
         phase = np.arange(_PER_CYCLE) / _PER_CYCLE
@@ -49,12 +52,20 @@ class Cycles:
     def __len__(self) -> int:
         return len(self.spread)
 
-    def last(self, count: int) -> "Cycles":
+    def last(self, count: int) -> Cycles:
         count = min(count, len(self))
-        return Cycles(self.period, self.shape[-count:], self.spread[-count:], self.mean[-count:], self.error[len(self.error) - count + 1 :])
+        return Cycles(
+            self.period,
+            self.shape[-count:],
+            self.spread[-count:],
+            self.mean[-count:],
+            self.error[len(self.error) - count + 1 :],
+        )
 
     def pace(self) -> np.ndarray:
-        """(k - 1,) frequency from each cycle to the next over that of the period, by the phase of the strongest multiple."""
+        """(k - 1,) frequency from each cycle to the next over that of the period, by the phase of the strongest
+        multiple.
+        """
         lines = np.fft.rfft(self.shape, axis=1)[:, 1:]
         number = int(np.argmax(np.sum(np.abs(lines) ** 2, axis=0)))
         turn = np.angle(lines[1:, number] * np.conj(lines[:-1, number]))

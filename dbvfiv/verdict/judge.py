@@ -1,4 +1,7 @@
-"""What a time series does in the end, judged so that sampling at the period, beats, slow growth and noise do not mislead."""
+"""What a time series does in the end, judged so that sampling at the period, beats, slow growth and noise do not
+mislead.
+"""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -44,7 +47,12 @@ class JudgeOptions:
 
 
 def judge(
-    time, values, options: JudgeOptions = JudgeOptions(), *, residual: float | None = None, closed_below: float | None = None
+    time,
+    values,
+    options: JudgeOptions = JudgeOptions(),
+    *,
+    residual: float | None = None,
+    closed_below: float | None = None,
 ) -> Verdict:
     """Verdict on a signal.
 
@@ -54,7 +62,8 @@ def judge(
         Samples at increasing times; uneven ones are interpolated.
     options : JudgeOptions
     residual : float, optional
-        How far from equilibrium the system is at the end, relative; a signal that stands still while its system does not is not steady.
+        How far from equilibrium the system is at the end, relative; a signal that stands still while its system does
+        not is not steady.
     closed_below : float, optional
         Level below which the signal counts as closed.
 
@@ -78,20 +87,29 @@ def judge(
     whole = {"smallest": float(np.min(values)), "largest": float(np.max(values))}
     if len(series.values) < 16:
         end = series.values[-1]
-        return Verdict("undecided", False, "There are fewer than 16 samples.", mean=float(end), amplitude=0.0, rms=0.0, **whole)
+        return Verdict(
+            "undecided", False, "There are fewer than 16 samples.", mean=float(end), amplitude=0.0, rms=0.0, **whole
+        )
     return replace(_judge(series, options, residual, closed_below), **whole)
 
 
 def _judge(series: Series, options: JudgeOptions, residual: float | None, closed_below: float | None) -> Verdict:
     tail = series.last(0.2 * series.duration)
-    at_end = {"mean": float(tail.values.mean()), "amplitude": 0.5 * float(np.ptp(tail.values)), "rms": float(tail.values.std())}
+    at_end = {
+        "mean": float(tail.values.mean()),
+        "amplitude": 0.5 * float(np.ptp(tail.values)),
+        "rms": float(tail.values.std()),
+    }
     if closed_below is not None and series.last(0.3 * series.duration).values.max() <= closed_below:
         return Verdict("closed", True, "The signal stays below the level of a closed valve.", **at_end)
     size = max(abs(at_end["mean"]), float(np.ptp(series.values)))
     if at_end["amplitude"] > 1e-9 * size:
         fast = undersampled(series)
         if fast:
-            words = f"It swings at {fast:.4g} Hz, and {1.0 / (fast * series.step):.2g} samples a cycle are too few to judge by."
+            words = (
+                f"It swings at {fast:.4g} Hz, and {1.0 / (fast * series.step):.2g} samples a cycle are "
+                f"too few to judge by."
+            )
             return Verdict("undecided", False, words, **at_end)
         found = _oscillation(series, options, size)
         if found is not None:
@@ -99,7 +117,8 @@ def _judge(series: Series, options: JudgeOptions, residual: float | None, closed
     return _without_cycles(series, options, size, residual, at_end)
 
 
-# -- signals with cycles ------------------------------------------------------------------------------------------------------------
+# -- signals with cycles
+# ----
 
 
 def _oscillation(series: Series, options: JudgeOptions, size: float) -> Verdict | None:
@@ -133,30 +152,50 @@ def _oscillation(series: Series, options: JudgeOptions, size: float) -> Verdict 
     return _name(series, cycles, recent, facts, direction, options)
 
 
-def _name(series: Series, cycles: Cycles, recent: Cycles, facts: dict, direction: str, options: JudgeOptions) -> Verdict:
+def _name(
+    series: Series, cycles: Cycles, recent: Cycles, facts: dict, direction: str, options: JudgeOptions
+) -> Verdict:
     error, count = facts["periodicity_error"], len(cycles)
     rate = abs(facts["amplitude_trend"])
     if error > options.noisy and direction in ("growing", "decaying") and rate < 0.5 * error:
         direction = ""  # the amplitudes wander because nothing repeats
-    if direction in ("growing", "decaying") and error > options.periodic and rate < 0.2 * error and not _noise_on_cycle(cycles, options):
+    if (
+        direction in ("growing", "decaying")
+        and error > options.periodic
+        and rate < 0.2 * error
+        and not _noise_on_cycle(cycles, options)
+    ):
         direction = ""  # growth as slow as that does not make cycles so different
     if direction in ("growing", "decaying"):
         words = f"The amplitude changes by {100 * facts['amplitude_trend']:+.2g} % a cycle"
         if comes_and_goes(cycles.spread, 2.5 * options.band):
-            return Verdict("irregular", count >= 2 * options.cycles, words + " after having come and gone before.", **facts)
+            return Verdict(
+                "irregular", count >= 2 * options.cycles, words + " after having come and gone before.", **facts
+            )
         if _slackens(recent.spread):
-            return Verdict(direction, False, words + ", less and less: it may be on its way to another amplitude.", **facts)
+            return Verdict(
+                direction, False, words + ", less and less: it may be on its way to another amplitude.", **facts
+            )
         doubled = abs(np.log(cycles.spread[-1] / cycles.spread[max(0, count - options.cycles)])) > 0.3
         return Verdict(direction, count >= options.cycles or (count >= 5 and doubled), words + ".", **facts)
     enough = (1.5 if error > options.noisy else 4.0) * options.cycles  # swings without a return
     if count < options.cycles and error > options.periodic and _swings(series) >= enough:
-        return Verdict("irregular", True, f"After {_swings(series)} swings it still repeats within {100 * error:.2g} % only.", **facts)
+        return Verdict(
+            "irregular",
+            True,
+            f"After {_swings(series)} swings it still repeats within {100 * error:.2g} % only.",
+            **facts,
+        )
     if count < options.cycles:
-        return Verdict("undecided", False, f"Only {count} cycles have been seen and {options.cycles} are needed.", **facts)
+        return Verdict(
+            "undecided", False, f"Only {count} cycles have been seen and {options.cycles} are needed.", **facts
+        )
     if error > options.noisy:
         return Verdict("irregular", True, f"Nothing repeats: the periodicity error is {error:.2g}.", **facts)
     if error > options.periodic and not _noise_on_cycle(cycles, options):
-        return Verdict("irregular", True, f"Cycles differ from one to the next by {100 * error:.2g} %, and not by noise.", **facts)
+        return Verdict(
+            "irregular", True, f"Cycles differ from one to the next by {100 * error:.2g} %, and not by noise.", **facts
+        )
     noisy = error > options.periodic
     band = max(options.band, 6.0 * trend_of(recent.spread).scatter) if noisy else options.band
     if comes_and_goes(cycles.spread[-max(options.cycles, 3 * count // 4) :], band if noisy else 0.5 * options.band):
@@ -168,13 +207,17 @@ def _name(series: Series, cycles: Cycles, recent: Cycles, facts: dict, direction
         return Verdict("undecided", False, "The amplitude still settles.", **facts)
     pace = cycles.pace()
     if len(pace) >= 6 and trend_of(pace).significant and abs(trend_of(pace).change) > options.drift:
-        return Verdict("undecided", False, f"The period still changes by {100 * trend_of(pace).slope:+.2g} % a cycle.", **facts)
+        return Verdict(
+            "undecided", False, f"The period still changes by {100 * trend_of(pace).slope:+.2g} % a cycle.", **facts
+        )
     means = cycles.last(options.cycles).mean
     if np.ptp(means) > max(10 * options.drift, (1.5 if noisy else 0.5) * error) * recent.spread.mean():
         if trend_of(np.exp((means - means.mean()) / np.ptp(means))).significant:
             return Verdict("undecided", False, "The mean of the cycles still moves.", **facts)
         return Verdict("irregular", True, "The mean of the cycles comes and goes.", **facts)
-    words = f"{still} cycles of equal amplitude, repeating within {100 * error:.2g} %" + (", the difference being noise." if noisy else ".")
+    words = f"{still} cycles of equal amplitude, repeating within {100 * error:.2g} %" + (
+        ", the difference being noise." if noisy else "."
+    )
     return Verdict("limit cycle", True, words, **facts)
 
 
@@ -199,7 +242,7 @@ def _period(series: Series) -> tuple[float, float]:
 
 
 def _direction(cycles: Cycles, options: JudgeOptions) -> str:
-    """"growing", "decaying", "settling" or "" from nested ends of the sequence of amplitudes."""
+    """ "growing", "decaying", "settling" or "" from nested ends of the sequence of amplitudes."""
     spread, count = cycles.spread, len(cycles)
     if count < options.cycles:
         found = trend_of(spread)
@@ -229,7 +272,9 @@ def _direction(cycles: Cycles, options: JudgeOptions) -> str:
 
 
 def _slackens(spread: np.ndarray) -> bool:
-    """Whether amplitudes change less and less, in proportion: as they do on the way to a cycle, and not in exponential growth or decay."""
+    """Whether amplitudes change less and less, in proportion: as they do on the way to a cycle, and not in exponential
+    growth or decay.
+    """
     half = len(spread) // 2
     first, last = trend_of(spread[: half + 1]), trend_of(spread[-half - 1 :])
     return bool(abs(last.slope) + 2.0 * last.error < 0.9 * abs(first.slope))
@@ -251,7 +296,8 @@ def _noise_on_cycle(cycles: Cycles, options: JudgeOptions) -> bool:
         return True
     within = np.mean(left[:, :-8] * left[:, 8:]) / power  # a sixteenth of a cycle
     across = np.mean(left[:-1] * left[1:]) / power
-    # noise averages out over a cycle; amplitudes that scatter as much as the signal does belong to cycles that are not equal
+    # noise averages out over a cycle; amplitudes that scatter as much as the signal does belong to cycles that are not
+    # equal
     unequal = trend_of(kept.spread).scatter > 0.4 * np.sqrt(np.mean(kept.error**2))
     return bool(within < 0.5 and across < 0.35 and not unequal)
 
@@ -261,10 +307,13 @@ def _factor(error: np.ndarray) -> float:
     return float(np.exp(trend_of(error).slope)) if len(error) >= 3 and error.min() > 1e-12 else np.nan
 
 
-# -- signals without ----------------------------------------------------------------------------------------------------------------
+# -- signals without
+# ----
 
 
-def _without_cycles(series: Series, options: JudgeOptions, size: float, residual: float | None, at_end: dict) -> Verdict:
+def _without_cycles(
+    series: Series, options: JudgeOptions, size: float, residual: float | None, at_end: dict
+) -> Verdict:
     tail = series.last(0.2 * series.duration).values
     thirds = [part.mean() for part in np.array_split(tail, 3)]
     first, second = thirds[1] - thirds[0], thirds[2] - thirds[1]
@@ -272,23 +321,39 @@ def _without_cycles(series: Series, options: JudgeOptions, size: float, residual
     if 2.0 * at_end["amplitude"] <= options.steady * size and to_come <= options.steady * size:
         if residual is not None and not residual <= options.residual:
             return Verdict(
-                "undecided", False, f"The signal stands still but its system does not (residual {residual:.2g}): it may be sampled at its own period.",
+                "undecided",
+                False,
+                (
+                    f"The signal stands still but its system does not (residual "
+                    f"{residual:.2g}): it may be sampled at its own period."
+                ),
                 **at_end,
-            )  # fmt: skip
-        return Verdict("steady", True, f"It changes by less than {options.steady:g} of its size, and little is to come.", **at_end)
+            )
+        return Verdict(
+            "steady", True, f"It changes by less than {options.steady:g} of its size, and little is to come.", **at_end
+        )
     ranges = np.array([np.ptp(part) for part in np.array_split(series.values, 8)])
     levels = np.array([part.mean() for part in np.array_split(series.values, 8)])
     late = ranges[-4:]
     falling, rising = np.all(np.diff(late) < 0), np.all(np.diff(late) > 0)
     if falling and late[-1] < 0.6 * late[0]:
-        return Verdict("decaying", bool(late[-1] < 0.1 * ranges.max()), "Its changes become smaller and smaller.", **at_end)
+        return Verdict(
+            "decaying", bool(late[-1] < 0.1 * ranges.max()), "Its changes become smaller and smaller.", **at_end
+        )
     if rising and late[-1] > 1.5 * late[0] and ranges[-1] == ranges.max():
-        return Verdict("growing", bool(late[-1] > 10 * max(late[0], 1e-300)), "Its changes become larger and larger.", **at_end)
+        return Verdict(
+            "growing", bool(late[-1] > 10 * max(late[0], 1e-300)), "Its changes become larger and larger.", **at_end
+        )
     steps = np.diff(levels[-5:])
     if np.all(steps > 0) or np.all(steps < 0):
         if np.ptp(levels[-5:]) > 2.0 * np.median([_scatter(part) for part in np.array_split(series.values, 8)[-4:]]):
             shrinking = abs(steps[-1]) < 0.5 * abs(steps[0])
-            return Verdict("decaying" if shrinking else "growing", False, "It drifts one way" + (", slower and slower." if shrinking else "."), **at_end)
+            return Verdict(
+                "decaying" if shrinking else "growing",
+                False,
+                "It drifts one way" + (", slower and slower." if shrinking else "."),
+                **at_end,
+            )
     if _swings(series) < options.cycles:
         return Verdict("undecided", False, "It moves, and too few swings have been seen to tell how.", **at_end)
     return Verdict("irregular", True, "It moves without a period.", **at_end)

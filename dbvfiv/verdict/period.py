@@ -1,4 +1,5 @@
 """The period of a signal: where the signal repeats itself best, refined on a spline."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -24,7 +25,8 @@ def mismatch(values: np.ndarray, largest: int) -> np.ndarray:
 def find_period(series: Series, longest: float = 0.5, samples: int = 4) -> tuple[float, float]:
     """Period to a sample and its mismatch; (nan, nan) if the signal never comes back to itself.
 
-    The first lag that matches nearly as well as the best one is taken, which tells a period from its multiples and a doubled period from half of it.
+    The first lag that matches nearly as well as the best one is taken, which tells a period from its multiples and a
+    doubled period from half of it.
 
     Parameters
     ----------
@@ -54,8 +56,8 @@ def find_period(series: Series, longest: float = 0.5, samples: int = 4) -> tuple
 def refine(series: Series, period: float, error: float = 0.0) -> tuple[float, float]:
     """Period at which the signal repeats best, by Newton's iterations on a spline, and the mismatch there.
 
-    A constant difference between a cycle and the next, slow drift, is left out of account. Where the first guess repeats badly the signal is smoothed
-    over a twentieth of the period first, as noise has no slope to go by.
+    A constant difference between a cycle and the next, slow drift, is left out of account. Where the first guess
+    repeats badly the signal is smoothed over a twentieth of the period first, as noise has no slope to go by.
     """
     spline = (smoothed(series, period / 20.0) if error > 0.02 else series).spline()
     slope = spline.derivative()

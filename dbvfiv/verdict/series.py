@@ -1,4 +1,5 @@
 """A time series: checks, even samples, smooth interpolation, spectrum."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ class Series:
     values: np.ndarray
 
     @classmethod
-    def of(cls, time, values) -> "Series":
+    def of(cls, time, values) -> Series:
         """From samples at increasing times; uneven ones are interpolated by a cubic spline at their typical distance.
 
         Raises
@@ -33,7 +34,9 @@ class Series:
         """
         time, values = np.asarray(time, float), np.asarray(values, float)
         if time.ndim != 1 or time.shape != values.shape:
-            raise ValueError(f"The series has {time.size} times and {values.size} values; both must be lists of the same length.")
+            raise ValueError(
+                f"The series has {time.size} times and {values.size} values; both must be lists of the same length."
+            )
         if time.size < 2:
             raise ValueError("A series needs at least two samples.")
         if not (np.isfinite(time).all() and np.isfinite(values).all()):
@@ -61,7 +64,7 @@ class Series:
         """s"""
         return self.start + self.duration
 
-    def last(self, duration: float) -> "Series":
+    def last(self, duration: float) -> Series:
         """The end of the series."""
         count = min(len(self.values), max(2, int(round(duration / self.step)) + 1))
         return Series(self.end - (count - 1) * self.step, self.step, self.values[-count:])
@@ -91,7 +94,9 @@ def spectrum(series: Series) -> tuple[np.ndarray, np.ndarray]:
 
 
 def undersampled(series: Series) -> float:
-    """Frequency, Hz, of a line that holds most of the signal's power and is sampled fewer than four times a cycle; zero without one."""
+    """Frequency, Hz, of a line that holds most of the signal's power and is sampled fewer than four times a cycle; zero
+    without one.
+    """
     frequency, amplitude = spectrum(series)
     power = amplitude**2
     at = int(np.argmax(power))

@@ -1,4 +1,5 @@
 """Time series from text files: columns separated by commas, semicolons, tabs or blanks, with or without a header."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,4 +1,5 @@
 """Whether a sequence of amplitudes grows, shrinks, settles, or comes and goes."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -49,7 +50,9 @@ def trend_of(values: np.ndarray) -> Trend:
 
 
 def remaining(values: np.ndarray) -> float:
-    """Relative change still to come if the sequence goes on as it does: geometric extrapolation of two halves; infinite if it does not settle."""
+    """Relative change still to come if the sequence goes on as it does: geometric extrapolation of two halves; infinite
+    if it does not settle.
+    """
     half = len(values) // 2
     first, last = trend_of(values[: half + 1]), trend_of(values[-half - 1 :])
     if abs(last.change) < 1e-12:

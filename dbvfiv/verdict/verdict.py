@@ -1,4 +1,5 @@
 """The verdict on a time series."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -30,13 +31,15 @@ class Verdict:
     cycles : int
         Cycles that the verdict rests on.
     periodicity_error : float
-        Root mean square of x(t + T) - x(t) over that of two unrelated signals of the same variance: 0 periodic, 1 unrelated.
+        Root mean square of x(t + T) - x(t) over that of two unrelated signals of the same variance: 0 periodic, 1
+        unrelated.
     periodicity_trend : float
         Factor of the periodicity error from one cycle to the next; below 1 while a cycle is being approached.
     amplitude_trend : float
         Relative change of the amplitude from one cycle to the next.
     harmonics : (k, 2) array
-        Amplitude and phase, rad, of the first multiples of the frequency: sum a_k cos(2 pi k t / T + phase), t from the start of the series.
+        Amplitude and phase, rad, of the first multiples of the frequency: sum a_k cos(2 pi k t / T + phase), t from the
+        start of the series.
     rms : float
         Root mean square about the mean, of the same part of the series.
     smallest, largest : float
@@ -66,10 +69,17 @@ class Verdict:
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON; what is not a number is None."""
         numbers = {
-            "mean": self.mean, "amplitude": self.amplitude, "frequency": self.frequency, "period": self.period,
-            "periodicity_error": self.periodicity_error, "periodicity_trend": self.periodicity_trend,
-            "amplitude_trend": self.amplitude_trend, "rms": self.rms, "smallest": self.smallest, "largest": self.largest,
-        }  # fmt: skip
+            "mean": self.mean,
+            "amplitude": self.amplitude,
+            "frequency": self.frequency,
+            "period": self.period,
+            "periodicity_error": self.periodicity_error,
+            "periodicity_trend": self.periodicity_trend,
+            "amplitude_trend": self.amplitude_trend,
+            "rms": self.rms,
+            "smallest": self.smallest,
+            "largest": self.largest,
+        }
         return {
             "verdict": self.name,
             "decided": bool(self.decided),

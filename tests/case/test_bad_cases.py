@@ -27,7 +27,8 @@ BAD = {
     "unit that does not exist": ("[drive]\npressure = '18 kilopuscals'", "not a pressure"),
     "text without a number": ("[valve]\nlip_radius = 'small'", "not a number"),
     "angle as a plain number in a text": (
-        "[[layers]]\nmaterial='CR'\nthickness=0.006\nangle='10 %'", r"layers\.0\.angle.*not an angle"
+        "[[layers]]\nmaterial='CR'\nthickness=0.006\nangle='10 %'",
+        r"layers\.0\.angle.*not an angle",
     ),
     "percent where a length is due": ("[valve]\nlip_radius = '10 %'", "valve.lip_radius"),
     "truth value for a number": ("[drive]\npressure = true", "truth value"),
@@ -41,7 +42,8 @@ BAD = {
     "integer with thousands of digits": (f"[damping]\nalpha = 1{'0' * 5000}", "not valid TOML"),
     "thickness zero": ("[valve]\nwall = 'uniform'\nwall_thickness = 0", "line 3.*greater than 0"),
     "thickness negative": (
-        "[valve]\nwall_map = [{ to = 0.6, thickness = '-3 mm' }]", r"valve\.wall_map\.0\.thickness.*greater than 0"
+        "[valve]\nwall_map = [{ to = 0.6, thickness = '-3 mm' }]",
+        r"valve\.wall_map\.0\.thickness.*greater than 0",
     ),
     "layer of no thickness": ("[[layers]]\nmaterial='CR'\nthickness=0", r"layers\.0\.thickness"),
     "layer without a material": ("[[layers]]\nthickness=0.01", r"layers\.0\.material is missing"),
@@ -49,7 +51,8 @@ BAD = {
     "layer of an unknown material": ("[[layers]]\nmaterial='teflon'\nthickness=0.01", "'teflon'.*CR, SBR, EPDM"),
     "no layers": ("layers = []", "layers is given as an empty list"),
     "one layer with one Gauss point": (
-        "[mesh]\nlayer_points=1\n[[layers]]\nmaterial='CR'\nthickness=0.01", "mesh.layer_points.*at least 2"
+        "[mesh]\nlayer_points=1\n[[layers]]\nmaterial='CR'\nthickness=0.01",
+        "mesh.layer_points.*at least 2",
     ),
     "angle beyond the full turn": ("[[layers]]\nmaterial='CR'\nthickness=0.01\nangle=270", r"layers\.0\.angle"),
     "density zero": ("[fluid]\ndensity = 0", "fluid.density.*greater than 0"),
@@ -77,22 +80,28 @@ BAD = {
     "key points that do not exist": ("[valve]\nkey_points = 'nowhere.txt'", "nowhere.txt.*does not exist"),
     "key points that are a folder": ("[valve]\nkey_points = '.'", "valve.key_points"),
     "tension test that does not exist": (
-        "[materials.A]\nkind='fit'\npath='test.csv'\ndensity=1300", r"materials\.A\.path.*does not exist"
+        "[materials.A]\nkind='fit'\npath='test.csv'\ndensity=1300",
+        r"materials\.A\.path.*does not exist",
     ),
     "fit of four terms": ("[materials.A]\nkind='fit'\npath='x'\nterms=4\ndensity=1", r"materials\.A\."),
     "strain level out of range": ("[materials]\nstrain_level = '80 %'", "strain_level.*60 %"),
     "strain level as percent number": ("[materials]\nstrain_level = 10", "strain_level.*60 %"),
     "material that is a number": ("[materials]\nCR = 3", "materials.CR"),
     "material without a kind": ("[materials.A]\nc10 = 1e6", r"materials\.A\.kind is missing"),
-    "material of an unknown kind": ("[materials.A]\nkind = 'ogden'", r'materials\.A\.kind is given as "ogden".*neo-hookean'),
+    "material of an unknown kind": (
+        "[materials.A]\nkind = 'ogden'",
+        r'materials\.A\.kind is given as "ogden".*neo-hookean',
+    ),
     "material kind that is a list": ("[materials.A]\nkind = [1]", r"materials\.A\.kind"),
     "Mooney-Rivlin without stiffness": (
-        "[materials.A]\nkind='mooney-rivlin'\nc10='1 MPa'\nc01='-1 MPa'\ndensity=1300", r"materials\.A\.c10.*greater than 0"
+        "[materials.A]\nkind='mooney-rivlin'\nc10='1 MPa'\nc01='-1 MPa'\ndensity=1300",
+        r"materials\.A\.c10.*greater than 0",
     ),
     "Mooney-Rivlin without c01": ("[materials.A]\nkind='mooney-rivlin'\nc10='1 MPa'\ndensity=1300", "c01 is missing"),
     "neo-Hookean without stiffness": ("[materials.A]\nkind='neo-hookean'\nshear_modulus=0\ndensity=1", "shear_modulus"),
     "Poisson ratio one half": (
-        "[materials.A]\nkind='isotropic'\nyoungs_modulus=1e6\npoisson_ratio=0.5\ndensity=1", "poisson_ratio.*less than 0.5"
+        "[materials.A]\nkind='isotropic'\nyoungs_modulus=1e6\npoisson_ratio=0.5\ndensity=1",
+        "poisson_ratio.*less than 0.5",
     ),
     "ply that is not positive definite": (
         "[materials.A]\nkind='orthotropic'\ne1=1e6\ne2=4e6\nnu12=0.6\ng12=1e6\ng13=1e6\ng23=1e6\ndensity=1",

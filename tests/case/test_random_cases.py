@@ -29,14 +29,23 @@ SCALAR = st.one_of(
     st.sampled_from(["flow", "neo-hookean", "halpin-tsai", "density=1:10:3", "pressure=::", "CR"]),
 )
 JUNK = st.recursive(
-    SCALAR, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4), max_leaves=8
+    SCALAR,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=8,
 )
 TOML_TEXT = st.text(alphabet=string.printable + "é\x00\u2028", max_size=80)
 LIKELY_LINES = st.lists(
     st.one_of(
-        st.sampled_from(["[valve]", "[drive]", "[[layers]]", "[materials.A]", "[materials]", "[[valve.wall_map]]", '"""']),
-        st.builds("{} = {}".format, st.sampled_from(sorted({k.split(".")[-1] for k in KEYS})), st.one_of(
-            st.integers(), st.floats(), NUMBER_TEXT.map(repr), st.sampled_from(["true", "[]", "{}", "[{}]", "'CR'"]))),
+        st.sampled_from(
+            ["[valve]", "[drive]", "[[layers]]", "[materials.A]", "[materials]", "[[valve.wall_map]]", '"""']
+        ),
+        st.builds(
+            "{} = {}".format,
+            st.sampled_from(sorted({k.split(".")[-1] for k in KEYS})),
+            st.one_of(
+                st.integers(), st.floats(), NUMBER_TEXT.map(repr), st.sampled_from(["true", "[]", "{}", "[{}]", "'CR'"])
+            ),
+        ),
     ),
     max_size=12,
 ).map("\n".join)

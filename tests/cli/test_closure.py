@@ -21,7 +21,9 @@ def test_one_json_document(command_line):
 
 @pytest.mark.slow
 def test_both_supports_with_file_and_figures(command_line, tmp_path):
-    done = command_line("closure", *COARSE, "-p", "5 kPa", "--compare", "-o", tmp_path / "run.h5", "--plots", tmp_path / "figures")
+    done = command_line(
+        "closure", *COARSE, "-p", "5 kPa", "--compare", "-o", tmp_path / "run.h5", "--plots", tmp_path / "figures"
+    )
     assert done.status == 0, done.err
     assert "Supports: contact" in done.out and "Supports: held-lips" in done.out
     assert (tmp_path / "run.h5").exists() and (tmp_path / "run-held-lips.h5").exists()
@@ -31,9 +33,17 @@ def test_both_supports_with_file_and_figures(command_line, tmp_path):
 @pytest.mark.slow
 def test_a_wall_that_snaps_is_told_in_a_sentence(command_line, one_sentence):
     done = command_line(
-        "closure", *COARSE, "--set", "valve.thickness_factor=0.25", "--set", "closure.arclength=false", "--set", "closure.max_step=0.5 kPa",
-        "-p", "28 kPa",
-    )  # fmt: skip
+        "closure",
+        *COARSE,
+        "--set",
+        "valve.thickness_factor=0.25",
+        "--set",
+        "closure.arclength=false",
+        "--set",
+        "closure.max_step=0.5 kPa",
+        "-p",
+        "28 kPa",
+    )
     assert done.status == 1
     last = done.err.strip().splitlines()[-1]
     assert one_sentence(last) and "were reached" in last

@@ -48,7 +48,9 @@ def test_version(command_line):
     assert (outcome.status, outcome.out.split()[0]) == (0, "dbvfiv")
 
 
-@pytest.mark.parametrize("arguments", [["cas"], ["case", "--nonsense"], ["case", "a", "b"], ["case", "--set"], ["doctor", "x"]])
+@pytest.mark.parametrize(
+    "arguments", [["cas"], ["case", "--nonsense"], ["case", "a", "b"], ["case", "--set"], ["doctor", "x"]]
+)
 def test_a_wrong_command_line_is_one_sentence(command_line, one_sentence, arguments):
     outcome = command_line(*arguments)
     assert outcome.status == 2 and outcome.out == ""
@@ -161,7 +163,12 @@ def test_json_of_arrays_and_of_what_is_not_finite(capsys):
     import numpy as np
 
     print_json({"a": np.array([1.0, np.nan]), "b": np.float64(2), "c": (1, None), "d": 1 + 2j})
-    assert json.loads(capsys.readouterr().out) == {"a": [1.0, None], "b": 2.0, "c": [1, None], "d": {"re": 1.0, "im": 2.0}}
+    assert json.loads(capsys.readouterr().out) == {
+        "a": [1.0, None],
+        "b": 2.0,
+        "c": [1, None],
+        "d": {"re": 1.0, "im": 2.0},
+    }
 
 
 def test_a_result_that_cannot_be_written_is_refused_before_the_work(tmp_path, capsys):

@@ -18,15 +18,28 @@ def test_modes_json(command_line):
     assert outcome.status == 0, outcome.err
     document = json.loads(outcome.out)
     modes = document["modes"]
-    assert len(modes) == 4 and all(set(mode) == {"growth_rate", "frequency", "damping_ratio", "residual"} for mode in modes)
+    assert len(modes) == 4 and all(
+        set(mode) == {"growth_rate", "frequency", "damping_ratio", "residual"} for mode in modes
+    )
     assert [m["growth_rate"] for m in modes] == sorted((m["growth_rate"] for m in modes), reverse=True)
     assert all(m["frequency"] >= 0 and m["residual"] < 1e-8 for m in modes)
     assert document["unstable_count"] == document["unstable_count_independent"] == 2 and document["stable"] is False
-    assert document["state"]["pressure"] == 6e3 and document["state"]["density"] == 10 and document["state"]["converged"]
+    assert (
+        document["state"]["pressure"] == 6e3 and document["state"]["density"] == 10 and document["state"]["converged"]
+    )
 
 
 def test_set_and_options_say_the_same(command_line):
-    by_set = ("--set", "drive.pressure=6 kPa", "--set", "fluid.density=10", "--set", "modes.count=2", "--set", "modes.in_vacuo=true")
+    by_set = (
+        "--set",
+        "drive.pressure=6 kPa",
+        "--set",
+        "fluid.density=10",
+        "--set",
+        "modes.count=2",
+        "--set",
+        "modes.in_vacuo=true",
+    )
     by_option = ("-p", "6e3", "--density", "10 kg/m^3", "-n", 2, "--in-vacuo")
     one, other = (json.loads(command_line("modes", *COARSE, *given, "--json").out) for given in (by_set, by_option))
     assert one == other and one["state"]["in_vacuo"]
@@ -49,12 +62,25 @@ def test_table_file_figures_and_what_reads_them(command_line, tmp_path):
 
 def test_at_rest_in_vacuo(command_line):
     document = json.loads(command_line("modes", *COARSE, "-p", 0, "--in-vacuo", "-n", 2, "--json").out)
-    assert document["state"]["pressure"] == 0 and document["stable"] is True and 10 < document["modes"][0]["frequency"] < 18
+    assert (
+        document["state"]["pressure"] == 0
+        and document["stable"] is True
+        and 10 < document["modes"][0]["frequency"] < 18
+    )
 
 
 @pytest.mark.parametrize(
     "arguments",
-    [("-p", "0"), ("-p", "nan"), ("-p", "-3"), ("--density", "0"), ("--density", "2 m"), ("--count", "0"), ("--animate", "1"), ("--set", "modes.cuont=3")],
+    [
+        ("-p", "0"),
+        ("-p", "nan"),
+        ("-p", "-3"),
+        ("--density", "0"),
+        ("--density", "2 m"),
+        ("--count", "0"),
+        ("--animate", "1"),
+        ("--set", "modes.cuont=3"),
+    ],
 )
 def test_impossible_modes(command_line, one_sentence, arguments):
     outcome = command_line("modes", *COARSE, *arguments)
@@ -62,15 +88,21 @@ def test_impossible_modes(command_line, one_sentence, arguments):
 
 
 def test_an_equilibrium_that_is_not_found(command_line, one_sentence):
-    outcome = command_line("modes", *COARSE, "--set", "steady.max_iterations=2", "--set", "steady.min_step=0.3", "-p", "100")
+    outcome = command_line(
+        "modes", *COARSE, "--set", "steady.max_iterations=2", "--set", "steady.min_step=0.3", "-p", "100"
+    )
     assert outcome.status == 1 and one_sentence(outcome.err.splitlines()[-1]) and "No equilibrium" in outcome.err
 
 
 def test_sweep_json(command_line, tmp_path):
-    outcome = command_line("sweep", *COARSE, "-p", "6 kPa", "--over", "density=1:1000:5:log", "-n", 3, "-o", tmp_path / "s.h5", "--json")
+    outcome = command_line(
+        "sweep", *COARSE, "-p", "6 kPa", "--over", "density=1:1000:5:log", "-n", 3, "-o", tmp_path / "s.h5", "--json"
+    )
     assert outcome.status == 0, outcome.err
     document = json.loads(outcome.out)
-    assert document["parameter"] == "density" and document["values"] == pytest.approx([1, 1000**0.25, 1000**0.5, 1000**0.75, 1000])
+    assert document["parameter"] == "density" and document["values"] == pytest.approx(
+        [1, 1000**0.25, 1000**0.5, 1000**0.75, 1000]
+    )
     for branch in document["branches"]:
         assert {"id", "growth_rate", "frequency", "confidence"} <= set(branch)
         assert all(len(branch[name]) == 5 for name in ("growth_rate", "frequency", "confidence"))
@@ -79,7 +111,9 @@ def test_sweep_json(command_line, tmp_path):
 
 
 def test_sweep_table_and_figures(command_line, tmp_path):
-    outcome = command_line("sweep", *COARSE, "--density", 10, "--over", "pressure=2 kPa:12 kPa:3", "-n", 2, "--plots", tmp_path)
+    outcome = command_line(
+        "sweep", *COARSE, "--density", 10, "--over", "pressure=2 kPa:12 kPa:3", "-n", 2, "--plots", tmp_path
+    )
     assert outcome.status == 0, outcome.err
     assert "becomes stable near pressure" in outcome.out and "Certified" in outcome.out
     assert {path.name for path in tmp_path.iterdir()} == {"sweep.png", "root-locus.png"}
@@ -94,7 +128,9 @@ def test_impossible_sweeps(command_line, one_sentence, range_):
 def test_ctrl_c_keeps_what_is_done(tmp_path):
     path = tmp_path / "s.h5"
     arguments = ["sweep", *COARSE, "--density", "10", "--over", "pressure=1 kPa:50 kPa:300", "-n", "2", "-o", str(path)]
-    run = subprocess.Popen([sys.executable, "-m", "dbvfiv", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    run = subprocess.Popen(
+        [sys.executable, "-m", "dbvfiv", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     shown = [run.stdout.readline() for _ in range(5)][2:]
     os.kill(run.pid, signal.SIGINT)
     _, err = run.communicate(timeout=60)

@@ -1,4 +1,5 @@
 """The command onset: JSON keys, result file, figure."""
+
 import json
 
 import pytest
@@ -6,7 +7,13 @@ import pytest
 from dbvfiv.cli import run
 from dbvfiv.results.registry import load_result
 
-SETTINGS = ["--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0", "--set=onset.normal_form=false", "--set=onset.coarse_mesh=0"]
+SETTINGS = [
+    "--set=mesh.around=8",
+    "--set=mesh.along=16",
+    "--set=damping.alpha=0",
+    "--set=onset.normal_form=false",
+    "--set=onset.coarse_mesh=0",
+]
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +25,20 @@ def outcome(tmp_path_factory):
 
     out = io.StringIO()
     with contextlib.redirect_stdout(out):
-        status = run(["onset", "--over", "density=1:1000:15:log", "--set=drive.pressure=6 kPa", *SETTINGS, "--json", "-o", str(path), "--plots", str(folder)])
+        status = run(
+            [
+                "onset",
+                "--over",
+                "density=1:1000:15:log",
+                "--set=drive.pressure=6 kPa",
+                *SETTINGS,
+                "--json",
+                "-o",
+                str(path),
+                "--plots",
+                str(folder),
+            ]
+        )
     return status, json.loads(out.getvalue()), path
 
 
@@ -26,7 +46,15 @@ def test_keys_that_scripts_rely_on(outcome):
     status, document, _ = outcome
     assert status == 0
     (point,) = document["points"]
-    assert {"parameter", "value", "frequency", "growth_rate", "criticality", "first_lyapunov_coefficient", "uncertainty"} <= set(point)
+    assert {
+        "parameter",
+        "value",
+        "frequency",
+        "growth_rate",
+        "criticality",
+        "first_lyapunov_coefficient",
+        "uncertainty",
+    } <= set(point)
     assert point["parameter"] == "density" and point["confirmed"] and point["criticality"] is None
     assert point["below"]["unstable_count"] == point["below"]["unstable_count_independent"] == 2
 

@@ -11,7 +11,8 @@ CODE = """
 import os
 {before}
 import dbvfiv, jax, jax.numpy as jnp
-print(jnp.zeros(1).dtype, jax.config.jax_compilation_cache_dir, os.environ["NUMBA_CACHE_DIR"], os.environ["OMP_NUM_THREADS"])
+print(jnp.zeros(1).dtype, jax.config.jax_compilation_cache_dir)
+print(os.environ["NUMBA_CACHE_DIR"], os.environ["OMP_NUM_THREADS"])
 """
 
 
@@ -21,7 +22,10 @@ def run(before: str = "", **environment: str) -> list[str]:
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("JAX_", "NUMBA_", "OMP_", "DBVFIV"))}
     done = subprocess.run(
         [sys.executable, "-c", CODE.format(before=before)],
-        capture_output=True, text=True, env=clean | environment, check=True,
+        capture_output=True,
+        text=True,
+        env=clean | environment,
+        check=True,
     )
     return done.stdout.split()
 

@@ -12,9 +12,17 @@ import dbvfiv
 
 COARSE = ("--set", "mesh.around=8", "--set", "mesh.along=16")
 KEYS = {
-    "pressure", "mass_flow", "outlet_area", "outlet_velocity", "max_displacement", "max_displacement_position", "lip_opening",
-    "converged", "iterations", "residual",
-}  # fmt: skip
+    "pressure",
+    "mass_flow",
+    "outlet_area",
+    "outlet_velocity",
+    "max_displacement",
+    "max_displacement_position",
+    "lip_opening",
+    "converged",
+    "iterations",
+    "residual",
+}
 
 
 def test_json(command_line):
@@ -57,21 +65,27 @@ def test_which_pressures(monkeypatch, tmp_path, command_line, toml, arguments, e
     from dbvfiv import api
 
     asked = []
-    monkeypatch.setattr(api.Valve, "_run", lambda self, pressures, output, observer: asked.extend(pressures) or sys.exit(0))
+    monkeypatch.setattr(
+        api.Valve, "_run", lambda self, pressures, output, observer: asked.extend(pressures) or sys.exit(0)
+    )
     (tmp_path / "a.toml").write_text(toml)
     with pytest.raises(SystemExit):
         command_line("steady", tmp_path / "a.toml", *COARSE, *arguments)
     assert asked == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("pressure", ["nan", "inf", "-3", "-36 kPa", "0", "1e9", "5 m", "much", "", "1:2", "5:1:3", "1:2:0", "a:b:c"])
+@pytest.mark.parametrize(
+    "pressure", ["nan", "inf", "-3", "-36 kPa", "0", "1e9", "5 m", "much", "", "1:2", "5:1:3", "1:2:0", "a:b:c"]
+)
 def test_impossible_pressures(command_line, one_sentence, tmp_path, pressure):
     outcome = command_line("steady", "--pressure", pressure, "-o", tmp_path / "r.h5")
     assert outcome.status == 2 and outcome.out == "" and one_sentence(outcome.err), outcome.err
     assert not (tmp_path / "r.h5").exists()
 
 
-@pytest.mark.parametrize("overrides", [["mesh.around=nine"], ["steady.pressures=[-1]"], ["shell.metric=true"], ["drive.pressure=-1"]])
+@pytest.mark.parametrize(
+    "overrides", [["mesh.around=nine"], ["steady.pressures=[-1]"], ["shell.metric=true"], ["drive.pressure=-1"]]
+)
 def test_impossible_cases(command_line, one_sentence, overrides):
     outcome = command_line("steady", *(x for o in overrides for x in ("--set", o)), "-p", "6 kPa")
     assert outcome.status == 2 and outcome.out == "" and one_sentence(outcome.err), outcome.err
@@ -104,7 +118,9 @@ def test_info_gives_the_case_back(command_line, coarse_run, tmp_path):
 
 
 def test_plot_and_export(command_line, coarse_run, tmp_path):
-    outcome = command_line("plot", coarse_run.path, "-o", tmp_path, "--only", "jet-velocity", "--format", "svg", "--json")
+    outcome = command_line(
+        "plot", coarse_run.path, "-o", tmp_path, "--only", "jet-velocity", "--format", "svg", "--json"
+    )
     assert outcome.status == 0 and json.loads(outcome.out)["written"] == [str(tmp_path / "jet-velocity.svg")]
     outcome = command_line("export", coarse_run.path, "-o", tmp_path / "x.vtkhdf")
     assert outcome.status == 0 and (tmp_path / "x.vtkhdf").exists()
@@ -123,7 +139,9 @@ def test_files_that_are_no_results(command_line, one_sentence, tmp_path, command
 def test_stopped_from_outside(tmp_path, kill):
     path = tmp_path / "r.h5"
     arguments = ["steady", *COARSE, "-p", "1 kPa:50 kPa:500", "-o", str(path)]
-    run = subprocess.Popen([sys.executable, "-m", "dbvfiv", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    run = subprocess.Popen(
+        [sys.executable, "-m", "dbvfiv", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     shown = [run.stdout.readline() for _ in range(5)][2:]  # head of the table, then three states
     os.kill(run.pid, kill)
     rest, err = run.communicate(timeout=60)
@@ -137,7 +155,9 @@ def test_stopped_from_outside(tmp_path, kill):
 
 def test_a_reader_that_leaves(tmp_path):
     arguments = ["steady", *COARSE, "-p", "1 kPa:50 kPa:500"]
-    run = subprocess.Popen([sys.executable, "-m", "dbvfiv", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    run = subprocess.Popen(
+        [sys.executable, "-m", "dbvfiv", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     run.stdout.readline()
     run.stdout.close()
     run.wait(timeout=60)

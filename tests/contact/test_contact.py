@@ -1,4 +1,6 @@
-"""The contact law and the contact of inner faces: potentials, forces and tangents agree; what starts beyond the plane is not pushed back."""
+"""The contact law and the contact of inner faces: potentials, forces and tangents agree; what starts beyond the plane
+is not pushed back.
+"""
 
 from __future__ import annotations
 
@@ -88,7 +90,9 @@ def test_tangent_is_the_derivative_of_the_residual_and_its_structure_is_symmetri
     q, p = _state(pressed), 2e4
     pressed.multiplier = np.random.default_rng(1).uniform(0, 1e6, pressed.contact.count)
     tangent = pressed.tangent(q, p)
-    assert tangent.residual == pytest.approx(pressed.residual(q, p), rel=1e-12, abs=1e-9 * np.abs(tangent.residual).max())
+    assert tangent.residual == pytest.approx(
+        pressed.residual(q, p), rel=1e-12, abs=1e-9 * np.abs(tangent.residual).max()
+    )
     matrix = pressed.shell.dofs.matrix(tangent.structure)
     assert abs(matrix - matrix.T).max() <= 1e-13 * abs(matrix).max()
     direction = np.random.default_rng(5).standard_normal(len(q))
@@ -114,7 +118,9 @@ def test_second_derivatives_agree_with_differences_of_the_tangent():
     assert exact == pytest.approx(change, rel=1e-4, abs=1e-5 * np.abs(change).max())
     change = (pressed.pressure_force(expand(q + h * b), 1.0) - pressed.pressure_force(expand(q), 1.0)) / h
     linear = pressed.shell.dofs.matrix(pressed.tangent(q, 0.0).stiffness - pressed.tangent(q, 1.0).stiffness) @ b
-    assert change - linear == pytest.approx(0.5 * h * pressed.pressure_force_second(expand(b), expand(b)), abs=1e-6 * np.abs(change).max())
+    assert change - linear == pytest.approx(
+        0.5 * h * pressed.pressure_force_second(expand(b), expand(b)), abs=1e-6 * np.abs(change).max()
+    )
 
 
 def test_a_contact_force_passes_through_the_touching_point():

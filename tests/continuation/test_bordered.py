@@ -13,6 +13,7 @@ from continuation.linear import DenseSolver, solver_for
 
 def singular(rng, n, smallest=0.0, complex_numbers=False):
     """A matrix with one singular value ``smallest``, with its last singular vectors."""
+
     def square():
         a = rng.standard_normal((n, n))
         return a + 1j * rng.standard_normal((n, n)) if complex_numbers else a
@@ -66,8 +67,7 @@ def test_exactly_singular_matrix_with_zero_row(sparse):
     e = np.array([0.0, 0.0, 1.0])
     border = Bordered(solver_for(matrix), e, e)
     assert solver_for(matrix).repaired
-    assert np.allclose(border.solve(np.array([1.0, 2.0, 3.0, 4.0])), [1.0, 1.0, 4.0, 3.0],
-                       rtol=0, atol=1e-13)
+    assert np.allclose(border.solve(np.array([1.0, 2.0, 3.0, 4.0])), [1.0, 1.0, 4.0, 3.0], rtol=0, atol=1e-13)
 
 
 def test_zero_matrix_of_order_one():

@@ -61,8 +61,7 @@ def test_tangents_are_unit_vectors_along_the_curve():
 
 def test_angle_between_tangents_is_limited():
     branch = s_curve(max_angle=0.1)
-    angles = [np.arccos(min(1.0, p.tangent @ q.tangent))
-              for p, q in zip(branch.points, branch.points[1:])]
+    angles = [np.arccos(min(1.0, p.tangent @ q.tangent)) for p, q in zip(branch.points, branch.points[1:])]
     assert max(angles) <= 0.1 + 1e-12
     assert len(branch) > len(s_curve(max_angle=0.5))
 
@@ -76,15 +75,13 @@ def test_natural_continuation_stops_before_the_fold_and_says_why():
 
 
 def test_direction_backwards():
-    branch = continue_branch(cusp(), [1.5], {"a": 2.0, "b": 1.0}, "a",
-                             ContinuationOptions(limits=LIMITS, direction=-1))
+    branch = continue_branch(cusp(), [1.5], {"a": 2.0, "b": 1.0}, "a", ContinuationOptions(limits=LIMITS, direction=-1))
     assert branch.values()[-1] == -2.0
     assert len(branch.of_kind("fold")) == 2
 
 
 def test_starting_on_a_limit_and_leaving_it_ends_at_once():
-    branch = continue_branch(cusp(), [1.5], {"a": 2.0, "b": 1.0}, "a",
-                             ContinuationOptions(limits=LIMITS))
+    branch = continue_branch(cusp(), [1.5], {"a": 2.0, "b": 1.0}, "a", ContinuationOptions(limits=LIMITS))
     assert len(branch) == 1 and branch.reason == "limit of a reached"
 
 
@@ -122,8 +119,7 @@ def test_stop_at_a_kind():
 
 def test_no_equilibrium_at_the_start_is_an_error():
     with pytest.raises(NotConverged, match="first point was not found"):
-        continue_branch(circle(), [0.1], {"p": 5.0}, "p",
-                        ContinuationOptions(newton=NewtonOptions(max_iterations=3)))
+        continue_branch(circle(), [0.1], {"p": 5.0}, "p", ContinuationOptions(newton=NewtonOptions(max_iterations=3)))
 
 
 def test_wrong_shape_and_unknown_parameter():
@@ -136,8 +132,7 @@ def test_wrong_shape_and_unknown_parameter():
 def test_a_domain_that_ends_keeps_the_points_up_to_there():
     """log(1 - p) leaves the reals at p = 1, with nothing to find beyond."""
     system = JaxSystem(lambda u, mu: u - jnp.log(1.0 - mu["p"]), 1)
-    branch = continue_branch(system, [0.0], {"p": 0.0}, "p",
-                             ContinuationOptions(max_points=50, max_step=2.0, step=0.5))
+    branch = continue_branch(system, [0.0], {"p": 0.0}, "p", ContinuationOptions(max_points=50, max_step=2.0, step=0.5))
     assert np.all(np.isfinite(branch.states))
     assert np.all(branch.values() < 1.0)
 
@@ -150,8 +145,9 @@ def test_a_model_may_say_that_it_ends():
             return super().residual(u, mu)
 
     stop = Stop(after=-1)
-    branch = continue_branch(Ending(lambda u, mu: u - mu["p"], 1), [0.0], {"p": 0.0}, "p",
-                             ContinuationOptions(max_points=60), observers=stop)
+    branch = continue_branch(
+        Ending(lambda u, mu: u - mu["p"], 1), [0.0], {"p": 0.0}, "p", ContinuationOptions(max_points=60), observers=stop
+    )
     assert branch.reason.endswith("outside the domain of the model: the lips would cross")
     assert 1.0 - 1e-6 < branch.values()[-1] <= 1.0
 
@@ -192,24 +188,31 @@ def test_interruption_keeps_points_and_resuming_gives_the_same_branch(tmp_path):
 
 def test_observers_hear_of_refusals_and_finds():
     stop = Stop(after=-1)
-    continue_branch(cusp(), [-1.5], MU, "a",
-                    ContinuationOptions(limits=LIMITS, step=0.5, max_angle=0.15), observers=stop)
+    continue_branch(
+        cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS, step=0.5, max_angle=0.15), observers=stop
+    )
     assert stop.finds == ["fold", "fold"]
     assert stop.refusals and all(step > 0 for _, step in stop.refusals)
 
 
 def test_a_plain_function_is_an_observer():
     lengths = []
-    branch = continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS),
-                             observers=lambda b: lengths.append(len(b)))
+    branch = continue_branch(
+        cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS), observers=lambda b: lengths.append(len(b))
+    )
     assert lengths == list(range(2, len(branch) + 1))
 
 
 def test_file_holds_everything(tmp_path):
     path = tmp_path / "b.h5"
     system = stuart_landau()
-    branch = continue_branch(system, [0, 0], {"mu": -0.5, "w": 2.0, "c": 0.7}, "mu",
-                             ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)}))
+    branch = continue_branch(
+        system,
+        [0, 0],
+        {"mu": -0.5, "w": 2.0, "c": 0.7},
+        "mu",
+        ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)}),
+    )
     branch.save(path)
     again = Branch.load(path)
     assert not path.with_name("b.h5.partial").exists()
@@ -235,8 +238,9 @@ continue_branch(cusp(), [-1.5], {MU}, "a", ContinuationOptions(limits={LIMITS}),
                 observers=[Checkpoint({str(path)!r}, 5), die])
 """
     root = Path(__file__).parents[2]
-    ended = subprocess.run([sys.executable, "-c", script], cwd=root, env={**os.environ,
-                           "PYTHONPATH": str(root)}, capture_output=True)
+    ended = subprocess.run(
+        [sys.executable, "-c", script], cwd=root, env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True
+    )
     assert ended.returncode == -signal.SIGKILL, ended.stderr
     left = Branch.load(path)
     assert len(left) == 10 and left.reason == "running"
@@ -255,8 +259,7 @@ def test_an_error_of_the_model_keeps_the_branch(tmp_path):
 
     path = tmp_path / "b.h5"
     with pytest.raises(RuntimeError, match="disk full") as error:
-        continue_branch(Breaking(lambda u, mu: u - mu["p"], 1), [0.0], {"p": 0.0}, "p",
-                        observers=Checkpoint(path))
+        continue_branch(Breaking(lambda u, mu: u - mu["p"], 1), [0.0], {"p": 0.0}, "p", observers=Checkpoint(path))
     kept = error.value.branch
     assert len(kept) > 3 and kept.reason == "error: disk full"
     assert len(Branch.load(path)) == len(kept)
@@ -299,14 +302,18 @@ def test_plot_draws_stability_and_special_points():
 
 def test_scales_make_a_branch_in_other_units_the_same():
     """The same curve with the state in millis and the parameter in kilos."""
+
     def other(u, mu):
         x, a = u * 1e-3, mu["a"] * 1e3
         return a + x - x**3
 
     branch = continue_branch(
-        JaxSystem(other, 1), [-1500.0], {"a": -2e-3}, "a",
-        ContinuationOptions(limits={"a": (-2e-3, 2e-3)}, state_scale=1e3,
-                            parameter_scales={"a": 1e-3}))
+        JaxSystem(other, 1),
+        [-1500.0],
+        {"a": -2e-3},
+        "a",
+        ContinuationOptions(limits={"a": (-2e-3, 2e-3)}, state_scale=1e3, parameter_scales={"a": 1e-3}),
+    )
     plain = s_curve()
     assert len(branch) == len(plain)
     assert np.allclose(branch.values() * 1e3, plain.values(), atol=1e-8)

@@ -27,8 +27,10 @@ CUBIC = RNG.standard_normal((N, N, N, N))
 
 def force(u, mu):
     return (
-        mu["a"] * (MATRIX @ u) + jnp.einsum("ijk,j,k", QUADRATIC, u, u)
-        + mu["b"] * jnp.einsum("ijkl,j,k,l", CUBIC, u, u, u) + mu["a"] ** 2 * jnp.sin(mu["b"] + u)
+        mu["a"] * (MATRIX @ u)
+        + jnp.einsum("ijk,j,k", QUADRATIC, u, u)
+        + mu["b"] * jnp.einsum("ijkl,j,k,l", CUBIC, u, u, u)
+        + mu["a"] ** 2 * jnp.sin(mu["b"] + u)
     )
 
 
@@ -102,7 +104,7 @@ def test_values_and_derivatives_equal_automatic_differentiation(system, case):
         step = RNG.standard_normal(N + 2)
         along = value.along(step[:N], {"a": step[N], "b": step[N + 1]})
         assert np.allclose(along, gradient[:, : N + 2] @ step, rtol=1e-10, atol=1e-12)
-    assert np.allclose(value.d_extra, gradient[:, N + 2:], rtol=1e-10, atol=1e-12)
+    assert np.allclose(value.d_extra, gradient[:, N + 2 :], rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize("case", CASES)

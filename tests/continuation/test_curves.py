@@ -19,21 +19,23 @@ from tests.systems.normal_forms import bautin, bogdanov_takens, cusp
 
 @pytest.fixture(scope="module")
 def cusp_fold():
-    branch = continue_branch(cusp(), [-1.5], {"a": -2.0, "b": 1.0}, "a",
-                             ContinuationOptions(limits={"a": (-2.0, 2.0)}))
+    branch = continue_branch(cusp(), [-1.5], {"a": -2.0, "b": 1.0}, "a", ContinuationOptions(limits={"a": (-2.0, 2.0)}))
     return branch.of_kind("fold")[0]
 
 
 @pytest.fixture(scope="module")
 def takens():
     return continue_branch(
-        bogdanov_takens(), [-1.2, 0.0], {"b1": -0.3, "b2": -1.0, "s": -1.0}, "b1",
-        ContinuationOptions(eigenvalues=2, limits={"b1": (-0.5, 2.0)}, max_step=0.1))
+        bogdanov_takens(),
+        [-1.2, 0.0],
+        {"b1": -0.3, "b2": -1.0, "s": -1.0},
+        "b1",
+        ContinuationOptions(eigenvalues=2, limits={"b1": (-0.5, 2.0)}, max_step=0.1),
+    )
 
 
 def test_fold_curve_through_a_cusp(cusp_fold):
-    curve = continue_fold(cusp(), cusp_fold, ("a", "b"),
-                          ContinuationOptions(direction=-1, limits={"b": (-1.0, 3.0)}))
+    curve = continue_fold(cusp(), cusp_fold, ("a", "b"), ContinuationOptions(direction=-1, limits={"b": (-1.0, 3.0)}))
     a, b = curve.values("a"), curve.values("b")
     assert np.abs(27 * a**2 - 4 * b**3).max() < 1e-9
     (point,) = curve.of_kind("cusp")
@@ -44,8 +46,9 @@ def test_fold_curve_through_a_cusp(cusp_fold):
 
 def test_fold_curve_through_a_bogdanov_takens_point(takens):
     fold = takens.of_kind("fold")[0]
-    curve = continue_fold(bogdanov_takens(), fold, ("b1", "b2"),
-                          ContinuationOptions(limits={"b2": (-2.0, 2.0)}, eigenvalues=2))
+    curve = continue_fold(
+        bogdanov_takens(), fold, ("b1", "b2"), ContinuationOptions(limits={"b2": (-2.0, 2.0)}, eigenvalues=2)
+    )
     assert np.abs(curve.values("b2") ** 2 - 4 * curve.values("b1")).max() < 1e-9
     (point,) = curve.of_kind("bogdanov-takens")
     assert abs(point.mu["b1"]) < 1e-9 and abs(point.mu["b2"]) < 1e-9
@@ -55,8 +58,7 @@ def test_fold_curve_through_a_bogdanov_takens_point(takens):
 
 def test_hopf_curve_ends_at_the_bogdanov_takens_point(takens):
     hopf = takens.of_kind("hopf")[0]
-    curve = continue_hopf(bogdanov_takens(), hopf, ("b1", "b2"),
-                          ContinuationOptions(limits={"b2": (-2.0, 2.0)}))
+    curve = continue_hopf(bogdanov_takens(), hopf, ("b1", "b2"), ContinuationOptions(limits={"b2": (-2.0, 2.0)}))
     assert curve.reason == "stopped at: bogdanov-takens"
     w = curve.values("omega")
     assert np.all(w > 0)  # the mirror image behind the point is left out
@@ -65,17 +67,18 @@ def test_hopf_curve_ends_at_the_bogdanov_takens_point(takens):
     (point,) = curve.of_kind("bogdanov-takens")
     assert abs(point.mu["b1"]) < 1e-9 and abs(point.mu["b2"]) < 1e-8
     # From there the fold curve starts too.
-    fold = continue_fold(bogdanov_takens(), point, ("b1", "b2"),
-                         ContinuationOptions(limits={"b2": (-2.0, 2.0)}))
+    fold = continue_fold(bogdanov_takens(), point, ("b1", "b2"), ContinuationOptions(limits={"b2": (-2.0, 2.0)}))
     assert np.abs(fold.values("b2") ** 2 - 4 * fold.values("b1")).max() < 1e-9
     assert fold.values("b2")[-1] == 2.0
 
 
 def test_generalised_hopf_point():
-    branch = continue_branch(bautin(), [0, 0], {"mu": -0.5, "nu": -0.5}, "mu",
-                             ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)}))
-    curve = continue_hopf(bautin(), branch.of_kind("hopf")[0], ("mu", "nu"),
-                          ContinuationOptions(limits={"nu": (-1, 1)}))
+    branch = continue_branch(
+        bautin(), [0, 0], {"mu": -0.5, "nu": -0.5}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
+    )
+    curve = continue_hopf(
+        bautin(), branch.of_kind("hopf")[0], ("mu", "nu"), ContinuationOptions(limits={"nu": (-1, 1)})
+    )
     # c1 = nu per |z|^2, twice that with q* q = 1.
     assert np.allclose(curve.values("l1"), 2 * curve.values("nu"), rtol=0, atol=1e-10)
     (point,) = curve.of_kind("generalised hopf")
@@ -84,15 +87,18 @@ def test_generalised_hopf_point():
 
 def test_zero_hopf_point_and_counts():
     """A Hopf pair and, decoupled, a real eigenvalue a."""
+
     def residual(u, mu):
         x, y, z = u
         return jnp.stack([mu["mu"] * x - y - x**3, x + mu["mu"] * y, mu["a"] * z - z**3])
 
     system = JaxSystem(residual, 3)
-    branch = continue_branch(system, np.zeros(3), {"mu": -0.5, "a": -0.6}, "mu",
-                             ContinuationOptions(eigenvalues=3, limits={"mu": (-1, 1)}))
-    curve = continue_hopf(system, branch.of_kind("hopf")[0], ("mu", "a"),
-                          ContinuationOptions(limits={"a": (-1, 1)}, eigenvalues=3))
+    branch = continue_branch(
+        system, np.zeros(3), {"mu": -0.5, "a": -0.6}, "mu", ContinuationOptions(eigenvalues=3, limits={"mu": (-1, 1)})
+    )
+    curve = continue_hopf(
+        system, branch.of_kind("hopf")[0], ("mu", "a"), ContinuationOptions(limits={"a": (-1, 1)}, eigenvalues=3)
+    )
     (point,) = curve.of_kind("zero-hopf")
     assert abs(point.mu["a"]) < 1e-9
     assert np.array_equal(curve.unstable, (curve.values("a") > 0).astype(int))
@@ -100,13 +106,15 @@ def test_zero_hopf_point_and_counts():
 
 def test_curve_with_a_turning_point_in_both_parameters():
     """Hopf at mu^2 + nu^2 = 1: an isolated island of instability, closed in the plane."""
+
     def residual(u, mu):
         g = 1 - mu["mu"] ** 2 - mu["nu"] ** 2
         return jnp.stack([g * u[0] - 2 * u[1] - u[0] ** 3, 2 * u[0] + g * u[1]])
 
     system = JaxSystem(residual, 2)
-    branch = continue_branch(system, np.zeros(2), {"mu": -2.0, "nu": 0.1}, "mu",
-                             ContinuationOptions(eigenvalues=2, limits={"mu": (-2, 2)}))
+    branch = continue_branch(
+        system, np.zeros(2), {"mu": -2.0, "nu": 0.1}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-2, 2)})
+    )
     points = branch.of_kind("hopf")
     assert len(points) == 2
     curve = continue_hopf(system, points[0], ("mu", "nu"), ContinuationOptions(max_step=0.2))
@@ -120,8 +128,9 @@ def test_curve_with_a_turning_point_in_both_parameters():
 def test_curves_are_saved_and_resumed(tmp_path, cusp_fold):
     options = ContinuationOptions(direction=-1, limits={"b": (-1.0, 3.0)})
     whole = continue_fold(cusp(), cusp_fold, ("a", "b"), options)
-    part = continue_fold(cusp(), cusp_fold, ("a", "b"),
-                         ContinuationOptions(direction=-1, limits={"b": (-1.0, 3.0)}, max_points=9))
+    part = continue_fold(
+        cusp(), cusp_fold, ("a", "b"), ContinuationOptions(direction=-1, limits={"b": (-1.0, 3.0)}, max_points=9)
+    )
     assert part.reason == "largest number of points reached"
     part.save(tmp_path / "curve.h5")
     longer = resume_curve(cusp(), Branch.load(tmp_path / "curve.h5"), options)

@@ -22,13 +22,11 @@ from tests.systems.operator_only import OperatorOnly
 
 
 def wide(**more):
-    return ContinuationOptions(**{"limits": {"mu": (-1.0, 1.0)}, "step": 0.5, "max_step": 1.9,
-                                  **more})
+    return ContinuationOptions(**{"limits": {"mu": (-1.0, 1.0)}, "step": 0.5, "max_step": 1.9, **more})
 
 
 def test_exchange_of_unstable_pairs_is_seen_though_the_count_stays():
-    branch = continue_branch(subcritical_double(), np.zeros(4), {"mu": -1.0}, "mu",
-                             wide(eigenvalues=4))
+    branch = continue_branch(subcritical_double(), np.zeros(4), {"mu": -1.0}, "mu", wide(eigenvalues=4))
     assert set(branch.unstable) == {2}
     found = sorted(s.values["omega"] for s in branch.of_kind("hopf"))
     assert np.allclose(found, [1.0, 2.5], rtol=0, atol=1e-10)
@@ -53,8 +51,7 @@ def chain(thresholds, frequencies):
 def test_three_hopf_points_within_one_step(frequencies):
     """Also with frequencies that all but agree, and with equal ones."""
     thresholds = [-0.11, 0.03, 0.3]
-    branch = continue_branch(chain(thresholds, frequencies), np.zeros(6), {"mu": -1.0}, "mu",
-                             wide(eigenvalues=6))
+    branch = continue_branch(chain(thresholds, frequencies), np.zeros(6), {"mu": -1.0}, "mu", wide(eigenvalues=6))
     points = sorted(branch.of_kind("hopf"), key=lambda s: s.mu["mu"])
     assert np.allclose([s.mu["mu"] for s in points], thresholds, rtol=0, atol=1e-9)
     assert np.allclose([s.values["omega"] for s in points], frequencies, rtol=0, atol=1e-9)
@@ -64,11 +61,11 @@ def test_three_hopf_points_within_one_step(frequencies):
 @pytest.mark.parametrize(("start", "step"), [(-0.4, 0.9), (-0.8, 1.7)])
 def test_pair_that_crosses_and_then_splits_into_real_ones_within_the_step(start, step):
     """lambda^2 - 4 mu lambda + 1: Hopf at 0, complex for |mu| < 1/2, real at one or both ends."""
+
     def residual(u, mu):
         return jnp.stack([u[1], -u[0] + 4 * mu["mu"] * u[1] - u[1] ** 3])
 
-    branch = continue_branch(JaxSystem(residual, 2), np.zeros(2), {"mu": start}, "mu",
-                             wide(eigenvalues=2, step=step))
+    branch = continue_branch(JaxSystem(residual, 2), np.zeros(2), {"mu": start}, "mu", wide(eigenvalues=2, step=step))
     assert len(branch) <= 4
     (point,) = branch.special
     assert point.kind == "hopf" and point.located
@@ -91,20 +88,23 @@ def test_a_located_point_outside_of_its_bracket_is_refused():
 
     result, _, reason = safeguarded(tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, attempt)
     assert result == fold and len(calls) == 3 and reason == ""
-    never, guess, reason = safeguarded(tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1,
-                                       lambda *_: (np.array([-fold, 0.0]), 0.0))
+    never, guess, reason = safeguarded(
+        tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, lambda *_: (np.array([-fold, 0.0]), 0.0)
+    )
     assert never is None and "left the bracket" in reason
     assert abs(guess.z[0] - fold) < 1e-3  # the best bracket is kept
 
 
 def test_leaving_and_returning_within_a_few_steps():
     """A tongue: unstable only for |mu| < 0.2."""
+
     def residual(u, mu):
         g = 0.04 - mu["mu"] ** 2
         return jnp.stack([g * u[0] - 2 * u[1] - u[0] ** 3, 2 * u[0] + g * u[1]])
 
-    branch = continue_branch(JaxSystem(residual, 2), np.zeros(2), {"mu": -1.0}, "mu",
-                             wide(eigenvalues=2, max_step=0.25, step=0.25))
+    branch = continue_branch(
+        JaxSystem(residual, 2), np.zeros(2), {"mu": -1.0}, "mu", wide(eigenvalues=2, max_step=0.25, step=0.25)
+    )
     at = [s.mu["mu"] for s in branch.of_kind("hopf")]
     assert np.allclose(at, [-0.2, 0.2], rtol=0, atol=1e-9)
     assert branch.of_kind("hopf")[0].values["crossing_real"] > 0
@@ -114,22 +114,28 @@ def test_leaving_and_returning_within_a_few_steps():
 @pytest.mark.parametrize("centre", [0.0, 0.07, 0.2])
 def test_a_tongue_narrower_than_the_step_is_not_stepped_over(centre):
     """Unstable only within 0.06 of the centre, steps of 0.4; points on neither side see it."""
+
     def residual(u, mu):
         g = 0.06**2 - (mu["mu"] - centre) ** 2
         return jnp.stack([g * u[0] - 2 * u[1] - u[0] ** 3, 2 * u[0] + g * u[1]])
 
-    branch = continue_branch(JaxSystem(residual, 2), np.zeros(2), {"mu": -1.0}, "mu",
-                             wide(eigenvalues=2, max_step=0.4, step=0.4))
+    branch = continue_branch(
+        JaxSystem(residual, 2), np.zeros(2), {"mu": -1.0}, "mu", wide(eigenvalues=2, max_step=0.4, step=0.4)
+    )
     at = [s.mu["mu"] for s in branch.of_kind("hopf")]
     assert np.allclose(sorted(at), [centre - 0.06, centre + 0.06], rtol=0, atol=1e-9)
-    assert all(branch.values()[s.index] <= s.mu["mu"] <= branch.values()[s.index + 1]
-               for s in branch.special)
+    assert all(branch.values()[s.index] <= s.mu["mu"] <= branch.values()[s.index + 1] for s in branch.special)
 
 
 def test_pole_of_the_branch_point_test_is_no_branch_point():
     """A fold is passed with the test function of branch points running all over the place."""
-    branch = continue_branch(bogdanov_takens(), [-1.2, 0.0], {"b1": -0.3, "b2": -1.0, "s": -1.0},
-                             "b1", ContinuationOptions(limits={"b1": (-0.5, 2.0)}, max_step=0.1))
+    branch = continue_branch(
+        bogdanov_takens(),
+        [-1.2, 0.0],
+        {"b1": -0.3, "b2": -1.0, "s": -1.0},
+        "b1",
+        ContinuationOptions(limits={"b1": (-0.5, 2.0)}, max_step=0.1),
+    )
     assert not [s for s in branch.special if s.kind == "branch point"]
 
 
@@ -140,8 +146,9 @@ def test_branch_points_of_modes_that_do_not_know_of_each_other():
     for hidden in (False, True):
         model = OperatorOnly(system, 0.0) if hidden else system
         spectrum = system.spectrum if hidden else None
-        branch = continue_branch(model, np.zeros(4), {"mu": -1.0}, "mu",
-                                 wide(eigenvalues=4, step=0.4, max_step=0.4), spectrum=spectrum)
+        branch = continue_branch(
+            model, np.zeros(4), {"mu": -1.0}, "mu", wide(eigenvalues=4, step=0.4, max_step=0.4), spectrum=spectrum
+        )
         at = sorted(s.mu["mu"] for s in branch.of_kind("branch point"))
         assert np.allclose(at, thresholds, rtol=0, atol=1e-9)
 
@@ -155,8 +162,9 @@ def test_determinant_alone_sees_single_branch_points():
 
 
 def test_real_eigenvalue_without_watching_for_branch_points_is_reported():
-    branch = continue_branch(pitchfork(), np.zeros(2), {"mu": -1.0, "e": 0.0}, "mu",
-                             wide(eigenvalues=2, branch_points=False))
+    branch = continue_branch(
+        pitchfork(), np.zeros(2), {"mu": -1.0, "e": 0.0}, "mu", wide(eigenvalues=2, branch_points=False)
+    )
     (special,) = branch.special
     assert special.kind == "zero eigenvalue" and not special.located
     assert "real eigenvalue crossed zero" in special.reason
@@ -170,14 +178,14 @@ def test_unconverged_eigenvalues_make_the_count_unknown():
         s = honest(u, mu, count, near)
         return Spectrum(s.values, s.vectors, np.array([True, False]), 1)
 
-    branch = continue_branch(system, [0, 0], {"mu": -0.5, "w": 2.0, "c": 0.7}, "mu",
-                             wide(eigenvalues=2), spectrum=lazy)
+    branch = continue_branch(system, [0, 0], {"mu": -0.5, "w": 2.0, "c": 0.7}, "mu", wide(eigenvalues=2), spectrum=lazy)
     assert set(branch.unstable) == {-1}
 
 
 def test_without_location_a_point_is_only_bracketed():
-    branch = continue_branch(stuart_landau(), [0, 0], {"mu": -0.5, "w": 2.0, "c": 0.7}, "mu",
-                             wide(eigenvalues=2, locate=False))
+    branch = continue_branch(
+        stuart_landau(), [0, 0], {"mu": -0.5, "w": 2.0, "c": 0.7}, "mu", wide(eigenvalues=2, locate=False)
+    )
     assert not branch.of_kind("hopf")
     (special,) = branch.of_kind("hopf", located=False)
     assert "not asked for" in special.reason
@@ -189,9 +197,13 @@ def test_missing_second_derivative_leaves_the_point_bracketed_with_the_reason():
             return super(JaxSystem, self).d2(u, mu, a, b)
 
     system = NoSecond(brusselator()._residual, 2)
-    branch = continue_branch(system, [1.0, 0.5], {"A": 1.0, "B": 0.5}, "B",
-                             ContinuationOptions(eigenvalues=2, branch_points=False,
-                                                 limits={"B": (0.0, 4.0)}))
+    branch = continue_branch(
+        system,
+        [1.0, 0.5],
+        {"A": 1.0, "B": 0.5},
+        "B",
+        ContinuationOptions(eigenvalues=2, branch_points=False, limits={"B": (0.0, 4.0)}),
+    )
     (special,) = branch.of_kind("hopf", located=False)
     assert "no second derivative" in special.reason
     assert abs(special.mu["B"] - 2.0) < 0.5
@@ -208,10 +220,12 @@ def test_only_products_and_solves_are_used():
     hidden = continue_branch(system, start, mu, "l", options).of_kind("hopf")[0]
     shown = continue_branch(inner, start, mu, "l", options).of_kind("hopf")[0]
     assert np.isclose(hidden.mu["l"], shown.mu["l"], rtol=1e-10)
-    assert np.isclose(hidden.values["first_lyapunov_coefficient"],
-                      shown.values["first_lyapunov_coefficient"], rtol=1e-7)
-    form = hopf_normal_form(system, hidden.u, hidden.mu, hidden.values["omega"],
-                            hidden.vectors["right"], hidden.vectors["left"], "l")
+    assert np.isclose(
+        hidden.values["first_lyapunov_coefficient"], shown.values["first_lyapunov_coefficient"], rtol=1e-7
+    )
+    form = hopf_normal_form(
+        system, hidden.u, hidden.mu, hidden.values["omega"], hidden.vectors["right"], hidden.vectors["left"], "l"
+    )
     assert np.isclose(form.l1, hidden.values["first_lyapunov_coefficient"], rtol=1e-9)
 
 

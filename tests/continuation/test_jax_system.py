@@ -17,7 +17,7 @@ RNG = np.random.default_rng(0)
 A, B, C, D = RNG.standard_normal((4, 2))
 STEP = 1e-5
 # Central differences of smooth functions of order one: h^2 and eps/h are both below 1e-9.
-CLOSE = dict(rtol=1e-7, atol=1e-8)
+CLOSE = {"rtol": 1e-7, "atol": 1e-8}
 
 
 def central(function):
@@ -38,34 +38,35 @@ def test_state_derivatives(system):
     lin = system.linear(POINT, MU)
     assert np.allclose(lin.matvec(A), central(lambda h: system.residual(POINT + h * A, MU)), **CLOSE)
     assert np.allclose(
-        system.d2(POINT, MU, A, B),
-        central(lambda h: system.linear(POINT + h * B, MU).matvec(A)), **CLOSE)
-    assert np.allclose(
-        system.d3(POINT, MU, A, B, C),
-        central(lambda h: system.d2(POINT + h * C, MU, A, B)), **CLOSE)
+        system.d2(POINT, MU, A, B), central(lambda h: system.linear(POINT + h * B, MU).matvec(A)), **CLOSE
+    )
+    assert np.allclose(system.d3(POINT, MU, A, B, C), central(lambda h: system.d2(POINT + h * C, MU, A, B)), **CLOSE)
 
 
 @pytest.mark.parametrize("name", ["mu", "w", "c"])
 def test_parameter_derivatives_against_the_defaults_of_the_base(system, name):
-    assert np.allclose(system.d_parameter(POINT, MU, name),
-                       SystemBase.d_parameter(system, POINT, MU, name), **CLOSE)
-    assert np.allclose(system.d2_parameter(POINT, MU, name, A),
-                       SystemBase.d2_parameter(system, POINT, MU, name, A), **CLOSE)
-    assert np.allclose(system.d_parameters2(POINT, MU, "mu", name),
-                       SystemBase.d_parameters2(system, POINT, MU, "mu", name), **CLOSE)
+    assert np.allclose(system.d_parameter(POINT, MU, name), SystemBase.d_parameter(system, POINT, MU, name), **CLOSE)
+    assert np.allclose(
+        system.d2_parameter(POINT, MU, name, A), SystemBase.d2_parameter(system, POINT, MU, name, A), **CLOSE
+    )
+    assert np.allclose(
+        system.d_parameters2(POINT, MU, "mu", name), SystemBase.d_parameters2(system, POINT, MU, "mu", name), **CLOSE
+    )
 
 
 def test_mass_derivatives(system):
     def mass(u, mu, v):
         return system.linear(u, mu).mass_matvec(v)
 
-    assert np.allclose(system.mass_d(POINT, MU, C, A),
-                       central(lambda h: mass(POINT + h * A, MU, C)), **CLOSE)
-    assert np.allclose(system.mass_d2(POINT, MU, C, A, B),
-                       central(lambda h: system.mass_d(POINT + h * B, MU, C, A)), **CLOSE)
+    assert np.allclose(system.mass_d(POINT, MU, C, A), central(lambda h: mass(POINT + h * A, MU, C)), **CLOSE)
+    assert np.allclose(
+        system.mass_d2(POINT, MU, C, A, B), central(lambda h: system.mass_d(POINT + h * B, MU, C, A)), **CLOSE
+    )
     assert np.allclose(
         system.mass_parameter(POINT, MU, "mu", C),
-        central(lambda h: mass(POINT, {**MU, "mu": MU["mu"] + h}, C)), **CLOSE)
+        central(lambda h: mass(POINT, {**MU, "mu": MU["mu"] + h}, C)),
+        **CLOSE,
+    )
 
 
 def test_sparse_assembly_equals_dense():
@@ -74,8 +75,7 @@ def test_sparse_assembly_equals_dense():
     dense = JaxSystem(sparse._residual, 2 * points)
     u = 2.0 + 0.3 * np.sin(np.arange(2 * points))
     mu = {"A": 2.0, "B": 5.0, "l": 0.7, "D1": 0.008, "D2": 0.004}
-    assert np.allclose(sparse.linear(u, mu).jacobian.toarray(), dense.linear(u, mu).jacobian,
-                       rtol=0, atol=1e-13)
+    assert np.allclose(sparse.linear(u, mu).jacobian.toarray(), dense.linear(u, mu).jacobian, rtol=0, atol=1e-13)
 
 
 def test_colours_never_share_a_row():

@@ -26,17 +26,16 @@ def test_deflation_finds_all_three_states_of_a_pitchfork():
     system, mu = pitchfork(), {"mu": 1.0, "e": 0.0}
     known = []
     for _ in range(3):
-        result = equilibrium(system, [0.6, 0.1], mu,
-                             NewtonOptions(max_iterations=100),
-                             Deflation(tuple(known)))
+        result = equilibrium(system, [0.6, 0.1], mu, NewtonOptions(max_iterations=100), Deflation(tuple(known)))
         known.append(result.required().u)
     assert np.allclose(sorted(u[0] for u in known), [-1.0, 0.0, 1.0], atol=1e-9)
 
 
 def test_deflation_at_the_known_state_itself_does_not_return_it():
     system, mu = pitchfork(), {"mu": 1.0, "e": 0.0}
-    result = equilibrium(system, [1.0, 1.0 + 1e-9], mu, NewtonOptions(max_iterations=50),
-                         Deflation((np.array([1.0, 1.0]),)))
+    result = equilibrium(
+        system, [1.0, 1.0 + 1e-9], mu, NewtonOptions(max_iterations=50), Deflation((np.array([1.0, 1.0]),))
+    )
     assert not (result.converged and np.allclose(result.u, [1.0, 1.0], atol=1e-6))
 
 
@@ -44,8 +43,7 @@ def test_line_search_saves_what_plain_newton_loses():
     system = scalar(lambda u, mu: jnp.arctan(u) - mu["c"])
     plain = equilibrium(system, [3.0], {"c": 0.0})
     damped = equilibrium(system, [3.0], {"c": 0.0}, NewtonOptions(line_search=True))
-    assert not plain.converged and plain.reason in ("diverged", "not finite", "singular",
-                                                    "maximum iterations")
+    assert not plain.converged and plain.reason in ("diverged", "not finite", "singular", "maximum iterations")
     assert damped.converged and abs(damped.u[0]) < 1e-10
 
 
@@ -53,8 +51,7 @@ def test_line_search_saves_what_plain_newton_loses():
     ("f", "start", "options", "reason"),
     [
         (lambda u, mu: u**2 + 1.0, 0.7, NewtonOptions(max_iterations=8), "maximum iterations"),
-        (lambda u, mu: u**2 + 1.0, 0.7, NewtonOptions(line_search=True, max_iterations=200),
-         "line search stalled"),
+        (lambda u, mu: u**2 + 1.0, 0.7, NewtonOptions(line_search=True, max_iterations=200), "line search stalled"),
         (lambda u, mu: jnp.log(u), 5.0, NewtonOptions(), "not finite"),
         (lambda u, mu: 1.0 + u**4, 1e-4, NewtonOptions(divergence=10.0), "diverged"),
     ],
@@ -86,8 +83,7 @@ def test_reused_factors_give_the_same_state_with_fewer_factorisations():
 
 def test_observer_sees_every_residual():
     seen = []
-    result = equilibrium(scalar(lambda u, mu: u**2 - 2.0), [1.0], {"c": 0.0},
-                         observer=lambda i, r: seen.append((i, r)))
+    result = equilibrium(scalar(lambda u, mu: u**2 - 2.0), [1.0], {"c": 0.0}, observer=lambda i, r: seen.append((i, r)))
     assert [r for _, r in seen] == list(result.history)
 
 

@@ -13,11 +13,13 @@ MU = {"mu": -0.5, "w": 2.0, "c": 0.7}
 
 
 def hopf_of(system, u, mu, parameter, low, high):
-    branch = continue_branch(system, u, mu, parameter,
-                             ContinuationOptions(eigenvalues=3, limits={parameter: (low, high)}))
+    branch = continue_branch(
+        system, u, mu, parameter, ContinuationOptions(eigenvalues=3, limits={parameter: (low, high)})
+    )
     (point,) = branch.of_kind("hopf")
-    form = hopf_normal_form(system, point.u, point.mu, point.values["omega"],
-                            point.vectors["right"], point.vectors["left"], parameter)
+    form = hopf_normal_form(
+        system, point.u, point.mu, point.values["omega"], point.vectors["right"], point.vectors["left"], parameter
+    )
     return point, form
 
 
@@ -47,9 +49,17 @@ def test_criticality_of_the_mirror_image():
 def brusselator_numbers(system, u, extra=()):
     _, form = hopf_of(system, u, {"A": 1.0, "B": 1.5}, "B", 0.5, 3.0)
     first = np.eye(len(u))[0]
-    return np.array([form.omega, form.amplitude_coefficient(first), form.crossing.real,
-                     form.crossing.imag, form.c1.imag / form.c1.real, form.side(),
-                     form.frequency(0.1)])
+    return np.array(
+        [
+            form.omega,
+            form.amplitude_coefficient(first),
+            form.crossing.real,
+            form.crossing.imag,
+            form.c1.imag / form.c1.real,
+            form.side(),
+            form.frequency(0.1),
+        ]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +88,7 @@ def test_mass_that_moves_with_state_and_parameter(reference):
 
 def test_algebraic_constraint_with_singular_mass(reference):
     """The reaction rate x^2 y as an unknown with 0 = x^2 y - s."""
+
     def residual(u, mu):
         x, y, s = u
         return jnp.stack([mu["A"] - (mu["B"] + 1) * x + s, mu["B"] * x - s, x**2 * y - s])

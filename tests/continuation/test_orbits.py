@@ -4,8 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from continuation import Branch, ContinuationOptions, NewtonOptions, NotABifurcation, NotConverged
-from continuation import continue_branch
+from continuation import Branch, ContinuationOptions, NewtonOptions, NotABifurcation, NotConverged, continue_branch
 from continuation.collocation import OrbitSystem
 from continuation.jax_system import JaxSystem
 from continuation.orbits import (
@@ -43,8 +42,13 @@ def test_period_converges_with_twice_the_degree(degree):
     errors = []
     counts = (10, 20) if degree < 4 else (16, 32)
     for intervals in counts:
-        orbit = find_orbit(van_der_pol(), 2 * CIRCLE * [1, -1], 2 * np.pi, {"mu": 0.5},
-                           OrbitOptions(intervals, degree, 0, NewtonOptions(1e-11)))
+        orbit = find_orbit(
+            van_der_pol(),
+            2 * CIRCLE * [1, -1],
+            2 * np.pi,
+            {"mu": 0.5},
+            OrbitOptions(intervals, degree, 0, NewtonOptions(1e-11)),
+        )
         errors.append(abs(orbit.period - 6.3806758017736))
     assert 2 * degree - 0.7 < np.log2(errors[0] / errors[1]) < 2 * degree + 1.2
 
@@ -67,16 +71,16 @@ def test_jacobian_of_the_collocation_equations_by_differences():
 def test_mesh_adaptation_pays_for_relaxation_oscillations():
     guess = 2 * CIRCLE * [1, -1]
     mild = find_orbit(van_der_pol(), guess, 2 * np.pi, {"mu": 1.0})
-    states, period = mild.nodes[:: 4], mild.period
+    states, period = mild.nodes[::4], mild.period
     for mu in (2.0, 3.0, 4.0, 5.0):
-        fine = find_orbit(van_der_pol(), _resample(states, 400), period, {"mu": mu},
-                          OrbitOptions(intervals=100))
+        fine = find_orbit(van_der_pol(), _resample(states, 400), period, {"mu": mu}, OrbitOptions(intervals=100))
         period = fine.period
         states = fine(np.linspace(0, period, 100, endpoint=False))
     error = {}
     for adaptations in (0, 3):
-        orbit = find_orbit(van_der_pol(), states, period, {"mu": 5.0},
-                           OrbitOptions(intervals=40, adaptations=adaptations))
+        orbit = find_orbit(
+            van_der_pol(), states, period, {"mu": 5.0}, OrbitOptions(intervals=40, adaptations=adaptations)
+        )
         error[adaptations] = abs(orbit.period - fine.period)
     assert error[3] < 0.05 * error[0]
 
@@ -89,11 +93,12 @@ def _resample(states, count):
 
 def test_cycles_from_a_hopf_point_follow_the_square_root():
     system = stuart_landau()
-    hopf = continue_branch(system, [0, 0], {**MU, "mu": -0.5}, "mu",
-                           ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})).of_kind("hopf")[0]
-    branch = orbits_from_hopf(system, hopf, "mu", 0.1,
-                              ContinuationOptions(limits={"mu": (0, 0.5)}, newton=NEWTON),
-                              OrbitOptions(intervals=16))
+    hopf = continue_branch(
+        system, [0, 0], {**MU, "mu": -0.5}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
+    ).of_kind("hopf")[0]
+    branch = orbits_from_hopf(
+        system, hopf, "mu", 0.1, ContinuationOptions(limits={"mu": (0, 0.5)}, newton=NEWTON), OrbitOptions(intervals=16)
+    )
     assert branch.reason == "limit of mu reached"
     assert np.allclose(branch.values("period"), 2 * np.pi / (2 - 0.7 * branch.values()), rtol=1e-8)
     assert set(branch.unstable) == {0}
@@ -104,26 +109,37 @@ def test_fold_of_cycles_of_the_bautin_system(tmp_path):
     """z' = (mu + i) z + nu z|z|^2 - z|z|^4, nu = 1: cycles mu = r^4 - r^2, fold at -1/4."""
     system = bautin()
     mu = {"mu": -0.5, "nu": 1.0}
-    hopf = continue_branch(system, [0, 0], mu, "mu",
-                           ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})).of_kind("hopf")[0]
+    hopf = continue_branch(
+        system, [0, 0], mu, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
+    ).of_kind("hopf")[0]
     assert hopf.values["criticality"] == "sub"
-    branch = orbits_from_hopf(system, hopf, "mu", 0.2,
-                              ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON,
-                                                  max_step=0.2),
-                              OrbitOptions(intervals=12))
+    branch = orbits_from_hopf(
+        system,
+        hopf,
+        "mu",
+        0.2,
+        ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON, max_step=0.2),
+        OrbitOptions(intervals=12),
+    )
     (fold,) = branch.of_kind("fold of cycles")
     assert abs(fold.mu["mu"] + 0.25) < 1e-8
     at = fold.index
-    assert set(branch.unstable[: at + 1]) == {1} and set(branch.unstable[at + 1:]) == {0}
+    assert set(branch.unstable[: at + 1]) == {1} and set(branch.unstable[at + 1 :]) == {0}
     branch.save(tmp_path / "cycles.h5")
-    part = orbits_from_hopf(system, hopf, "mu", 0.2,
-                            ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON,
-                                                max_step=0.2, max_points=5),
-                            OrbitOptions(intervals=12))
+    part = orbits_from_hopf(
+        system,
+        hopf,
+        "mu",
+        0.2,
+        ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON, max_step=0.2, max_points=5),
+        OrbitOptions(intervals=12),
+    )
     part.save(tmp_path / "part.h5")
-    longer = resume_orbits(system, Branch.load(tmp_path / "part.h5"),
-                           ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON,
-                                               max_step=0.2))
+    longer = resume_orbits(
+        system,
+        Branch.load(tmp_path / "part.h5"),
+        ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON, max_step=0.2),
+    )
     assert np.allclose(longer.values(), branch.values(), rtol=0, atol=1e-7)
     again = orbit_at(system, Branch.load(tmp_path / "cycles.h5"), -1)
     r2 = 0.5 + np.sqrt(0.25 + 0.3)
@@ -145,17 +161,23 @@ def test_period_doubling_of_a_twisted_band():
         # cos and sin of the full angle give the symmetric matrix with half-angle axes.
         m = 0.5 * (g - 1.0)
         d = 0.5 * (g + 1.0)
-        return jnp.stack([x - y - r2 * x, x + y - r2 * y,
-                          (m + d * c) * p + (d * s - half) * q - p**3,
-                          (d * s + half) * p + (m - d * c) * q - q**3])
+        return jnp.stack(
+            [
+                x - y - r2 * x,
+                x + y - r2 * y,
+                (m + d * c) * p + (d * s - half) * q - p**3,
+                (d * s + half) * p + (m - d * c) * q - q**3,
+            ]
+        )
 
     system = JaxSystem(residual, 4)
     guess = np.hstack([CIRCLE, np.zeros_like(CIRCLE)])
     orbit = find_orbit(system, guess, 6.0, {"mu": 0.0}, OrbitOptions(intervals=16))
     real = orbit.nontrivial[np.argmin(np.abs(orbit.nontrivial + np.exp(-2 * np.pi * a)))]
     assert np.isclose(real, -np.exp(-2 * np.pi * a), rtol=1e-6)
-    branch = continue_orbits(system, orbit, "mu",
-                             ContinuationOptions(limits={"mu": (0, 0.6)}, newton=NEWTON, max_step=0.1))
+    branch = continue_orbits(
+        system, orbit, "mu", ContinuationOptions(limits={"mu": (0, 0.6)}, newton=NEWTON, max_step=0.1)
+    )
     (point,) = branch.of_kind("period doubling")
     assert abs(point.mu["mu"] - a) < 1e-7
     assert branch.unstable[0] == 0 and branch.unstable[-1] == 1
@@ -168,7 +190,12 @@ def test_a_guess_that_is_no_orbit():
 
 
 def test_orbits_start_at_hopf_points_only():
-    branch = continue_branch(bautin(), [0, 0], {"mu": -0.5, "nu": 1.0}, "mu",
-                             ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)}, locate=False))
+    branch = continue_branch(
+        bautin(),
+        [0, 0],
+        {"mu": -0.5, "nu": 1.0},
+        "mu",
+        ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)}, locate=False),
+    )
     with pytest.raises(NotABifurcation):
         orbits_from_hopf(bautin(), branch.special[0], "mu", 0.1)

@@ -15,10 +15,10 @@ def dense_twin(chain):
     """The same equations written once in JAX, with dense matrices."""
     k, c = chain.stiffness.toarray(), chain.damping.toarray()
     b = np.eye(chain.size)
-    b[chain.count:, chain.count:] = chain.mass.toarray()
+    b[chain.count :, chain.count :] = chain.mass.toarray()
 
     def residual(u, mu):
-        q, v = u[: chain.count], u[chain.count:]
+        q, v = u[: chain.count], u[chain.count :]
         coupling = chain.feed @ (chain.read.T @ (q + chain.delay * v))
         return jnp.concatenate([v, -c @ v - k @ q - q**3 + 0.4 * q * v + mu["mu"] * coupling])
 
@@ -39,14 +39,14 @@ def test_condensed_solves_equal_dense_ones(shift):
     assert np.allclose(own.solve_transpose(dense.jacobian.T @ x.real), x.real)
 
 
-OPTIONS = ContinuationOptions(eigenvalues=8, near=0.1j, limits={"mu": (0.0, 0.1)}, step=0.01,
-                              max_step=0.02, stop_at=frozenset({"hopf"}))
+OPTIONS = ContinuationOptions(
+    eigenvalues=8, near=0.1j, limits={"mu": (0.0, 0.1)}, step=0.01, max_step=0.02, stop_at=frozenset({"hopf"})
+)
 
 
 def test_condensed_and_dense_find_the_same_hopf_point():
     chain = CoupledChain(40)
-    found = [continue_branch(s, np.zeros(80), MU, "mu", OPTIONS).of_kind("hopf")[0]
-             for s in (chain, dense_twin(chain))]
+    found = [continue_branch(s, np.zeros(80), MU, "mu", OPTIONS).of_kind("hopf")[0] for s in (chain, dense_twin(chain))]
     one, two = found
     assert np.isclose(one.mu["mu"], two.mu["mu"], rtol=1e-9)
     assert np.isclose(one.values["omega"], two.values["omega"], rtol=1e-9)

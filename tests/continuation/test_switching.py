@@ -51,8 +51,7 @@ def test_points_on_both_sides_of_the_buckled_column_tree():
     system = JaxSystem(residual, n)
     # K has the eigenvalues 4 sin^2((2k-1) pi / (4 n + 2)) of a fixed-free chain.
     exact = 4 * np.sin((2 * np.arange(1, 3) - 1) * np.pi / (4 * n + 2)) ** 2
-    options = ContinuationOptions(limits={"p": (0.0, 0.6)}, step=0.02, max_step=0.05,
-                                  eigenvalues=n)
+    options = ContinuationOptions(limits={"p": (0.0, 0.6)}, step=0.02, max_step=0.05, eigenvalues=n)
     trunk = continue_branch(system, np.zeros(n), {"p": 0.0}, "p", options)
     points = trunk.of_kind("branch point")
     assert np.allclose([s.mu["p"] for s in points], exact, rtol=1e-9)
@@ -64,8 +63,12 @@ def test_points_on_both_sides_of_the_buckled_column_tree():
 
 def test_only_located_branch_points_will_do():
     system = pitchfork()
-    trunk = continue_branch(system, np.zeros(2), {"mu": -1.0, "e": 0.0}, "mu",
-                            ContinuationOptions(eigenvalues=2, limits={"mu": (-1.0, 1.0)},
-                                                branch_points=False))
+    trunk = continue_branch(
+        system,
+        np.zeros(2),
+        {"mu": -1.0, "e": 0.0},
+        "mu",
+        ContinuationOptions(eigenvalues=2, limits={"mu": (-1.0, 1.0)}, branch_points=False),
+    )
     with pytest.raises(NotABifurcation, match="zero eigenvalue"):
         switch_branch(system, trunk.special[0], "mu", OPTIONS)

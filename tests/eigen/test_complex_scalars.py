@@ -1,4 +1,5 @@
 """The same results with a PETSc built for complex numbers, in a process of its own."""
+
 import os
 import subprocess
 import sys
@@ -36,8 +37,10 @@ def complex_packages() -> list[str]:
     named = os.environ.get("PETSC_COMPLEX_PATH")
     if named:
         return named.split(os.pathsep)
-    found = [next(Path("/usr/lib").glob(f"{kind}dir/*/x86_64-linux-gnu-complex/lib/python3/dist-packages"), None)
-             for kind in ("petsc", "slepc")]
+    found = [
+        next(Path("/usr/lib").glob(f"{kind}dir/*/x86_64-linux-gnu-complex/lib/python3/dist-packages"), None)
+        for kind in ("petsc", "slepc")
+    ]
     return [str(f) for f in found] if all(found) else []
 
 
@@ -45,7 +48,8 @@ def complex_packages() -> list[str]:
 def test_complex_scalars_give_the_same():
     paths = complex_packages() + [str(ROOT)]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
-    run = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, cwd=ROOT,
-                         capture_output=True, text=True, timeout=300)
+    run = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=environment, cwd=ROOT, capture_output=True, text=True, timeout=300
+    )
     assert run.returncode == 0, run.stderr[-2000:]
     assert run.stdout.strip().endswith("agrees")

@@ -1,9 +1,9 @@
 """Left vectors and eigenvalue derivatives."""
+
 import numpy as np
 import pytest
 
-from eigen import (CoupledPencil, PencilDerivative, SearchOptions, difference, eigenvalue_derivative,
-                   leading_modes)
+from eigen import CoupledPencil, PencilDerivative, SearchOptions, difference, eigenvalue_derivative, leading_modes
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import random_pencil
 
@@ -15,9 +15,14 @@ def full_matrix(pencil, s):
     return np.block([[D - G @ A @ J, -G @ B], [R @ J, S]])
 
 
-@pytest.mark.parametrize("options", [SearchOptions(left=True, method="dense", max_frequency=10.0),
-                                     SearchOptions(left=True, method="krylov", max_frequency=10.0),
-                                     SearchOptions(left=True, method="krylov", shifts=(0.5 + 2j, 8.0))])
+@pytest.mark.parametrize(
+    "options",
+    [
+        SearchOptions(left=True, method="dense", max_frequency=10.0),
+        SearchOptions(left=True, method="krylov", max_frequency=10.0),
+        SearchOptions(left=True, method="krylov", shifts=(0.5 + 2j, 8.0)),
+    ],
+)
 @pytest.mark.parametrize("m, b", [(0, 0), (4, 0), (4, 1), (4, 2)])
 def test_left_vectors_and_their_scaling(options, m, b):
     pencil = random_pencil(np.random.default_rng(m + b), 30, m, b)
@@ -35,8 +40,11 @@ def test_left_vectors_and_their_scaling(options, m, b):
 
 
 def changed(pencil, change, step):
-    names = [n for n in ("M", "C", "K", "G", "J", "A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")
-             if getattr(change, n) is not None]
+    names = [
+        n
+        for n in ("M", "C", "K", "G", "J", "A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")
+        if getattr(change, n) is not None
+    ]
     return pencil.replace(**{n: getattr(pencil, n) + step * getattr(change, n) for n in names})
 
 
@@ -63,8 +71,10 @@ def test_derivative_with_callables_and_density():
     search = SearchOptions(left=True, method="krylov", max_frequency=40.0)
     modes = leading_modes(base, 3, search)
     change = difference(less, more, 2 * step)
-    as_callable = PencilDerivative(K=lambda x: 0 * x, **{
-        n: getattr(change, n) for n in ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")})
+    as_callable = PencilDerivative(
+        K=lambda x: 0 * x,
+        **{n: getattr(change, n) for n in ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")},
+    )
     up, down = (leading_modes(p, 3, search).eigenvalues for p in (more, less))
     for i in range(3):
         predicted = eigenvalue_derivative(base, modes.mode(i), change)

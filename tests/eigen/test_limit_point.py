@@ -1,4 +1,5 @@
 """Leading modes where stiffness-proportional damping makes real eigenvalues accumulate."""
+
 import numpy as np
 import pytest
 import scipy.sparse as sp

@@ -1,4 +1,5 @@
 """Leading modes against dense solutions, and awkward input."""
+
 import numpy as np
 import pytest
 
@@ -44,10 +45,12 @@ def test_plate_over_four_decades_of_density_against_dense(storage, density):
 
 def test_the_leading_modes_depend_neither_on_the_number_nor_on_the_shift(plate):
     few = leading_modes(plate, 4, SearchOptions(max_frequency=40.0))
-    for options, count in ((SearchOptions(max_frequency=40.0), 8),
-                           (SearchOptions(shifts=(250.0,), max_frequency=40.0), 4),
-                           (SearchOptions(shifts=(100 + 200j,), max_frequency=40.0), 4),
-                           (SearchOptions(shifts=(300.0, 80 + 150j), max_frequency=40.0), 4)):
+    for options, count in (
+        (SearchOptions(max_frequency=40.0), 8),
+        (SearchOptions(shifts=(250.0,), max_frequency=40.0), 4),
+        (SearchOptions(shifts=(100 + 200j,), max_frequency=40.0), 4),
+        (SearchOptions(shifts=(300.0, 80 + 150j), max_frequency=40.0), 4),
+    ):
         other = leading_modes(plate, count, options)
         assert np.abs(other.eigenvalues[:4] - few.eigenvalues).max() < 1e-8 * np.abs(few.eigenvalues).max()
         assert other.complete_above <= few.growth_rate[-1]
@@ -56,8 +59,12 @@ def test_the_leading_modes_depend_neither_on_the_number_nor_on_the_shift(plate):
 def test_the_region_holds_what_it_claims(plate):
     modes = leading_modes(plate, 5, SearchOptions(method="krylov", max_frequency=30.0))
     values = dense_eigenvalues(plate)
-    inside = values[(values.real >= modes.complete_above) & (values.real <= modes.complete_below)
-                    & (values.imag >= 0) & (values.imag <= 60 * np.pi)]
+    inside = values[
+        (values.real >= modes.complete_above)
+        & (values.real <= modes.complete_below)
+        & (values.imag >= 0)
+        & (values.imag <= 60 * np.pi)
+    ]
     assert inside.size >= 5
     for value in leading_of(inside, 5):
         assert np.abs(modes.eigenvalues - value).min() < 1e-7 * abs(value)
@@ -99,16 +106,20 @@ def test_shift_on_an_eigenvalue_is_moved_and_said():
 
 def test_singular_stiffness():
     K = np.diag(np.arange(60.0) ** 2)
-    modes = leading_modes(CoupledPencil(M=np.eye(60), C=0.1 * np.eye(60), K=K), 3,
-                          SearchOptions(method="krylov", max_frequency=0.5))
+    modes = leading_modes(
+        CoupledPencil(M=np.eye(60), C=0.1 * np.eye(60), K=K), 3, SearchOptions(method="krylov", max_frequency=0.5)
+    )
     assert modes.eigenvalues[0] == pytest.approx(0.0, abs=1e-9)
     assert np.allclose(modes.growth_rate[1:3], -0.05)
 
 
 def test_zero_damping():
     K = np.diag(np.arange(1.0, 81.0) ** 2)
-    modes = leading_modes(CoupledPencil(M=np.eye(80), C=np.zeros((80, 80)), K=K), 4,
-                          SearchOptions(method="krylov", max_frequency=4.5 / (2 * np.pi)))
+    modes = leading_modes(
+        CoupledPencil(M=np.eye(80), C=np.zeros((80, 80)), K=K),
+        4,
+        SearchOptions(method="krylov", max_frequency=4.5 / (2 * np.pi)),
+    )
     assert np.allclose(np.sort(modes.eigenvalues.imag), [1, 2, 3, 4])
     assert np.abs(modes.growth_rate).max() < 1e-8
 
@@ -152,21 +163,43 @@ def test_a_workspace_serves_one_pencil_after_another(plate):
         assert np.allclose(modes.eigenvalues, fresh.eigenvalues, rtol=1e-9)
 
 
-@pytest.mark.parametrize("parts, message", [
-    (dict(M=np.eye(2), C=np.eye(3), K=np.eye(2)), "has shape"),
-    (dict(M=np.eye(2), C=np.eye(2), K=np.diag([1.0, np.nan])), "not finite"),
-    (dict(M=np.eye(2), C=np.eye(2), K=1j * np.eye(2)), "must be real"),
-    (dict(M=np.eye(2), C=np.eye(2), K=np.eye(2), G=np.ones((2, 1))), "give both or neither"),
-    (dict(M=np.eye(2), C=np.eye(2), K=np.eye(2), G=np.ones((2, 1)), J=np.ones((1, 2)),
-          S0=[[1.0]], B0=np.ones((1, 2))), "B0"),
-])
+@pytest.mark.parametrize(
+    "parts, message",
+    [
+        ({"M": np.eye(2), "C": np.eye(3), "K": np.eye(2)}, "has shape"),
+        ({"M": np.eye(2), "C": np.eye(2), "K": np.diag([1.0, np.nan])}, "not finite"),
+        ({"M": np.eye(2), "C": np.eye(2), "K": 1j * np.eye(2)}, "must be real"),
+        ({"M": np.eye(2), "C": np.eye(2), "K": np.eye(2), "G": np.ones((2, 1))}, "give both or neither"),
+        (
+            {
+                "M": np.eye(2),
+                "C": np.eye(2),
+                "K": np.eye(2),
+                "G": np.ones((2, 1)),
+                "J": np.ones((1, 2)),
+                "S0": [[1.0]],
+                "B0": np.ones((1, 2)),
+            },
+            "B0",
+        ),
+    ],
+)
 def test_wrong_pencils_are_refused(parts, message):
     with pytest.raises(ValueError, match=message):
         CoupledPencil(**parts)
 
 
-@pytest.mark.parametrize("wrong", [dict(max_frequency=-1.0), dict(method="fast"), dict(shifts=()),
-                                   dict(tolerance=0.0), dict(shifts=(np.inf,)), dict(max_pairs=0)])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"max_frequency": -1.0},
+        {"method": "fast"},
+        {"shifts": ()},
+        {"tolerance": 0.0},
+        {"shifts": (np.inf,)},
+        {"max_pairs": 0},
+    ],
+)
 def test_wrong_options_are_refused(wrong):
     with pytest.raises(ValueError):
         SearchOptions(**wrong)

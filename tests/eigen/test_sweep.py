@@ -1,4 +1,5 @@
 """Sweeps on a structural basis against full solves."""
+
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ def over_density(base, storage=False):
     def pencil(density):
         other = plate_over_channel(6, 15, density=density, storage=storage)
         return other.replace(M=base.M, C=base.C, K=base.K, G=base.G, J=base.J)
+
     return pencil
 
 
@@ -45,8 +47,9 @@ def test_damping_sweep(state):
         alpha, beta = damping(index)
         return base.replace(C=(alpha * base.M + beta * stiffness).tocsr())
 
-    result = sweep(pencil, range(4), 3, SearchOptions(max_frequency=30.0), damping_at=damping,
-                   stiffness=stiffness, checks=4)
+    result = sweep(
+        pencil, range(4), 3, SearchOptions(max_frequency=30.0), damping_at=damping, stiffness=stiffness, checks=4
+    )
     assert result.certified, result.notes
     assert max(error for _, error in result.checks) < 1e-6
 
@@ -63,8 +66,9 @@ def test_a_poor_basis_is_enlarged(state):
 
 def test_a_sweep_that_cannot_be_certified_says_so(state):
     base, _ = state
-    result = sweep(over_density(base), np.geomspace(1, 100, 6), 2, SearchOptions(max_frequency=40.0),
-                   tolerance=1e-18, max_solves=2)
+    result = sweep(
+        over_density(base), np.geomspace(1, 100, 6), 2, SearchOptions(max_frequency=40.0), tolerance=1e-18, max_solves=2
+    )
     assert not result.certified and "missed the tolerance" in result.notes[0]
 
 

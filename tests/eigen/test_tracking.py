@@ -1,4 +1,5 @@
 """Modes followed along a parameter: crossings, veerings, real pairs that merge and split."""
+
 import numpy as np
 import pytest
 
@@ -52,8 +53,9 @@ def test_real_modes_merge_into_a_pair_and_split_again():
 def test_cantilever_pipe_to_flutter():
     search = SearchOptions(method="dense", max_frequency=40.0)
     values = np.linspace(0.5, 6.5, 25)
-    branches = track(lambda u: fluid_conveying_pipe(u, 0.2, elements=10), values,
-                     TrackOptions(count=4, margin=1, search=search))
+    branches = track(
+        lambda u: fluid_conveying_pipe(u, 0.2, elements=10), values, TrackOptions(count=4, margin=1, search=search)
+    )
     # each branch is smooth: second differences stay small against the values
     for row in branches.eigenvalues:
         known = row[np.isfinite(row)]
@@ -73,18 +75,23 @@ def test_plate_over_density():
 
     values = np.geomspace(1.0, 50.0, 8)
     seen = []
-    branches = track(pencil, values, TrackOptions(count=3, margin=3, search=SearchOptions(max_frequency=40.0)),
-                     observer=lambda value, solves: seen.append(value))
+    branches = track(
+        pencil,
+        values,
+        TrackOptions(count=3, margin=3, search=SearchOptions(max_frequency=40.0)),
+        observer=lambda value, solves: seen.append(value),
+    )
     assert seen == list(values)
-    fine = track(pencil, np.geomspace(1.0, 50.0, 22), TrackOptions(
-        count=3, margin=3, search=SearchOptions(max_frequency=40.0)))
+    fine = track(
+        pencil, np.geomspace(1.0, 50.0, 22), TrackOptions(count=3, margin=3, search=SearchOptions(max_frequency=40.0))
+    )
     # the same modes lead to the same ends, in three times as many steps
     for row in branches.eigenvalues[np.isfinite(branches.eigenvalues).all(axis=1)]:
         partner = np.argmin(np.abs(fine.eigenvalues[:, 0] - row[0]))
         assert fine.eigenvalues[partner, -1] == pytest.approx(row[-1], rel=1e-6)
 
 
-@pytest.mark.parametrize("wrong", [dict(count=0), dict(margin=-1), dict(least_confidence=1.5)])
+@pytest.mark.parametrize("wrong", [{"count": 0}, {"margin": -1}, {"least_confidence": 1.5}])
 def test_wrong_options_are_refused(wrong):
     with pytest.raises(ValueError):
         TrackOptions(**wrong)

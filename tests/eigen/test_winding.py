@@ -1,4 +1,5 @@
 """The independent count against dense spectra."""
+
 import numpy as np
 import pytest
 
@@ -11,10 +12,16 @@ from tests.systems.random_pencils import dense_eigenvalues, random_pencil
 def random_case(rng):
     m = int(rng.integers(0, 4))
     return random_pencil(
-        rng, int(rng.integers(1, 9)), m, int(rng.integers(0, 3)) if m else 0,
-        added_mass=rng.random() < 0.5, unsymmetric=rng.random() < 0.6,
+        rng,
+        int(rng.integers(1, 9)),
+        m,
+        int(rng.integers(0, 3)) if m else 0,
+        added_mass=rng.random() < 0.5,
+        unsymmetric=rng.random() < 0.6,
         damping=rng.choice(["general", "positive", "none", "mass"]),
-        scale=10 ** rng.uniform(-3, 1), algebraic=rng.random() < 0.2)
+        scale=10 ** rng.uniform(-3, 1),
+        algebraic=rng.random() < 0.2,
+    )
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -48,7 +55,7 @@ def test_lines_other_than_the_axis(line):
 
 def test_counts_within_a_band():
     rng = np.random.default_rng(12)
-    for k in range(40):
+    for _k in range(40):
         pencil = random_case(rng)
         values = dense_eigenvalues(pencil)
         band = 0.5
@@ -79,8 +86,9 @@ def test_a_structure_unstable_by_itself_is_counted():
 
 def test_poles_of_the_fluid_in_the_right_half_plane_are_no_trouble():
     # the fluid alone grows: (s - 2) U = s q; weakly coupled, so U's eigenvalue stays near 2
-    pencil = CoupledPencil(M=[[1.0]], C=[[0.2]], K=[[1.0]], G=[[1.0]], J=[[1.0]], B0=[[0.01]],
-                           R1=[[-1.0]], S0=[[-2.0]], S1=[[1.0]])
+    pencil = CoupledPencil(
+        M=[[1.0]], C=[[0.2]], K=[[1.0]], G=[[1.0]], J=[[1.0]], B0=[[0.01]], R1=[[-1.0]], S0=[[-2.0]], S1=[[1.0]]
+    )
     assert unstable_count(pencil).number == 1
 
 
@@ -93,8 +101,10 @@ def test_sparse_and_dense_determinants_agree(monkeypatch):
     assert dense.number == sparse.number == int(np.sum(dense_eigenvalues(pencil).real > 0))
 
 
-@pytest.mark.parametrize("velocity, storage, density", [
-    (3.0, False, 10.0), (3.0, True, 10.0), (6.0, False, 10.0), (8.0, False, 2.0), (5.0, True, 1000.0)])
+@pytest.mark.parametrize(
+    "velocity, storage, density",
+    [(3.0, False, 10.0), (3.0, True, 10.0), (6.0, False, 10.0), (8.0, False, 2.0), (5.0, True, 1000.0)],
+)
 def test_large_pencils_by_basis(velocity, storage, density):
     pencil = plate_over_channel(6, 15, inlet_velocity=velocity, storage=storage, density=density)
     assert pencil.n > Determinant.dense_below
@@ -138,8 +148,15 @@ def test_reduced_basis_has_the_transfer_function():
 
 def test_an_eigenvalue_at_zero_is_said_and_ends_the_refinement():
     """A coupling that leaves a constant free: the count cannot be certain, and must not go on for ever."""
-    pencil = CoupledPencil(M=np.eye(2), C=0.1 * np.eye(2), K=np.diag([1.0, 4.0]), G=np.ones((2, 1)), J=np.ones((1, 2)),
-                           B0=[[1.0]], S1=[[1.0]])  # fmt: skip
+    pencil = CoupledPencil(
+        M=np.eye(2),
+        C=0.1 * np.eye(2),
+        K=np.diag([1.0, 4.0]),
+        G=np.ones((2, 1)),
+        J=np.ones((1, 2)),
+        B0=[[1.0]],
+        S1=[[1.0]],
+    )
     count = unstable_count(pencil)
     assert not count.certain
     assert count.evaluations < 500

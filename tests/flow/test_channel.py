@@ -24,7 +24,9 @@ def difference(function, x, direction, step):
 
 
 def test_steady_pressure_is_bernoullis():
-    """p_k = P (A_o^-2 - A_k^-2)/(A_o^-2 - A_in^-2) (Th. 4.10): nothing at the outlet, everything at the inlet, no density."""
+    """p_k = P (A_o^-2 - A_k^-2)/(A_o^-2 - A_in^-2) (Th. 4.10): nothing at the outlet, everything at the inlet, no
+    density.
+    """
     z, area = passage()
     channel = Channel(z, FLOOR)
     pressure = channel.steady_pressure(area, 18e3)
@@ -108,7 +110,8 @@ def test_operators_at_a_moving_state(storage, unsteady):
 
 @pytest.mark.parametrize("storage", [0.0, 1.0])
 def test_widening_channel(storage):
-    """A straight channel whose walls part at a constant rate r: with s counted from the inlet A U(s) = A U - r s, exactly.
+    """A straight channel whose walls part at a constant rate r: with s counted from the inlet A U(s) = A U - r s,
+    exactly.
 
     p = P - rho [(U(s)^2 - U^2)/2 + U' s + r^2 s^2/(2 A^2)]; the quasi-steady law moves no fluid with the wall.
     """
@@ -120,12 +123,16 @@ def test_widening_channel(storage):
     pressure = channel.pressure(area * one, rate * one, 0 * one, velocity, velocity_rate, 18e3, density)
     drawn = storage * rate * s / area
     speed = velocity - drawn
-    expected = 18e3 - density * (0.5 * (speed**2 - velocity**2) + velocity_rate * s + 0.5 * drawn**2 / max(storage, 1.0))
+    expected = 18e3 - density * (
+        0.5 * (speed**2 - velocity**2) + velocity_rate * s + 0.5 * drawn**2 / max(storage, 1.0)
+    )
     assert pressure == pytest.approx(expected, rel=1e-7)
 
 
 def test_storage_conserves_volume():
-    """An accelerating wall: the flow into each stretch less the flow out of it changes as the volume's second derivative."""
+    """An accelerating wall: the flow into each stretch less the flow out of it changes as the volume's second
+    derivative.
+    """
     z, area = passage()
     acceleration = 0.5 * np.random.default_rng(4).standard_normal(len(z))
     zero, density, velocity_rate = np.zeros(len(z)), 1000.0, 2.0
@@ -145,7 +152,9 @@ def test_storage_conserves_volume():
 
 
 def test_added_mass_only_with_storage():
-    """The pressure against a wall that accelerates outwards falls everywhere once the inlet velocity has followed (p = 0 at the outlet)."""
+    """The pressure against a wall that accelerates outwards falls everywhere once the inlet velocity has followed (p =
+    0 at the outlet).
+    """
     z, area = passage()
     assert np.all(Channel(z, FLOOR, 0.0).operators(area, 18e3, 1000.0).area2 == 0.0)
     operators = Channel(z, FLOOR, 1.0).operators(area, 18e3, 1000.0)
@@ -155,7 +164,7 @@ def test_added_mass_only_with_storage():
 
 
 def test_closed_passage_stays_finite_and_smooth():
-    """Areas that pass through zero: pressures and slopes finite, monotone in the area, bounded by the inlet pressure."""
+    """Areas through zero: pressures and slopes finite, monotone in the area, bounded by the inlet pressure."""
     z, area = passage()
     channel = Channel(z, FLOOR)
     levels = np.concatenate([np.linspace(-40 * FLOOR, 40 * FLOOR, 81), [-1e-2, -1.0]])
@@ -169,7 +178,10 @@ def test_closed_passage_stays_finite_and_smooth():
         assert np.isfinite(velocity) and velocity > 0.0
         operators = channel.operators(shut, 18e3, 1000.0)
         assert all(np.isfinite(part).all() for part in vars(operators).values())
-    flows = [channel.inlet_velocity(np.concatenate([[level], area[1:]]), 18e3, 1000.0) for level in np.linspace(-1e-4, 1e-3, 50)]
+    flows = [
+        channel.inlet_velocity(np.concatenate([[level], area[1:]]), 18e3, 1000.0)
+        for level in np.linspace(-1e-4, 1e-3, 50)
+    ]
     assert np.all(np.diff(flows) >= 0.0)
 
 
@@ -184,7 +196,9 @@ def test_all_stations_shut():
 
 def test_floor_does_not_touch_an_open_passage():
     z, area = passage()
-    assert Channel(z, FLOOR).steady_pressure(area, 1.0) == pytest.approx(Channel(z, 1e-7).steady_pressure(area, 1.0), abs=1e-8)
+    assert Channel(z, FLOOR).steady_pressure(area, 1.0) == pytest.approx(
+        Channel(z, 1e-7).steady_pressure(area, 1.0), abs=1e-8
+    )
 
 
 def test_positions_must_increase():

@@ -15,7 +15,9 @@ VALVE = Case().valve
 
 
 def mesh_of(around=8, along=16, **valve):
-    case = Case().replace({"mesh.around": around, "mesh.along": along} | {f"valve.{key}": value for key, value in valve.items()})
+    case = Case().replace(
+        {"mesh.around": around, "mesh.along": along} | {f"valve.{key}": value for key, value in valve.items()}
+    )
     return valve_mesh(case.valve, case.mesh)
 
 
@@ -111,7 +113,9 @@ def test_normals_point_out_of_the_valve():
 
 def test_wall_map():
     mesh = mesh_of(4, 48)
-    expected = np.select([mesh.element_z < 0.21, mesh.element_z < 0.30, mesh.element_z < 0.49], [0.012, 0.015, 0.019], 0.016)
+    expected = np.select(
+        [mesh.element_z < 0.21, mesh.element_z < 0.30, mesh.element_z < 0.49], [0.012, 0.015, 0.019], 0.016
+    )
     assert np.array_equal(mesh.thickness, expected)
     assert np.all(mesh_of(wall="uniform").thickness == 0.01438)
     assert mesh_of(4, 48, thickness_factor=0.5).thickness == pytest.approx(expected / 2)
@@ -142,7 +146,9 @@ def given_valve(path):
 
 
 def test_key_points_reproduce_the_parametric_surface(tmp_path):
-    """Key points sampled from the parametric surface give it back, the lip's tight side edge as well as fifteen points allow."""
+    """Key points sampled from the parametric surface give it back, the lip's tight side edge as well as fifteen points
+    allow.
+    """
     surface = surface_of(VALVE)
     length = 0.125 + 0.5 * np.pi * 0.00619
     corner = 0.125 / length
@@ -151,7 +157,8 @@ def test_key_points_reproduce_the_parametric_surface(tmp_path):
     given = mesh_of(16, 32, key_points=str(path))
     own = mesh_of(16, 32)
     assert given.z == pytest.approx(own.z, abs=1e-12)
-    # nodes may slide in the surface: a saddle profile is taken at its own equal arc lengths, a ruled one at those of its ends
+    # nodes may slide in the surface: a saddle profile is taken at its own equal arc lengths, a ruled one at those of
+    # its ends
     fine = np.linspace(0, 1, 20001)
     radius = 0.00619
     distance = np.zeros(given.rows.shape)
@@ -159,8 +166,11 @@ def test_key_points_reproduce_the_parametric_surface(tmp_path):
         curve = surface.section(level, fine)
         for j, node in enumerate(given.nodes[given.rows[k]]):
             distance[k, j] = np.sqrt(((curve - node) ** 2).sum(axis=1).min())
-    on_profile = np.isin(np.round(given.z, 9), np.round([profile.z for profile in surface_of(given_valve(path)).profiles], 9))
-    # the curvature of the lip jumps where straight and circle meet: a cubic spline with points R1 pi/14 apart rings by a few per cent of R1
+    on_profile = np.isin(
+        np.round(given.z, 9), np.round([profile.z for profile in surface_of(given_valve(path)).profiles], 9)
+    )
+    # the curvature of the lip jumps where straight and circle meet: a cubic spline with points R1 pi/14 apart rings by
+    # a few per cent of R1
     assert distance[on_profile].max() < 0.03 * radius
     # between the profiles of the saddle the two correspondences differ, most near its tight end
     assert distance.max() < 0.06 * radius

@@ -38,7 +38,9 @@ def test_two_constants_come_back_from_a_file(tmp_path):
     law = MooneyRivlin(0.3e6, 0.1e6, 0.0, 1300.0)
     path = tmp_path / "tension.csv"
     strains = np.linspace(0.02, 0.5, 12)
-    lines = [f"{p / 1e6!r}\tx\t{100 * s!r}" for s, p in zip(strains.tolist(), uniaxial_stress(law, 1 + strains).tolist())]
+    lines = [
+        f"{p / 1e6!r}\tx\t{100 * s!r}" for s, p in zip(strains.tolist(), uniaxial_stress(law, 1 + strains).tolist())
+    ]
     path.write_text("# fifth loading\n\nNominal stress [MPa]\tremark\tengineering_strain (%)\n" + "\n".join(lines))
     test = read_tension_test(path)
     np.testing.assert_allclose(test.strain, strains, rtol=1e-14)

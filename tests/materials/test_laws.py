@@ -68,9 +68,7 @@ def test_small_strains_lose_no_digits(size):
 
 def test_kirchhoff_energy_is_the_laminate_formula():
     ply = OrthotropicPly(150e9, 9e9, 0.3, 5e9, 4e9, 3e9, 1600.0)
-    compliance = np.array(
-        [[1 / 150e9, -0.3 / 150e9, 0], [-0.3 / 150e9, 1 / 9e9, 0], [0, 0, 1 / 5e9]]
-    )
+    compliance = np.array([[1 / 150e9, -0.3 / 150e9, 0], [-0.3 / 150e9, 1 / 9e9, 0], [0, 0, 1 / 5e9]])
     e = np.array([1e-3, -2e-3, 3e-3, 4e-3, 5e-3])
     expected = 0.5 * (e[:3] @ np.linalg.solve(compliance, e[:3]) + 4e9 * e[3] ** 2 + 3e9 * e[4] ** 2)
     assert float(ply.energy(e)) == pytest.approx(expected, rel=1e-14)
@@ -123,9 +121,7 @@ def test_reference_state_is_free_and_has_the_small_strain_stiffness(law):
 def test_rubber_at_rest_is_incompressible_plane_stress():
     law = rubber("EPDM", 0.2)
     mu = law.small_strain_shear_modulus
-    expected = mu * np.array(
-        [[4, 2, 0, 0, 0], [2, 4, 0, 0, 0], [0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1]]
-    )
+    expected = mu * np.array([[4, 2, 0, 0, 0], [2, 4, 0, 0, 0], [0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1]])
     np.testing.assert_allclose(jax.hessian(law.energy)(jnp.zeros(5)), expected, rtol=1e-13, atol=1e-6)
 
 
@@ -133,9 +129,7 @@ def test_stress_by_complex_step(law):
     """Plain arithmetic throughout, so the step goes through without jax."""
     for e in STRAINS:
         by_jax = np.asarray(jax.grad(law.energy)(jnp.asarray(e)))
-        by_step = [
-            np.imag(complex(law.energy(e + 1e-30j * np.eye(5)[i]))) / 1e-30 for i in range(5)
-        ]
+        by_step = [np.imag(complex(law.energy(e + 1e-30j * np.eye(5)[i]))) / 1e-30 for i in range(5)]
         np.testing.assert_allclose(by_jax, by_step, rtol=1e-11, atol=1e-12 * np.abs(by_jax).max())
 
 

@@ -44,18 +44,33 @@ def test_strain_level_and_fibre_constants():
 @pytest.mark.parametrize(
     "card, law",
     [
-        ({"kind": "mooney-rivlin", "c10": "0.3 MPa", "c01": 1e5, "density": 1100.0}, MooneyRivlin(3e5, 1e5, 0.0, 1100.0)),
+        (
+            {"kind": "mooney-rivlin", "c10": "0.3 MPa", "c01": 1e5, "density": 1100.0},
+            MooneyRivlin(3e5, 1e5, 0.0, 1100.0),
+        ),
         ({"kind": "neo-hookean", "shear_modulus": "1 MPa", "density": 1100.0}, MooneyRivlin(5e5, 0.0, 0.0, 1100.0)),
         (
             {"kind": "isotropic", "youngs_modulus": "6 MPa", "poisson_ratio": 0.49, "density": 1300.0},
             IsotropicElastic(6e6, 0.49, 1300.0),
         ),
         (
-            {"kind": "orthotropic", "e1": 9e8, "e2": 8e6, "nu12": 0.3, "g12": 3e6, "g13": 2e6, "g23": 1e6, "density": 1270.0},
+            {
+                "kind": "orthotropic",
+                "e1": 9e8,
+                "e2": 8e6,
+                "nu12": 0.3,
+                "g12": 3e6,
+                "g13": 2e6,
+                "g23": 1e6,
+                "density": 1270.0,
+            },
             OrthotropicPly(9e8, 8e6, 0.3, 3e6, 2e6, 1e6, 1270.0),
         ),
         ({"kind": "halpin-tsai", "fibre_fraction": "30 %"}, ply_from_constituents(fibre_fraction=0.3)),
-        ({"kind": "shipped", "rubber": "EPDM", "strain_level": "40 %", "density": 1150.0}, rubber("EPDM", 0.4, density=1150.0)),
+        (
+            {"kind": "shipped", "rubber": "EPDM", "strain_level": "40 %", "density": 1150.0},
+            rubber("EPDM", 0.4, density=1150.0),
+        ),
     ],
 )
 def test_tables_of_the_case(card, law):

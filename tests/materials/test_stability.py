@@ -84,9 +84,7 @@ def test_margin_is_one_at_rest_for_every_law():
             assert stability_margin(law, np.zeros((2, 3, 5)), measure) == pytest.approx(np.ones((2, 3)), rel=1e-12)
 
 
-@given(
-    st.floats(0.01, 2.0), st.floats(0.0, 2.0), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5)
-)
+@given(st.floats(0.01, 2.0), st.floats(0.0, 2.0), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
 def test_mooney_with_non_negative_constants_is_always_stable(c10, c01, first, second):
     law = MooneyRivlin(c10 * 1e6, c01 * 1e6, 0.0, 1300.0)
     assert hill_margin(law, [first, second, -first - second]) > 0.0
@@ -121,7 +119,10 @@ def test_states_of_the_same_stretches_are_one_state():
     """Equibiaxial tension of a sheet is compression through its thickness."""
     limits = stable_range(rubber("EPDM", 0.2))
     assert limits.equibiaxial[1] ** -2 == pytest.approx(limits.uniaxial[0], rel=1e-9)
-    assert limits.equivalent_strain <= min(-np.log(limits.uniaxial[0]), 2 / np.sqrt(3) * np.log(limits.pure_shear[1])) + 1e-12
+    assert (
+        limits.equivalent_strain
+        <= min(-np.log(limits.uniaxial[0]), 2 / np.sqrt(3) * np.log(limits.pure_shear[1])) + 1e-12
+    )
 
 
 def test_margin_changes_sign_at_the_range():

@@ -28,7 +28,9 @@ def make_model():
 
 
 def opened(model: ValveModel, lift: float, seed: int = 0, noise: float = 2e-4) -> np.ndarray:
-    """Free unknowns of a duckbill lifted by `lift` (m) at the lip, less towards the flange, with noise on every unknown."""
+    """Free unknowns of a duckbill lifted by `lift` (m) at the lip, less towards the flange, with noise on every
+    unknown.
+    """
     mesh = model.mesh
     generator = np.random.default_rng(seed)
     nodal = noise * generator.standard_normal((len(mesh.nodes), 5)) * np.array([1, 1, 1, 30, 30])

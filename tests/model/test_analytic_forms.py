@@ -1,4 +1,7 @@
-"""Second and third derivatives of the coupled residual against differences of its value, about a steady state with damping and both continuity laws."""
+"""Second and third derivatives of the coupled residual against differences of its value, about a steady state with
+damping and both continuity laws.
+"""
+
 import itertools
 
 import numpy as np
@@ -35,7 +38,10 @@ def motions(residual, number):
     """Smooth motions with displacements, velocities and accelerations, of sizes that all terms notice."""
     n = residual.model.size
     random = np.random.default_rng(5)
-    return [(random.normal(size=n) * 1e-3, random.normal(size=n), random.normal(size=n), random.normal(), random.normal()) for _ in range(number)]
+    return [
+        (random.normal(size=n) * 1e-3, random.normal(size=n), random.normal(size=n), random.normal(), random.normal())
+        for _ in range(number)
+    ]
 
 
 def difference(residual, about, parameters, directions):

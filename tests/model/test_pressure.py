@@ -17,7 +17,11 @@ def patch_shell(held: str) -> Shell:
     for name, nodes in edges.items():
         if held == "all" or name == held:
             free[nodes, :3] = False
-    return Shell(ShellMesh.build(patch.nodes, patch.quads, 0.01, material_axis=(1.0, 0, 0)), isotropic_section(1e6, 0.3, 0.01), free)
+    return Shell(
+        ShellMesh.build(patch.nodes, patch.quads, 0.01, material_axis=(1.0, 0, 0)),
+        isotropic_section(1e6, 0.3, 0.01),
+        free,
+    )
 
 
 def force(shell, q, nodal_pressure, loaded):
@@ -29,7 +33,9 @@ def force(shell, q, nodal_pressure, loaded):
 def stiffness(shell, q, nodal_pressure, loaded):
     data = np.zeros(len(shell.dofs.pattern[1]))
     slots = shell.dofs.slots
-    pressure_stiffness(shell.mesh.quads, shell.mesh.nodes, shell.dofs.expand(q), nodal_pressure, loaded, slots, 1.0, data)
+    pressure_stiffness(
+        shell.mesh.quads, shell.mesh.nodes, shell.dofs.expand(q), nodal_pressure, loaded, slots, 1.0, data
+    )
     return shell.dofs.matrix(data)
 
 
@@ -65,13 +71,19 @@ def test_a_free_edge_makes_the_stiffness_unsymmetric():
 
 
 def test_pressure_on_a_closed_surface_has_no_resultant():
-    """All of a sphere cut open along one meridian but joined node by node: forces and moments cancel whatever the shape."""
+    """All of a sphere cut open along one meridian but joined node by node: forces and moments cancel whatever the
+    shape.
+    """
     n = 8
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, n + 1)[:-1], np.linspace(0.4, np.pi - 0.4, n + 1), indexing="ij")
     nodes = np.stack([np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)], axis=-1).reshape(-1, 3)
     index = np.arange(n * (n + 1)).reshape(n, n + 1)
     following = np.roll(index, -1, axis=0)
-    quads = np.stack([index[:, :-1], index[:, 1:], following[:, 1:], following[:, :-1]], axis=-1).reshape(-1, 4).astype(np.int32)
+    quads = (
+        np.stack([index[:, :-1], index[:, 1:], following[:, 1:], following[:, :-1]], axis=-1)
+        .reshape(-1, 4)
+        .astype(np.int32)
+    )
     q = np.zeros((len(nodes), 5))
     q[:, :3] = 0.05 * np.random.default_rng(1).standard_normal(nodes.shape)
     out = np.zeros_like(q)

@@ -10,8 +10,16 @@ from dbvfiv.plots import figures_of, published
 from dbvfiv.plots.layers import unrolled
 
 NAMES = {
-    "head-discharge", "area-discharge", "jet-velocity", "deflection", "lip-shapes", "centre-line", "passage", "deformed", "layer-stress",
-}  # fmt: skip
+    "head-discharge",
+    "area-discharge",
+    "jet-velocity",
+    "deflection",
+    "lip-shapes",
+    "centre-line",
+    "passage",
+    "deformed",
+    "layer-stress",
+}
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +65,12 @@ def test_published_points_only_on_the_reference_valve(figures, coarse_run):
     lines = figures["head-discharge"].axes[0].lines
     assert len(lines) == 2 and np.allclose(lines[1].get_xdata(), [47.88, 75.52, 90.82])
     assert published.applies(Case()) and published.applies(Case().replace({"materials.strain_level": "20 %"}))
-    for changes in ({"valve.lip_half_width": 0.1}, {"fluid.density": 10}, {"drive.kind": "uniform"}, {"valve.thickness_factor": 1.1}):
+    for changes in (
+        {"valve.lip_half_width": 0.1},
+        {"fluid.density": 10},
+        {"drive.kind": "uniform"},
+        {"valve.thickness_factor": 1.1},
+    ):
         assert not published.applies(Case().replace(changes)), changes
 
 
@@ -75,7 +88,9 @@ def test_no_flow_no_curves_of_the_flow(coarse_valve):
 
 @pytest.mark.parametrize("format, head", [("png", b"\x89PNG"), ("svg", b"<?xml")])
 def test_files(tmp_path, coarse_run, format, head):
-    written = dbvfiv.load_result(coarse_run.path).plot(tmp_path / "new" / "folder", format, only=["head-discharge", "passage"])
+    written = dbvfiv.load_result(coarse_run.path).plot(
+        tmp_path / "new" / "folder", format, only=["head-discharge", "passage"]
+    )
     assert [path.name for path in written] == [f"head-discharge.{format}", f"passage.{format}"]
     assert all(path.read_bytes().startswith(head) for path in written)
 

@@ -13,7 +13,13 @@ from dbvfiv.api import load
 from dbvfiv.plots.closure_curves import supports_compared
 from dbvfiv.results import load_result
 
-COARSE = {"mesh.around": 6, "mesh.along": 10, "closure.max_step": "5 kPa", "closure.start": "open", "closure.eigenvalues": 2}
+COARSE = {
+    "mesh.around": 6,
+    "mesh.along": 10,
+    "closure.max_step": "5 kPa",
+    "closure.start": "open",
+    "closure.eigenvalues": 2,
+}
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +64,9 @@ def test_paraview_gets_contact_pressure_and_gap_on_all_four_quarters(run, tmp_pa
         fields = root["PointData"]
         assert {"displacement", "contact_pressure", "gap"} <= set(fields)
         assert len(fields["contact_pressure"]) == 2 * points
-        assert fields["contact_pressure"][:].max() == pytest.approx(max(s.largest_contact_pressure for s in result.states))
+        assert fields["contact_pressure"][:].max() == pytest.approx(
+            max(s.largest_contact_pressure for s in result.states)
+        )
 
 
 def test_figures(run, tmp_path):

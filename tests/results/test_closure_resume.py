@@ -17,7 +17,13 @@ from dbvfiv.results import load_result
 from dbvfiv.results.closure_run import resume_closure
 from dbvfiv.studies.observer import Observer
 
-COARSE = {"mesh.around": 6, "mesh.along": 10, "closure.max_step": "3 kPa", "closure.start": "open", "closure.eigenvalues": 2}
+COARSE = {
+    "mesh.around": 6,
+    "mesh.along": 10,
+    "closure.max_step": "3 kPa",
+    "closure.start": "open",
+    "closure.eigenvalues": 2,
+}
 PRESSURES = [4e3, 1.2e4, 2e4]
 
 
@@ -55,7 +61,9 @@ def test_an_interrupted_run_goes_on_as_if_it_had_not_been(whole, tmp_path):
     path = tmp_path / "run.h5"
     first = load(None, COARSE).closure(PRESSURES, output=path, observer=StopAfter(1))
     assert not first.complete and len(load_result(path).states) == 1
-    assert len(load_result(path).walk) > len([p for p in whole.walk if p.pressure <= PRESSURES[0]])  # a part of the way to the next state too
+    assert len(load_result(path).walk) > len(
+        [p for p in whole.walk if p.pressure <= PRESSURES[0]]
+    )  # a part of the way to the next state too
     agree(resume_closure(path), whole)
     with pytest.raises(CaseError, match="nothing is left to do"):
         resume_closure(path)
@@ -78,7 +86,16 @@ def test_other_results_are_refused(tmp_path):
 def test_a_killed_run_has_lost_no_finished_state(whole, tmp_path):
     path = tmp_path / "run.h5"
     words = [f"--set={key}={value}" for key, value in COARSE.items()]
-    command = [sys.executable, "-m", "dbvfiv", "closure", *words, *(f"--pressure={p:g}" for p in PRESSURES), "-o", str(path)]
+    command = [
+        sys.executable,
+        "-m",
+        "dbvfiv",
+        "closure",
+        *words,
+        *(f"--pressure={p:g}" for p in PRESSURES),
+        "-o",
+        str(path),
+    ]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     for line in run.stdout:
         if line.split()[:1] == ["4"]:

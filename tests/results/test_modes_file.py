@@ -59,7 +59,9 @@ def test_numbers_carry_units(stored):
 def test_state_and_valve_say_the_same(coarse_valve, modes):
     other = coarse_valve.modes("6 kPa", count=5, **FLUTTER)
     assert [m.growth_rate for m in other.modes] == pytest.approx([m.growth_rate for m in modes.modes], rel=1e-6)
-    assert other.state.mass_flow == pytest.approx(modes.state.mass_flow, rel=1e-6)  # of the lighter fluid, not of the state's
+    assert other.state.mass_flow == pytest.approx(
+        modes.state.mass_flow, rel=1e-6
+    )  # of the lighter fluid, not of the state's
     storage = coarse_valve.modes("6 kPa", count=2, continuity="storage", **FLUTTER)
     assert abs(storage.modes[0].eigenvalue - modes.modes[0].eigenvalue) > 1
 
@@ -91,7 +93,10 @@ def vtk_steps(path, numbers=None):
         reader.SetStep(number)
         reader.Update()
         grid = reader.GetOutput()
-        data = [{d.GetArrayName(i): vtk_to_numpy(d.GetArray(i)).copy() for i in range(d.GetNumberOfArrays())} for d in (grid.GetPointData(), grid.GetCellData())]
+        data = [
+            {d.GetArrayName(i): vtk_to_numpy(d.GetArray(i)).copy() for i in range(d.GetNumberOfArrays())}
+            for d in (grid.GetPointData(), grid.GetCellData())
+        ]
         steps.append((vtk_to_numpy(grid.GetPoints().GetData()).copy(), *data))
     return times, steps
 
@@ -101,7 +106,9 @@ def test_vtk_reads_the_modes(stored, tmp_path):
     assert times == (1, 2, 3, 4, 5)
     for mode, (points, fields, cells) in zip(stored.modes, steps, strict=True):
         shape = fields["mode_real"] + 1j * fields["mode_imag"]
-        assert fields["mode_amplitude"].max() == pytest.approx(1) and np.linalg.norm(shape.real, axis=1).max() == pytest.approx(1)
+        assert fields["mode_amplitude"].max() == pytest.approx(1) and np.linalg.norm(
+            shape.real, axis=1
+        ).max() == pytest.approx(1)
         lip = np.isclose(points[:, 2], 0) & np.isclose(points[:, 0], 0)
         up, down = shape[lip & (points[:, 1] > 0)][0], shape[lip & (points[:, 1] < 0)][0]
         assert np.allclose(up * [1, -1, 1], down)  # all quarters, mirrored
@@ -148,7 +155,11 @@ def test_a_missing_branch_is_null(sweep):
 
 
 def test_figures(stored, stored_sweep):
-    assert set(figures_of(stored, only=["eigenvalues", "winding", "centre-line-1"])) == {"eigenvalues", "winding", "centre-line-1"}
+    assert set(figures_of(stored, only=["eigenvalues", "winding", "centre-line-1"])) == {
+        "eigenvalues",
+        "winding",
+        "centre-line-1",
+    }
     assert set(figures_of(stored, mode=2, only=["mode-shape-2", "centre-line-2"])) == {"mode-shape-2", "centre-line-2"}
     assert set(figures_of(stored_sweep)) == {"sweep", "root-locus"}
     with pytest.raises(CaseError):
@@ -162,7 +173,9 @@ def test_centre_line_shows_the_cycle(stored):
     state, mode = stored.state, stored.modes[0]
     row = stored.mesh.rows[:, 0]
     expected = stored.mesh.nodes[row] + state.nodal[row, :3] + mode.drawn_amplitude(state) * mode.shape[row, :3].real
-    assert np.allclose(lines[0].get_ydata(), 1e3 * expected[:, 1]) and np.allclose(lines[0].get_xdata(), 1e3 * expected[:, 2])
+    assert np.allclose(lines[0].get_ydata(), 1e3 * expected[:, 1]) and np.allclose(
+        lines[0].get_xdata(), 1e3 * expected[:, 2]
+    )
     assert all(line.get_ydata().min() > 0 for line in lines[:10])  # drawn without crossing the closing plane
 
 

@@ -50,7 +50,9 @@ def test_station_data_belong_together(stored):
         assert np.allclose(flow, state.mass_flow, rtol=1e-6)
         head = state.station_pressure + 0.5 * density * state.station_velocity**2
         assert np.allclose(head, head[0], rtol=1e-6)
-        assert state.station_pressure[0] == pytest.approx(0, abs=1e-9) and state.station_pressure[-1] == pytest.approx(state.pressure)
+        assert state.station_pressure[0] == pytest.approx(0, abs=1e-9) and state.station_pressure[-1] == pytest.approx(
+            state.pressure
+        )
 
 
 def test_the_model_can_be_rebuilt_and_the_state_is_an_equilibrium(stored):
@@ -78,11 +80,14 @@ def test_files_of_the_case_travel_with_the_result(tmp_path, coarse_run, monkeypa
     stress = 2 * (stretch - stretch**-2) * (law.parameters[0] + law.parameters[1] / stretch)
     data = tmp_path / "tension.csv"
     data.write_text("strain,stress\n" + "".join(f"{s - 1:.6f},{p:.6e}\n" for s, p in zip(stretch, stress)))
-    case = dbvfiv.load(changes={
-        "mesh.around": 8, "mesh.along": 16,
-        "materials.own": {"kind": "fit", "path": str(data), "density": 1300},
-        "layers.0.material": "own",
-    }).case  # fmt: skip
+    case = dbvfiv.load(
+        changes={
+            "mesh.around": 8,
+            "mesh.along": 16,
+            "materials.own": {"kind": "fit", "path": str(data), "density": 1300},
+            "layers.0.material": "own",
+        }
+    ).case
     monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "cache"))
     with h5py.File(tmp_path / "h.h5", "w") as file:
         write_header(file, Header.of("steady", case))
@@ -107,7 +112,9 @@ def test_a_stopped_run_keeps_what_it_found(tmp_path, coarse_valve):
     with SteadyFile(path, coarse_valve.model) as file:
         result = run_steady(coarse_valve.model, [2e3, 6e3, 18e3], observer=Observers(file, _StopAfter(2)))
         # another program may look at a run that goes on
-        code = f"import dbvfiv; r = dbvfiv.load_result({str(path)!r}); print([s.pressure for s in r.states], r.complete)"
+        code = (
+            f"import dbvfiv; r = dbvfiv.load_result({str(path)!r}); print([s.pressure for s in r.states], r.complete)"
+        )
         seen = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         assert seen.stdout.strip() == "[2000.0, 6000.0] False", seen.stderr
         file.conclude(result.failures, not result.interrupted)
@@ -172,7 +179,9 @@ def _damage(path, kind):
                 file["case/json"] = "{"
 
 
-@pytest.mark.parametrize("kind", ["text", "empty", "cut", "foreign", "newer", "unknown", "no states", "no case", "bad case"])
+@pytest.mark.parametrize(
+    "kind", ["text", "empty", "cut", "foreign", "newer", "unknown", "no states", "no case", "bad case"]
+)
 def test_broken_files_are_one_sentence(tmp_path, coarse_run, one_sentence, kind):
     path = tmp_path / "r.h5"
     path.write_bytes(coarse_run.path.read_bytes())

@@ -1,9 +1,11 @@
-"""Meshes and a small static solver for shells that are not valves; shared by the tests of the shell and the verification cases."""
+"""Meshes and a small static solver for shells that are not valves; shared by the tests of the shell and the
+verification cases.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Callable
 
 import numpy as np
 
@@ -49,15 +51,19 @@ def isotropic_section(e: float, nu: float, h: float, density: float = 1.0, shear
 
 
 def mixed_section() -> Section:
-    """Wall of the 12-inch valve: three rubbers and two fibre plies, the rubbers with different constants at every layer."""
+    """Wall of the 12-inch valve: three rubbers and two fibre plies, the rubbers with different constants at every
+    layer.
+    """
     ply = OrthotropicPly(1.5e9, 8e6, 0.287, 5.57e6, 5.57e6, 2.94e6, 1270.0)
-    return Section((
-        Layer(rubber("CR", 0.1), 6.35e-3, name="CR"),
-        Layer(rubber("SBR", 0.2), 3.175e-3, name="SBR"),
-        Layer(ply, 0.8382e-3, 54.0, 5 / 6, "ply +54"),
-        Layer(ply, 0.8382e-3, -54.0, 5 / 6, "ply -54"),
-        Layer(rubber("EPDM", 0.4), 3.175e-3, 0.0, 0.9, "EPDM"),
-    ))  # fmt: skip
+    return Section(
+        (
+            Layer(rubber("CR", 0.1), 6.35e-3, name="CR"),
+            Layer(rubber("SBR", 0.2), 3.175e-3, name="SBR"),
+            Layer(ply, 0.8382e-3, 54.0, 5 / 6, "ply +54"),
+            Layer(ply, 0.8382e-3, -54.0, 5 / 6, "ply -54"),
+            Layer(rubber("EPDM", 0.4), 3.175e-3, 0.0, 0.9, "EPDM"),
+        )
+    )
 
 
 def rotation_about(axis, angle: float) -> np.ndarray:
@@ -87,10 +93,13 @@ def rigid_motion(mesh: ShellMesh, turn: np.ndarray, shift=(0.0, 0.0, 0.0)) -> np
 def random_state(mesh: ShellMesh, seed: int, stretch: float = 0.1, turn: float = 0.4, rigid: float = 1.2) -> np.ndarray:
     """Nodal unknowns (nn, 5): a rigid motion, and on top of it displacements and rotations random at every node.
 
-    `stretch` is measured in the mean element size, `turn` and the `rigid` rotation in rad; nodes that are held need `rigid = 0`.
+    `stretch` is measured in the mean element size, `turn` and the `rigid` rotation in rad; nodes that are held need
+    `rigid = 0`.
     """
     generator = np.random.default_rng(seed)
-    size = np.sqrt(np.mean(np.linalg.norm(mesh.nodes[mesh.quads[:, 2]] - mesh.nodes[mesh.quads[:, 0]], axis=1) ** 2) / 2)
+    size = np.sqrt(
+        np.mean(np.linalg.norm(mesh.nodes[mesh.quads[:, 2]] - mesh.nodes[mesh.quads[:, 0]], axis=1) ** 2) / 2
+    )
     axis = generator.standard_normal(3)
     nodal = rigid_motion(mesh, rotation_about(axis, rigid), rigid * size * generator.standard_normal(3))
     nodal[:, :3] += stretch * size * generator.uniform(-1, 1, (mesh.node_count, 3))
@@ -112,13 +121,16 @@ def dead_load(force: np.ndarray):
     return lambda q, factor: (factor * force, None)
 
 
-def solve_path(shell: Shell, load, factors, start=None, tolerance: float = 1e-9, smallest: float = 1e-5, iterations: int = 25):
+def solve_path(
+    shell: Shell, load, factors, start=None, tolerance: float = 1e-9, smallest: float = 1e-5, iterations: int = 25
+):
     """Equilibria (list) at increasing load factors by full Newton steps, halving a load step that fails.
 
     Parameters
     ----------
     load : callable
-        `load(q, factor)` returns the external force (n,) and, or None, the values of its derivative on the pattern of the shell.
+        `load(q, factor)` returns the external force (n,) and, or None, the values of its derivative on the pattern of
+        the shell.
     """
     solver = DirectFactor(*shell.dofs.pattern)
     q = np.zeros(shell.size) if start is None else start.copy()
@@ -147,7 +159,9 @@ def _newton(shell, load, solver, q, factor, tolerance, iterations):
         if not rounding:  # what rounding of the positions alone leaves
             place = shell.dofs.expand(np.abs(q))
             place[:, :3] += np.abs(shell.mesh.nodes)
-            rounding = np.finfo(float).eps * np.linalg.norm(shell.dofs.matrix(np.abs(data)) @ shell.dofs.restrict(place))
+            rounding = np.finfo(float).eps * np.linalg.norm(
+                shell.dofs.matrix(np.abs(data)) @ shell.dofs.restrict(place)
+            )
         external, slope = load(q, factor)
         residual = force - external
         norm = np.linalg.norm(residual)

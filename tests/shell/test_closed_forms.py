@@ -75,7 +75,9 @@ def test_simple_shear_of_rubber():
 
 @pytest.mark.parametrize("angle", [0.0, 30.0, 54.0, -54.0, 90.0])
 def test_ply_axes(angle):
-    """Strains and stresses of a stretched ply in its own axes; a positive angle turns from the material axis about the normal."""
+    """Strains and stresses of a stretched ply in its own axes; a positive angle turns from the material axis about the
+    normal.
+    """
     shell = sheet(Section((Layer(PLY, 0.01, angle),)))
     gradient = np.array([[1.05, 0.03], [0.01, 0.97]])
     green = 0.5 * (gradient.T @ gradient - np.eye(2))
@@ -124,18 +126,27 @@ def test_laminate_stiffness():
         shear = np.zeros((2, 2))
         for low, high, angle in zip(z[:-1], z[1:], angles):
             c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-            bar = np.array([
-                [q11 * c**4 + 2 * (q12 + 2 * q66) * s**2 * c**2 + q22 * s**4,
-                 (q11 + q22 - 4 * q66) * s**2 * c**2 + q12 * (s**4 + c**4),
-                 (q11 - q12 - 2 * q66) * s * c**3 + (q12 - q22 + 2 * q66) * s**3 * c],
-                [0.0, q11 * s**4 + 2 * (q12 + 2 * q66) * s**2 * c**2 + q22 * c**4,
-                 (q11 - q12 - 2 * q66) * s**3 * c + (q12 - q22 + 2 * q66) * s * c**3],
-                [0.0, 0.0, (q11 + q22 - 2 * q12 - 2 * q66) * s**2 * c**2 + q66 * (s**4 + c**4)],
-            ])  # fmt: skip
+            bar = np.array(
+                [
+                    [
+                        q11 * c**4 + 2 * (q12 + 2 * q66) * s**2 * c**2 + q22 * s**4,
+                        (q11 + q22 - 4 * q66) * s**2 * c**2 + q12 * (s**4 + c**4),
+                        (q11 - q12 - 2 * q66) * s * c**3 + (q12 - q22 + 2 * q66) * s**3 * c,
+                    ],
+                    [
+                        0.0,
+                        q11 * s**4 + 2 * (q12 + 2 * q66) * s**2 * c**2 + q22 * c**4,
+                        (q11 - q12 - 2 * q66) * s**3 * c + (q12 - q22 + 2 * q66) * s * c**3,
+                    ],
+                    [0.0, 0.0, (q11 + q22 - 2 * q12 - 2 * q66) * s**2 * c**2 + q66 * (s**4 + c**4)],
+                ]
+            )
             bar = np.triu(bar) + np.triu(bar, 1).T
             for power in range(3):
                 a[power][:] += bar * (high ** (power + 1) - low ** (power + 1)) / (power + 1)
-            g = np.array([[PLY.g13 * c**2 + PLY.g23 * s**2, (PLY.g13 - PLY.g23) * c * s], [0, PLY.g13 * s**2 + PLY.g23 * c**2]])
+            g = np.array(
+                [[PLY.g13 * c**2 + PLY.g23 * s**2, (PLY.g13 - PLY.g23) * c * s], [0, PLY.g13 * s**2 + PLY.g23 * c**2]]
+            )
             shear += 5 / 6 * (high - low) * (np.triu(g) + np.triu(g, 1).T)
         total = h.sum()
         unit = section.linear_stiffness
@@ -166,7 +177,9 @@ def test_patch(name):
     stiffness = shell.dofs.matrix(shell.force_and_tangent(np.zeros(shell.size))[1])
     full = exact.ravel().copy()
     full[inner] = spsolve(stiffness[inner][:, inner].tocsc(), -stiffness[inner][:, held] @ full[held])
-    if name == "transverse shear":  # the field of constant shear is in equilibrium only with its moments; check the strain alone
+    if (
+        name == "transverse shear"
+    ):  # the field of constant shear is in equilibrium only with its moments; check the strain alone
         full[inner] = exact.ravel()[inner]
     assert np.abs(full - exact.ravel()).max() < 1e-10 * np.abs(exact).max()
     strains = shell.strains(1e-4 * exact.ravel())  # small enough to be linear
@@ -174,11 +187,15 @@ def test_patch(name):
 
 
 def test_energy_is_the_work_of_the_loads():
-    """Along a path of equilibria the work of the loads is the stored energy; the trapezoidal rule misses by the square of the step."""
+    """Along a path of equilibria the work of the loads is the stored energy; the trapezoidal rule misses by the square
+    of the step.
+    """
     patch = grid(6, 3, lambda u, v: (0.4 * u, 0.2 * v, 0.05 * np.sin(2 * u)))
     free = np.ones((patch.nodes.shape[0], 5), bool)
     free[patch.index[0]] = False
-    shell = Shell(ShellMesh.build(patch.nodes, patch.quads, 0.012, material_axis=(1.0, 0.0, 0.0)), mixed_section(), free)
+    shell = Shell(
+        ShellMesh.build(patch.nodes, patch.quads, 0.012, material_axis=(1.0, 0.0, 0.0)), mixed_section(), free
+    )
     force = np.zeros((patch.nodes.shape[0], 5))
     force[patch.index[-1], 2] = [0.5, 1.0, 1.0, 0.5]
     force[patch.index[-1], 0] = 0.3

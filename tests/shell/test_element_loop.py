@@ -30,7 +30,8 @@ def test_force_and_tangent_are_those_of_the_energy(mixed_shell, seed, stretch, t
     expected_force, expected_tangent = assembled(shell, q)
     force, data = shell.force_and_tangent(q)
     tangent = shell.dofs.matrix(data).toarray()
-    # a nearly rigid motion leaves forces that are differences of much larger numbers: their scale is stiffness times size
+    # a nearly rigid motion leaves forces that are differences of much larger numbers: their scale is stiffness times
+    # size
     scale = max(np.abs(expected_force).max(), np.abs(expected_tangent).max() * np.abs(shell.mesh.nodes).max() * 1e-2)
     assert np.abs(force - expected_force).max() < 1e-12 * scale
     assert np.abs(shell.force(q) - expected_force).max() < 1e-12 * scale

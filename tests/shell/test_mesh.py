@@ -43,11 +43,15 @@ def test_symmetry_planes_hold_the_directors():
 
 
 def test_curvature_and_area_of_a_cylinder():
-    """Nodes and averaged directors turn alike, so the curvature is exact inside; the area misses by the square of the element size."""
+    """Nodes and averaged directors turn alike, so the curvature is exact inside; the area misses by the square of the
+    element size.
+    """
     errors = []
     for count in (10, 20, 40):
         geometry = reference_geometry(arc(count))
-        inner = thickness_over_radius(geometry)[2:-2]  # without the ends, where the directors of a free edge are one-sided
+        inner = thickness_over_radius(geometry)[
+            2:-2
+        ]  # without the ends, where the directors of a free edge are one-sided
         assert np.allclose(inner, 0.1, rtol=1e-12)
         errors.append(abs(geometry.area.sum() - 0.1 * 2 * 0.2))
     assert errors[-1] < 5e-6
@@ -59,7 +63,9 @@ def test_folded_places_are_found():
     shell = Shell(arc(20, 0.1), isotropic_section(1e6, 0.3, 0.02))
     assert len(shell.folded_places()) == 0
     tight = Shell(arc(20, 0.009), isotropic_section(1e6, 0.3, 0.02))
-    assert len(tight.folded_places()) == 4 * (40 - 4)  # all but the ends, where the directors of a free edge are one-sided
+    assert len(tight.folded_places()) == 4 * (
+        40 - 4
+    )  # all but the ends, where the directors of a free edge are one-sided
 
 
 def test_true_metric_is_refused_where_the_wall_folds():
@@ -75,7 +81,9 @@ def test_unknown_metric_is_refused():
 
 
 def test_metrics_agree_for_a_thin_wall():
-    """Stiffness of a cylinder with both treatments: the difference goes with the square of thickness over radius, not faster."""
+    """Stiffness of a cylinder with both treatments: the difference goes with the square of thickness over radius, not
+    faster.
+    """
     differences = []
     for h in (0.02, 0.01, 0.005):
         patch = grid(12, 2, lambda u, v: (0.1 * np.cos(2 * u), 0.1 * np.sin(2 * u), 0.2 * v))

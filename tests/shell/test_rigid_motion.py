@@ -114,14 +114,19 @@ def test_kinetic_energy_of_a_rigid_plate(turn):
     # box integrals: second moments about the origin of the material points before they are moved
     rho = [1000.0, 3000.0]
     faces = np.array([-0.02, 0.01, 0.02])
-    m0, m1, m2 = (sum(r * (b ** (k + 1) - a ** (k + 1)) / (k + 1) for r, a, b in zip(rho, faces[:-1], faces[1:])) for k in range(3))
+    m0, m1, m2 = (
+        sum(r * (b ** (k + 1) - a ** (k + 1)) / (k + 1) for r, a, b in zip(rho, faces[:-1], faces[1:]))
+        for k in range(3)
+    )
     area = length * width
     first = np.array([0.5 * length * area * m0, 0.5 * width * area * m0, area * m1])
-    second = np.array([
-        [length**2 / 3 * area * m0, length * width / 4 * area * m0, length / 2 * area * m1],
-        [length * width / 4 * area * m0, width**2 / 3 * area * m0, width / 2 * area * m1],
-        [length / 2 * area * m1, width / 2 * area * m1, area * m2],
-    ])  # fmt: skip
+    second = np.array(
+        [
+            [length**2 / 3 * area * m0, length * width / 4 * area * m0, length / 2 * area * m1],
+            [length * width / 4 * area * m0, width**2 / 3 * area * m0, width / 2 * area * m1],
+            [length / 2 * area * m1, width / 2 * area * m1, area * m2],
+        ]
+    )
     total = area * m0
     shift = np.array([0.2, 0.1, -0.3])
     first, second = turn @ first, turn @ second @ turn.T
@@ -158,7 +163,9 @@ def test_convective_inertia_is_that_of_lagranges_equations(saddle_shell):
     """d/dt (M v) - d/dq (v M v / 2) = M a + convective inertia, by differences."""
     shell = saddle_shell
     q = shell.dofs.restrict(random_state(shell.mesh, 9, 0.05, 0.8, rigid=0.0))
-    v = shell.dofs.restrict(np.random.default_rng(10).standard_normal((shell.mesh.node_count, 5)) * np.array([0.1] * 3 + [1] * 2))
+    v = shell.dofs.restrict(
+        np.random.default_rng(10).standard_normal((shell.mesh.node_count, 5)) * np.array([0.1] * 3 + [1] * 2)
+    )
 
     def mass(x):
         return shell.dofs.matrix(shell.mass(x))

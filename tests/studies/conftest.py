@@ -3,7 +3,14 @@ import pytest
 from dbvfiv.case import load_case
 from dbvfiv.studies.stability_walk import StabilityWalk
 
-COARSE = ["mesh.around=8", "mesh.along=16", "damping.alpha=0", "damping.beta=0.003", "fluid.density=10", "drive.pressure=6000"]
+COARSE = [
+    "mesh.around=8",
+    "mesh.along=16",
+    "damping.alpha=0",
+    "damping.beta=0.003",
+    "fluid.density=10",
+    "drive.pressure=6000",
+]
 
 
 @pytest.fixture(scope="session")

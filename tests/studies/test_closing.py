@@ -29,7 +29,11 @@ def test_a_forward_flow_is_that_of_the_ordinary_fluid(storage):
     rate = np.zeros(8)
     for inlet in (500.0, 2e4):
         u = ours.velocity((AREA, rate), (1.1 * AREA, rate), inlet, 0.0, 0.6, 50.0, -0.3)
-        assert u == pytest.approx(theirs.velocity((AREA, rate), (1.1 * AREA, rate), inlet, 0.0, 0.6, 50.0, -0.3), rel=1e-12) and u > 0
+        assert (
+            u
+            == pytest.approx(theirs.velocity((AREA, rate), (1.1 * AREA, rate), inlet, 0.0, 0.6, 50.0, -0.3), rel=1e-12)
+            and u > 0
+        )
 
 
 @pytest.mark.parametrize("storage", [0.0, 1.0])
@@ -105,7 +109,9 @@ def test_contact_of_the_coupled_valve_is_part_of_its_exact_tangent():
 
 def test_a_history_that_opens_again_is_not_shut_before_it_shuts_for_good():
     turn = Turn(1e4, 0.1, 0.4)
-    assert [turn(t) for t in (0.0, 0.3, 0.5, 0.9)] == pytest.approx([1e4, 0.0, -1e4, -1e4], abs=1e-9) and turn.zero == pytest.approx(0.3)
+    assert [turn(t) for t in (0.0, 0.3, 0.5, 0.9)] == pytest.approx(
+        [1e4, 0.0, -1e4, -1e4], abs=1e-9
+    ) and turn.zero == pytest.approx(0.3)
 
     def sample(time, passage):
         return ClosingSample(time, turn(time), 0.0, passage, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -118,7 +124,10 @@ def test_a_history_that_opens_again_is_not_shut_before_it_shuts_for_good():
 
 
 def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
-    case = Case().replace(COARSE | {"mesh.around": 8, "mesh.along": 14, "closure.reversal_time": "0.2 s", "closure.reversal_hold": "0.2 s"})
+    case = Case().replace(
+        COARSE
+        | {"mesh.around": 8, "mesh.along": 14, "closure.reversal_time": "0.2 s", "closure.reversal_hold": "0.2 s"}
+    )
     result = run_closing(case)
     told = result.summary()
     assert not result.failure and told["stays_shut"]

@@ -1,4 +1,6 @@
-"""The valve under back pressure on a coarse mesh: what is found is an equilibrium, is told honestly, and does not depend on how it was found."""
+"""The valve under back pressure on a coarse mesh: what is found is an equilibrium, is told honestly, and does not
+depend on how it was found.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ def test_states_are_equilibria_without_penetration(pressed):
         assert state.force_balance < 1e-8
         assert state.stable and not state.beyond_limit
         assert state.contact_pressure.min() >= 0.0
-        assert state.contact_force == pytest.approx(2 * np.sum(model.contact.area * state.contact_pressure[model.contact.nodes]))
+        assert state.contact_force == pytest.approx(
+            2 * np.sum(model.contact.area * state.contact_pressure[model.contact.nodes])
+        )
 
 
 def test_the_contact_carries_the_pressure_on_the_lips(pressed):
@@ -119,7 +123,9 @@ def test_an_open_start_turns_a_flow_back(case):
     flows = [state.mass_flow for state in result.opened]
     assert flows == sorted(flows, reverse=True) and flows[-1] < 0.1 * flows[0]
     assert result.opened[0].pressure == 10e3
-    assert result.states[0].max_displacement == pytest.approx(run_closure(case, [2e3]).states[0].max_displacement, rel=1e-8)
+    assert result.states[0].max_displacement == pytest.approx(
+        run_closure(case, [2e3]).states[0].max_displacement, rel=1e-8
+    )
 
 
 @pytest.mark.slow
@@ -169,7 +175,9 @@ def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
 
 
 def test_energy_balances_to_1e_8_on_request_from_the_first_touch_on(case):
-    """Work of the pressure, work of renewing multipliers, strain energy and contact potential, with load steps as they are."""
+    """Work of the pressure, work of renewing multipliers, strain energy and contact potential, with load steps as they
+    are.
+    """
     case = case.replace({"mesh.around": 6, "mesh.along": 10})
     rough = run_closure(case, [7e3]).states[0]
     fine = run_closure(case.replace({"closure.balance_tolerance": 1e-8}), [7e3]).states[0]

@@ -1,4 +1,5 @@
 """Scans along a parameter on spectra known in closed form."""
+
 import numpy as np
 import pytest
 

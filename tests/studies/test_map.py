@@ -1,4 +1,5 @@
 """Stability maps on a coarse mesh: order of columns, certificates, gaps, resume, lost workers."""
+
 import os
 import signal
 import subprocess
@@ -18,7 +19,13 @@ from dbvfiv.studies.map_column import MapColumn, MapPlan
 from dbvfiv.studies.map_curves import linked
 from dbvfiv.studies.observer import Observer
 
-AXES = {"map.x": "pressure=1000:12000:6", "map.y": "density=1:1000:10:log", "map.curve": False, "map.refine": 1, "map.checks": 3}
+AXES = {
+    "map.x": "pressure=1000:12000:6",
+    "map.y": "density=1:1000:10:log",
+    "map.curve": False,
+    "map.refine": 1,
+    "map.checks": 3,
+}
 
 
 @pytest.fixture(scope="module")
@@ -72,14 +79,22 @@ def test_linked_tongue_is_one_curve(case):
     for value in (1000.0, 2000.0, 3000.0, 4000.0, 5000.0):
         half = width.get(value)
         middle = 0.5
-        onsets = [] if half is None else [(0, plan.value(plan.y, middle - half), 30.0, 1), (0, plan.value(plan.y, middle + half), 31.0, -1)]
+        onsets = (
+            []
+            if half is None
+            else [(0, plan.value(plan.y, middle - half), 30.0, 1), (0, plan.value(plan.y, middle + half), 31.0, -1)]
+        )
         columns.append(MapColumn(value, 0, {}, np.array(onsets, float).reshape(-1, 4), 0.0))
     (curve,) = linked(plan, tuple(columns))
     assert len(curve.x) == 6 and not curve.exact
 
 
 def test_both_laws_and_pairs_without_the_load(coarse_case):
-    both = run_map(coarse_case.replace(AXES | {"map.x": "pressure=2000:6000:2", "map.continuity": "both", "map.refine": 0, "map.checks": 2}))
+    both = run_map(
+        coarse_case.replace(
+            AXES | {"map.x": "pressure=2000:6000:2", "map.continuity": "both", "map.refine": 0, "map.checks": 2}
+        )
+    )
     assert both.grid("growth_rate").shape == (2, 10, 2) and both.grid("certified").all()
     pair = coarse_case.replace(AXES | {"map.x": "beta=0.001:0.004:3", "map.y": "storage=0:1:5", "map.refine": 0})
     result = run_map(pair)
@@ -87,7 +102,11 @@ def test_both_laws_and_pairs_without_the_load(coarse_case):
 
 
 def test_two_structural_axes(coarse_case):
-    result = run_map(coarse_case.replace(AXES | {"map.x": "pressure=3000:9000:2", "map.y": "thickness=0.9:1.1:2", "map.refine": 0, "map.checks": 1}))
+    result = run_map(
+        coarse_case.replace(
+            AXES | {"map.x": "pressure=3000:9000:2", "map.y": "thickness=0.9:1.1:2", "map.refine": 0, "map.checks": 1}
+        )
+    )
     assert result.grid("certified").all() and (result.grid("how") == 1).all()
 
 
@@ -136,9 +155,14 @@ def test_an_interrupted_map_resumes_to_the_same_numbers(case, whole, tmp_path):
 
 
 def test_json_and_figures(case, tmp_path, capsys):
-    arguments = [f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()]
+    arguments = [
+        f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()
+    ]
     mesh = ["--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0"]
-    assert run(["map", *arguments, *mesh, "--x", "pressure=3 kPa:8 kPa:3", "--json", "--plots", str(tmp_path / "figures")]) == 0
+    assert (
+        run(["map", *arguments, *mesh, "--x", "pressure=3 kPa:8 kPa:3", "--json", "--plots", str(tmp_path / "figures")])
+        == 0
+    )
     import json
 
     document = json.loads(capsys.readouterr().out)
@@ -159,7 +183,9 @@ if __name__ == "__main__":
 def test_killed_run_resumes(case, whole, tmp_path):
     path, script = tmp_path / "map.h5", tmp_path / "go.py"
     script.write_text(_RUN)
-    settings = [f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()]
+    settings = [
+        f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()
+    ]
     mesh = ["--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0"]
     process = subprocess.Popen([sys.executable, str(script), "map", *settings, *mesh, "-o", str(path)], cwd=os.getcwd())
     deadline = time.time() + 240

@@ -81,7 +81,14 @@ def test_the_motion_satisfies_the_time_dependent_equations(model, state, flutter
     def left(size):
         moved = [size * (value**k * q).real for k in range(3)]
         force, outlet = dynamic_residual(
-            model, LIGHT, state.pressure, state.q + moved[0], moved[1], moved[2], steady + size * inlet.real, size * (value * inlet).real
+            model,
+            LIGHT,
+            state.pressure,
+            state.q + moved[0],
+            moved[1],
+            moved[2],
+            steady + size * inlet.real,
+            size * (value * inlet).real,
         )
         unit = np.linalg.norm(dofs.matrix(model.mass(state.q)) @ moved[2])
         return np.linalg.norm(force) / unit, abs(outlet) / state.pressure
@@ -95,7 +102,9 @@ def test_pressures_and_areas_belong_to_the_mode(model, state, flutter):
     """Areas by finite difference of the deformed rows; no pressure at the outlet."""
     size = 1e-6
     for shape, areas, pressures in zip(flutter.shapes, flutter.areas, flutter.pressures):
-        moved = model.rows.areas(model.nodal(state.q) + size * shape.real) - model.rows.areas(model.nodal(state.q) - size * shape.real)
+        moved = model.rows.areas(model.nodal(state.q) + size * shape.real) - model.rows.areas(
+            model.nodal(state.q) - size * shape.real
+        )
         assert np.allclose(moved / (2 * size), areas.real, atol=1e-6 * np.abs(areas).max())
         assert abs(pressures[0]) < 1e-9 * np.abs(pressures).max()
 
@@ -116,11 +125,17 @@ def test_the_number_asked_for_changes_nothing(model, state, conditions):
 
 def test_another_shift_gives_the_same(model, state, flutter):
     search = SearchOptions(shifts=(250.0 + 150.0j,))
-    assert np.allclose(run_modes(model, state, LIGHT, ModesOptions(4, search=search)).eigenvalues[:3], flutter.eigenvalues[:3], rtol=1e-8)
+    assert np.allclose(
+        run_modes(model, state, LIGHT, ModesOptions(4, search=search)).eigenvalues[:3],
+        flutter.eigenvalues[:3],
+        rtol=1e-8,
+    )
 
 
 def test_in_vacuo_at_rest(model):
-    """Undamped modes of the structure come by frequency, have no growth, and damp as beta omega^2 / 2 once damping is there."""
+    """Undamped modes of the structure come by frequency, have no growth, and damp as beta omega^2 / 2 once damping is
+    there.
+    """
     rest = rest_state(model)
     free = run_modes(model, rest, Conditions(1000.0, 0.0, 0.0), ModesOptions(6, in_vacuo=True))
     omega = free.eigenvalues.imag
@@ -183,7 +198,9 @@ def test_refusals(model, state, one_sentence):
 
 @pytest.mark.slow
 def test_the_flutter_of_the_reference_mesh():
-    """28 x 48, 6 kPa, 10 kg/m3: about +27 1/s at 36.3 Hz, the next near -24 1/s at 16.8 Hz; a few per cent between two models."""
+    """28 x 48, 6 kPa, 10 kg/m3: about +27 1/s at 36.3 Hz, the next near -24 1/s at 16.8 Hz; a few per cent between two
+    models.
+    """
     model = ValveModel(Case())
     found = run_modes(model, LoadPath(model).go_to(6e3), LIGHT)
     first, second = found.eigenvalues[:2]

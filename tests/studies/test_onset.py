@@ -1,4 +1,5 @@
 """Onsets of the valve on a coarse mesh."""
+
 import numpy as np
 import pytest
 
@@ -40,7 +41,9 @@ def test_no_flow_no_onset(coarse_case):
         run_onset(coarse_case.replace({"drive.kind": "uniform"}))
 
 
-@pytest.mark.parametrize("parameter, values", [("alpha", (0.0, 40.0, 120.0)), ("beta", (0.002, 0.004, 0.008)), ("storage", (0.0, 0.5, 1.0))])
+@pytest.mark.parametrize(
+    "parameter, values", [("alpha", (0.0, 40.0, 120.0)), ("beta", (0.002, 0.004, 0.008)), ("storage", (0.0, 0.5, 1.0))]
+)
 def test_onset_over_other_parameters(coarse_case, parameter, values):
     options = OnsetOptions(parameter, values, normal_form=False, coarse_mesh=0)
     result = run_onset(coarse_case.replace({"fluid.density": 20}), options)

@@ -1,4 +1,7 @@
-"""Interrupted and killed onset runs go on: nothing is solved twice, and the outcome is that of a run that was never interrupted."""
+"""Interrupted and killed onset runs go on: nothing is solved twice, and the outcome is that of a run that was never
+interrupted.
+"""
+
 import os
 import signal
 import subprocess
@@ -66,7 +69,12 @@ def test_the_run_meets_both_meshes(whole):
 def test_an_interrupted_run_goes_on(case, whole, tmp_path, where):
     complete, seen = whole
     fine = sum(mesh == 0 for mesh, _ in seen.samples)
-    stop = {"scan": 2, "location": 8, "second mesh": fine + len(complete.points) + 3, "end": len(seen.samples) + len(seen.points) - 1}[where]
+    stop = {
+        "scan": 2,
+        "location": 8,
+        "second mesh": fine + len(complete.points) + 3,
+        "end": len(seen.samples) + len(seen.points) - 1,
+    }[where]
     path = tmp_path / "onset.h5"
     first = Watch(stop)
     assert not onset(case, "valve", path, first).complete
@@ -140,7 +148,10 @@ def test_a_killed_run_goes_on(whole, tmp_path):
     path, script = tmp_path / "onset.h5", tmp_path / "go.py"
     script.write_text(_RUN)
     settings = ["mesh.around=8", "mesh.along=16", "damping.alpha=0", "onset.normal_form=false", "fluid.density=4"]
-    process = subprocess.Popen([sys.executable, str(script), "onset", "--over", RANGE, *(f"--set={s}" for s in settings), "-o", str(path)], cwd=os.getcwd())
+    process = subprocess.Popen(
+        [sys.executable, str(script), "onset", "--over", RANGE, *(f"--set={s}" for s in settings), "-o", str(path)],
+        cwd=os.getcwd(),
+    )
     deadline = time.time() + 240
     while time.time() < deadline and process.poll() is None:
         time.sleep(0.02)

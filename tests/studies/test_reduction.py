@@ -1,4 +1,5 @@
 """Small models of a state against the full pencil."""
+
 import numpy as np
 import pytest
 
@@ -27,7 +28,9 @@ def test_fluid_parts_go_with_powers_of_the_root_of_density(linear):
     parts = fluid_parts(linear.model.flow, linear.area, linear.inlet, 7.0, 0.3)
     for name, power in POWERS.items():
         power += name[0] in "BS"  # the velocity there is not scaled
-        assert parts[name] == pytest.approx(unit[name] * 7.0 ** (power / 2), rel=1e-9, abs=1e-9 * np.abs(unit[name]).max())
+        assert parts[name] == pytest.approx(
+            unit[name] * 7.0 ** (power / 2), rel=1e-9, abs=1e-9 * np.abs(unit[name]).max()
+        )
 
 
 def test_block_solves_with_the_transpose(linear):

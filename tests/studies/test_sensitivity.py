@@ -1,4 +1,5 @@
 """Derivatives of an eigenvalue against eigenvalues of changed valves."""
+
 import numpy as np
 import pytest
 
@@ -20,7 +21,18 @@ def valve():
 
 
 @pytest.mark.parametrize(
-    "name", ["pressure", "density", "alpha", "beta", "thickness_factor", "layer 3 angle", "layer 1 thickness", "layer 2 c10", "layer 4 e1"]
+    "name",
+    [
+        "pressure",
+        "density",
+        "alpha",
+        "beta",
+        "thickness_factor",
+        "layer 3 angle",
+        "layer 1 thickness",
+        "layer 2 c10",
+        "layer 4 e1",
+    ],
 )
 def test_derivative_is_that_of_the_eigenvalue(valve, name):
     model, q, mode = valve
@@ -34,7 +46,9 @@ def test_derivative_is_that_of_the_eigenvalue(valve, name):
         return values[np.argmin(abs(values - mode.eigenvalue))]
 
     direct = (eigenvalue(found.value + h) - eigenvalue(found.value - h)) / (2 * h)
-    assert found.derivative == pytest.approx(direct, rel=2e-4, abs=2e-5 * abs(mode.eigenvalue) / (abs(found.value) or 1.0))
+    assert found.derivative == pytest.approx(
+        direct, rel=2e-4, abs=2e-5 * abs(mode.eigenvalue) / (abs(found.value) or 1.0)
+    )
 
 
 def test_an_unknown_parameter_is_named(valve):

@@ -43,7 +43,9 @@ def test_flow_is_that_of_bernoulli_at_the_outlet(model):
     velocity = np.sqrt(2 * 18e3 / density / (1 - (a / b) ** 2))
     assert state.outlet_velocity == pytest.approx(velocity, rel=1e-6)
     assert state.mass_flow == pytest.approx(4 * density * a * velocity, rel=1e-6)
-    assert state.station_pressure[0] == pytest.approx(0.0, abs=1e-9) and state.station_pressure[-1] == pytest.approx(18e3)
+    assert state.station_pressure[0] == pytest.approx(0.0, abs=1e-9) and state.station_pressure[-1] == pytest.approx(
+        18e3
+    )
     assert state.lip_opening > 0.01
 
 
@@ -54,8 +56,18 @@ def test_run_keeps_the_order_asked_for(model):
     assert not result.failures and not result.interrupted
     points = result.summary()["points"]
     assert points[0]["mass_flow"] < points[1]["mass_flow"]
-    wanted = {"pressure", "mass_flow", "outlet_area", "outlet_velocity", "max_displacement", "max_displacement_position",
-              "lip_opening", "converged", "iterations", "residual"}  # fmt: skip
+    wanted = {
+        "pressure",
+        "mass_flow",
+        "outlet_area",
+        "outlet_velocity",
+        "max_displacement",
+        "max_displacement_position",
+        "lip_opening",
+        "converged",
+        "iterations",
+        "residual",
+    }
     assert wanted <= set(points[0])
 
 

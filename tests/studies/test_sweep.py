@@ -76,7 +76,9 @@ def test_a_tolerance_beyond_reach_is_not_called_certified(model, state):
 
 
 def test_branches_keep_their_identity(over_density):
-    """One branch goes from flutter to heavy damping, its frequency rising all the way; confidences exist where branches do."""
+    """One branch goes from flutter to heavy damping, its frequency rising all the way; confidences exist where branches
+    do.
+    """
     branches = over_density.branches
     assert list(branches.ids) == list(1 + np.arange(len(branches.ids)))
     first = branches.eigenvalues[0]

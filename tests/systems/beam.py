@@ -1,4 +1,5 @@
 """Uniform beam of unit length, stiffness and mass: Hermite elements, and problems made of it."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -46,10 +47,13 @@ class Beam:
 
 def hermite(xi: np.ndarray, h: float) -> np.ndarray:
     """Cubic shape functions and two derivatives on an element, shape (3, 4, points)."""
-    return np.array([
-        [1 - 3 * xi**2 + 2 * xi**3, h * (xi - 2 * xi**2 + xi**3), 3 * xi**2 - 2 * xi**3, h * (xi**3 - xi**2)],
-        [(-6 * xi + 6 * xi**2) / h, 1 - 4 * xi + 3 * xi**2, (6 * xi - 6 * xi**2) / h, 3 * xi**2 - 2 * xi],
-        [(-6 + 12 * xi) / h**2, (-4 + 6 * xi) / h, (6 - 12 * xi) / h**2, (6 * xi - 2) / h]])
+    return np.array(
+        [
+            [1 - 3 * xi**2 + 2 * xi**3, h * (xi - 2 * xi**2 + xi**3), 3 * xi**2 - 2 * xi**3, h * (xi**3 - xi**2)],
+            [(-6 * xi + 6 * xi**2) / h, 1 - 4 * xi + 3 * xi**2, (6 * xi - 6 * xi**2) / h, 3 * xi**2 - 2 * xi],
+            [(-6 + 12 * xi) / h**2, (-4 + 6 * xi) / h, (6 - 12 * xi) / h**2, (6 * xi - 2) / h],
+        ]
+    )
 
 
 def beam(elements: int = 60, *, clamped_end: bool = False) -> Beam:
@@ -72,8 +76,15 @@ def beam(elements: int = 60, *, clamped_end: bool = False) -> Beam:
             blocks = np.einsum("ip,jp,ep->eij", left, right, weights * factor(place))
         return sp.csr_matrix((blocks.ravel(), (rows, cols)), (size, size))[keep][:, keep]
 
-    return Beam(x, assemble(shape, shape), assemble(second, second), assemble(first, first),
-                assemble(shape, first), assemble(shape, second, lambda s: 1 - s), keep)
+    return Beam(
+        x,
+        assemble(shape, shape),
+        assemble(second, second),
+        assemble(first, first),
+        assemble(shape, first),
+        assemble(shape, second, lambda s: 1 - s),
+        keep,
+    )
 
 
 def beck_column(load: float, elements: int = 60, damping: float = 0.0) -> CoupledPencil:
@@ -89,8 +100,9 @@ def leipholz_column(load: float, elements: int = 60) -> CoupledPencil:
     return CoupledPencil(M=b.mass, C=0 * b.mass, K=b.bending + load * b.curvature)
 
 
-def fluid_conveying_pipe(velocity: float, mass_ratio: float, elements: int = 60, *,
-                         clamped_end: bool = False) -> CoupledPencil:
+def fluid_conveying_pipe(
+    velocity: float, mass_ratio: float, elements: int = 60, *, clamped_end: bool = False
+) -> CoupledPencil:
     """w'''' + u^2 w'' + 2 sqrt(beta) u dw'/dt + d2w/dt2 = 0."""
     b = beam(elements, clamped_end=clamped_end)
     K = b.bending - velocity**2 * b.tension
@@ -101,5 +113,8 @@ def fluid_conveying_pipe(velocity: float, mass_ratio: float, elements: int = 60,
 
 def ziegler_pendulum(load: float, damping: float = 0.0) -> CoupledPencil:
     """Two rods, follower force; masses 2 and 1, springs, lengths and dampers equal."""
-    return CoupledPencil(M=[[3.0, 1.0], [1.0, 1.0]], C=damping * np.array([[2.0, -1.0], [-1.0, 1.0]]),
-                         K=[[2.0 - load, load - 1.0], [-1.0, 1.0]])
+    return CoupledPencil(
+        M=[[3.0, 1.0], [1.0, 1.0]],
+        C=damping * np.array([[2.0, -1.0], [-1.0, 1.0]]),
+        K=[[2.0 - load, load - 1.0], [-1.0, 1.0]],
+    )

@@ -27,10 +27,7 @@ def bratu_2d(points: int) -> JaxSystem:
 
     def residual(u, mu):
         full = jnp.pad(u.reshape(points, points), 1)
-        laplacian = (
-            full[2:, 1:-1] + full[:-2, 1:-1] + full[1:-1, 2:] + full[1:-1, :-2]
-            - 4 * full[1:-1, 1:-1]
-        ) / h**2
+        laplacian = (full[2:, 1:-1] + full[:-2, 1:-1] + full[1:-1, 2:] + full[1:-1, :-2] - 4 * full[1:-1, 1:-1]) / h**2
         return laplacian.ravel() + mu["lambda"] * jnp.exp(u)
 
     line = sp.diags([1.0, 1.0, 1.0], [-1, 0, 1], shape=(points, points))

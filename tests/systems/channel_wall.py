@@ -1,4 +1,5 @@
 """Elastic wall of a channel with ideal unsteady one-dimensional flow, as a coupled pencil."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -11,8 +12,9 @@ from .beam import beam, hermite
 from .one_dimensional_flow import linearised_flow
 
 
-def channel_wall(velocity: float, mass_ratio: float, inlet: str, *, damping: float = 0.0,
-                 modes: int = 18, inlet_length: float = 0.0) -> CoupledPencil:
+def channel_wall(
+    velocity: float, mass_ratio: float, inlet: str, *, damping: float = 0.0, modes: int = 18, inlet_length: float = 0.0
+) -> CoupledPencil:
     """Polynomial Galerkin for the wall, spectral quadrature for the flow: converged digits.
 
     Parameters
@@ -29,17 +31,23 @@ def channel_wall(velocity: float, mass_ratio: float, inlet: str, *, damping: flo
     """
     x, weight = leggauss(modes + 10)
     x, weight = 0.5 * (x + 1), 0.5 * weight
-    basis = [Polynomial([0, 0, 1]) * Legendre.basis(k, domain=[0, 1]).convert(kind=Polynomial)
-             for k in range(modes)]
+    basis = [Polynomial([0, 0, 1]) * Legendre.basis(k, domain=[0, 1]).convert(kind=Polynomial) for k in range(modes)]
     value = np.array([f(x) for f in basis])
     turn = np.linalg.inv(np.linalg.cholesky((value * weight) @ value.T))
     curvature = turn @ np.array([f.deriv(2)(x) for f in basis])
     K = (curvature * weight) @ curvature.T
     # the flow needs the inlet and the outlet among its stations
     stations = np.concatenate([[0.0], x, [1.0]])
-    flow = linearised_flow(stations, np.ones_like(stations), velocity, 1.0, storage=True,
-                           inlet=inlet, inlet_length=inlet_length,
-                           integral=spectral_integral(x, stations))
+    flow = linearised_flow(
+        stations,
+        np.ones_like(stations),
+        velocity,
+        1.0,
+        storage=True,
+        inlet=inlet,
+        inlet_length=inlet_length,
+        integral=spectral_integral(x, stations),
+    )
     J = (turn @ np.array([f(stations) for f in basis])).T
     G = np.zeros((modes, stations.size))
     G[:, 1:-1] = mass_ratio * (turn @ value) * weight
@@ -55,8 +63,9 @@ def spectral_integral(points: np.ndarray, stations: np.ndarray) -> np.ndarray:
     return np.hstack([np.zeros((stations.size, 1)), integrals @ fit, np.zeros((stations.size, 1))])
 
 
-def channel_wall_elements(velocity: float, mass_ratio: float, inlet: str, *, elements: int = 100,
-                          damping: float = 0.0) -> CoupledPencil:
+def channel_wall_elements(
+    velocity: float, mass_ratio: float, inlet: str, *, elements: int = 100, damping: float = 0.0
+) -> CoupledPencil:
     """Hermite elements for the wall, the trapezoidal rule for the flow; second order."""
     b = beam(elements)
     nodes, h = b.x.size, 1.0 / elements
@@ -70,6 +79,5 @@ def channel_wall_elements(velocity: float, mass_ratio: float, inlet: str, *, ele
     block = mass_ratio * np.einsum("ip,jp,p->ij", shape, linear, weights)
     G = np.zeros((2 * nodes, nodes))
     for e in range(elements):
-        G[2 * e:2 * e + 4, e:e + 2] += block
-    return CoupledPencil(M=b.mass, C=damping * b.bending, K=b.bending, G=G[b.keep],
-                         J=J[:, b.keep], **flow.keywords())
+        G[2 * e : 2 * e + 4, e : e + 2] += block
+    return CoupledPencil(M=b.mass, C=damping * b.bending, K=b.bending, G=G[b.keep], J=J[:, b.keep], **flow.keywords())

@@ -14,7 +14,6 @@ def langford() -> JaxSystem:
         x, y, z = u
         m = mu["mu"]
         gain = m - 3 + z + 0.2 * (1 - z**2)
-        return jnp.stack([gain * x - 0.25 * y, 0.25 * x + gain * y,
-                          m * z - (x**2 + y**2 + z**2)])
+        return jnp.stack([gain * x - 0.25 * y, 0.25 * x + gain * y, m * z - (x**2 + y**2 + z**2)])
 
     return JaxSystem(residual, 3)

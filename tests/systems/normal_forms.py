@@ -8,9 +8,7 @@ from continuation.jax_system import JaxSystem
 
 def pitchfork() -> JaxSystem:
     """x' = mu x - x^3 + e, with a decoupled stable y."""
-    return JaxSystem(
-        lambda u, mu: jnp.stack([mu["mu"] * u[0] - u[0] ** 3 + mu["e"], -u[1] + u[0] ** 2]), 2
-    )
+    return JaxSystem(lambda u, mu: jnp.stack([mu["mu"] * u[0] - u[0] ** 3 + mu["e"], -u[1] + u[0] ** 2]), 2)
 
 
 def transcritical() -> JaxSystem:
@@ -29,9 +27,8 @@ def bogdanov_takens() -> JaxSystem:
     Fold: b2^2 = 4 b1; Hopf (s = -1): b1 = 0, b2 < 0, omega^2 = -b2; both meet at the origin.
     """
     return JaxSystem(
-        lambda u, mu: jnp.stack(
-            [u[1], mu["b1"] + mu["b2"] * u[0] + u[0] ** 2 + mu["s"] * u[0] * u[1]]
-        ), 2,
+        lambda u, mu: jnp.stack([u[1], mu["b1"] + mu["b2"] * u[0] + u[0] ** 2 + mu["s"] * u[0] * u[1]]),
+        2,
     )
 
 
@@ -52,8 +49,9 @@ def stuart_landau(mass=None) -> JaxSystem:
     def residual(u, mu):
         x, y = u
         r2 = x**2 + y**2
-        return jnp.stack([mu["mu"] * x - mu["w"] * y - r2 * (x - mu["c"] * y),
-                          mu["mu"] * y + mu["w"] * x - r2 * (y + mu["c"] * x)])
+        return jnp.stack(
+            [mu["mu"] * x - mu["w"] * y - r2 * (x - mu["c"] * y), mu["mu"] * y + mu["w"] * x - r2 * (y + mu["c"] * x)]
+        )
 
     return JaxSystem(residual, 2, mass=mass)
 
@@ -84,7 +82,13 @@ def subcritical_double(values=np.array([1.0, 2.5])) -> JaxSystem:
     def residual(u, mu):
         a, b = u[:2], u[2:]
         m = mu["mu"]
-        return jnp.stack([m * a[0] - w1 * a[1] - a[0] ** 3, w1 * a[0] + m * a[1],
-                          -m * b[0] - w2 * b[1] - b[0] ** 3, w2 * b[0] - m * b[1]])
+        return jnp.stack(
+            [
+                m * a[0] - w1 * a[1] - a[0] ** 3,
+                w1 * a[0] + m * a[1],
+                -m * b[0] - w2 * b[1] - b[0] ** 3,
+                w2 * b[0] - m * b[1],
+            ]
+        )
 
     return JaxSystem(residual, 4)

@@ -10,7 +10,6 @@ def one_degree_valve() -> JaxSystem:
 
     def residual(state, mu):
         x, v, f = state
-        return jnp.stack([v, (f - mu["c"] * v - mu["k"] * x) / mu["m"],
-                          mu["B"] * v - mu["r"] * f])
+        return jnp.stack([v, (f - mu["c"] * v - mu["k"] * x) / mu["m"], mu["B"] * v - mu["r"] * f])
 
     return JaxSystem(residual, 3)

@@ -3,6 +3,7 @@
 The matrices that a `CoupledPencil` wants (areas to pressures, one inlet unknown), for
 both continuity laws, by the trapezoidal rule along the stations.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -52,9 +53,17 @@ def cumulative_trapezoid(stations: np.ndarray) -> np.ndarray:
     return integral
 
 
-def linearised_flow(stations, area, inlet_velocity, density, *, storage: bool,
-                    inlet: str = "head", inlet_length: float = 0.0,
-                    integral: np.ndarray | None = None) -> FlowMatrices:
+def linearised_flow(
+    stations,
+    area,
+    inlet_velocity,
+    density,
+    *,
+    storage: bool,
+    inlet: str = "head",
+    inlet_length: float = 0.0,
+    integral: np.ndarray | None = None,
+) -> FlowMatrices:
     """Linearise p = P - rho [(U^2 - U_in^2)/2 + d/dt int U ds] about a steady flow.
 
     Parameters
@@ -100,6 +109,5 @@ def linearised_flow(stations, area, inlet_velocity, density, *, storage: bool,
     if inlet == "flux":
         # the unknown is the inlet pressure instead of the inlet velocity
         one, zero = np.ones((m, 1)), np.zeros((m, 1))
-        return FlowMatrices(A0, A1, A2, one, zero, A0[-1:], A1[-1:], A2[-1:],
-                            one[-1:], zero[-1:])
+        return FlowMatrices(A0, A1, A2, one, zero, A0[-1:], A1[-1:], A2[-1:], one[-1:], zero[-1:])
     raise ValueError(f"The inlet law '{inlet}' is unknown; it is 'head' or 'flux'.")

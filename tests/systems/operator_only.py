@@ -11,8 +11,17 @@ class OperatorOnly(SystemBase):
         self.inner, self.size, self.near = inner, inner.size, near
         self.constant_mass = inner.constant_mass
         self.factorisations = 0
-        for name in ("residual", "d_parameter", "d2", "d3", "d2_parameter", "d_parameters2",
-                     "mass_d", "mass_d2", "mass_parameter"):
+        for name in (
+            "residual",
+            "d_parameter",
+            "d2",
+            "d3",
+            "d2_parameter",
+            "d_parameters2",
+            "mass_d",
+            "mass_d2",
+            "mass_parameter",
+        ):
             setattr(self, name, getattr(inner, name))
 
     def linear(self, u, mu):
@@ -24,8 +33,7 @@ class OperatorOnly(SystemBase):
 
 
 class _Operators:
-    __slots__ = ("size", "matvec", "rmatvec", "solve", "solve_transpose", "mass_matvec",
-                 "mass_rmatvec", "shifted")
+    __slots__ = ("size", "matvec", "rmatvec", "solve", "solve_transpose", "mass_matvec", "mass_rmatvec", "shifted")
 
     def __init__(self, linear):
         for name in self.__slots__:

@@ -17,8 +17,7 @@ def pipe_matrices(count: int):
     points, weights = leggauss(2 * count + 8)
     points, weights = 0.5 * (points + 1), 0.5 * weights
     clamped = Polynomial([0, 0, 1])
-    shifted = [np.polynomial.Legendre.basis(k, domain=[0, 1]).convert(kind=Polynomial)
-               for k in range(count)]
+    shifted = [np.polynomial.Legendre.basis(k, domain=[0, 1]).convert(kind=Polynomial) for k in range(count)]
     basis = [clamped * p for p in shifted]
     values = [np.stack([f.deriv(m)(points) if m else f(points) for f in basis]) for m in range(3)]
     mass = (values[0] * weights) @ values[0].T

@@ -5,6 +5,7 @@ rotations) on a regular grid, clamped at the inlet end, free at the outlet, coup
 one-dimensional flow whose stations are the rows of nodes. It makes a realistic pencil
 without a shell program; nothing published is claimed for it.
 """
+
 from __future__ import annotations
 
 import numpy as np
@@ -18,16 +19,13 @@ GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
 
 
 def _shape(xi, eta):
-    n = 0.25 * np.array([(1 - xi) * (1 - eta), (1 + xi) * (1 - eta),
-                         (1 + xi) * (1 + eta), (1 - xi) * (1 + eta)])
-    dn = 0.25 * np.array([[-(1 - eta), (1 - eta), (1 + eta), -(1 + eta)],
-                          [-(1 - xi), -(1 + xi), (1 + xi), (1 - xi)]])
+    n = 0.25 * np.array([(1 - xi) * (1 - eta), (1 + xi) * (1 - eta), (1 + xi) * (1 + eta), (1 - xi) * (1 + eta)])
+    dn = 0.25 * np.array([[-(1 - eta), (1 - eta), (1 + eta), -(1 + eta)], [-(1 - xi), -(1 + xi), (1 + xi), (1 - xi)]])
     return n, dn
 
 
 def _element(dx, dz, young, poisson, thickness, density):
-    plane = young / (1 - poisson**2) * np.array(
-        [[1, poisson, 0], [poisson, 1, 0], [0, 0, (1 - poisson) / 2]])
+    plane = young / (1 - poisson**2) * np.array([[1, poisson, 0], [poisson, 1, 0], [0, 0, (1 - poisson) / 2]])
     shear = 5 / 6 * young / (2 * (1 + poisson)) * thickness
     stiffness, mass = np.zeros((20, 20)), np.zeros((20, 20))
     inertia = density * np.array([thickness] * 3 + [thickness**3 / 12] * 2)
@@ -45,8 +43,9 @@ def _element(dx, dz, young, poisson, thickness, density):
             membrane[2, 0::5], membrane[2, 1::5] = nz, nx
             bending[0, 3::5], bending[1, 4::5] = nx, nz
             bending[2, 3::5], bending[2, 4::5] = nz, nx
-            stiffness += jacobian * (thickness * membrane.T @ plane @ membrane
-                                     + thickness**3 / 12 * bending.T @ plane @ bending)
+            stiffness += jacobian * (
+                thickness * membrane.T @ plane @ membrane + thickness**3 / 12 * bending.T @ plane @ bending
+            )
             for d in range(5):
                 mass[d::5, d::5] += jacobian * inertia[d] * np.outer(n, n)
     n, nx, nz = gradients(0.0, 0.0)  # one point for the shear: no locking
@@ -57,10 +56,18 @@ def _element(dx, dz, young, poisson, thickness, density):
     return stiffness, mass
 
 
-def plate_over_channel(across: int = 28, along: int = 48, *, density: float = 10.0,
-                       storage: bool = False, alpha: float = 0.0, beta: float = 3e-3,
-                       follower: float = 0.02, inlet_velocity: float = 3.0,
-                       with_parts: bool = False):
+def plate_over_channel(
+    across: int = 28,
+    along: int = 48,
+    *,
+    density: float = 10.0,
+    storage: bool = False,
+    alpha: float = 0.0,
+    beta: float = 3e-3,
+    follower: float = 0.02,
+    inlet_velocity: float = 3.0,
+    with_parts: bool = False,
+):
     """Build the pencil.
 
     Parameters
@@ -104,16 +111,15 @@ def plate_over_channel(across: int = 28, along: int = 48, *, density: float = 10
     J = sp.csr_matrix((np.tile(x_weight, nz), (station, w.ravel())), (nz, n))
     G = sp.csr_matrix((np.repeat(z_weight, nx) * np.tile(x_weight, nz), (w.ravel(), station)), (n, nz))
     keep = np.ones(n, bool)
-    keep[dof_of(node[0], range(5))] = False          # clamped inlet
-    keep[dof_of(node[:, 0], (0, 3))] = False         # symmetry plane
-    keep[dof_of(node[:, -1], (2,))] = False          # side edge held
+    keep[dof_of(node[0], range(5))] = False  # clamped inlet
+    keep[dof_of(node[:, 0], (0, 3))] = False  # symmetry plane
+    keep[dof_of(node[:, -1], (2,))] = False  # side edge held
     Ks, M, load = (x.tocsr()[keep][:, keep] for x in (Ks, M, load))
     J, G = J[:, keep].tocsr(), G[keep].tocsr()
     # opening tapers towards the outlet, so the flow speeds up
     stations = np.linspace(0.0, length, nz)
     area = width * np.linspace(0.04, 0.008, nz)
-    flow = linearised_flow(stations, area, inlet_velocity, density, storage=storage,
-                           inlet_length=0.0)
+    flow = linearised_flow(stations, area, inlet_velocity, density, storage=storage, inlet_length=0.0)
     K = (Ks - load).tocsr()
     C = (alpha * M + beta * Ks).tocsr()
     pencil = CoupledPencil(M=M, C=C, K=K, G=G, J=J, **flow.keywords())

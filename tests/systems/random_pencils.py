@@ -1,4 +1,5 @@
 """Random pencils small enough for a dense solution of the first-order form."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -8,8 +9,9 @@ import scipy.sparse as sp
 from eigen import CoupledPencil
 
 
-def random_pencil(rng, n, m, b, *, added_mass=True, damping="general", unsymmetric=True, scale=1.0,
-                  algebraic=False, density=None) -> CoupledPencil:
+def random_pencil(
+    rng, n, m, b, *, added_mass=True, damping="general", unsymmetric=True, scale=1.0, algebraic=False, density=None
+) -> CoupledPencil:
     """A random pencil; with `density` its structure is sparse.
 
     Parameters
@@ -20,6 +22,7 @@ def random_pencil(rng, n, m, b, *, added_mass=True, damping="general", unsymmetr
     algebraic : bool
         S1 = 0: the inner unknowns have no dynamics of their own.
     """
+
     def normal(*shape):
         return rng.standard_normal(shape)
 
@@ -31,18 +34,30 @@ def random_pencil(rng, n, m, b, *, added_mass=True, damping="general", unsymmetr
     root = matrix()
     M = root @ root.T / n + np.eye(n)
     low = matrix()
-    C = {"general": 0.1 * matrix(), "positive": 0.02 * (low @ low.T) + 0.01 * np.eye(n),
-         "none": np.zeros((n, n)), "mass": 0.01 * M}[damping]
+    C = {
+        "general": 0.1 * matrix(),
+        "positive": 0.02 * (low @ low.T) + 0.01 * np.eye(n),
+        "none": np.zeros((n, n)),
+        "mass": 0.01 * M,
+    }[damping]
     K = np.diag(10 ** rng.uniform(-1, 2, n)) + (0.3 * matrix() if unsymmetric else 0)
-    parts = dict(M=M, C=C, K=K)
+    parts = {"M": M, "C": C, "K": K}
     if m:
-        parts |= dict(G=normal(n, m), J=normal(m, n), A0=scale * normal(m, m), A1=scale * normal(m, m),
-                      B0=scale * normal(m, b), B1=scale * normal(m, b), R0=normal(b, m),
-                      R1=normal(b, m), S0=normal(b, b))
+        parts |= {
+            "G": normal(n, m),
+            "J": normal(m, n),
+            "A0": scale * normal(m, m),
+            "A1": scale * normal(m, m),
+            "B0": scale * normal(m, b),
+            "B1": scale * normal(m, b),
+            "R0": normal(b, m),
+            "R1": normal(b, m),
+            "S0": normal(b, b),
+        }
         if added_mass:
-            parts |= dict(A2=0.3 * scale * normal(m, m), R2=0.1 * normal(b, m))
+            parts |= {"A2": 0.3 * scale * normal(m, m), "R2": 0.1 * normal(b, m)}
         if not algebraic:
-            parts |= dict(S1=normal(b, b))
+            parts |= {"S1": normal(b, b)}
     return CoupledPencil(**parts)
 
 

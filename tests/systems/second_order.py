@@ -16,21 +16,19 @@ from continuation.system import SystemBase
 class CoupledChain(SystemBase):
     """Fixed chain of ``count`` unit masses; ``rank`` columns feed strains back as forces."""
 
-    def __init__(self, count: int, rank: int = 3, near: complex = 0.0, damping: float = 0.05,
-                 delay: float = 5.0):
+    def __init__(self, count: int, rank: int = 3, near: complex = 0.0, damping: float = 0.05, delay: float = 5.0):
         self.count, self.size, self.near = count, 2 * count, near
         self.delay = delay
         one = np.ones(count)
         self.mass = sp.diags([one + 0.3 * np.sin(np.arange(count))], [0], format="csc")
-        self.stiffness = (count / 20.0) ** 2 * sp.diags([-one[1:], 2 * one, -one[1:]],
-                                                        [-1, 0, 1], format="csc")
+        self.stiffness = (count / 20.0) ** 2 * sp.diags([-one[1:], 2 * one, -one[1:]], [-1, 0, 1], format="csc")
         self.damping = damping * self.mass + 1e-3 * self.stiffness
         x = (np.arange(count) + 0.5) / count
         self.feed = np.stack([np.sin((k + 1) * np.pi * x) for k in range(rank)], 1) / count
         self.read = np.stack([np.sin((k + 1) * np.pi * x + 0.3) for k in range(rank)], 1)
 
     def parts(self, u):
-        return u[: self.count], u[self.count:]
+        return u[: self.count], u[self.count :]
 
     def _coupling(self, q, v):
         return self.feed @ (self.read.T @ (q + self.delay * v))

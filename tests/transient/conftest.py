@@ -18,7 +18,9 @@ def small_model(*changes):
 @pytest.fixture
 def valve():
     """`valve({"fluid.density": 10})`: a coarse model with some keys changed."""
-    return lambda changes={}: small_model(*sorted((k, tuple(v) if isinstance(v, list) else v) for k, v in changes.items()))
+    return lambda changes={}: small_model(
+        *sorted((k, tuple(v) if isinstance(v, list) else v) for k, v in changes.items())
+    )
 
 
 @pytest.fixture

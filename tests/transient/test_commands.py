@@ -14,7 +14,9 @@ SMALL = [
 
 def test_transient_and_what_reads_it(command_line, tmp_path):
     path, figures = tmp_path / "run.h5", tmp_path / "figures"
-    outcome = command_line("transient", *SMALL, "-o", path, "--plots", figures, "--animate", figures / "run.gif", "--json")
+    outcome = command_line(
+        "transient", *SMALL, "-o", path, "--plots", figures, "--animate", figures / "run.gif", "--json"
+    )
     assert outcome.status == 0, outcome.err
     document = json.loads(outcome.out)
     for key in ("verdict", "amplitude", "frequency", "mean", "cycles_observed", "periodicity_error", "steps", "time"):
@@ -23,7 +25,15 @@ def test_transient_and_what_reads_it(command_line, tmp_path):
         assert key in document["lip_opening"] or key in ("steps", "time")
     assert document["steps"] == 20 and document["time"] == pytest.approx(0.02)
     drawn = {p.name for p in figures.iterdir()}
-    assert {"history.png", "phase-portrait.png", "spectrum.png", "centre-line-cycle.png", "energies.png", "lip-wave.png", "run.gif"} <= drawn
+    assert {
+        "history.png",
+        "phase-portrait.png",
+        "spectrum.png",
+        "centre-line-cycle.png",
+        "energies.png",
+        "lip-wave.png",
+        "run.gif",
+    } <= drawn
     assert (figures / "run.gif").read_bytes()[:3] == b"GIF"
     assert command_line("info", path).status == 0
     outcome = command_line("resume", path, "--duration", "25 ms", "--json")
@@ -35,7 +45,11 @@ def test_transient_and_what_reads_it(command_line, tmp_path):
 
 
 def test_resume_refuses_in_one_sentence(command_line, tmp_path, one_sentence):
-    for arguments in (["resume", tmp_path / "none.h5"], ["transient", "--set", "transient.numerical_damping=0.7"], ["verdict", tmp_path / "none.csv"]):
+    for arguments in (
+        ["resume", tmp_path / "none.h5"],
+        ["transient", "--set", "transient.numerical_damping=0.7"],
+        ["verdict", tmp_path / "none.csv"],
+    ):
         outcome = command_line(*arguments)
         assert outcome.status == 2 and one_sentence(outcome.err), outcome.err
 
@@ -70,7 +84,13 @@ def test_verdict_without_times(command_line, tmp_path):
 
 @pytest.mark.parametrize(
     "text, words",
-    [("", "no numbers"), ("1,2\n3\n", "line 2"), ("t,x\n1,a\n", "line 2"), ("0,1\n0,2\n1,3\n", "do not increase"), ("1\n2\n3\n", "--rate")],
+    [
+        ("", "no numbers"),
+        ("1,2\n3\n", "line 2"),
+        ("t,x\n1,a\n", "line 2"),
+        ("0,1\n0,2\n1,3\n", "do not increase"),
+        ("1\n2\n3\n", "--rate"),
+    ],
 )
 def test_verdict_refuses_in_one_sentence(command_line, tmp_path, one_sentence, text, words):
     file = tmp_path / "bad.csv"

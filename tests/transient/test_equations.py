@@ -1,4 +1,6 @@
-"""The equations of a step against the time-dependent residual of the model, and their iteration matrix against differences."""
+"""The equations of a step against the time-dependent residual of the model, and their iteration matrix against
+differences.
+"""
 
 import numpy as np
 import pytest
@@ -20,8 +22,13 @@ def test_consistent_accelerations_meet_the_model(valve, open_state, law):
     v = 0.05 * open_state / np.abs(open_state).max()
     state = consistent_state(motion, 0.0, open_state, v, 0.4, 9e3)
     rate = 0.0
-    if motion.moving_fluid:  # psi = U times an integral, at the areas' rates; only the outlet's equation fixes the rate of U
-        rates = [dynamic_residual(model, motion.conditions, 9e3, open_state, v, state.a, state.speed, r)[1] for r in (0.0, 1.0)]
+    if (
+        motion.moving_fluid
+    ):  # psi = U times an integral, at the areas' rates; only the outlet's equation fixes the rate of U
+        rates = [
+            dynamic_residual(model, motion.conditions, 9e3, open_state, v, state.a, state.speed, r)[1]
+            for r in (0.0, 1.0)
+        ]
         rate = -rates[0] / (rates[1] - rates[0])
     force, outlet = dynamic_residual(model, motion.conditions, 9e3, open_state, v, state.a, state.speed, rate)
     scale = np.abs(state.force).max()
@@ -38,7 +45,8 @@ def test_flow_is_that_of_the_channel(valve, law):
     area = model.rows.areas(model.nodal(model.rest())) + 1e-3 * rng.random(model.stations)
     rate, acceleration, h = 1e-2 * rng.standard_normal(model.stations), rng.standard_normal(model.stations), 1e-6
     psi_rate = (
-        fluid.state(area + h * rate, rate + h * acceleration, 0.3 + 2 * h).psi - fluid.state(area - h * rate, rate - h * acceleration, 0.3 - 2 * h).psi
+        fluid.state(area + h * rate, rate + h * acceleration, 0.3 + 2 * h).psi
+        - fluid.state(area - h * rate, rate - h * acceleration, 0.3 - 2 * h).psi
     ) / (2 * h)
     p = fluid.pressure(fluid.state(area, rate, 0.3), psi_rate, 6e3)
     assert p == pytest.approx(channel.pressure(area, rate, acceleration, 0.3, 2.0, 6e3, 50.0), rel=1e-6, abs=1e-3)
@@ -52,7 +60,11 @@ def test_slopes_of_the_flow(valve, law):
     area = model.rows.areas(model.nodal(model.rest())) + 1e-5 * rng.random(model.stations)
     rate = 1e-2 * rng.standard_normal(model.stations)
     found = fluid.slopes(area, rate, 0.3)
-    steps = [(1e-9 * rng.standard_normal(model.stations), 0, 0), (0, 1e-6 * rng.standard_normal(model.stations), 0), (0, 0, 1e-4)]
+    steps = [
+        (1e-9 * rng.standard_normal(model.stations), 0, 0),
+        (0, 1e-6 * rng.standard_normal(model.stations), 0),
+        (0, 0, 1e-4),
+    ]
     for slope, (da, dr, du) in zip(found, steps):
         change = fluid.state(area + da, rate + dr, 0.3 + du).speed - fluid.state(area - da, rate - dr, 0.3 - du).speed
         direction = da if np.ndim(da) else dr if np.ndim(dr) else du

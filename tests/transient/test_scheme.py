@@ -5,11 +5,17 @@ import pytest
 
 from dbvfiv.transient.scheme import SCHEMES, scheme
 
-MEMBERS = [("generalised-alpha", nd) for nd in (0.0, 0.1, 0.3, 0.5)] + [("hht", 0.0), ("hht", 0.1), ("hht", 0.3), ("newmark", 0.0), ("newmark", 0.2)]
+MEMBERS = [("generalised-alpha", nd) for nd in (0.0, 0.1, 0.3, 0.5)] + [
+    ("hht", 0.0),
+    ("hht", 0.1),
+    ("hht", 0.3),
+    ("newmark", 0.0),
+    ("newmark", 0.2),
+]
 
 
 def amplification(s, omega_h, beta_h=0.0):
-    """(4, 4) matrix of a step of M a + beta F' + F = 0, F = omega^2 q, for (q, h v, h^2 a, previous difference of F)."""
+    """(4, 4) matrix of a step of M a + beta F' + F = 0, F = omega^2 q, for (q, h v, h^2 a, last difference of F)."""
     w = omega_h**2
     columns = []
     for q, v, a, rate in np.eye(4):
@@ -63,7 +69,9 @@ def test_order_of_the_eigenvalues(name, nd, order):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.15)
 
 
-@pytest.mark.parametrize("name, nd", [("generalised-alpha", 0.6), ("generalised-alpha", -0.1), ("hht", 0.4), ("euler", 0.0)])
+@pytest.mark.parametrize(
+    "name, nd", [("generalised-alpha", 0.6), ("generalised-alpha", -0.1), ("hht", 0.4), ("euler", 0.0)]
+)
 def test_what_is_no_member_is_refused(name, nd):
     with pytest.raises(ValueError):
         scheme(name, nd)

@@ -7,7 +7,7 @@ from dbvfiv.transient.control import ControlOptions, FixedSteps, step_control
 from dbvfiv.transient.equations import ValveMotion
 from dbvfiv.transient.scheme import scheme
 from dbvfiv.transient.state import consistent_state
-from dbvfiv.transient.stepper import Stepper, StepFailure, StepOptions
+from dbvfiv.transient.stepper import StepFailure, StepOptions, Stepper
 
 TIGHT = StepOptions(tolerance=1e-9, floor=1e-13)
 
@@ -65,7 +65,15 @@ def test_a_free_swing_keeps_its_energy(valve, open_state):
     from dbvfiv.transient.start import steady_positions
 
     start = steady_positions(valve(), 2e3)
-    model = valve({"drive.kind": "uniform", "drive.pressure": 0.0, "supports.lip_stop": False, "damping.alpha": 0.0, "damping.beta": 0.0})
+    model = valve(
+        {
+            "drive.kind": "uniform",
+            "drive.pressure": 0.0,
+            "supports.lip_stop": False,
+            "damping.alpha": 0.0,
+            "damping.beta": 0.0,
+        }
+    )
     motion = ValveMotion(model)
     state = consistent_state(motion, 0.0, start, 0 * start, 0.0, 0.0)
     energy = sum(motion.energies(state.q, state.v))
@@ -134,7 +142,9 @@ def test_factors_are_kept(valve, open_state):
     motion = ValveMotion(valve({"fluid.density": 300.0}))
     speed = motion.model.flow.inlet_velocity(motion.model.rows.areas(motion.model.nodal(open_state)), 12e3, 300.0)
     state = consistent_state(motion, 0.0, open_state, 0 * open_state, speed, 12e3)
-    _, results, stepper, _ = advance(motion, state, 1e-4, 100, lambda t: 12e3 + 50 * np.sin(200 * t), options=StepOptions())
+    _, results, stepper, _ = advance(
+        motion, state, 1e-4, 100, lambda t: 12e3 + 50 * np.sin(200 * t), options=StepOptions()
+    )
     assert stepper.factorisations < 10
     assert stepper.residuals < 350
 

@@ -23,10 +23,28 @@ def table(path):
 
 @pytest.mark.slow
 def test_response_to_density(tmp_path):
-    arguments = ["response_to_density.py", tmp_path, 300, 100, "--mesh", "6x8", "--pressure", "6 kPa", "--duration", "0.03 s", "--step", "1 ms"]
+    arguments = [
+        "response_to_density.py",
+        tmp_path,
+        300,
+        100,
+        "--mesh",
+        "6x8",
+        "--pressure",
+        "6 kPa",
+        "--duration",
+        "0.03 s",
+        "--step",
+        "1 ms",
+    ]
     study(*arguments)
     first = table(tmp_path / "response.csv")
-    assert [(row["way"], row["density"]) for row in first] == [("down", "300"), ("down", "100"), ("up", "100"), ("up", "300")]
+    assert [(row["way"], row["density"]) for row in first] == [
+        ("down", "300"),
+        ("down", "100"),
+        ("up", "100"),
+        ("up", "300"),
+    ]
     assert all(int(row["steps"]) >= 30 for row in first)  # slamming lips may halve some
     times = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
     study(*arguments)
@@ -37,8 +55,30 @@ def test_response_to_density(tmp_path):
 
 @pytest.mark.slow
 def test_cycle_convergence_and_slamming(tmp_path):
-    out = study("cycle_convergence.py", tmp_path / "a", "--mesh", "6x8", "--steps", 2, 1, 0.5, "--duration", "0.04 s", "--mesh-duration", "0.04 s")
+    out = study(
+        "cycle_convergence.py",
+        tmp_path / "a",
+        "--mesh",
+        "6x8",
+        "--steps",
+        2,
+        1,
+        0.5,
+        "--duration",
+        "0.04 s",
+        "--mesh-duration",
+        "0.04 s",
+    )
     assert out.count("order of") == 5 and "verdict" in out and len(table(tmp_path / "a" / "convergence.csv")) == 3
-    study("slamming.py", tmp_path / "b", "base:", "soft:supports.lip_stop_stiffness=1e6", "--mesh", "6x8", "--duration", "0.08 s")
+    study(
+        "slamming.py",
+        tmp_path / "b",
+        "base:",
+        "soft:supports.lip_stop_stiffness=1e6",
+        "--mesh",
+        "6x8",
+        "--duration",
+        "0.08 s",
+    )
     base, soft = table(tmp_path / "b" / "slamming.csv")
     assert (base["variant"], soft["variant"]) == ("base", "soft") and float(base["time"]) == pytest.approx(0.08)

@@ -21,7 +21,9 @@ def relaxing(rate, start):
 
 
 def bursts(gap, strength):
-    """Rings of 40 Hz that die in 50 ms, `gap` apart on average, as lips do that slam: arrays of times between them and of their strengths."""
+    """Rings of 40 Hz that die in 50 ms, `gap` apart on average, as lips do that slam: arrays of times between them and
+    of their strengths.
+    """
     out = np.zeros_like(T)
     for begin, size in zip(np.cumsum(gap), strength):
         after = np.maximum(T - begin, 0.0)
@@ -212,7 +214,9 @@ def test_beats_seen_for_long_are_not_taken_for_growth_at_any_moment():
     beat = np.sin(W * t) + 0.3 * np.sin(1.01 * W * t)
     for end in range(42, 121, 6):
         verdict = judge(t[: end * 500], beat[: end * 500])
-        assert not (verdict.name in ("limit cycle", "steady") or (verdict.name in ("growing", "decaying") and verdict.decided)), (end, verdict)
+        assert not (
+            verdict.name in ("limit cycle", "steady") or (verdict.name in ("growing", "decaying") and verdict.decided)
+        ), (end, verdict)
 
 
 def test_closed():
@@ -248,7 +252,13 @@ def test_units_and_offset_of_time_do_not_matter():
 def test_van_der_pol(mu, period, amplitude):
     t = np.linspace(0, 200, 8001)
     run = solve_ivp(
-        lambda _, y: [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]], (0, 200), [0.1, 0], t_eval=t, rtol=1e-11, atol=1e-12, method="DOP853"
+        lambda _, y: [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]],
+        (0, 200),
+        [0.1, 0],
+        t_eval=t,
+        rtol=1e-11,
+        atol=1e-12,
+        method="DOP853",
     )
     verdict = judge(t, run.y[0])
     assert verdict.name == "limit cycle" and verdict.decided
@@ -266,7 +276,9 @@ def lorenz(t, y):
     return [10 * (y[1] - y[0]), y[0] * (28 - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]]
 
 
-@pytest.mark.parametrize("system, span, component", [(rossler, (100, 400), 0), (lorenz, (10, 60), 0), (lorenz, (10, 60), 2)])
+@pytest.mark.parametrize(
+    "system, span, component", [(rossler, (100, 400), 0), (lorenz, (10, 60), 0), (lorenz, (10, 60), 2)]
+)
 def test_chaos_is_irregular(system, span, component):
     t = np.linspace(*span, 10001)
     values = solve_ivp(system, (0, span[1]), [1, 1, 1], t_eval=t, rtol=1e-9).y[component]

@@ -1,4 +1,5 @@
 """Critical parameters of small pencils by bracketing, for the verification tests."""
+
 import numpy as np
 from scipy.optimize import brentq
 
@@ -24,13 +25,13 @@ def coalescence(pencil_at, low, high):
     (omega_2^2 - omega_1^2)^2 passes through zero there linearly, so its root is sharp where
     that of the growth rate is not.
     """
+
     def lowest_two(x):
         pencil = pencil_at(x)
         values = np.linalg.eigvals(np.linalg.solve(pencil.M.toarray(), pencil.K.toarray()))
         return values[np.argsort(np.abs(values))[:2]].astype(complex)
 
-    root = brentq(lambda x: ((lambda v: ((v[1] - v[0]) ** 2).real)(lowest_two(x))), low, high,
-                  xtol=1e-12, rtol=1e-14)
+    root = brentq(lambda x: (lambda v: ((v[1] - v[0]) ** 2).real)(lowest_two(x)), low, high, xtol=1e-12, rtol=1e-14)
     omega = np.sqrt(lowest_two(root).mean().real)
     # the package's own eigenvalues say the same
     modes = leading_modes(pencil_at(root * (1 + 1e-6)), 1, SearchOptions(max_frequency=omega / 4))

@@ -1,7 +1,7 @@
 """A layered solid of 20-node hexahedra on FElupe: the independent reference of the three-point bending case.
 
-Nearly incompressible Mooney-Rivlin rubber and orthotropic St Venant-Kirchhoff plies, energies differentiated by JAX; 2 x 2 x 2 integration keeps the
-elements free of shear and volumetric locking.
+Nearly incompressible Mooney-Rivlin rubber and orthotropic St Venant-Kirchhoff plies, energies differentiated by JAX; 2
+x 2 x 2 integration keeps the elements free of shear and volumetric locking.
 """
 
 from __future__ import annotations
@@ -84,10 +84,15 @@ class LayeredSolid:
 
     def __post_init__(self):
         faces = np.concatenate([[0.0], np.cumsum([layer.thickness for layer in self.layers])])
-        z = np.concatenate([np.linspace(a, b, self.per_layer + 1)[:-1] for a, b in zip(faces[:-1], faces[1:])] + [faces[-1:]])
+        z = np.concatenate(
+            [np.linspace(a, b, self.per_layer + 1)[:-1] for a, b in zip(faces[:-1], faces[1:])] + [faces[-1:]]
+        )
         shape = (len(self.x), len(self.y), len(z))
         box = fem.Cube(n=shape)
-        box.points[:] = np.stack([g[i] for g, i in zip((self.x, self.y, z), np.rint(box.points * (np.array(shape) - 1)).astype(int).T)], axis=1)
+        box.points[:] = np.stack(
+            [g[i] for g, i in zip((self.x, self.y, z), np.rint(box.points * (np.array(shape) - 1)).astype(int).T)],
+            axis=1,
+        )
         mesh = box.convert(order=2, calc_points=True)
         quadrature = fem.GaussLegendre(order=1, dim=3)
         self.region = fem.RegionQuadraticHexahedron(mesh, quadrature=quadrature)
@@ -97,7 +102,9 @@ class LayeredSolid:
         layer = np.searchsorted(faces, middle) - 1
         count = quadrature.npoints
         table = np.array([parameters_of(item) for item in self.layers])
-        self._parameters = jnp.asarray(np.tile(table[layer], (count, 1)))  # quadrature point first, as FElupe orders its fields
+        self._parameters = jnp.asarray(
+            np.tile(table[layer], (count, 1))
+        )  # quadrature point first, as FElupe orders its fields
         self.body = fem.SolidBody(fem.Material(self._evaluate_stress, self._evaluate_tangent), self.field)
         self._solver = None
 
@@ -129,7 +136,9 @@ class LayeredSolid:
         return weights / weights.sum()
 
     def solve(self, force: np.ndarray, fixed: np.ndarray, tolerance: float = 1e-8) -> np.ndarray:
-        """Displacements (points, 3) under dead forces (points, 3), from the present state on; `fixed` (points, 3) is true where held."""
+        """Displacements (points, 3) under dead forces (points, 3), from the present state on; `fixed` (points, 3) is
+        true where held.
+        """
         free = np.flatnonzero(~fixed.ravel())
         u = self.field[0].values
         for _ in range(30):

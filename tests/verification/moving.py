@@ -40,7 +40,11 @@ class Motion:
         return np.zeros(self.size)
 
     def force_rate(self, q, v):
-        return np.zeros(self.size) if not np.any(v) else (self.internal_force(q + 1e-6 * v) - self.internal_force(q - 1e-6 * v)) / 2e-6
+        return (
+            np.zeros(self.size)
+            if not np.any(v)
+            else (self.internal_force(q + 1e-6 * v) - self.internal_force(q - 1e-6 * v)) / 2e-6
+        )
 
     def speeds(self, state):
         return NONE
@@ -117,7 +121,16 @@ class ShellMotion(Motion):
         _, values = shell.force_and_tangent(q_new)
         values = weights.force * values + weights.inertia * shell.mass(q)
         pressure = weights.load * weights.theta * load.inlet
-        pressure_stiffness(mesh.quads, mesh.nodes, shell.dofs.expand(q), self._pressure(pressure), self._all, shell.dofs.slots, -1.0, values)
+        pressure_stiffness(
+            mesh.quads,
+            mesh.nodes,
+            shell.dofs.expand(q),
+            self._pressure(pressure),
+            self._all,
+            shell.dofs.slots,
+            -1.0,
+            values,
+        )
         self._refactor(values)
 
     def solve(self, force, outlet):
@@ -134,4 +147,6 @@ class ShellMotion(Motion):
         nodal = shell.dofs.expand(q)
         d, d1, _ = shell.directors(nodal)
         kinetic = kinetic_energy(shell.mesh.quads, shell._integrals, d1, shell.dofs.expand(v))
-        return float(kinetic + strain_energy(shell.mesh.quads, shell.mesh.nodes, nodal, d, *shell._reference, *shell._wall))
+        return float(
+            kinetic + strain_energy(shell.mesh.quads, shell.mesh.nodes, nodal, d, *shell._reference, *shell._wall)
+        )

@@ -3,6 +3,7 @@
 Reference: Galerkin and exact transfer matrix, agreeing to six digits. mu = 1, U = 1, wall
 clamped at the inlet, free at the outlet.
 """
+
 import numpy as np
 import pytest
 
@@ -32,8 +33,12 @@ def test_table_to_the_printed_digits(inlet):
 
 @pytest.mark.parametrize("inlet", ["flux", "head"])
 def test_finite_elements_converge_to_the_table_with_second_order(inlet):
-    errors = [np.abs(lowest(channel_wall_elements(1.0, 1.0, inlet, elements=n), 3)
-                     - lowest(channel_wall(1.0, 1.0, inlet), 3)).max() for n in (16, 32)]
+    errors = [
+        np.abs(
+            lowest(channel_wall_elements(1.0, 1.0, inlet, elements=n), 3) - lowest(channel_wall(1.0, 1.0, inlet), 3)
+        ).max()
+        for n in (16, 32)
+    ]
     assert 1.8 < np.log2(errors[0] / errors[1]) < 2.2
 
 
@@ -51,8 +56,7 @@ def test_table_on_a_fine_grid_by_krylov_method(inlet):
 
 @pytest.mark.parametrize("inlet, velocity, omega", [("flux", 10.0563, 16.3257), ("head", 11.6925, 12.9595)])
 def test_free_lip_flutters_with_kelvin_voigt_damping(inlet, velocity, omega):
-    found, frequency = hopf(lambda u: channel_wall(u, 1.0, inlet, damping=0.01),
-                            0.98 * velocity, 1.02 * velocity)
+    found, frequency = hopf(lambda u: channel_wall(u, 1.0, inlet, damping=0.01), 0.98 * velocity, 1.02 * velocity)
     assert found == pytest.approx(velocity, abs=5e-5)
     assert frequency == pytest.approx(omega, abs=5e-5)
 

@@ -83,7 +83,11 @@ def test_the_same_ring_under_dead_pressure_buckles_at_four():
         steps.reach(p * EI / RADIUS**3)
         tangent = model.tangent(steps.q, steps.pressure)
         matrix, mass = (model.shell.dofs.matrix(v).toarray() for v in (tangent.structure, model.mass(steps.q)))
-        return float(np.linalg.eigvalsh(np.linalg.solve(np.linalg.cholesky(mass), np.linalg.solve(np.linalg.cholesky(mass), matrix).T)).min())
+        return float(
+            np.linalg.eigvalsh(
+                np.linalg.solve(np.linalg.cholesky(mass), np.linalg.solve(np.linalg.cholesky(mass), matrix).T)
+            ).min()
+        )
 
     steps.reach(1.0 * EI / RADIUS**3)
     # the round state stays an equilibrium past 3 EI/R^3, where the follower load leaves it
@@ -108,7 +112,9 @@ def test_an_arch_snaps_at_a_limit_point_and_is_followed_beyond_it():
     model = _arch()
     lowest = []
     see = lambda p, q: lowest.append((p, stiffness_spectrum(model, q, p, 2).lowest))  # noqa: E731
-    steps = LoadSteps(model, LoadStepOptions(NewtonOptions(1e-9, 30), 1e-6, max_step=20.0, largest_jump=1e-3), accepted=see)
+    steps = LoadSteps(
+        model, LoadStepOptions(NewtonOptions(1e-9, 30), 1e-6, max_step=20.0, largest_jump=1e-3), accepted=see
+    )
     target = 8000.0
     with pytest.raises(SolveError):
         steps.reach(target)
@@ -122,7 +128,9 @@ def test_an_arch_snaps_at_a_limit_point_and_is_followed_beyond_it():
     (pa, a), (pb, b) = lowest[-2], lowest[-1]
     assert pa + (pb - pa) * a**2 / (a**2 - b**2) == pytest.approx(top.pressure, rel=1e-4)
     # load steps back from beyond, with the pressure falling, end at the other limit point
-    back = LoadSteps(model, LoadStepOptions(NewtonOptions(1e-9, 30), 1e-6, largest_jump=1e-3, max_step=200.0), path.pressure, path.q)
+    back = LoadSteps(
+        model, LoadStepOptions(NewtonOptions(1e-9, 30), 1e-6, largest_jump=1e-3, max_step=200.0), path.pressure, path.q
+    )
     if bottom.pressure > 0:
         with pytest.raises(SolveError):
             back.reach(0.5 * bottom.pressure)

@@ -1,4 +1,6 @@
-"""Contact against solutions that know nothing of the shell: a strip pressed on a plane, a ring squeezed between plates, energies."""
+"""Contact against solutions that know nothing of the shell: a strip pressed on a plane, a ring squeezed between plates,
+energies.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ E, WIDTH = 5e6, 0.02
 
 
 def _strip(elements: int, half=0.5, h=4e-3, gap=1e-3, depth=0.7e-3, penalty=1e8) -> PressedShell:
-    """Half of a strip whose clamp can slide along it, its face a small gap above the plane; nu = 0, so a beam of stiffness E h^3 / 12.
+    """Half of a strip whose clamp can slide along it, its face a small gap above the plane; nu = 0, so a beam of
+    stiffness E h^3 / 12.
 
     The face lies at a depth of its own, other than half the wall: only the gap may matter to a strip.
     """
@@ -42,7 +45,8 @@ def _strip(elements: int, half=0.5, h=4e-3, gap=1e-3, depth=0.7e-3, penalty=1e8)
 def _beam(q: float, half=0.5, h=4e-3, gap=1e-3) -> tuple[float, float]:
     """Free length from the clamp and contact force of half a strip of unit width, by beam theory.
 
-    With w = w' = 0 at the clamp and w = gap, w' = w'' = 0 where contact begins, EI w'''' = q gives s^4 = 72 EI gap / q; the clamp carries 2 q s / 3.
+    With w = w' = 0 at the clamp and w = gap, w' = w'' = 0 where contact begins, EI w'''' = q gives s^4 = 72 EI gap / q;
+    the clamp carries 2 q s / 3.
     """
     s = (72 * E * h**3 / 12 * gap / q) ** 0.25
     return s, q * half - 2 * q * s / 3
@@ -80,12 +84,15 @@ def test_a_strip_pressed_on_a_plane_lifts_off_where_beam_theory_says():
 
 def _ring(elements: int, radius=0.1, h=1e-3, squeeze=0.0, penalty=1e5) -> PressedShell:
     """Lower right quarter of a ring; its outer face touches a plane that has been raised by `squeeze`."""
+
     def place(u, v):
         a = -0.5 * np.pi * (1 - u)
         return radius * np.cos(a), radius + 0.5 * h + radius * np.sin(a), WIDTH * v
 
     patch = grid(elements, 1, place)
-    mesh = ShellMesh.build(patch.nodes, patch.quads, h, planes=[(patch.index[0], 0), (patch.index[-1], 1)], material_axis=(0.0, 0.0, 1.0))
+    mesh = ShellMesh.build(
+        patch.nodes, patch.quads, h, planes=[(patch.index[0], 0), (patch.index[-1], 1)], material_axis=(0.0, 0.0, 1.0)
+    )
     outward = np.einsum("ni,ni->n", mesh.directors, mesh.nodes - [0, radius + 0.5 * h, 0])
     side = np.sign(outward[len(outward) // 2])
     free = np.ones((mesh.node_count, 5), bool)
@@ -96,7 +103,9 @@ def _ring(elements: int, radius=0.1, h=1e-3, squeeze=0.0, penalty=1e5) -> Presse
     free[patch.index[-1], 1] = False
     free[patch.index[-1], 4] = False
     shell = Shell(mesh, isotropic_section(E, 0.0, h), free)
-    contact = PlaneContact(shell, np.arange(mesh.node_count), -side * 0.5 * h, tributary_area(shell), ContactLaw(penalty))
+    contact = PlaneContact(
+        shell, np.arange(mesh.node_count), -side * 0.5 * h, tributary_area(shell), ContactLaw(penalty)
+    )
     contact.lift[:] = -squeeze
     return PressedShell(shell, contact)
 
@@ -143,8 +152,9 @@ def _newton(model, factor, q):
 def _elastica(force: float, radius=0.1, h=1e-3) -> tuple[float, float]:
     """Half height of a ring squeezed by `force` per unit width between smooth plates, and half the flat contact length.
 
-    An inextensible ring without shear: EI theta'' = (F/2) cos(theta) along the quarter, theta = 0 at the plate, pi/2 at the side, where the normal
-    force is F/2 and the shear vanishes; the ring was a circle, and lies flat once its curvature at the plate has fallen to zero.
+    An inextensible ring without shear: EI theta'' = (F/2) cos(theta) along the quarter, theta = 0 at the plate, pi/2 at
+    the side, where the normal force is F/2 and the shear vanishes; the ring was a circle, and lies flat once its
+    curvature at the plate has fallen to zero.
     """
     ei, quarter = E * h**3 / 12, 0.5 * np.pi * radius
 
@@ -154,7 +164,9 @@ def _elastica(force: float, radius=0.1, h=1e-3) -> tuple[float, float]:
 
         s = np.linspace(0, 1, 81)
         guess = np.stack([0.5 * np.pi * s, np.full(81, 0.5 * np.pi / length), radius * (1 - np.cos(0.5 * np.pi * s))])
-        found = solve_bvp(rate, lambda a, b: np.array([a[0], b[0] - 0.5 * np.pi, a[2]]), s, guess, tol=1e-9, max_nodes=20000)
+        found = solve_bvp(
+            rate, lambda a, b: np.array([a[0], b[0] - 0.5 * np.pi, a[2]]), s, guess, tol=1e-9, max_nodes=20000
+        )
         assert found.success
         return found.sol
 
@@ -171,7 +183,8 @@ def test_a_squeezed_ring_follows_the_elastica_before_and_after_it_lies_flat():
     ei, radius = E * (1e-3) ** 3 / 12, 0.1
     forces = np.array([1.0, 6.0]) * ei / radius**2
     expected = [_elastica(force) for force in forces]
-    # for a little force the formula of strength of materials: half the change of the diameter is (pi/4 - 2/pi)/2 F R^3/EI
+    # for a little force the formula of strength of materials: half the change of the diameter is (pi/4 - 2/pi)/2 F
+    # R^3/EI
     small = _elastica(1e-3 * ei / radius**2)[0]
     assert radius - small == pytest.approx(0.5 * (np.pi / 4 - 2 / np.pi) * 1e-3 * radius, rel=1e-3)
     assert expected[0][1] == 0.0 and expected[1][1] > 0.02 * radius

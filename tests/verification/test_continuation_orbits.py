@@ -15,8 +15,10 @@ PHASE = 2 * np.pi * np.arange(80) / 80
 NEWTON = NewtonOptions(tolerance=1e-9)
 
 
-@pytest.mark.parametrize(("mu", "period", "amplitude", "multiplier"), [
-    (0.5, 6.380676, 2.002488, 0.0391769), (1.0, 6.663287, 2.008620, 8.59695e-4)])
+@pytest.mark.parametrize(
+    ("mu", "period", "amplitude", "multiplier"),
+    [(0.5, 6.380676, 2.002488, 0.0391769), (1.0, 6.663287, 2.008620, 8.59695e-4)],
+)
 def test_van_der_pol(mu, period, amplitude, multiplier):
     """To the printed digits."""
     guess = 2 * np.stack([np.cos(PHASE), -np.sin(PHASE)], axis=1)
@@ -34,15 +36,21 @@ def test_van_der_pol(mu, period, amplitude, multiplier):
 def test_langford():
     """Circular orbit from mu = 5 - sqrt(11); torus bifurcation at exactly 2."""
     system = langford()
-    equilibria = continue_branch(system, [0, 0, 1.5], {"mu": 1.5}, "mu",
-                                 ContinuationOptions(eigenvalues=3, limits={"mu": (1.2, 2.5)}))
+    equilibria = continue_branch(
+        system, [0, 0, 1.5], {"mu": 1.5}, "mu", ContinuationOptions(eigenvalues=3, limits={"mu": (1.2, 2.5)})
+    )
     (hopf,) = equilibria.of_kind("hopf")
     # On the axis z = mu the growth is 2 mu - 3 + 0.2 (1 - mu^2).
     assert np.isclose(hopf.mu["mu"], 5 - np.sqrt(11), rtol=1e-10)
     assert abs(hopf.mu["mu"] - 1.683) < 5e-4 and np.isclose(hopf.values["omega"], 0.25)
-    branch = orbits_from_hopf(system, hopf, "mu", 0.1,
-                              ContinuationOptions(limits={"mu": (1.6, 2.05)}, newton=NEWTON),
-                              OrbitOptions(intervals=40))
+    branch = orbits_from_hopf(
+        system,
+        hopf,
+        "mu",
+        0.1,
+        ContinuationOptions(limits={"mu": (1.6, 2.05)}, newton=NEWTON),
+        OrbitOptions(intervals=40),
+    )
     (torus,) = branch.of_kind("torus")
     assert abs(torus.mu["mu"] - 2.0) < 1e-9
     assert branch.unstable[0] == 0 and branch.unstable[-1] == 2
@@ -58,18 +66,24 @@ def test_langford():
 
 
 def hopf_form(system, u, mu, parameter, low, high):
-    branch = continue_branch(system, u, mu, parameter,
-                             ContinuationOptions(eigenvalues=3, step=0.2, max_step=2.0,
-                                                 limits={parameter: (low, high)}))
+    branch = continue_branch(
+        system,
+        u,
+        mu,
+        parameter,
+        ContinuationOptions(eigenvalues=3, step=0.2, max_step=2.0, limits={parameter: (low, high)}),
+    )
     (point,) = branch.of_kind("hopf")
-    return point, hopf_normal_form(system, point.u, point.mu, point.values["omega"],
-                                   point.vectors["right"], point.vectors["left"], parameter)
+    return point, hopf_normal_form(
+        system, point.u, point.mu, point.values["omega"], point.vectors["right"], point.vectors["left"], parameter
+    )
 
 
 def swing(system, start, mu, time, functional):
     """Half of peak to peak over the first and the last few turns."""
-    solution = solve_ivp(lambda t, u: system.residual(u, mu), (0, time), start, method="LSODA",
-                         rtol=1e-9, atol=1e-11, dense_output=True)
+    solution = solve_ivp(
+        lambda t, u: system.residual(u, mu), (0, time), start, method="LSODA", rtol=1e-9, atol=1e-11, dense_output=True
+    )
     first = functional @ solution.sol(np.linspace(0, 0.06 * time, 600))
     last = functional @ solution.sol(np.linspace(0.94 * time, time, 600))
     return 0.5 * np.ptp(first), 0.5 * np.ptp(last)
@@ -127,10 +141,14 @@ def test_cycles_of_the_brusselator_agree_with_the_normal_form_to_first_order():
     """Ratio of computed to predicted squared amplitude tends to 1 linearly in the distance."""
     system = brusselator()
     point, form = hopf_form(system, [1.0, 1.5], {"A": 1.0, "B": 1.5}, "B", 0.5, 3.0)
-    branch = orbits_from_hopf(system, point, "B", 0.08,
-                              ContinuationOptions(limits={"B": (1.9, 2.06)}, newton=NEWTON,
-                                                  step=0.02, max_step=0.05),
-                              OrbitOptions(intervals=16))
+    branch = orbits_from_hopf(
+        system,
+        point,
+        "B",
+        0.08,
+        ContinuationOptions(limits={"B": (1.9, 2.06)}, newton=NEWTON, step=0.02, max_step=0.05),
+        OrbitOptions(intervals=16),
+    )
     change = branch.values() - 2.0
     x = np.array([1.0, 0.0])
     ratios = []

@@ -1,4 +1,7 @@
-"""The steady branch of the 12-inch valve over inlet pressure, by pseudo-arclength: folds would be met and passed, and there are none."""
+"""The steady branch of the 12-inch valve over inlet pressure, by pseudo-arclength: folds would be met and passed, and
+there are none.
+"""
+
 import numpy as np
 import pytest
 
@@ -21,9 +24,16 @@ def branch(walk):
     place = Place.of(walk.case)
     system = system_of(walk.case, walk, place)
     options = ContinuationOptions(
-        step=0.02, min_step=1e-5, max_step=0.2, max_points=400, limits={"inlet": (0.0, HIGHEST)}, parameter_scales={"inlet": 2e4}, state_scale=10.0,
-        newton=NewtonOptions(tolerance=1e-4, max_iterations=12), branch_points=False,
-    )  # fmt: skip
+        step=0.02,
+        min_step=1e-5,
+        max_step=0.2,
+        max_points=400,
+        limits={"inlet": (0.0, HIGHEST)},
+        parameter_scales={"inlet": 2e4},
+        state_scale=10.0,
+        newton=NewtonOptions(tolerance=1e-4, max_iterations=12),
+        branch_points=False,
+    )
     return continue_branch(system, system.state(walk.equilibrium(place), place.mu()), place.mu(), "inlet", options)
 
 

@@ -1,8 +1,11 @@
-"""Super- or subcritical: the first Lyapunov coefficient of the coupled valve against time integration on both sides of an onset.
+"""Super- or subcritical: the first Lyapunov coefficient of the coupled valve against time integration on both sides of
+an onset.
 
-On the centre manifold an amplitude r obeys r' = r (sigma + Re c1 r^2). From kicks of different size the rate r'/r is read off runs of half a second and
-compared with that of the normal form, in which sigma comes from the crossing speed and Re c1 from the third derivatives: where the rate vanishes is the cycle.
+On the centre manifold an amplitude r obeys r' = r (sigma + Re c1 r^2). From kicks of different size the rate r'/r is
+read off runs of half a second and compared with that of the normal form, in which sigma comes from the crossing speed
+and Re c1 from the third derivatives: where the rate vanishes is the cycle.
 """
+
 import numpy as np
 import pytest
 
@@ -22,27 +25,42 @@ class Onset:
     """The onset over density of a coarse valve at 6 kPa, its normal form, and runs beside it."""
 
     def __init__(self):
-        self.case = load_case(None, ["mesh.around=8", "mesh.along=16", "damping.alpha=0", "damping.beta=0.003", "drive.pressure=6 kPa"])
+        self.case = load_case(
+            None, ["mesh.around=8", "mesh.along=16", "damping.alpha=0", "damping.beta=0.003", "drive.pressure=6 kPa"]
+        )
         options = OnsetOptions("density", tuple(np.geomspace(1, 1000, 21)), True, normal_form=False, coarse_mesh=0)
         search = OnsetSearch(self.case, options)
         (crossing,) = search.scan.run(options.values)
         self.point = point = search.point(crossing)
-        self.form = normal_form(self.case, search.walk, point.place, search.critical(point.place, point.ahead), "density")
+        self.form = normal_form(
+            self.case, search.walk, point.place, search.critical(point.place, point.ahead), "density"
+        )
         self.model = search.walk.built(point.place).model
         self.steady = self.lip(search.walk.equilibrium(point.place))
         shape = self.form.q[: self.model.size]
         change = ASIDE * point.value
         #: Amplitude of the lip on the predicted cycle, m.
-        self.cycle = 2 * abs(self.lip(shape.real) + 1j * self.lip(shape.imag)) * np.sqrt(abs(self.form.crossing.real / self.form.c1.real) * change)
+        self.cycle = (
+            2
+            * abs(self.lip(shape.real) + 1j * self.lip(shape.imag))
+            * np.sqrt(abs(self.form.crossing.real / self.form.c1.real) * change)
+        )
         self.sigma = abs(self.form.crossing.real) * change
 
     def lip(self, q) -> float:
         return float(self.model.nodal(q)[self.model.mesh.rows[0, 0], 1])
 
     def rate(self, side: int, kick: float) -> tuple[float, float]:
-        """Rate of the lip's amplitude (1/s) after a kick in units of the predicted cycle, and the mean amplitude in the same units."""
-        changes = {"fluid.density": self.point.value * (1 + side * ASIDE), "transient.start": "kick", "transient.kick_opening": kick * self.cycle,
-                   "transient.duration": 0.5, "transient.step": 4e-4}  # fmt: skip
+        """Rate of the lip's amplitude (1/s) after a kick in units of the predicted cycle, and the mean amplitude in the
+        same units.
+        """
+        changes = {
+            "fluid.density": self.point.value * (1 + side * ASIDE),
+            "transient.start": "kick",
+            "transient.kick_opening": kick * self.cycle,
+            "transient.duration": 0.5,
+            "transient.step": 4e-4,
+        }
         history = transient(ValveModel(self.case.replace(changes))).history
         time, lip = np.array(history["time"]), np.array(history["lip_opening"]) - self.steady
         period = 1.0 / self.point.frequency

@@ -1,10 +1,12 @@
 """Onset of fluid-induced vibration of the 12-inch valve, pinned on a coarse mesh.
 
-Guards against unintended change; the numbers themselves are checked by the count of unstable eigenvalues and the full pencil on both sides, here and in
-tests/studies. After a change that is meant to alter them (shell, flow, materials, mesh), look at the differences and write the file anew:
+Guards against unintended change; the numbers themselves are checked by the count of unstable eigenvalues and the full
+pencil on both sides, here and in tests/studies. After a change that is meant to alter them (shell, flow, materials,
+mesh), look at the differences and write the file anew:
 
     python tests/verification/test_fiv_onset.py
 """
+
 import json
 from pathlib import Path
 
@@ -18,7 +20,9 @@ TOLERANCE = 2e-6
 
 
 def measured() -> dict:
-    """Onset densities at 2 and 6 kPa, onset pressures at 10 kg/m3, and leading eigenvalues at 6 kPa, for both continuity laws."""
+    """Onset densities at 2 and 6 kPa, onset pressures at 10 kg/m3, and leading eigenvalues at 6 kPa, for both
+    continuity laws.
+    """
     from dbvfiv.case import Case
     from dbvfiv.studies.onset import OnsetOptions, OnsetSearch
     from dbvfiv.studies.parameters import Place
@@ -31,11 +35,16 @@ def measured() -> dict:
         options = OnsetOptions(parameter, tuple(values), True, normal_form=False, coarse_mesh=0)
         search = OnsetSearch(case, options, walk=walk, place=base.at(**fixed))
         points = [search.point(crossing) for crossing in search.scan.run(values)]
-        return [{"value": p.value, "frequency": p.frequency, "gains": p.gains, "confirmed": p.confirmed} for p in points]
+        return [
+            {"value": p.value, "frequency": p.frequency, "gains": p.gains, "confirmed": p.confirmed} for p in points
+        ]
 
     found = {}
     for law, storage in (("quasi-steady", 0.0), ("storage", 1.0)):
-        one = {f"density at {p:g} Pa": onsets("density", np.geomspace(1, 1000, 17), pressure=p, storage=storage) for p in (2e3, 6e3)}
+        one = {
+            f"density at {p:g} Pa": onsets("density", np.geomspace(1, 1000, 17), pressure=p, storage=storage)
+            for p in (2e3, 6e3)
+        }
         one["pressure at 10 kg/m3"] = onsets("pressure", np.geomspace(1e3, 2e4, 9), density=10.0, storage=storage)
         modes = walk.spectrum(base.at(pressure=6e3, density=10.0, storage=storage)).eigenvalues[:2]
         one["leading eigenvalues"] = [[float(m.real), float(m.imag / (2 * np.pi))] for m in modes]
@@ -67,7 +76,9 @@ def test_onsets(now, pinned, law, name):
 
 @pytest.mark.parametrize("law", ["quasi-steady", "storage"])
 def test_leading_eigenvalues(now, pinned, law):
-    assert np.array(now[law]["leading eigenvalues"]) == pytest.approx(np.array(pinned[law]["leading eigenvalues"]), rel=TOLERANCE)
+    assert np.array(now[law]["leading eigenvalues"]) == pytest.approx(
+        np.array(pinned[law]["leading eigenvalues"]), rel=TOLERANCE
+    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
-"""A thin ring under outside pressure buckles at p R^3/(EI) = 3 if the pressure follows the wall, at 4 if its direction stays (dead load).
+"""A thin ring under outside pressure buckles at p R^3/(EI) = 3 if the pressure follows the wall, at 4 if its direction
+stays (dead load).
 
-The difference is the pressure stiffness alone. Quarter of the ring between two symmetry planes, nu = 0, nothing moves along the axis.
+The difference is the pressure stiffness alone. Quarter of the ring between two symmetry planes, nu = 0, nothing moves
+along the axis.
 """
 
 from __future__ import annotations
@@ -54,16 +56,23 @@ def critical(elements: int, follower: bool) -> float:
     stiffness, slope = linearised(ring(elements), follower)
     # K0 x = -p K1 x
     values = sl.eigvals(-slope, stiffness)
-    values = 1 / np.real(values[(np.abs(values.imag) < 1e-9 * np.abs(values).max()) & (values.real > 1e-9 * np.abs(values).max())])
+    values = 1 / np.real(
+        values[(np.abs(values.imag) < 1e-9 * np.abs(values).max()) & (values.real > 1e-9 * np.abs(values).max())]
+    )
     return float(values.min()) / UNIT
 
 
 @pytest.mark.parametrize("follower, exact", [(True, 3.0), (False, 4.0)])
 def test_ring_buckles(follower, exact):
-    """0.5 % on 32 elements of the quarter, second order, the limit within 0.05 % (thickness and compression count with h^2/R^2 = 1e-4)."""
+    """0.5 % on 32 elements of the quarter, second order, the limit within 0.05 % (thickness and compression count with
+    h^2/R^2 = 1e-4).
+    """
     values = [critical(n, follower) for n in (8, 16, 32)]
     order, limit = richardson(values)
-    print(f"\n{'follower' if follower else 'dead'}: {np.round(values, 5)} order {order:.2f} limit {limit:.5f} exact {exact}")
+    print(
+        f"\n{'follower' if follower else 'dead'}: {np.round(values, 5)} order {order:.2f} limit {limit:.5f} "
+        f"exact {exact}"
+    )
     assert values[-1] == pytest.approx(exact, rel=5e-3)
     assert limit == pytest.approx(exact, rel=5e-4)
     assert order == pytest.approx(2.0, abs=0.2)

@@ -1,7 +1,8 @@
 """Simply supported square cross-ply plates: deflections and frequencies of first-order shear theory.
 
-Reference values: exact Navier series with the shear correction 5/6 (rotary inertia included in the frequencies). Moduli ratios of the classical
-laminate benchmarks: static E1/E2 = 25, G12 = G13 = 0.5 E2, G23 = 0.2 E2, nu12 = 0.25; dynamic 40, 0.6, 0.6, 0.5, 0.25.
+Reference values: exact Navier series with the shear correction 5/6 (rotary inertia included in the frequencies). Moduli
+ratios of the classical laminate benchmarks: static E1/E2 = 25, G12 = G13 = 0.5 E2, G23 = 0.2 E2, nu12 = 0.25; dynamic
+40, 0.6, 0.6, 0.5, 0.25.
 """
 
 from __future__ import annotations
@@ -57,7 +58,9 @@ def deflection(angles, slenderness, n, load) -> float:
     x, y = shell.mesh.nodes[:, :2].T
     pressure = np.sin(np.pi * x) * np.sin(np.pi * y) if load == "sinusoidal" else np.ones(len(x))
     out = np.zeros((len(x), 5))
-    pressure_force(shell.mesh.quads, shell.mesh.nodes, np.zeros_like(out), pressure, np.ones(shell.mesh.element_count), out)
+    pressure_force(
+        shell.mesh.quads, shell.mesh.nodes, np.zeros_like(out), pressure, np.ones(shell.mesh.element_count), out
+    )
     stiffness = shell.dofs.matrix(shell.force_and_tangent(np.zeros(shell.size))[1])
     w = shell.dofs.expand(spsolve(stiffness.tocsc(), shell.dofs.restrict(out)))[index[-1, -1], 2]
     return 100 * w / slenderness**3
@@ -77,7 +80,10 @@ def test_deflection_under_load(angles, slenderness):
     for load, exact in zip(("sinusoidal", "uniform"), DEFLECTIONS[angles, slenderness]):
         values = [deflection(angles, slenderness, n, load) for n in (8, 16, 32)]
         order, limit = richardson(values)
-        print(f"\n{angles} a/h {slenderness} {load}: {values[0]:.4f} {values[1]:.4f} {values[2]:.4f} order {order:.2f} -> {limit:.4f}, exact {exact}")
+        print(
+            f"\n{angles} a/h {slenderness} {load}: {values[0]:.4f} {values[1]:.4f} {values[2]:.4f} order "
+            f"{order:.2f} -> {limit:.4f}, exact {exact}"
+        )
         assert values[-1] == pytest.approx(exact, rel=1e-3)
         assert limit == pytest.approx(exact, rel=2e-4)
         assert order == pytest.approx(2.0, abs=0.2)
@@ -89,7 +95,10 @@ def test_lowest_frequency(angles, slenderness):
     exact = FREQUENCIES[angles, slenderness]
     values = [frequency(angles, slenderness, n) for n in (8, 16, 32)]
     order, limit = richardson(values)
-    print(f"\n{angles} a/h {slenderness}: {values[0]:.4f} {values[1]:.4f} {values[2]:.4f} order {order:.2f} -> {limit:.4f}, exact {exact}")
+    print(
+        f"\n{angles} a/h {slenderness}: {values[0]:.4f} {values[1]:.4f} {values[2]:.4f} order {order:.2f} "
+        f"-> {limit:.4f}, exact {exact}"
+    )
     assert values[-1] == pytest.approx(exact, rel=1e-3)
     assert limit == pytest.approx(exact, rel=1e-4)
     assert order == pytest.approx(2.0, abs=0.2)

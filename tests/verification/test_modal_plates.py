@@ -1,9 +1,9 @@
 """Natural frequencies of square isotropic plates against converged Mindlin solutions (shear correction 5/6).
 
-10 m by 10 m, E 200 GPa, nu 0.3, density 8000 kg/m3. Twisting moments fall to zero within about a third of the thickness of a free edge, and a
-solution that does not resolve this layer comes out too high: Legendre-Ritz series of degree 16 give 1.6203 and 4.1863 Hz for the free plate where
-degrees 44 and 56 agree on 1.6184 and 4.1820. The values below are those of degree 56 (free) and 54 (clamped); often quoted ones, next to them, lie up
-to 0.12 % higher.
+10 m by 10 m, E 200 GPa, nu 0.3, density 8000 kg/m3. Twisting moments fall to zero within about a third of the thickness
+of a free edge, and a solution that does not resolve this layer comes out too high: Legendre-Ritz series of degree 16
+give 1.6203 and 4.1863 Hz for the free plate where degrees 44 and 56 agree on 1.6184 and 4.1820. The values below are
+those of degree 56 (free) and 54 (clamped); often quoted ones, next to them, lie up to 0.12 % higher.
 """
 
 from __future__ import annotations
@@ -17,8 +17,16 @@ from tests.shell.structures import grid, isotropic_section
 
 # thickness, frequencies with the edge layer resolved, and as quoted
 REFERENCE = {
-    "free": (0.05, (1.61839, 2.35922, 2.92177, 4.18197, 4.18197, 7.35316), (1.6203, 2.3593, 2.9219, 4.1868, 4.1868, 7.3537)),
-    "one edge clamped": (0.05, (0.417880, 1.02270, 2.56174, 3.27195, 3.72128, 6.51030), (0.4179, 1.0236, 2.5622, 3.2735, 3.7244, 6.5179)),
+    "free": (
+        0.05,
+        (1.61839, 2.35922, 2.92177, 4.18197, 4.18197, 7.35316),
+        (1.6203, 2.3593, 2.9219, 4.1868, 4.1868, 7.3537),
+    ),
+    "one edge clamped": (
+        0.05,
+        (0.417880, 1.02270, 2.56174, 3.27195, 3.72128, 6.51030),
+        (0.4179, 1.0236, 2.5622, 3.2735, 3.7244, 6.5179),
+    ),
     "hard simply supported": (1.0, (45.911, 109.528, 109.528, 168.074), (45.911, 109.528, 109.528, 168.074)),
 }
 
@@ -26,7 +34,8 @@ REFERENCE = {
 def frequencies(support: str, n: int) -> np.ndarray:
     """Lowest frequencies, Hz, on n by n elements; rigid-body modes left out, in-plane motion held."""
     h, exact, _ = REFERENCE[support]
-    # finer towards the edges: twisting moments fall to zero within about a thickness of a free edge, and a regular mesh misses that
+    # finer towards the edges: twisting moments fall to zero within about a thickness of a free edge, and a regular mesh
+    # misses that
     cosine = lambda t: 5.0 * (1 - np.cos(np.pi * t))  # noqa: E731
     patch = grid(n, n, lambda u, v: (cosine(u), cosine(v), 0 * u))
     free = np.ones((len(patch.nodes), 5), bool)
@@ -52,7 +61,9 @@ def frequencies(support: str, n: int) -> np.ndarray:
 
 @pytest.mark.parametrize("support", sorted(REFERENCE))
 def test_plate_frequencies(support):
-    """0.6 % on 48 x 48 elements; the error falls with the square of the element size; extrapolated within 0.02 %, and 0.15 % of quoted values."""
+    """0.6 % on 48 x 48 elements; the error falls with the square of the element size; extrapolated within 0.02 %, and
+    0.15 % of quoted values.
+    """
     _, exact, quoted = REFERENCE[support]
     exact = np.array(exact)
     coarse, fine = frequencies(support, 24), frequencies(support, 48)

@@ -1,8 +1,9 @@
 """The 12-inch valve with one isotropic material at rest in vacuo: lowest frequencies.
 
-E 6 MPa, nu 0.49, density 1300 kg/m3, measured wall. Reference: 13.51, 18.63, 24.04, 30.90 Hz, an independent implementation on 28 x 48 elements that
-agreed with Kratos within 0.4 % over eight modes. The inner face folds over itself at the side edge behind the duckbill, so the values belong to
-first-order shell theory (other through-thickness treatments give 12.6 to 14.0 Hz for the first).
+E 6 MPa, nu 0.49, density 1300 kg/m3, measured wall. Reference: 13.51, 18.63, 24.04, 30.90 Hz, an independent
+implementation on 28 x 48 elements that agreed with Kratos within 0.4 % over eight modes. The inner face folds over
+itself at the side edge behind the duckbill, so the values belong to first-order shell theory (other through-thickness
+treatments give 12.6 to 14.0 Hz for the first).
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ REFERENCE = np.array([13.51, 18.63, 24.04, 30.90])
 
 def frequencies(around: int, along: int, shear_correction: float) -> np.ndarray:
     changes = {
-        "materials.named": {"one": {"kind": "isotropic", "youngs_modulus": 6e6, "poisson_ratio": 0.49, "density": 1300.0}},
+        "materials.named": {
+            "one": {"kind": "isotropic", "youngs_modulus": 6e6, "poisson_ratio": 0.49, "density": 1300.0}
+        },
         "layers": [{"material": "one", "thickness": 0.01}],
         "shell.shear_correction_rubber": shear_correction,
         "mesh.around": around,
@@ -37,7 +40,10 @@ def frequencies(around: int, along: int, shear_correction: float) -> np.ndarray:
 def test_frequencies_of_the_isotropic_valve(shear_correction):
     """Within 1 % at 28 x 48, with either shear correction (they differ by 0.4 %)."""
     coarse, reference_mesh = frequencies(14, 24, shear_correction), frequencies(28, 48, shear_correction)
-    print(f"\nshear correction {shear_correction:.3f}: 14 x 24 {np.round(coarse, 3)}  28 x 48 {np.round(reference_mesh, 3)}  reference {REFERENCE}")
+    print(
+        f"\nshear correction {shear_correction:.3f}: 14 x 24 {np.round(coarse, 3)}  28 x 48 "
+        f"{np.round(reference_mesh, 3)}  reference {REFERENCE}"
+    )
     assert reference_mesh == pytest.approx(REFERENCE, rel=0.01)
 
 

@@ -1,4 +1,5 @@
 """One-degree valve, exact: Hopf point B = k + c r - m k r/(c + m r), omega^2 = k r/(c + m r)."""
+
 import numpy as np
 import pytest
 
@@ -17,8 +18,8 @@ def test_eigenvalues_are_the_roots_of_the_cubic():
 
 def test_hopf_point():
     found, omega = hopf(lambda B: one_degree_valve(B, 0.5), 0.1, 0.4)
-    assert found == pytest.approx(13 / 60, abs=1e-9)   # 0.216667
-    assert omega == pytest.approx(np.sqrt(0.5 / 0.6), abs=1e-9)   # 0.912871
+    assert found == pytest.approx(13 / 60, abs=1e-9)  # 0.216667
+    assert omega == pytest.approx(np.sqrt(0.5 / 0.6), abs=1e-9)  # 0.912871
 
 
 @pytest.mark.parametrize("B, unstable", [(0.2, 0), (0.23, 2), (-0.5, 0), (-5.0, 0)])

@@ -3,19 +3,22 @@
 Critical u and omega at three mass ratios from Galerkin series (14 and 20 modes agree in the
 printed digits); the clamped-clamped pipe diverges at u = 2 pi exactly.
 """
+
 import numpy as np
 import pytest
 
-from eigen import certified_spectrum, SearchOptions
+from eigen import SearchOptions, certified_spectrum
 from tests.systems.beam import fluid_conveying_pipe
 from tests.verification.critical import hopf
 
 
-@pytest.mark.parametrize("mass_ratio, velocity, omega", [
-    (0.1, 4.7499, 14.2171), (0.2, 5.5914, 13.7147), (0.5, 9.3224, 26.4973)])
+@pytest.mark.parametrize(
+    "mass_ratio, velocity, omega", [(0.1, 4.7499, 14.2171), (0.2, 5.5914, 13.7147), (0.5, 9.3224, 26.4973)]
+)
 def test_cantilever_flutters(mass_ratio, velocity, omega):
-    found, frequency = hopf(lambda u: fluid_conveying_pipe(u, mass_ratio, elements=60),
-                            0.97 * velocity, 1.03 * velocity, band=20.0)
+    found, frequency = hopf(
+        lambda u: fluid_conveying_pipe(u, mass_ratio, elements=60), 0.97 * velocity, 1.03 * velocity, band=20.0
+    )
     # half a unit of the last digit, plus the mesh (2e-5 with 60 elements)
     assert found == pytest.approx(velocity, abs=7e-5)
     assert frequency == pytest.approx(omega, abs=1.5e-4)

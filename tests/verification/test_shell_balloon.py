@@ -1,4 +1,6 @@
-"""A thin Mooney-Rivlin sphere blown up by inside pressure: p = 4 (h0/r0)(l^-1 - l^-7)(W1 + l^2 W2), through the shell and its follower pressure."""
+"""A thin Mooney-Rivlin sphere blown up by inside pressure: p = 4 (h0/r0)(l^-1 - l^-7)(W1 + l^2 W2), through the shell
+and its follower pressure.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ def octant(n: int) -> Shell:
         a, b, c = corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]
         ab, ac = 0.5 * (a + b), 0.5 * (a + c)
         u, v = np.meshgrid(t, t, indexing="ij")
-        place = sum(w[..., None] * p for w, p in (((1 - u) * (1 - v), a), (u * (1 - v), ab), (u * v, middle), ((1 - u) * v, ac)))
+        place = sum(
+            w[..., None] * p for w, p in (((1 - u) * (1 - v), a), (u * (1 - v), ab), (u * v, middle), ((1 - u) * v, ac))
+        )
         base = sum(len(part) for part in nodes)
         index = base + np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
         nodes.append(place.reshape(-1, 3))
@@ -80,12 +84,17 @@ def stretches():
 
 
 def test_stretch_of_the_balloon(stretches):
-    """The stretch reached at the pressure of the closed form; where the curve is nearly flat small errors of pressure are large in stretch."""
+    """The stretch reached at the pressure of the closed form; where the curve is nearly flat small errors of pressure
+    are large in stretch.
+    """
     for k, exact in enumerate(STRETCHES):
         order, limit = richardson(stretches[:, k])
         slope = np.gradient([pressure(exact * (1 + d)) for d in (-1e-4, 0, 1e-4)])[1] / (1e-4 * exact)
         by_pressure = (stretches[-1, k] - exact) * slope / pressure(exact)
-        print(f"\nl {exact}: {stretches[:, k]} order {order:.2f} limit {limit:.5f}; error of the pressure {by_pressure:.1e}")
+        print(
+            f"\nl {exact}: {stretches[:, k]} order {order:.2f} limit {limit:.5f}; error of the pressure "
+            f"{by_pressure:.1e}"
+        )
         assert abs(by_pressure) < 5e-3
         assert limit == pytest.approx(exact, rel=2e-3)
         assert order == pytest.approx(2.0, abs=0.25)

@@ -1,7 +1,8 @@
-"""Large displacements of thin shells: cantilevers against elastica and closed form, popular benchmarks against published tables.
+"""Large displacements of thin shells: cantilevers against elastica and closed form, popular benchmarks against
+published tables.
 
-Tables: Sze, Liu & Lo (2004), Finite Elements in Analysis and Design 40, 1551-1569, computed with Abaqus S4R; three to four digits, not converged in
-the mesh. St Venant-Kirchhoff material, shear correction 5/6.
+Tables: Sze, Liu & Lo (2004), Finite Elements in Analysis and Design 40, 1551-1569, computed with Abaqus S4R; three to
+four digits, not converged in the mesh. St Venant-Kirchhoff material, shear correction 5/6.
 """
 
 from __future__ import annotations
@@ -14,26 +15,85 @@ from dbvfiv.shell import Shell, ShellMesh
 from tests.shell.structures import dead_load, grid, isotropic_section, observed_order, rectangle, richardson, solve_path
 
 # P/Pmax, tip displacements -u and w on 16 x 1 elements
-END_SHEAR = np.array([
-    [0.05, 0.026, 0.663], [0.1, 0.103, 1.309], [0.15, 0.224, 1.922], [0.2, 0.381, 2.493], [0.25, 0.563, 3.015], [0.3, 0.763, 3.488],
-    [0.35, 0.971, 3.912], [0.4, 1.184, 4.292], [0.45, 1.396, 4.631], [0.5, 1.604, 4.933], [0.55, 1.807, 5.202], [0.6, 2.002, 5.444],
-    [0.65, 2.19, 5.66], [0.7, 2.37, 5.855], [0.75, 2.541, 6.031], [0.8, 2.705, 6.19], [0.85, 2.861, 6.335], [0.9, 3.01, 6.467],
-    [0.95, 3.151, 6.588], [1.0, 3.286, 6.698],
-])  # fmt: skip
+END_SHEAR = np.array(
+    [
+        [0.05, 0.026, 0.663],
+        [0.1, 0.103, 1.309],
+        [0.15, 0.224, 1.922],
+        [0.2, 0.381, 2.493],
+        [0.25, 0.563, 3.015],
+        [0.3, 0.763, 3.488],
+        [0.35, 0.971, 3.912],
+        [0.4, 1.184, 4.292],
+        [0.45, 1.396, 4.631],
+        [0.5, 1.604, 4.933],
+        [0.55, 1.807, 5.202],
+        [0.6, 2.002, 5.444],
+        [0.65, 2.19, 5.66],
+        [0.7, 2.37, 5.855],
+        [0.75, 2.541, 6.031],
+        [0.8, 2.705, 6.19],
+        [0.85, 2.861, 6.335],
+        [0.9, 3.01, 6.467],
+        [0.95, 3.151, 6.588],
+        [1.0, 3.286, 6.698],
+    ]
+)
 # P/Pmax, displacement under the outward and the inward force
-HEMISPHERE = np.array([
-    [0.05, 0.855, 0.955], [0.1, 1.499, 1.84], [0.15, 1.969, 2.604], [0.2, 2.321, 3.261], [0.25, 2.596, 3.833], [0.3, 2.819, 4.339],
-    [0.35, 3.002, 4.79], [0.4, 3.158, 5.196], [0.45, 3.291, 5.565], [0.5, 3.406, 5.902], [0.55, 3.508, 6.212], [0.6, 3.598, 6.497],
-    [0.65, 3.678, 6.761], [0.7, 3.75, 7.006], [0.75, 3.816, 7.234], [0.8, 3.875, 7.448], [0.85, 3.929, 7.647], [0.9, 3.979, 7.835],
-    [0.95, 4.025, 8.011], [1, 4.067, 8.178],
-])  # fmt: skip
+HEMISPHERE = np.array(
+    [
+        [0.05, 0.855, 0.955],
+        [0.1, 1.499, 1.84],
+        [0.15, 1.969, 2.604],
+        [0.2, 2.321, 3.261],
+        [0.25, 2.596, 3.833],
+        [0.3, 2.819, 4.339],
+        [0.35, 3.002, 4.79],
+        [0.4, 3.158, 5.196],
+        [0.45, 3.291, 5.565],
+        [0.5, 3.406, 5.902],
+        [0.55, 3.508, 6.212],
+        [0.6, 3.598, 6.497],
+        [0.65, 3.678, 6.761],
+        [0.7, 3.75, 7.006],
+        [0.75, 3.816, 7.234],
+        [0.8, 3.875, 7.448],
+        [0.85, 3.929, 7.647],
+        [0.9, 3.979, 7.835],
+        [0.95, 4.025, 8.011],
+        [1, 4.067, 8.178],
+    ]
+)
 # P/Pmax, deflection of the crown
-SEMICYLINDER = np.array([
-    [0.05, 5.421], [0.1, 16.1], [0.125, 22.195], [0.15, 27.657], [0.175, 32.7], [0.2, 37.582], [0.225, 42.633], [0.25, 48.537],
-    [0.275, 56.355], [0.3, 66.41], [0.325, 79.81], [0.35, 94.669], [0.4, 113.704], [0.45, 124.751], [0.5, 132.653], [0.55, 138.92],
-    [0.6, 144.185], [0.65, 148.77], [0.7, 152.863], [0.75, 156.584], [0.8, 160.015], [0.85, 163.211], [0.9, 166.2], [0.95, 168.973],
-    [1, 171.505],
-])  # fmt: skip
+SEMICYLINDER = np.array(
+    [
+        [0.05, 5.421],
+        [0.1, 16.1],
+        [0.125, 22.195],
+        [0.15, 27.657],
+        [0.175, 32.7],
+        [0.2, 37.582],
+        [0.225, 42.633],
+        [0.25, 48.537],
+        [0.275, 56.355],
+        [0.3, 66.41],
+        [0.325, 79.81],
+        [0.35, 94.669],
+        [0.4, 113.704],
+        [0.45, 124.751],
+        [0.5, 132.653],
+        [0.55, 138.92],
+        [0.6, 144.185],
+        [0.65, 148.77],
+        [0.7, 152.863],
+        [0.75, 156.584],
+        [0.8, 160.015],
+        [0.85, 163.211],
+        [0.9, 166.2],
+        [0.95, 168.973],
+        [1, 171.505],
+    ]
+)
 
 
 def cantilever(length: float, elements: int, planar: bool = False) -> tuple[Shell, np.ndarray]:
@@ -58,10 +118,12 @@ def end_shear(elements: int, factors) -> np.ndarray:
 
 
 def timoshenko_tip(factor: float) -> tuple[float, float]:
-    """Tip of an extensible, shearable cantilever under a dead end force, the beam theory that the shell holds for nu = 0.
+    """Tip of an extensible, shearable cantilever under a dead end force, the beam theory that the shell holds for nu =
+    0.
 
-    Unknowns along the length: place (x, w), turn of the section and moment; the end force is known everywhere. The energy of the bending strain
-    x'.d' pulls along the beam with moment times curvature, a strain of -(h curvature)^2/12: what a linear strain over the wall leaves out.
+    Unknowns along the length: place (x, w), turn of the section and moment; the end force is known everywhere. The
+    energy of the bending strain x'.d' pulls along the beam with moment times curvature, a strain of -(h
+    curvature)^2/12: what a linear strain over the wall leaves out.
     """
     ea, ga, ei, force = 1.2e6 * 0.1, 5 / 6 * 0.6e6 * 0.1, 1.2e6 * 0.1**3 / 12, 4.0 * factor
 
@@ -91,7 +153,8 @@ def test_end_shear_table():
 
 @pytest.mark.parametrize("factor, elastica", [(0.5, (1.6064, 4.9346)), (1.0, (3.2894, 6.6996))])
 def test_end_shear_converges_to_the_beam(factor, elastica):
-    """Second order towards the shearable, extensible beam; the elastica (no shear, no stretch) lies 0.1 % away from that.
+    """Second order towards the shearable, extensible beam; the elastica (no shear, no stretch) lies 0.1 % away from
+    that.
 
     The order is read off the three finest meshes.
     """
@@ -99,14 +162,18 @@ def test_end_shear_converges_to_the_beam(factor, elastica):
     beam = np.array(timoshenko_tip(factor))
     for i, name in enumerate(("-u", "w")):
         order, limit = richardson(values[:, i])
-        print(f"\nP/Pmax {factor} {name}: {values[:, i]} order {order:.2f} limit {limit:.5f} beam {beam[i]:.5f} elastica {elastica[i]}")
+        print(
+            f"\nP/Pmax {factor} {name}: {values[:, i]} order {order:.2f} limit {limit:.5f} beam "
+            f"{beam[i]:.5f} elastica {elastica[i]}"
+        )
         assert limit == pytest.approx(beam[i], rel=2e-5)
         assert order == pytest.approx(2.0, abs=0.1)
         assert limit == pytest.approx(elastica[i], rel=1e-3)
 
 
 def roll_up(elements: int, factors, planar=True) -> np.ndarray:
-    """Tip displacements (-u, w) under end moments, in shares of the moment 50 pi/3 that rolls the strip to a full circle.
+    """Tip displacements (-u, w) under end moments, in shares of the moment 50 pi/3 that rolls the strip to a full
+    circle.
 
     The work-conjugate of the rotation towards x is minus the moment, exactly so while the director turns in one plane.
     """
@@ -141,7 +208,9 @@ def circle_of_the_theory(factors) -> np.ndarray:
 
 
 def test_roll_up_to_a_full_circle():
-    """Errors in shares of the length; second order. The rotation passes pi, which is regular only while it stays in one plane."""
+    """Errors in shares of the length; second order. The rotation passes pi, which is regular only while it stays in one
+    plane.
+    """
     factors = np.arange(1, 11) / 10
     exact, own = circle(factors), circle_of_the_theory(factors)
     errors = []
@@ -149,7 +218,10 @@ def test_roll_up_to_a_full_circle():
         tips = roll_up(n, factors)
         errors.append(np.abs(tips - own).max() / 12)
         away = np.abs(tips - exact)
-        print(f"\n{n} elements: largest error {errors[-1]:.2e}, from the inextensible strip {away.max() / 12:.2e}, at the full circle {away[-1] / 12}")
+        print(
+            f"\n{n} elements: largest error {errors[-1]:.2e}, from the inextensible strip "
+            f"{away.max() / 12:.2e}, at the full circle {away[-1] / 12}"
+        )
     print(f"the theory itself lies {np.abs(own - exact).max() / 12:.1e} from the inextensible strip")
     assert away.max() < 2.5e-3 * 12
     assert observed_order(errors) == pytest.approx([2.0, 2.0], abs=0.1)
@@ -168,7 +240,11 @@ def hemisphere(n: int, factors) -> np.ndarray:
 
     def place(u, v):
         height = (0.5 * np.pi - polar) * v
-        return 10 * np.cos(height) * np.cos(0.5 * np.pi * u), 10 * np.cos(height) * np.sin(0.5 * np.pi * u), 10 * np.sin(height)
+        return (
+            10 * np.cos(height) * np.cos(0.5 * np.pi * u),
+            10 * np.cos(height) * np.sin(0.5 * np.pi * u),
+            10 * np.sin(height),
+        )
 
     patch = grid(n, n, place)
     front, back = patch.index[0], patch.index[-1]  # planes y = 0 and x = 0
@@ -191,8 +267,9 @@ def hemisphere(n: int, factors) -> np.ndarray:
 def test_pinched_hemisphere():
     """Against the table, 1.5 % of the largest displacement on 32 x 32 elements of the quarter.
 
-    On 16 x 16 the element is too stiff by 5 %: a full 2 x 2 integration without incompatible modes locks in the membrane strains of this thin
-    (h/R = 0.004), doubly curved wall bent without stretching; it recovers fast on finer meshes.
+    On 16 x 16 the element is too stiff by 5 %: a full 2 x 2 integration without incompatible modes locks in the
+    membrane strains of this thin (h/R = 0.004), doubly curved wall bent without stretching; it recovers fast on finer
+    meshes.
     """
     values = hemisphere(32, HEMISPHERE[:, 0])
     print("\nP/Pmax  outward  table   inward  table")
@@ -201,7 +278,9 @@ def test_pinched_hemisphere():
     meshes = np.array([hemisphere(16, [1.0])[0], values[-1], hemisphere(64, [1.0])[0]])
     for i, name in enumerate(("outward", "inward")):
         order, limit = richardson(meshes[:, i])
-        print(f"{name}: 16, 32, 64: {meshes[:, i]}, order {order:.2f}, limit {limit:.3f}, table {HEMISPHERE[-1, 1 + i]}")
+        print(
+            f"{name}: 16, 32, 64: {meshes[:, i]}, order {order:.2f}, limit {limit:.3f}, table {HEMISPHERE[-1, 1 + i]}"
+        )
     assert np.abs(values - HEMISPHERE[:, 1:]).max() < 0.015 * HEMISPHERE[-1, 2]
     assert np.abs(meshes[-1] - HEMISPHERE[-1, 1:]).max() < 0.005 * HEMISPHERE[-1, 2]
 

@@ -1,8 +1,9 @@
 """Three-point bending of the layered strip of Th. 3.4: shell against a layered solid.
 
-160 x 50 x 17 mm, supports 50 mm either side of the load; top to bottom CR 3, SBR 3 + 3, fibre +54 1, fibre -54 1, EPDM 3 + 3 mm. Load and supports are
-shear forces spread evenly over the section in both models, so that neither indents the soft rubber locally, and the deflection is their
-work-conjugate: the mean over the section under the load less that over the supports.
+160 x 50 x 17 mm, supports 50 mm either side of the load; top to bottom CR 3, SBR 3 + 3, fibre +54 1, fibre -54 1, EPDM
+3 + 3 mm. Load and supports are shear forces spread evenly over the section in both models, so that neither indents the
+soft rubber locally, and the deflection is their work-conjugate: the mean over the section under the load less that over
+the supports.
 """
 
 from __future__ import annotations
@@ -78,20 +79,28 @@ def solid_reference() -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.parametrize("rubber_factor", [1.0, 5 / 6])
 def test_layered_strip(rubber_factor):
-    """Within 1 %, whichever shear correction the rubber gets (plies 5/6): one is a little too stiff, the other too soft."""
+    """Within 1 %, whichever shear correction the rubber gets (plies 5/6): one is a little too stiff, the other too
+    soft.
+    """
     stack = layers(shear=rubber_factor)
     stack = tuple(Layer(item.law, item.thickness, item.angle, 5 / 6 if item.angle else rubber_factor) for item in stack)
     shell, solid = shell_deflections(stack, LOADS, 64, 20), solid_reference()
-    print(f"\nshear correction of the rubber {rubber_factor:.3f}\n  load N  shell mm  solid mm  difference  over linear")
+    print(
+        f"\nshear correction of the rubber {rubber_factor:.3f}\n  load N  shell mm  solid mm  difference  over linear"
+    )
     for load, a, b in zip(LOADS, shell, solid):
-        print(f"  {load:6.1f}  {1e3 * a:8.4f}  {1e3 * b:8.4f}  {a / b - 1:+10.2%}  {b / load / (solid[0] / LOADS[0]):8.3f}")
+        print(
+            f"  {load:6.1f}  {1e3 * a:8.4f}  {1e3 * b:8.4f}  {a / b - 1:+10.2%}  "
+            f"{b / load / (solid[0] / LOADS[0]):8.3f}"
+        )
     assert shell == pytest.approx(solid, rel=0.01)
     assert shell / LOADS == pytest.approx(shell[0] / LOADS[0], rel=0.1)  # nearly linear (Th. Fig. 3-13)
 
 
 @pytest.mark.slow
 def test_plies_along_the_strip():
-    """Plies along the strip, 200 times stiffer than the rubber about them: here a director that stays straight is 2 to 5 % too stiff.
+    """Plies along the strip, 200 times stiffer than the rubber about them: here a director that stays straight is 2 to
+    5 % too stiff.
 
     No part of the published case; it bounds what first-order theory can give for such a wall.
     """
@@ -99,5 +108,8 @@ def test_plies_along_the_strip():
     for factor in (1.0, 5 / 6):
         stack = layers(angle=0.0, shear=factor)
         shell = shell_deflections(stack, LOADS[:1], 64, 20)[0]
-        print(f"\nplies at 0 degrees, shear correction {factor:.3f}: shell {1e3 * shell:.5f} mm, solid {1e3 * solid:.5f} mm ({shell / solid - 1:+.2%})")
+        print(
+            f"\nplies at 0 degrees, shear correction {factor:.3f}: shell {1e3 * shell:.5f} mm, solid "
+            f"{1e3 * solid:.5f} mm ({shell / solid - 1:+.2%})"
+        )
         assert 0.95 < shell / solid < 1.0

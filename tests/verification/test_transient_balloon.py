@@ -1,7 +1,7 @@
 """A suddenly pressurised Mooney-Rivlin balloon: largest stretch and period against quadrature of its energy equation.
 
-With P = p r0/(h0 C10), C01/C10 = 0.25 and time in r0 sqrt(rho/C10) a thin sphere at rest obeys l'^2 / 2 + w(l) = 0, w as in `potential`. Reference numbers: P = 1: largest
-stretch 1.079943, period 1.29213; P = 2: 1.205003, 1.53042.
+With P = p r0/(h0 C10), C01/C10 = 0.25 and time in r0 sqrt(rho/C10) a thin sphere at rest obeys l'^2 / 2 + w(l) = 0, w
+as in `potential`. Reference numbers: P = 1: largest stretch 1.079943, period 1.29213; P = 2: 1.205003, 1.53042.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from dbvfiv.transient.scheme import scheme
 from dbvfiv.transient.state import consistent_state
-from dbvfiv.transient.stepper import Stepper, StepOptions
+from dbvfiv.transient.stepper import StepOptions, Stepper
 from tests.shell.structures import richardson
 from tests.verification.moving import ShellMotion
 from tests.verification.test_shell_balloon import RUBBER, H, octant

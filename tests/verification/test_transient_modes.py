@@ -1,7 +1,9 @@
-"""Three routes to one number: the full pencil, its reduction to the fluid's transfer function, and the ringing of the nonlinear valve after a small push.
+"""Three routes to one number: the full pencil, its reduction to the fluid's transfer function, and the ringing of the
+nonlinear valve after a small push.
 
-The push follows the leading oscillating mode. Growth rate and frequency are read off the lip by fitting x_{k+1} + g^2 x_{k-1} = 2 g cos(omega h) x_k, which holds for one
-mode exactly; without numerical damping the step leaves errors of second order, which two steps show and remove.
+The push follows the leading oscillating mode. Growth rate and frequency are read off the lip by fitting x_{k+1} + g^2
+x_{k-1} = 2 g cos(omega h) x_k, which holds for one mode exactly; without numerical damping the step leaves errors of
+second order, which two steps show and remove.
 """
 
 from __future__ import annotations
@@ -24,25 +26,50 @@ BETA = 0.003
 QUASI, STORAGE = "quasi-steady", "storage"
 #: Continuity law, pressure (Pa), density (kg/m3), and the sign of the growth rate.
 STATES = [
-    (QUASI, 2e3, 10.0, +1), (QUASI, 6e3, 1.2, +1), (QUASI, 10e3, 100.0, -1), (QUASI, 18e3, 1000.0, -1),
-    (STORAGE, 2e3, 1.2, +1), (STORAGE, 6e3, 1.2, +1), (STORAGE, 10e3, 10.0, -1), (STORAGE, 18e3, 1000.0, -1),
-]  # fmt: skip
+    (QUASI, 2e3, 10.0, +1),
+    (QUASI, 6e3, 1.2, +1),
+    (QUASI, 10e3, 100.0, -1),
+    (QUASI, 18e3, 1000.0, -1),
+    (STORAGE, 2e3, 1.2, +1),
+    (STORAGE, 6e3, 1.2, +1),
+    (STORAGE, 10e3, 10.0, -1),
+    (STORAGE, 18e3, 1000.0, -1),
+]
 
 
-def three_routes(law: str, pressure: float, density: float, mesh=(8, 12), steps=(50, 100), periods: float = 1.25) -> dict:
-    """Eigenvalues of the leading oscillating mode by the three ways, the last by steps per period and in the limit of small ones."""
+def three_routes(
+    law: str, pressure: float, density: float, mesh=(8, 12), steps=(50, 100), periods: float = 1.25
+) -> dict:
+    """Eigenvalues of the leading oscillating mode by the three ways, the last by steps per period and in the limit of
+    small ones.
+    """
     changes = {
-        "mesh.around": mesh[0], "mesh.along": mesh[1], "fluid.continuity": law, "fluid.density": density, "drive.pressure": pressure,
-        "damping.alpha": 0.0, "damping.beta": BETA, "transient.start": "kick", "transient.kick_opening": PUSH,
-    }  # fmt: skip
+        "mesh.around": mesh[0],
+        "mesh.along": mesh[1],
+        "fluid.continuity": law,
+        "fluid.density": density,
+        "drive.pressure": pressure,
+        "damping.alpha": 0.0,
+        "damping.beta": BETA,
+        "transient.start": "kick",
+        "transient.kick_opening": PUSH,
+    }
     valve = dbvfiv.load(changes=changes)
     model = valve.model
     full = next(m for m in valve.modes(count=8).modes if m.frequency > 0)
     eigenvalue = complex(full.growth_rate, 2 * np.pi * full.frequency)
     q = steady_positions(model, pressure)
     state = linearise(model, q, pressure)
-    densities = density * np.array([0.9, 0.95, 1.0, 1.05, 1.1])  # judged at the ends and fed in the middle: the state itself is none of the checks
-    found = sweep(lambda d: state.pencil(Conditions(float(d), 0.0, BETA)), densities, 4, SearchOptions(limit_point=-1 / BETA), checks=2)
+    densities = density * np.array(
+        [0.9, 0.95, 1.0, 1.05, 1.1]
+    )  # judged at the ends and fed in the middle: the state itself is none of the checks
+    found = sweep(
+        lambda d: state.pencil(Conditions(float(d), 0.0, BETA)),
+        densities,
+        4,
+        SearchOptions(limit_point=-1 / BETA),
+        checks=2,
+    )
     reduced = found.eigenvalues[2][np.argmin(np.abs(found.eigenvalues[2] - eigenvalue))]
     lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
     rings = []
@@ -56,7 +83,12 @@ def three_routes(law: str, pressure: float, density: float, mesh=(8, 12), steps=
         rings.append(ringing(x / PUSH, step))
     first, second = rings[-2:]
     ratio = (steps[-1] / steps[-2]) ** 2
-    return {"full": eigenvalue, "reduced": complex(reduced), "in time": rings, "limit": second + (second - first) / (ratio - 1)}
+    return {
+        "full": eigenvalue,
+        "reduced": complex(reduced),
+        "in time": rings,
+        "limit": second + (second - first) / (ratio - 1),
+    }
 
 
 def ringing(x: np.ndarray, step: float) -> complex:
@@ -73,13 +105,20 @@ def errors(found: complex, expected: complex) -> tuple[float, float]:
 
 def table(rows: list) -> str:
     """Lines for the documentation."""
-    lines = ["| continuity | kPa | kg/m3 | growth rate, frequency (full) | reduced | in time | off by, % |", "|---|---|---|---|---|---|---|"]
+    lines = [
+        "| continuity | kPa | kg/m3 | growth rate, frequency (full) | reduced | in time | off by, % |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for (law, pressure, density, _), r in rows:
+
         def text(v):
             return f"{v.real:.4f}, {abs(v.imag) / (2 * np.pi):.4f}"
 
         growth, frequency = errors(r["limit"], r["full"])
-        lines.append(f"| {law} | {pressure / 1e3:g} | {density:g} | {text(r['full'])} | {text(r['reduced'])} | {text(r['limit'])} | {100 * growth:.3f}, {100 * frequency:.4f} |")
+        lines.append(
+            f"| {law} | {pressure / 1e3:g} | {density:g} | {text(r['full'])} | {text(r['reduced'])} | "
+            f"{text(r['limit'])} | {100 * growth:.3f}, {100 * frequency:.4f} |"
+        )
     return "\n".join(lines)
 
 
@@ -87,7 +126,10 @@ def table(rows: list) -> str:
 def test_three_routes(law, pressure, density, sign):
     found = three_routes(law, pressure, density)
     full = found["full"]
-    print(f"\n{law} {pressure:g} {density:g}: full {full:.5f} reduced {found['reduced']:.5f} in time {found['in time']} limit {found['limit']:.5f}")
+    print(
+        f"\n{law} {pressure:g} {density:g}: full {full:.5f} reduced {found['reduced']:.5f} in time "
+        f"{found['in time']} limit {found['limit']:.5f}"
+    )
     assert np.sign(full.real) == sign
     assert abs(found["reduced"] - full) < 1e-6 * abs(full)
     growth, frequency = errors(found["limit"], full)

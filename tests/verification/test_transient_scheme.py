@@ -1,4 +1,6 @@
-"""Order of accuracy of the coupled steps, energy of a free swing, and oscillators with one unknown through the same stepper."""
+"""Order of accuracy of the coupled steps, energy of a free swing, and oscillators with one unknown through the same
+stepper.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ from dbvfiv.transient.equations import ValveMotion
 from dbvfiv.transient.scheme import scheme
 from dbvfiv.transient.start import steady_positions
 from dbvfiv.transient.state import consistent_state
-from dbvfiv.transient.stepper import Stepper, StepOptions
+from dbvfiv.transient.stepper import StepOptions, Stepper
 from tests.verification.moving import PointMotion
 
 TIGHT = StepOptions(tolerance=1e-9, floor=1e-13)
@@ -27,7 +29,8 @@ def run(motion, state, step: float, count: int, pressure=lambda t: 0.0, nd: floa
     return states
 
 
-# -- order --------------------------------------------------------------------------------------------------------------------------
+# -- order
+# ----
 
 
 @pytest.mark.parametrize("law", ["quasi-steady", "storage"])
@@ -52,19 +55,29 @@ def test_order_of_the_coupled_scheme(law, nd):
     ends = np.array(ends)
     differences = np.abs(np.diff(ends, axis=0))
     orders = np.log2(differences[:-1] / differences[1:])
-    print(f"\n{law}, numerical damping {nd}: orders of lip position, lip velocity, inlet velocity, |q|:\n{orders.round(2)}")
+    print(
+        f"\n{law}, numerical damping {nd}: orders of lip position, lip velocity, inlet velocity, "
+        f"|q|:\n{orders.round(2)}"
+    )
     assert orders[-1].min() > 1.85
     assert orders[-1].mean() == pytest.approx(2.0, abs=0.1)
 
 
-# -- energy -------------------------------------------------------------------------------------------------------------------------
+# -- energy
+# ----
 
 
 @pytest.mark.slow
 def test_a_free_swing_keeps_its_energy_over_10_000_steps():
     """The valve let go from its shape at 2 kPa: no load, no stops, no damping of any kind."""
     start = steady_positions(dbvfiv.load(changes=COARSE).model, 2e3)
-    free = {"drive.kind": "uniform", "drive.pressure": 0.0, "supports.lip_stop": False, "damping.alpha": 0.0, "damping.beta": 0.0}
+    free = {
+        "drive.kind": "uniform",
+        "drive.pressure": 0.0,
+        "supports.lip_stop": False,
+        "damping.alpha": 0.0,
+        "damping.beta": 0.0,
+    }
     motion = ValveMotion(dbvfiv.load(changes=COARSE | free).model)
     state = consistent_state(motion, 0.0, start, 0 * start, 0.0, 0.0)
     stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: 0.0, StepOptions(tolerance=1e-8))
@@ -74,12 +87,16 @@ def test_a_free_swing_keeps_its_energy_over_10_000_steps():
         state = stepper.step(state, 2e-4).state
         off[k] = sum(motion.energies(state.q, state.v)) / energy - 1.0
     quarters = np.array_split(off, 4)
-    print(f"\nrelative energy off by {off.min():.2e} to {off.max():.2e}; means of the quarters {[f'{t.mean():.1e}' for t in quarters]}")
+    print(
+        f"\nrelative energy off by {off.min():.2e} to {off.max():.2e}; means of the quarters "
+        f"{[f'{t.mean():.1e}' for t in quarters]}"
+    )
     assert np.abs(off).max() < 5e-4
     assert abs(quarters[-1].mean() - quarters[0].mean()) < 1e-4
 
 
-# -- one unknown --------------------------------------------------------------------------------------------------------------------
+# -- one unknown
+# ----
 
 
 def oscillator_start(motion, q: float, v: float):

@@ -1,4 +1,4 @@
-"""Water, pressure applied at once: the run ends in the steady state, as fast as the slowest mode of that state allows."""
+"""Water, pressure applied at once: the run ends in the steady state, as fast as the slowest mode there allows."""
 
 from __future__ import annotations
 
@@ -17,8 +17,16 @@ STUDY = Path(__file__).parents[2] / "cases" / "studies" / "sudden_pressure.py"
 
 
 def approach(pressure: float, mesh, duration: float, step: float):
-    """Relative distances of the mass flow to the steady one, their decay rate (1/s) over the last part, and the slowest eigenvalue (1/s)."""
-    changes = {"mesh.around": mesh[0], "mesh.along": mesh[1], "drive.pressure": pressure, "transient.duration": duration, "transient.step": step}
+    """Relative distances of the mass flow to the steady one, their decay rate (1/s) over the last part, and the slowest
+    eigenvalue (1/s).
+    """
+    changes = {
+        "mesh.around": mesh[0],
+        "mesh.along": mesh[1],
+        "drive.pressure": pressure,
+        "transient.duration": duration,
+        "transient.step": step,
+    }
     valve = dbvfiv.load(changes=changes)
     history = run_transient(valve.model).history
     off = history["mass_flow"] / valve.steady(pressure).mass_flow - 1.0
@@ -31,7 +39,10 @@ def approach(pressure: float, mesh, duration: float, step: float):
 @pytest.mark.parametrize("pressure", [18e3, 36e3])
 def test_water_settles_as_the_slowest_mode_allows(pressure):
     off, rate, slowest = approach(pressure, (8, 12), 0.6, 2e-3)
-    print(f"\n{pressure:g}: off at the end {off[-1]:.2e}, largest {off.max():.1e}, rate {rate:.3f}, slowest mode {slowest:.3f}")
+    print(
+        f"\n{pressure:g}: off at the end {off[-1]:.2e}, largest {off.max():.1e}, rate {rate:.3f}, slowest "
+        f"mode {slowest:.3f}"
+    )
     assert abs(off[-1]) < 1e-4
     assert off.max() < 1e-4
     assert rate == pytest.approx(slowest, rel=0.02)

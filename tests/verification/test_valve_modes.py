@@ -1,4 +1,7 @@
-"""Coupled eigenvalues of the 12-inch valve: known point, two independent counts, insensitivity to how they were sought, mesh."""
+"""Coupled eigenvalues of the 12-inch valve: known point, two independent counts, insensitivity to how they were sought,
+mesh.
+"""
+
 import numpy as np
 import pytest
 
@@ -32,10 +35,14 @@ def options(beta=0.003, **more):
 
 
 def test_light_fluid_at_6_kpa(valve):
-    """A first model gave about +27 1/s at 36.3 Hz and -24 at 16.8 Hz; a few per cent between two honest implementations."""
+    """A first model gave about +27 1/s at 36.3 Hz and -24 at 16.8 Hz; a few per cent between two honest
+    implementations.
+    """
     found = leading_modes(valve.pencil(LIGHT), 4, options())
-    print(f"\nleading {found.eigenvalues[0].real:+.2f} 1/s at {found.frequency[0]:.2f} Hz (about +27, 36.3), "
-          f"next {found.eigenvalues[1].real:+.2f} at {found.frequency[1]:.2f} Hz (-24, 16.8)")  # fmt: skip
+    print(
+        f"\nleading {found.eigenvalues[0].real:+.2f} 1/s at {found.frequency[0]:.2f} Hz (about +27, 36.3), "
+        f"next {found.eigenvalues[1].real:+.2f} at {found.frequency[1]:.2f} Hz (-24, 16.8)"
+    )
     assert found.eigenvalues[0].real == pytest.approx(27.0, rel=0.05)
     assert found.frequency[0] == pytest.approx(36.3, rel=0.03)
     assert found.eigenvalues[1].real == pytest.approx(-24.0, rel=0.06)
@@ -57,13 +64,18 @@ def test_water_is_damped_from_2_to_50_kpa():
     for lin in linearised(model_of(28, 48), [2e3, 6e3, 12e3, 18e3, 29e3, 36e3, 50e3]):
         for storage in (0.0, 1.0):
             found = leading_modes(lin.pencil(Conditions(1000.0, 5.0, 0.003), storage=storage), 4, options())
-            print(f"{lin.inlet / 1e3:5.0f} kPa, {'storage' if storage else 'quasi-steady':12s}: leading {found.eigenvalues[0]:.3f} 1/s")
+            print(
+                f"{lin.inlet / 1e3:5.0f} kPa, {'storage' if storage else 'quasi-steady':12s}: leading "
+                f"{found.eigenvalues[0]:.3f} 1/s"
+            )
             assert found.status == "complete"
             assert found.growth_rate[0] < 0
 
 
 def test_two_counts_agree_at_200_random_states():
-    """Pressure, density, damping and continuity drawn at random; spectrum and argument principle must find the same number."""
+    """Pressure, density, damping and continuity drawn at random; spectrum and argument principle must find the same
+    number.
+    """
     rng = np.random.default_rng(20)
     model = model_of(14, 24)
     pressures = np.sort(np.exp(rng.uniform(np.log(200.0), np.log(50e3), 20)))
@@ -72,9 +84,13 @@ def test_two_counts_agree_at_200_random_states():
         workspace = Workspace()
         basis = TransferBasis(lin.pencil(LIGHT))
         for _ in range(10):
-            conditions = Conditions(10 ** rng.uniform(-0.5, 3.2), rng.choice([0.0, rng.uniform(0, 10)]), 10 ** rng.uniform(-4, -2))
+            conditions = Conditions(
+                10 ** rng.uniform(-0.5, 3.2), rng.choice([0.0, rng.uniform(0, 10)]), 10 ** rng.uniform(-4, -2)
+            )
             storage = float(rng.integers(2))
-            both = certified_spectrum(lin.pencil(conditions, storage=storage), 6, options(conditions.beta), workspace=workspace, basis=basis)
+            both = certified_spectrum(
+                lin.pencil(conditions, storage=storage), 6, options(conditions.beta), workspace=workspace, basis=basis
+            )
             unstable += both.unstable_count > 0
             if not both.agrees:
                 missed.append((lin.inlet, conditions, storage, both.statement))

@@ -1,8 +1,10 @@
-"""Steady states of the 12-inch valve: discharge, place of the largest displacement, grids, and the trends of the thesis.
+"""Steady states of the 12-inch valve: discharge, place of the largest displacement, grids, and the trends of the
+thesis.
 
-Published (Th. 7, four quarters): 47.88, 75.52, 90.82 kg/s at 18, 29, 36 kPa, 10 % rubber set. A first, independent implementation of the same model on
-28 x 48 elements gave 42.0, 67.4, 82.0 kg/s with the 10 % set and 48.8, 77.4, 93.8 with the 20 % set. The published flows are met within 4 % by
-the 20 % set and within 13 % by the 10 % set; the saddle's shape, lost with its key points, and the folding side edge are of that size.
+Published (Th. 7, four quarters): 47.88, 75.52, 90.82 kg/s at 18, 29, 36 kPa, 10 % rubber set. A first, independent
+implementation of the same model on 28 x 48 elements gave 42.0, 67.4, 82.0 kg/s with the 10 % set and 48.8, 77.4, 93.8
+with the 20 % set. The published flows are met within 4 % by the 20 % set and within 13 % by the 10 % set; the saddle's
+shape, lost with its key points, and the folding side edge are of that size.
 """
 
 from __future__ import annotations
@@ -23,7 +25,9 @@ FIRST_MODEL = {"10 %": np.array([42.0, 67.4, 82.0]), "20 %": np.array([48.8, 77.
 
 
 def states(pressures, around=28, along=48, **changes):
-    case = Case().replace({"mesh.around": around, "mesh.along": along} | {k.replace("__", "."): v for k, v in changes.items()})
+    case = Case().replace(
+        {"mesh.around": around, "mesh.along": along} | {k.replace("__", "."): v for k, v in changes.items()}
+    )
     result = run_steady(ValveModel(case), pressures)
     assert not result.failures
     return result.states
@@ -40,7 +44,10 @@ def test_discharge(level):
     found = np.array([state.mass_flow for state in reference(level)])
     print(f"\n{level}: kPa   kg/s    first model      published")
     for p, flow, first, thesis in zip(PRESSURES, found, FIRST_MODEL[level], PUBLISHED):
-        print(f"      {p / 1e3:4.0f}  {flow:7.3f}  {first:6.1f} ({flow / first - 1:+.1%})  {thesis:6.2f} ({flow / thesis - 1:+.1%})")
+        print(
+            f"      {p / 1e3:4.0f}  {flow:7.3f}  {first:6.1f} ({flow / first - 1:+.1%})  {thesis:6.2f} "
+            f"({flow / thesis - 1:+.1%})"
+        )
     assert found == pytest.approx(FIRST_MODEL[level], rel=0.02)
     assert found == pytest.approx(PUBLISHED, rel=0.04 if level == "20 %" else 0.14)
 
@@ -50,7 +57,9 @@ def test_largest_displacement_is_at_the_joint(level):
     """In the middle (x = 0), within one element of the line z = 0.21 m where duckbill and saddle join (Th. 7)."""
     for state in reference(level):
         x, _, z = state.max_displacement_position
-        print(f"\n{level} {state.pressure / 1e3:.0f} kPa: {state.max_displacement * 1e3:.2f} mm at x {x:.4f}, z {z:.4f} m")
+        print(
+            f"\n{level} {state.pressure / 1e3:.0f} kPa: {state.max_displacement * 1e3:.2f} mm at x {x:.4f}, z {z:.4f} m"
+        )
         assert x == 0.0
         assert abs(z - 0.21) <= 0.56 / 48 * (1 + 1e-9)
     assert 0.055 < reference(level)[-1].max_displacement < 0.07  # 0.058 and 0.062 m at 36 kPa; published 0.069
@@ -63,7 +72,7 @@ def test_strain_level_adds_to_the_flow():
     assert np.all((ratio > 1.08) & (ratio < 1.18))
 
 
-TREND = dict(around=14, along=24)
+TREND = {"around": 14, "along": 24}
 TREND_PRESSURES = (6e3, 18e3, 36e3, 50e3)
 
 
@@ -122,7 +131,7 @@ def test_smooth_saddle():
 
 
 def grid_study(pressures, **changes) -> np.ndarray:
-    """Mass flow (3 grids, pressures) on 14 x 24, 28 x 48 and 56 x 96 elements, printed with observed order and limit."""
+    """Mass flow (3 grids, pressures) on 14 x 24, 28 x 48 and 56 x 96 elements, printed with order and limit."""
     found = np.array([[s.mass_flow for s in states(pressures, 14 * k, 24 * k, **changes)] for k in (1, 2, 4)])
     for p, (a, b, c) in zip(pressures, found.T):
         order, limit = richardson((a, b, c)) if (a - b) * (b - c) > 0 else (np.nan, np.nan)
@@ -136,8 +145,9 @@ def grid_study(pressures, **changes) -> np.ndarray:
 def test_grids(level):
     """Measured wall: the flow changes by 0.3 % from 28 x 48 to 56 x 96, at a low order.
 
-    The thickness is taken at element centres, and its step at z = 0.30 m falls between rows of these grids, at another share of an element on each:
-    an error of first order and changing sign. The walls below show the order of everything else.
+    The thickness is taken at element centres, and its step at z = 0.30 m falls between rows of these grids, at another
+    share of an element on each: an error of first order and changing sign. The walls below show the order of everything
+    else.
     """
     print(f"\n{level} set")
     found = grid_study(PRESSURES, materials__strain_level=level)
@@ -156,7 +166,9 @@ STEP_ON_A_ROW = [
 @pytest.mark.slow
 @pytest.mark.parametrize("wall", ["averaged", "step on a row"])
 def test_grids_without_a_step_inside_elements(wall):
-    """Averaged wall, or the step moved to 0.28 m: second order or better, with the fold of the side edge and the kinks of the saddle in place."""
+    """Averaged wall, or the step moved to 0.28 m: second order or better, with the fold of the side edge and the kinks
+    of the saddle in place.
+    """
     print(f"\n{wall}")
     changes = {"valve__wall": "uniform"} if wall == "averaged" else {"valve__wall_map": STEP_ON_A_ROW}
     for column in grid_study((18e3, 36e3), **changes).T:

@@ -2,6 +2,7 @@
 
 Bolotin, Nonconservative Problems of the Theory of Elastic Stability, 1963: equal dampers.
 """
+
 import numpy as np
 import pytest
 
