@@ -293,7 +293,7 @@ class Valve:
         return transient(valve.model, valve.name, output, observer)
 
     def _run(self, pressures: Sequence[float], output: str | Path | None, observer: Observer | None) -> SteadyResults:
-        from .results.header import Header
+        from .record.header import Header
         from .results.steady import SteadyResults
         from .results.steady_file import SteadyFile
         from .studies.observer import Observer, Observers

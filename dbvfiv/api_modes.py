@@ -50,7 +50,7 @@ def modes_of(valve: Valve, start: State | None, output: str | Path | None, obser
     ------
     CaseError, SolveError
     """
-    from .results.header import Header
+    from .record.header import Header
     from .results.modes import ModesResults
     from .studies.modes import run_modes
     from .studies.observer import Observer
@@ -94,7 +94,7 @@ def sweep_of(valve: Valve, start: State | None, output: str | Path | None, obser
     ------
     CaseError, SolveError
     """
-    from .results.header import Header
+    from .record.header import Header
     from .results.sweep import SweepResults
     from .studies.observer import Observer
     from .studies.sweep import run_sweep

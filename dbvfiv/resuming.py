@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from .errors import CaseError
 
 if TYPE_CHECKING:
-    from .results.result import Result
+    from .record.result import Result
     from .studies.observer import Observer
 
 
@@ -37,7 +37,7 @@ def resume(
     CaseError
         If the file is none of these, or there is nothing left to do.
     """
-    from .results.files import kind_of
+    from .record.files import kind_of
 
     kind = kind_of(path)
     if kind not in ("transient", "map", "onset", "closure"):

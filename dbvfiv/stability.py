@@ -39,8 +39,8 @@ def onset(
     >>> [(p["value"], p["frequency"]) for p in found.points]                                # doctest: +SKIP
     """
     from .api import Valve
-    from .results.header import Header
-    from .results.mesh import MeshData
+    from .record.header import Header
+    from .record.mesh import MeshData
     from .results.onset import OnsetResults
     from .results.onset_file import OnsetFile
     from .studies.onset import run_onset
@@ -65,7 +65,7 @@ def resume_onset(path: str | Path, observer: Observer | None = None) -> OnsetRes
         If the file holds no onset run, or one that had gone to its end.
     """
     from .api import Valve
-    from .results.mesh import MeshData
+    from .record.mesh import MeshData
     from .results.onset import OnsetResults
     from .results.onset_file import OnsetFile, known_items
     from .studies.onset import run_onset
@@ -101,10 +101,10 @@ def stability_map(
     CaseError, SolveError
     """
     from .api import Valve
-    from .results.header import Header
+    from .record.header import Header
+    from .record.mesh import MeshData
     from .results.map import MapResults
     from .results.map_file import MapFile
-    from .results.mesh import MeshData
     from .studies.map import run_map
     from .studies.map_column import MapPlan
 
@@ -128,9 +128,9 @@ def resume_map(path: str | Path, observer: Observer | None = None, workers: int 
         If the file holds no map, or one that had gone to its end.
     """
     from .api import Valve
+    from .record.mesh import MeshData
     from .results.map import MapResults
     from .results.map_file import MapFile, known_columns
-    from .results.mesh import MeshData
     from .studies.map import run_map
     from .studies.map_column import MapPlan
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def _writable(path: Path | None) -> Path | None:
     """Refuse a name that cannot be written before anything is computed."""
     if path is not None:
-        from ..results.files import check_writable
+        from ..record.files import check_writable
 
         check_writable(path)
     return path

@@ -39,7 +39,7 @@ def command(
 
     from ..case.quantity import Quantity
     from ..errors import CaseError
-    from ..results.files import kind_of
+    from ..record.files import kind_of
     from ..resuming import resume
 
     kind = kind_of(file)

@@ -17,7 +17,7 @@ from ..errors import CaseError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..results.result import Result
+    from ..record.result import Result
 
 FAMILIES: dict[str, tuple[str, ...]] = {
     "steady": ("discharge", "shapes", "passage", "deformed", "layers"),

@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from ..results.whole_valve import WholeValve
+from ..record.whole_valve import WholeValve
 from .deformed import COLOURS, shaded
 from .layers import unrolled
 from .style import MAGNITUDE, kilopascals, new_figure, some_of

@@ -12,7 +12,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from ..results.whole_valve import WholeValve
+from ..record.whole_valve import WholeValve
 from .style import kilopascals, new_figure
 
 if TYPE_CHECKING:

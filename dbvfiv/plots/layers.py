@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from .style import MAGNITUDE, kilopascals, new_figure
 
 if TYPE_CHECKING:
-    from ..results.mesh import MeshData
+    from ..record.mesh import MeshData
     from ..results.state import State
     from ..results.steady import SteadyResults
 

@@ -11,7 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from ..results.whole_valve import WholeValve
+from ..record.whole_valve import WholeValve
 from .deformed import COLOURS, frame, shaded
 from .modes_plane import UNSTABLE, conditions, mode_title
 from .style import new_figure

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from .layout import Column, read_array, write_array
+from ..record.layout import Column, read_array, write_array
 
 if TYPE_CHECKING:
     from ..studies.modes import ModesResult

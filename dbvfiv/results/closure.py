@@ -12,15 +12,17 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from ..record.files import reading
+from ..record.header import Header, read_header
+from ..record.layout import Table, read_texts
+from ..record.mesh import MeshData, read_mesh
+from ..record.result import Result
 from .closure_table import BUCKLING, FIELDS, HEAD, OPENED, PATH, REVERSAL, SUMMARY, row_of
-from .files import reading
-from .header import Header, read_header
-from .layout import Table, read_texts
-from .mesh import MeshData, read_mesh
-from .result import Result
 from .state import LAYERS, LayerData, layers_of
 
 if TYPE_CHECKING:
+    from ..record.vtkhdf import Step
+    from ..record.whole_valve import WholeValve
     from ..studies.closing import ClosingResult
     from ..studies.closure import ClosureResult
     from ..studies.closure_buckling import Buckling
@@ -28,8 +30,6 @@ if TYPE_CHECKING:
     from ..studies.closure_path import PathPoint
     from ..studies.closure_state import ClosureState
     from ..studies.state import SteadyState
-    from .vtkhdf import Step
-    from .whole_valve import WholeValve
 
 QUARTERS = 4
 

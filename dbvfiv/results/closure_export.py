@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .export import layer_field_names, motion
-from .vtkhdf import Step
-from .whole_valve import WholeValve
+from ..record.fields import layer_field_names, motion
+from ..record.vtkhdf import Step
+from ..record.whole_valve import WholeValve
 
 if TYPE_CHECKING:
     from .closure import ClosureResults

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..record.files import KeptFile, create, reopen
+from ..record.header import Header, write_header
+from ..record.layout import Table, read_texts, replace_texts
+from ..record.mesh import MeshData, write_mesh
 from ..studies.closure_buckling import Buckling
 from ..studies.closure_path import PathRestart
 from ..studies.observer import Observer
 from .closure import buckling_rows, opened_rows, path_rows, reference_opening, row_from
 from .closure_table import BUCKLING, FIELDS, OPENED, PATH, RESTART, REVERSAL, SUMMARY
-from .files import KeptFile, create, reopen
-from .header import Header, write_header
-from .layout import Table, read_texts, replace_texts
-from .mesh import MeshData, write_mesh
 from .state import LAYERS, LayerData, layers_of
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .layout import TEXT, Column
+from ..record.layout import TEXT, Column
 
 #: What a user reads off a state; the names are keys of the JSON output.
 SUMMARY = (

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from ..record.header import Header, read_header
+from ..record.layout import Table
+from ..record.mesh import MeshData, read_mesh
+from ..record.result import Result
 from ..studies.map import MapResult, grid
 from ..studies.map_checks import Check
 from ..studies.map_column import MapColumn, MapPlan
 from ..studies.map_curves import OnsetCurve, linked
-from .header import Header, read_header
-from .layout import Table
 from .map_file import MapFile, read_columns, read_messages
-from .mesh import MeshData, read_mesh
-from .result import Result
 from .stability_tables import CHECKS, CURVE_POINTS
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ import h5py
 import numpy as np
 
 from ..errors import CaseError
+from ..record.files import KeptFile, create, reading, reopen
+from ..record.header import Header, write_header
+from ..record.layout import Table, read_texts, replace_texts
+from ..record.mesh import MeshData, write_mesh
 from ..studies.map_column import CELLS, MapColumn, MapPlan
 from ..studies.observer import Observer
-from .files import KeptFile, create, reading, reopen
-from .header import Header, write_header
-from .layout import Table, read_texts, replace_texts
-from .mesh import MeshData, write_mesh
 from .stability_tables import CHECKS, CURVE_POINTS, MAP, MAP_ONSETS
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def known_columns(path: str | Path) -> tuple[list[MapColumn], Any, bool]:
     CaseError
         If it is no map.
     """
-    from .header import read_header
+    from ..record.header import read_header
 
     with reading(path) as file:
         kind = str(file.attrs["dbvfiv_kind"])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .layout import Column
+from ..record.layout import Column
 
 if TYPE_CHECKING:
     from ..studies.modes import ModesResult

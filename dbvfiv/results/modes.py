@@ -11,21 +11,21 @@ from typing import TYPE_CHECKING, Any
 import h5py
 
 from ..errors import CaseError
+from ..record.files import writing
+from ..record.header import Header, read_header, write_header
+from ..record.layout import Table, read_texts, replace_texts
+from ..record.mesh import MeshData, read_mesh, write_mesh
+from ..record.result import Result
 from .certificate import Certificate
-from .files import writing
-from .header import Header, read_header, write_header
-from .layout import Table, read_texts, replace_texts
-from .mesh import MeshData, read_mesh, write_mesh
 from .mode import MODE, ModeShape, rows_of
-from .result import Result
 from .state import FIELDS, SUMMARY, layers_of
 from .steady import SteadyResults, row_from
 
 if TYPE_CHECKING:
+    from ..record.vtkhdf import Step
+    from ..record.whole_valve import WholeValve
     from ..studies.modes import ModesResult
     from .state import State
-    from .vtkhdf import Step
-    from .whole_valve import WholeValve
 
 HEAD = (
     "  mode   growth rate    frequency   damping ratio   residual",

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .export import motion
-from .vtkhdf import Step
+from ..record.fields import motion
+from ..record.vtkhdf import Step
 
 if TYPE_CHECKING:
+    from ..record.whole_valve import WholeValve
     from .mode import ModeShape
     from .modes import ModesResults
-    from .whole_valve import WholeValve
 
 
 @dataclass(frozen=True)

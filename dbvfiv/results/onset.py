@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from ..record.header import Header, read_header
+from ..record.layout import read_texts
+from ..record.mesh import MeshData, read_mesh
+from ..record.result import Result
 from ..studies.onset_point import FINE
-from .header import Header, read_header
-from .layout import read_texts
-from .mesh import MeshData, read_mesh
 from .onset_file import OnsetFile, latest_points, read_rows, row_of_point
-from .result import Result
 from .stability_tables import SCAN
 
 if TYPE_CHECKING:

@@ -14,13 +14,13 @@ import h5py
 import numpy as np
 
 from ..errors import CaseError
+from ..record.files import KeptFile, create, reading, reopen
+from ..record.header import Header, read_header, write_header
+from ..record.layout import TEXT, Column, Table, replace_texts
+from ..record.mesh import MeshData, write_mesh
 from ..studies.observer import Observer
 from ..studies.onset_point import OnsetPoint, OnsetSample, Side
 from ..studies.parameters import Place
-from .files import KeptFile, create, reading, reopen
-from .header import Header, read_header, write_header
-from .layout import TEXT, Column, Table, replace_texts
-from .mesh import MeshData, write_mesh
 from .stability_tables import ONSETS, SCAN
 
 if TYPE_CHECKING:

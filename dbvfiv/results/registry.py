@@ -1,7 +1,7 @@
 """Kinds of result files and the classes that read them.
 
 A study registers here with one line: the kind that its files carry and ``module:class`` of its result, which is
-imported when such a file is read. The class derives from `dbvfiv.results.result.Result`. Its figures are registered the
+imported when such a file is read. The class derives from `dbvfiv.record.result.Result`. Its figures are registered the
 same way in `dbvfiv.plots.catalogue`.
 """
 
@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import CaseError
-from .files import reading
+from ..record.files import reading
 
 if TYPE_CHECKING:
-    from .result import Result
+    from ..record.result import Result
 
 READERS: dict[str, str] = {
     "steady": "dbvfiv.results.steady:SteadyResults",

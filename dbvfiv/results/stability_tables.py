@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .layout import TEXT, Column
+from ..record.layout import TEXT, Column
 
 ONSETS = (
     Column("value", "of the parameter", "Where the eigenvalue reaches the imaginary axis."),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .layout import TEXT, Column
+from ..record.layout import TEXT, Column
 
 if TYPE_CHECKING:
     from ..model import ValveModel

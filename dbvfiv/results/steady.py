@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from .files import reading
-from .header import Header, read_header
-from .layout import Table, read_texts
-from .mesh import MeshData, read_mesh
-from .result import Result
+from ..record.files import reading
+from ..record.header import Header, read_header
+from ..record.layout import Table, read_texts
+from ..record.mesh import MeshData, read_mesh
+from ..record.result import Result
 from .state import FIELDS, LAYERS, SUMMARY, LayerData, State, layers_of
 from .steady_table import HEAD, row_of
 
 if TYPE_CHECKING:
     from ..model import ValveModel
+    from ..record.vtkhdf import Step
+    from ..record.whole_valve import WholeValve
     from ..studies.steady import SteadyResult
-    from .vtkhdf import Step
-    from .whole_valve import WholeValve
 
 
 class SteadyResults(Result):
@@ -132,7 +132,7 @@ class SteadyResults(Result):
         return [*HEAD, *(row_of(state) for state in self.states)]
 
     def steps(self, valve: WholeValve) -> Sequence[Step]:
-        from .export import steady_steps
+        from ..record.fields import steady_steps
 
         return steady_steps(self, valve)
 

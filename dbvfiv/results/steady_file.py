@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..record.files import KeptFile, create
+from ..record.header import Header, write_header
+from ..record.layout import Table, replace_texts
+from ..record.mesh import MeshData, write_mesh
 from ..studies.observer import Observer
-from .files import KeptFile, create
-from .header import Header, write_header
-from .layout import Table, replace_texts
-from .mesh import MeshData, write_mesh
 from .state import FIELDS, LAYERS, SUMMARY, layers_of
 from .steady import row_from
 

@@ -11,12 +11,12 @@ import h5py
 import numpy as np
 
 from ..case.axis import KEYS
-from .files import writing
-from .header import Header, read_header, write_header
-from .layout import TEXT, Column, Table, read_array, read_texts, replace_texts, write_array
-from .mesh import MeshData, read_mesh, write_mesh
+from ..record.files import writing
+from ..record.header import Header, read_header, write_header
+from ..record.layout import TEXT, Column, Table, read_array, read_texts, replace_texts, write_array
+from ..record.mesh import MeshData, read_mesh, write_mesh
+from ..record.result import Result
 from .modes import surroundings
-from .result import Result
 from .state import SUMMARY
 from .sweep_table import crossing_line, head, rows_of_sweep, units_of
 

@@ -21,10 +21,10 @@ import numpy as np
 
 from ..errors import CaseError
 from ..model import ValveModel
-from ..results.files import create, reading, refuse_foreign
-from ..results.header import Header, write_header
-from ..results.layout import Column, read_texts, replace_texts
-from ..results.mesh import MeshData, write_mesh
+from ..record.files import create, reading, refuse_foreign
+from ..record.header import Header, write_header
+from ..record.layout import Column, read_texts, replace_texts
+from ..record.mesh import MeshData, write_mesh
 from ..studies.observer import Observer
 from .assess import RunVerdict
 from .history import PROFILES, SCALARS

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..model.valve import QUARTERS
-from ..results.layout import Column
+from ..record.layout import Column
 from .equations import Step, ValveMotion
 from .stepper import StepResult
 

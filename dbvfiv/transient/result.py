@@ -14,18 +14,18 @@ import h5py
 import numpy as np
 
 from ..errors import CaseError
-from ..results.files import reading
-from ..results.header import Header, read_header
-from ..results.layout import read_texts
-from ..results.mesh import MeshData, read_mesh
-from ..results.result import Result
-from ..results.vtkhdf import Step
+from ..record.files import reading
+from ..record.header import Header, read_header
+from ..record.layout import read_texts
+from ..record.mesh import MeshData, read_mesh
+from ..record.result import Result
+from ..record.vtkhdf import Step
 from .assess import RunVerdict
 from .file import STATES
 from .history import PROFILES, SCALARS
 
 if TYPE_CHECKING:
-    from ..results.whole_valve import WholeValve
+    from ..record.whole_valve import WholeValve
     from .run import TransientRun
 
 

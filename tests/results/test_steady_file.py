@@ -11,7 +11,7 @@ import pytest
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.materials.rubbers import rubber
-from dbvfiv.results.header import Header, read_header, write_header
+from dbvfiv.record.header import Header, read_header, write_header
 from dbvfiv.results.state import layers_of
 from dbvfiv.results.steady_file import SteadyFile
 from dbvfiv.studies.observer import Observer, Observers

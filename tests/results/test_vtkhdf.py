@@ -5,8 +5,8 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
+from dbvfiv.record.whole_valve import WholeValve
 from dbvfiv.results.steady import SteadyResults
-from dbvfiv.results.whole_valve import WholeValve
 
 vtk = pytest.importorskip("vtk")
 from vtk.util.numpy_support import vtk_to_numpy  # noqa: E402

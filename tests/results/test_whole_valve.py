@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from dbvfiv.results.export import motion
-from dbvfiv.results.whole_valve import WholeValve
+from dbvfiv.record.fields import motion
+from dbvfiv.record.whole_valve import WholeValve
 
 
 def _normals(points, quads):

@@ -17,8 +17,8 @@ from .vtkhdf import Step, write_vtkhdf
 from .whole_valve import WholeValve
 
 if TYPE_CHECKING:
+    from ..results.steady import SteadyResults
     from .result import Result
-    from .steady import SteadyResults
 
 _UNITS = {"displacement": "m", "rotation": "rad", "thickness": "m", "pressure": "Pa", "velocity": "m/s"}
 

@@ -108,7 +108,7 @@ class Result:
         return save_figures(self, folder, format, **choices)
 
     def export(self, path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any) -> Path:
-        """Write a VTKHDF file for ParaView; see `dbvfiv.results.export`."""
-        from .export import export_result
+        """Write a VTKHDF file for ParaView; see `dbvfiv.record.fields`."""
+        from .fields import export_result
 
         return export_result(self, path, quarter, deformed, **choices)
