@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dbvfiv.studies.steady import run_steady
+from dbvfiv.model.equilibria import find_equilibria
 
 from .registry import Row, benchmark
 from .statics import MESHES, model_of, refactorisation
@@ -21,12 +21,12 @@ import json, sys
 import dbvfiv
 from dbvfiv.case.model import Case
 from dbvfiv.model import ValveModel
-from dbvfiv.studies.steady import run_steady
+from dbvfiv.model.equilibria import find_equilibria
 def peak():  # getrusage would count what the parent process held when it started this one
     return int(next(line for line in open("/proc/self/status") if line.startswith("VmHWM")).split()[1]) / 1024
 before = peak()
 model = ValveModel(Case().replace({"mesh.around": int(sys.argv[1]), "mesh.along": int(sys.argv[2])}))
-failures = run_steady(model, [18e3]).failures
+failures = find_equilibria(model, [18e3]).failures
 print(json.dumps({"before": before, "peak": peak(), "failures": failures}))
 """
 
@@ -65,7 +65,7 @@ def growth():
     found = []
     for (around, along), rounds in zip(MESHES, (25, 15, 7)):
         model = model_of(around, along)
-        q = run_steady(model, [18e3]).states[0].q
+        q = find_equilibria(model, [18e3]).states[0].q
         factor = refactorisation(model, q)
         times = processor_medians(
             {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dbvfiv.model import Conditions, linearise
-from dbvfiv.studies.steady import run_steady
+from dbvfiv.model.equilibria import find_equilibria
 from eigen import SearchOptions, Workspace, leading_modes, sweep
 
 from .registry import Row, benchmark, medians, seconds
@@ -21,7 +21,7 @@ REFERENCE = Conditions(10.0, 0.0, 3e-3)
 def modes():
     """Ten leading coupled pairs at one state, linearisation included."""
     model = model_of(28, 48)
-    q = run_steady(model, [6e3]).states[0].q
+    q = find_equilibria(model, [6e3]).states[0].q
     factor = refactorisation(model, q)
     workspace = Workspace()
 
@@ -55,7 +55,7 @@ def density_sweep():
     a sample.
     """
     model = model_of(28, 48)
-    state = linearise(model, run_steady(model, [6e3]).states[0].q, 6e3)
+    state = linearise(model, find_equilibria(model, [6e3]).states[0].q, 6e3)
     options = SearchOptions(limit_point=-1 / REFERENCE.beta)
     workspace = Workspace()
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from dbvfiv.case.model import Case
 from dbvfiv.model import ValveModel
+from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.model.linear import DirectFactor
-from dbvfiv.studies.steady import run_steady
 
 from .registry import Row, benchmark, medians, seconds
 
@@ -34,7 +34,7 @@ def refactorisation(model: ValveModel, q: np.ndarray) -> DirectFactor:
 
 
 def assembly(model: ValveModel, rounds: int = 15) -> tuple[dict[str, float], np.ndarray]:
-    q = run_steady(model, [6e3]).states[0].q
+    q = find_equilibria(model, [6e3]).states[0].q
     factor = refactorisation(model, q)
     times = medians(
         {
@@ -68,7 +68,7 @@ def head_discharge():
         model = model_of(around, along)
         times, _ = assembly(model, 5)
         unit = len(CURVE) * 4 * (times["tangent"] + times["lu"])
-        spent, result = seconds(lambda: run_steady(model, CURVE))
+        spent, result = seconds(lambda: find_equilibria(model, CURVE))
         iterations = sum(state.iterations for state in result.states)
         target = 8.0 if (around, along) == (28, 48) else None
         yield Row(

@@ -11,8 +11,8 @@ import numpy as np
 
 from dbvfiv.case.model import Case
 from dbvfiv.model import ValveModel
+from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header
-from dbvfiv.studies.observer import Observer
 from dbvfiv.transient.file import TransientFile
 from dbvfiv.transient.options import RunOptions
 from dbvfiv.transient.run import Runner

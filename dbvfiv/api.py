@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -11,17 +11,17 @@ from .case import load_case
 from .case.model import Case
 from .case.quantity import Quantity
 from .errors import CaseError, SolveError
+from .model import ValveModel
+from .studies.session import Session
+from .studies.steady.result import State, SteadyResult
 
 if TYPE_CHECKING:
-    from .model import ValveModel
+    from .observer import Observer
     from .results.closure import ClosureResults
     from .results.map import MapResults
     from .results.modes import ModesResults
     from .results.onset import OnsetResults
-    from .results.state import State
-    from .results.steady import SteadyResults
     from .results.sweep import SweepResults
-    from .studies.observer import Observer
     from .transient.result import TransientResults
 
 _PRESSURE = Quantity("Pa", "kPa")
@@ -58,17 +58,14 @@ class Valve:
         return f"Valve({self.name!r})"
 
     @cached_property
-    def model(self) -> ValveModel:
-        from .model import ValveModel
+    def session(self) -> Session:
+        """The case with all that is worked out for it."""
+        return Session(self.case, self.name)
 
-        try:
-            model = ValveModel(self.case)
-            model.shell.energies  # built on first use otherwise, and it is here that an invalid metric shows
-            return model
-        except CaseError:
-            raise
-        except ValueError as error:  # what geometry, mesh and shell refuse
-            raise CaseError(str(error)) from error
+    @property
+    def model(self) -> ValveModel:
+        """The coupled model of the case."""
+        return self.session.model
 
     def replace(self, changes: Mapping[str, Any]) -> Valve:
         """A valve with some keys of its case changed, such as ``{"fluid.density": 10}``."""
@@ -78,7 +75,7 @@ class Valve:
     def steady(self, pressure: float | str) -> State: ...
 
     @overload
-    def steady(self, pressure: Iterable[float | str] | None = None) -> SteadyResults: ...
+    def steady(self, pressure: Iterable[float | str] | None = None) -> SteadyResult: ...
 
     def steady(self, pressure=None, *, output: str | Path | None = None, observer: Observer | None = None):
         """Equilibria.
@@ -94,7 +91,7 @@ class Valve:
 
         Returns
         -------
-        State or SteadyResults
+        State or SteadyResult
 
         Raises
         ------
@@ -104,9 +101,11 @@ class Valve:
             If one pressure was asked for and not reached. Of several, `failures` of the result names those that were
             not.
         """
-        single = isinstance(pressure, (int, float, str)) or hasattr(pressure, "__float__")
+        single = isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0
         asked = self.case.steady.pressures if pressure is None else [pressure] if single else pressure
-        result = self._run(read_pressures(asked, "pressure"), output, observer)
+        pressures = read_pressures(asked, "pressure")
+        self.model  # shared by what is asked of this valve
+        result = self.session.replace({"steady.pressures": list(pressures)}).perform("steady", output, observer)
         if not single:
             return result
         if result.failures:
@@ -291,23 +290,6 @@ class Valve:
 
         valve = changed(self, changes, {"transient.duration": duration})
         return transient(valve.model, valve.name, output, observer)
-
-    def _run(self, pressures: Sequence[float], output: str | Path | None, observer: Observer | None) -> SteadyResults:
-        from .record.header import Header
-        from .results.steady import SteadyResults
-        from .results.steady_file import SteadyFile
-        from .studies.observer import Observer, Observers
-        from .studies.steady import run_steady
-
-        observer = observer or Observer()
-        # what a result keeps is the case that gives it again
-        header = Header.of("steady", self.case.replace({"steady.pressures": list(pressures)}), self.name)
-        if output is None:
-            return SteadyResults.of(run_steady(self.model, pressures, observer=observer), header)
-        with SteadyFile(output, self.model, header) as file:
-            result = run_steady(self.model, pressures, observer=Observers(file, observer))  # kept first, then shown
-            file.conclude(result.failures, not result.interrupted)
-        return SteadyResults.of(result, header)
 
 
 def load(case: str | Path | Case | None = None, changes: Mapping[str, Any] | None = None) -> Valve:

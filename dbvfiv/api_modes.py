@@ -9,11 +9,11 @@ from .errors import CaseError, SolveError
 
 if TYPE_CHECKING:
     from .api import Valve
+    from .model.state import SteadyState
+    from .observer import Observer
     from .results.modes import ModesResults
     from .results.state import State
     from .results.sweep import SweepResults
-    from .studies.observer import Observer
-    from .studies.state import SteadyState
 
 #: Keyword arguments and the keys of the case that they stand for.
 KEYS = {
@@ -50,10 +50,10 @@ def modes_of(valve: Valve, start: State | None, output: str | Path | None, obser
     ------
     CaseError, SolveError
     """
+    from .observer import Observer
     from .record.header import Header
     from .results.modes import ModesResults
     from .studies.modes import run_modes
-    from .studies.observer import Observer
 
     observer = observer or Observer()
     state, warnings = state_of(valve, start, observer)
@@ -66,9 +66,9 @@ def modes_of(valve: Valve, start: State | None, output: str | Path | None, obser
 
 def state_of(valve: Valve, start: State | None, observer: Observer) -> tuple[SteadyState, tuple[str, ...]]:
     """The equilibrium at drive.pressure, and warnings: from a state found before, at rest, or by load steps."""
+    from .model.equilibria import find_equilibria
+    from .model.state import describe_state
     from .studies.modes import rest_state
-    from .studies.state import describe_state
-    from .studies.steady import run_steady
 
     model, pressure = valve.model, valve.case.drive.pressure
     if start is not None:
@@ -79,7 +79,7 @@ def state_of(valve: Valve, start: State | None, observer: Observer) -> tuple[Ste
         ), start.results.warnings
     if pressure == 0:
         return rest_state(model), ()
-    result = run_steady(model, [pressure], observer=observer)
+    result = find_equilibria(model, [pressure], observer=observer)
     if result.failures:
         raise SolveError(result.failures[0])
     if not result.states:
@@ -94,9 +94,9 @@ def sweep_of(valve: Valve, start: State | None, output: str | Path | None, obser
     ------
     CaseError, SolveError
     """
+    from .observer import Observer
     from .record.header import Header
     from .results.sweep import SweepResults
-    from .studies.observer import Observer
     from .studies.sweep import run_sweep
 
     observer = observer or Observer()

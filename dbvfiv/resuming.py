@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .errors import CaseError
+from .studies import KINDS
 
 if TYPE_CHECKING:
+    from .observer import Observer
     from .record.result import Result
-    from .studies.observer import Observer
 
 
 def resume(
@@ -40,6 +41,10 @@ def resume(
     from .record.files import kind_of
 
     kind = kind_of(path)
+    if kind in KINDS:
+        from .studies.session import resume_result
+
+        return resume_result(path, observer)
     if kind not in ("transient", "map", "onset", "closure"):
         raise CaseError(
             f"{str(path)!r} holds a result of kind {kind!r}; what can be resumed are transient, map, onset "

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from .case.model import Case
 from .errors import CaseError
-from .studies.observer import Observer, Observers
+from .observer import Observer, Observers
 
 if TYPE_CHECKING:
     from .results.map import MapResults

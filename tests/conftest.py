@@ -63,6 +63,4 @@ def coarse_valve():
 def coarse_run(coarse_valve, tmp_path_factory):
     """Three states of the coarse valve in memory; ``path`` is their result file."""
     path = tmp_path_factory.mktemp("coarse") / "coarse.h5"
-    result = coarse_valve.steady(pressure=[6e3, 18e3, 36e3], output=path)
-    result.path = path
-    return result
+    return coarse_valve.steady(pressure=[6e3, 18e3, 36e3], output=path)

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from ..studies.observer import Observer
+from ..observer import Observer
 
 
 class Progress(Observer):

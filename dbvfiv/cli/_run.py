@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from ..errors import CaseError, SolveError
+from ._study import make_command, study_commands
 
 # Typer brings its own Click in newer versions and uses the separate package in older ones.
 _UsageProblem = typer.BadParameter.__mro__[2]
@@ -46,8 +47,10 @@ def build() -> typer.Typer:
     folder = importlib.import_module(package).__path__
     names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
     modules = [(name, importlib.import_module(f"{package}.{name}")) for name in names]
-    for name, module in sorted(modules, key=lambda pair: (getattr(pair[1], "ORDER", 100), pair[0])):
-        app.command(name.replace("_", "-"), no_args_is_help=False)(module.command)
+    commands = [(name, module, module.command) for name, module in modules]
+    commands += [(kind, module, make_command(kind, module)) for kind, module in study_commands()]
+    for name, _, command in sorted(commands, key=lambda found: (getattr(found[1], "ORDER", 100), found[0])):
+        app.command(name.replace("_", "-"), no_args_is_help=False)(command)
     return app
 
 

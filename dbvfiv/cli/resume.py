@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
+from ..studies import KINDS
 from ._options import AsJson, PlotFolder, ResultFile
 from ._progress import Progress
+from ._study import report as report_study
 
 ORDER = 45
 
@@ -53,6 +55,8 @@ def command(
         except ValueError as error:
             raise CaseError(f"--duration is given as {duration!r}, {error}.") from None
     result = resume(file, duration=end, workers=workers, observer=Progress(quiet=as_json))
+    if kind in KINDS:
+        return report_study(result, file, plots, as_json)
     report = import_module(f"..{kind}", __name__).report
     report(result, file, plots, *([animate] if kind == "transient" else []), as_json)
 

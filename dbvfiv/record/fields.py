@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,6 @@ from .vtkhdf import Step, write_vtkhdf
 from .whole_valve import WholeValve
 
 if TYPE_CHECKING:
-    from ..results.steady import SteadyResults
     from .result import Result
 
 _UNITS = {"displacement": "m", "rotation": "rad", "thickness": "m", "pressure": "Pa", "velocity": "m/s"}
@@ -77,42 +76,6 @@ def _suffix(choices: dict[str, Any]) -> str:
 def _moved(steps: Sequence[Step], valve: WholeValve, deformed: bool) -> Iterator[Step]:
     for step in steps:
         yield replace(step, points=valve.points + step.point_data["displacement"]) if deformed else step
-
-
-@dataclass(frozen=True)
-class _SteadySteps(Sequence):
-    """States as steps, made one at a time; "time" is the pressure in Pa."""
-
-    result: SteadyResults
-    valve: WholeValve
-
-    def __len__(self) -> int:
-        return len(self.result.states)
-
-    def __getitem__(self, number):
-        state, valve, mesh = self.result.states[number], self.valve, self.result.mesh
-        layers = state.layers
-        rows = mesh.element_rows()
-        cell_data = {
-            "thickness": mesh.thickness,
-            "pressure": 0.5 * (state.station_pressure[rows] + state.station_pressure[rows + 1]),
-            "velocity": 0.5 * (state.station_velocity[rows] + state.station_velocity[rows + 1]),
-        }
-        for name, values in zip(layer_field_names(mesh, "von_mises"), layers.von_mises.T):
-            cell_data[name] = values
-        for name, values in zip(layer_field_names(mesh, "largest_stretch"), layers.stretch[:, :, 1].T):
-            cell_data[name] = values
-        return Step(
-            state.pressure,
-            motion(mesh, valve, state.nodal),
-            {name: valve.cells(values) for name, values in cell_data.items()},
-        )
-
-
-def steady_steps(result: SteadyResults, valve: WholeValve) -> Sequence[Step]:
-    """States of a steady result in the order of their pressures, as ParaView wants its times."""
-    ordered = sorted({state.pressure: state for state in result.states}.values(), key=lambda state: state.pressure)
-    return _SteadySteps(result.only(*ordered), valve)
 
 
 def motion(mesh: MeshData, valve: WholeValve, nodal: np.ndarray) -> dict[str, np.ndarray]:

@@ -53,6 +53,11 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
                 f"{str(path)!r} has file layout {layout} and this version reads up to {LAYOUT}; "
                 f"it was written by {file.attrs.get('program', 'a newer program')}."
             )
+        if layout < LAYOUT:
+            raise CaseError(
+                f"{str(path)!r} was written by an older program ({file.attrs.get('program', 'unknown')}) and this "
+                f"version cannot read it; make it anew with '{file.attrs.get('command', f'dbvfiv {kind}')}'."
+            )
         try:
             yield file
         except CaseError:

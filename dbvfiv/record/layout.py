@@ -7,15 +7,33 @@ leaves a file that ends at its last whole row.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import h5py
 import numpy as np
 
-LAYOUT = 1
+LAYOUT = 2
 TEXT = "text"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How a quantity stands in a printed table.
+
+    Attributes
+    ----------
+    title, unit : str
+    width : int
+    write : callable
+        From a row (any object with the column as attribute) to text.
+    """
+
+    title: str
+    unit: str
+    width: int
+    write: Callable[[Any], str]
 
 
 @dataclass(frozen=True)
@@ -31,12 +49,15 @@ class Column:
     description : str
     dtype : str
         A numpy type, or ``TEXT``.
+    shown : Shown, optional
+        How it is printed; not at all without.
     """
 
     name: str
     units: str
     description: str
     dtype: str = "f8"
+    shown: Shown | None = None
 
     def mark(self, dataset: h5py.Dataset) -> None:
         """Write units and description beside a dataset."""

@@ -20,6 +20,7 @@ _COLUMNS = (
     Column("z", "m", "Axial position of the rows (flow stations), from the lip"),
     Column("directors", "", "Unit vectors through the wall at rest"),
     Column("frames", "", "Two unit vectors at each node that the rotation unknowns turn the director towards"),
+    Column("free", "", "Which of the five unknowns of each node are free", "bool"),
     Column("thickness", "m", "Wall thickness of each element"),
     Column("layer_names", "", "Materials of the layers, inside to outside", TEXT),
     Column("layer_angles", "deg", "Angle of material axis 1 from the valve's axis"),
@@ -40,6 +41,8 @@ class MeshData:
     z : (m,) m
     directors : (nn, 3)
     frames : (nn, 2, 3)
+    free : (nn, 5) bool
+        Unknowns that no support holds.
     thickness : (ne,) m
     layer_names : (nl,) tuple of str, inside to outside
     layer_angles : (nl,) degrees
@@ -52,6 +55,7 @@ class MeshData:
     z: np.ndarray
     directors: np.ndarray
     frames: np.ndarray
+    free: np.ndarray
     thickness: np.ndarray
     layer_names: tuple[str, ...]
     layer_angles: np.ndarray
@@ -68,6 +72,7 @@ class MeshData:
             z=model.mesh.z,
             directors=surface.directors,
             frames=surface.frames,
+            free=model.shell.dofs.free,
             thickness=surface.thickness,
             layer_names=tuple(layer.name or f"layer {i + 1}" for i, layer in enumerate(section.layers)),
             layer_angles=np.array([layer.angle for layer in section.layers], float),
@@ -78,6 +83,10 @@ class MeshData:
     def shape(self) -> tuple[int, int]:
         """Elements around and along."""
         return self.rows.shape[1] - 1, self.rows.shape[0] - 1
+
+    def restrict(self, nodal: np.ndarray) -> np.ndarray:
+        """Free unknowns (n,) of nodal ones (nn, 5)."""
+        return nodal[self.free]
 
     def layer_titles(self) -> tuple[str, ...]:
         """Names of the layers that tell equal materials apart by their angle: "CR", "fibre +54°"."""

@@ -21,6 +21,7 @@ from .closure_table import BUCKLING, FIELDS, HEAD, OPENED, PATH, REVERSAL, SUMMA
 from .state import LAYERS, LayerData, layers_of
 
 if TYPE_CHECKING:
+    from ..model.state import SteadyState
     from ..record.vtkhdf import Step
     from ..record.whole_valve import WholeValve
     from ..studies.closing import ClosingResult
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from ..studies.closure_model import ClosureModel
     from ..studies.closure_path import PathPoint
     from ..studies.closure_state import ClosureState
-    from ..studies.state import SteadyState
 
 QUARTERS = 4
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..observer import Observer
 from ..record.files import KeptFile, create, reopen
 from ..record.header import Header, write_header
 from ..record.layout import Table, read_texts, replace_texts
 from ..record.mesh import MeshData, write_mesh
 from ..studies.closure_buckling import Buckling
 from ..studies.closure_path import PathRestart
-from ..studies.observer import Observer
 from .closure import buckling_rows, opened_rows, path_rows, reference_opening, row_from
 from .closure_table import BUCKLING, FIELDS, OPENED, PATH, RESTART, REVERSAL, SUMMARY
 from .state import LAYERS, LayerData, layers_of

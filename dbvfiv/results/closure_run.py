@@ -6,13 +6,13 @@ from pathlib import Path
 
 from ..case.model import Case
 from ..errors import CaseError
+from ..observer import Observer, Observers
 from ..record.files import reading
 from ..record.header import Header, read_header
 from ..record.layout import read_texts
 from ..studies.closing import run_closing
 from ..studies.closure import run_closure
 from ..studies.closure_model import ClosureModel, closure_model
-from ..studies.observer import Observer, Observers
 from .closure import ClosureResults
 from .closure_file import ClosureFile
 from .registry import load_result

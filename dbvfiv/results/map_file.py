@@ -9,12 +9,12 @@ import h5py
 import numpy as np
 
 from ..errors import CaseError
+from ..observer import Observer
 from ..record.files import KeptFile, create, reading, reopen
 from ..record.header import Header, write_header
 from ..record.layout import Table, read_texts, replace_texts
 from ..record.mesh import MeshData, write_mesh
 from ..studies.map_column import CELLS, MapColumn, MapPlan
-from ..studies.observer import Observer
 from .stability_tables import CHECKS, CURVE_POINTS, MAP, MAP_ONSETS
 
 if TYPE_CHECKING:

@@ -14,11 +14,11 @@ import h5py
 import numpy as np
 
 from ..errors import CaseError
+from ..observer import Observer
 from ..record.files import KeptFile, create, reading, reopen
 from ..record.header import Header, read_header, write_header
 from ..record.layout import TEXT, Column, Table, replace_texts
 from ..record.mesh import MeshData, write_mesh
-from ..studies.observer import Observer
 from ..studies.onset_point import OnsetPoint, OnsetSample, Side
 from ..studies.parameters import Place
 from .stability_tables import ONSETS, SCAN

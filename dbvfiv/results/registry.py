@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING
 
 from ..errors import CaseError
 from ..record.files import reading
+from ..studies import KINDS
+from ..studies.session import read_result
 
 if TYPE_CHECKING:
     from ..record.result import Result
 
 READERS: dict[str, str] = {
-    "steady": "dbvfiv.results.steady:SteadyResults",
     "closure": "dbvfiv.results.closure:ClosureResults",
     "modes": "dbvfiv.results.modes:ModesResults",
     "sweep": "dbvfiv.results.sweep:SweepResults",
@@ -44,6 +45,8 @@ def load_result(path: str | Path) -> Result:
     """
     with reading(path) as file:
         kind = str(file.attrs["dbvfiv_kind"])
+        if kind in KINDS:
+            return read_result(path)
         if kind not in READERS:
             raise CaseError(f"{str(path)!r} holds a result of kind {kind!r}, which this version does not know.")
         return reader(kind).read(file, Path(path))

@@ -14,7 +14,7 @@ from ..record.layout import TEXT, Column
 
 if TYPE_CHECKING:
     from ..model import ValveModel
-    from ..studies.state import SteadyState
+    from ..model.state import SteadyState
     from .modes import ModesResults
     from .steady import SteadyResults
     from .sweep import SweepResults
@@ -93,7 +93,7 @@ class State:
     max_displacement_position : (3,) tuple, m, at rest
     lip_opening : float, m
     stops, converged, iterations, load_steps, residual, rounding, reason
-        See `dbvfiv.studies.state.SteadyState`.
+        See `dbvfiv.model.state.SteadyState`.
     nodal : (nn, 5) m and rad
     station_area, station_velocity, station_pressure : (m,) m2, m/s, Pa
     results : SteadyResults
@@ -143,7 +143,7 @@ class State:
 
     def solution(self) -> SteadyState:
         """The state as studies take it, to start from for instance."""
-        from ..studies.state import SteadyState
+        from ..model.state import SteadyState
 
         fields = [c.name for c in SUMMARY] + [c.name for c in FIELDS if c.name != "nodal"]
         return SteadyState(q=self.q, **{name: getattr(self, name) for name in fields})

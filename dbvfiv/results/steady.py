@@ -20,9 +20,9 @@ from .steady_table import HEAD, row_of
 
 if TYPE_CHECKING:
     from ..model import ValveModel
+    from ..model.equilibria import SteadyResult
     from ..record.vtkhdf import Step
     from ..record.whole_valve import WholeValve
-    from ..studies.steady import SteadyResult
 
 
 class SteadyResults(Result):
@@ -54,7 +54,7 @@ class SteadyResults(Result):
 
         Parameters
         ----------
-        result : dbvfiv.studies.steady.SteadyResult
+        result : dbvfiv.model.equilibria.SteadyResult
         header : Header, optional
             Where it comes from; made from the model's case without one.
         """
@@ -138,7 +138,7 @@ class SteadyResults(Result):
 
 
 def row_from(model: ValveModel, state: Any) -> dict[str, Any]:
-    """Columns of a state (`dbvfiv.studies.state.SteadyState`) of a model."""
+    """Columns of a state (`dbvfiv.model.state.SteadyState`) of a model."""
     row = {c.name: getattr(state, c.name) for c in (*SUMMARY, *FIELDS) if c.name != "nodal"}
     return row | {"nodal": model.nodal(state.q)}
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..observer import Observer
 from ..record.files import KeptFile, create
 from ..record.header import Header, write_header
 from ..record.layout import Table, replace_texts
 from ..record.mesh import MeshData, write_mesh
-from ..studies.observer import Observer
 from .state import FIELDS, LAYERS, SUMMARY, layers_of
 from .steady import row_from
 
@@ -49,7 +49,7 @@ class SteadyFile(KeptFile, Observer):
         self._file.flush()
 
     def item(self, result: Any) -> None:
-        """Keep a state (`dbvfiv.studies.state.SteadyState`)."""
+        """Keep a state (`dbvfiv.model.state.SteadyState`)."""
         layers = layers_of(self.model, result.q)
         fields = {c.name: getattr(layers, c.name.split("/")[1]) for c in LAYERS}
         self._states.append(row_from(self.model, result) | fields)

@@ -1,1 +1,10 @@
-"""What can be asked of a valve: each study takes a model and options and returns a result object."""
+"""Studies: a room for each question that the program answers.
+
+A room holds the study's keys of the case file (`keys`), how it runs (`study`), what comes of it (`result`), its figures
+and its command. What several rooms share lies beside them: the `session` that they ask, the `study` and `result` that
+they make, and `stability`.
+"""
+
+#: Every study: the name of its room, command, section of the case file and kind of result, in the order of the
+#: commands. A new study is a folder and a word here.
+KINDS = ("steady",)

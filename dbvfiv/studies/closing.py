@@ -10,6 +10,7 @@ import numpy as np
 
 from ..case.model import Case
 from ..errors import SolveError
+from ..observer import Observer
 from ..transient.control import ControlOptions, FixedSteps
 from ..transient.scheme import scheme
 from ..transient.start import steady_positions
@@ -18,7 +19,6 @@ from ..transient.stepper import StepFailure, StepOptions, Stepper
 from .closing_motion import ClosingMotion, ContactValve
 from .closure_opening import FACES, measure
 from .closure_state import QUARTERS
-from .observer import Observer
 
 #: Rest before the drive turns, over the time it takes to turn.
 LEAD = 0.1

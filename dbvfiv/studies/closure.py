@@ -10,13 +10,13 @@ import numpy as np
 from ..case.model import Case
 from ..errors import SolveError
 from ..model import ValveModel
+from ..model.equilibria import find_equilibria, model_warnings, state_warnings
+from ..model.state import SteadyState
+from ..observer import Observer
 from .closure_buckling import Buckling
 from .closure_model import HELD_LIPS, ClosureModel, closure_model
 from .closure_path import ClosureOptions, ClosurePath, PathPoint, PathRestart
 from .closure_state import ClosureState
-from .observer import Observer
-from .state import SteadyState
-from .steady import model_warnings, run_steady, state_warnings
 
 #: States of the flow that is turned back, from the open pressure down to a fiftieth of it.
 OPEN_STATES = 10
@@ -149,7 +149,7 @@ def _turned_back(case: Case, observer: Observer) -> tuple[SteadyState, ...]:
     flowing = case.replace({"drive.kind": "flow", "drive.side": "inside"})
     pressures = np.geomspace(case.closure.open_pressure, case.closure.open_pressure / 50, OPEN_STATES)
     quiet = _Progress(observer)
-    result = run_steady(ValveModel(flowing), pressures, observer=quiet)
+    result = find_equilibria(ValveModel(flowing), pressures, observer=quiet)
     if result.failures:
         raise SolveError(result.failures[0])
     return result.states

@@ -12,8 +12,8 @@ from continuation.branch import Branch
 
 from ..contact import PressedShell
 from ..contact.second import contact_second
+from ..observer import Observer
 from .closure_stability import stiffness_spectrum
-from .observer import Observer
 
 PARAMETER = "pressure"
 

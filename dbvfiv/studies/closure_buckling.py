@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..contact import PressedShell
+from ..model.load_steps import LoadStepOptions, LoadSteps
 from .closure_stability import StiffnessSpectrum, stiffness_spectrum
-from .load_steps import LoadStepOptions, LoadSteps
 
 #: The eigenvalue at a located buckling state over that at the stable end of its bracket.
 TOLERANCE = 1e-7

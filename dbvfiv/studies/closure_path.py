@@ -11,15 +11,15 @@ import numpy as np
 from continuation import NotConverged
 
 from ..errors import SolveError
+from ..model.load_steps import LoadStepOptions, LoadSteps
 from ..model.newton import NewtonOptions
+from ..observer import Observer
 from .closure_arclength import arclength_path
 from .closure_buckling import Buckling, BucklingWatch
 from .closure_energy import EnergyLedger
 from .closure_model import ClosureModel
 from .closure_opening import FACES, opening
 from .closure_state import QUARTERS, ClosureState, contact_front, describe_closure
-from .load_steps import LoadStepOptions, LoadSteps
-from .observer import Observer
 
 #: Farthest that an equilibrium may lie from its prediction, over the mean wall thickness.
 LARGEST_JUMP = 0.15
@@ -165,7 +165,7 @@ class ClosurePath:
             steps.q,
             steps.slope,
             self.model.pressed.multiplier,
-            steps._step,
+            steps.step,
             self.beyond_limit,
             eigenvalue,
             self.energy.totals,
@@ -175,7 +175,7 @@ class ClosurePath:
     def resume(self, at: PathRestart) -> None:
         """Stand where another walk stood."""
         steps = self.steps
-        steps.pressure, steps.q, steps.slope, steps._step = at.pressure, at.q, at.slope, at.step
+        steps.pressure, steps.q, steps.slope, steps.step = at.pressure, at.q, at.slope, at.step
         self.model.pressed.multiplier = at.multiplier
         self.beyond_limit = at.beyond_limit
         self.watch.resume(at.pressure, at.q, at.eigenvalue, at.buckling)

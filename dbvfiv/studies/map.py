@@ -8,12 +8,12 @@ import numpy as np
 
 from ..case.model import Case
 from ..errors import SolveError
+from ..observer import Observer
 from .column import DIRECT
 from .map_checks import Check, check_cells
 from .map_column import CELLS, MapColumn, MapPlan
 from .map_curves import OnsetCurve, continued, linked
 from .map_pool import columns
-from .observer import Observer
 from .parameters import check_flow
 from .stability_walk import StabilityWalk
 

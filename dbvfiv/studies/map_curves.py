@@ -13,8 +13,8 @@ from continuation import ContinuationError, ContinuationOptions, NewtonOptions, 
 from continuation.hopf import hopf_borders
 
 from ..errors import CaseError, SolveError
+from ..observer import Observer
 from .map_column import MapColumn, MapPlan
-from .observer import Observer
 from .onset_normal_form import system_of
 from .plane_system import RATE, PlaneSystem
 from .stability_walk import StabilityWalk

@@ -21,9 +21,9 @@ from ..errors import CaseError, SolveError
 from ..flow import Channel
 from ..model import ValveModel
 from ..model.dynamics import Conditions, linearise
+from ..model.state import SteadyState, describe_state
+from ..observer import Observer
 from .modes_search import suited
-from .observer import Observer
-from .state import SteadyState, describe_state
 
 #: Unbalanced force over pressure force above which a state is no equilibrium of its model.
 _UNBALANCED = 1e-4

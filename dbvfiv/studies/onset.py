@@ -10,7 +10,7 @@ import numpy as np
 
 from ..case.model import Case
 from ..errors import SolveError
-from .observer import Observer
+from ..observer import Observer
 from .onset_mesh import with_uncertainty
 from .onset_point import OnsetPoint, OnsetSample
 from .onset_search import OnsetOptions, OnsetSearch

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..case.model import Case
 from ..errors import SolveError
+from ..observer import Observer
 from .crossings import locate
-from .observer import Observer
 from .onset_point import COARSE, OnsetPoint
 from .onset_search import OnsetOptions, OnsetSearch
 

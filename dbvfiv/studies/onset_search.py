@@ -9,9 +9,9 @@ import numpy as np
 
 from ..case.model import Case
 from ..errors import CaseError, SolveError
+from ..observer import Observer
 from .column import floor_of
 from .crossings import WATCHED, Crossing, Scan, locate
-from .observer import Observer
 from .onset_normal_form import MISSING, described
 from .onset_point import FINE, OnsetPoint, OnsetSample, Side
 from .parameters import Place, is_surrounding

@@ -12,10 +12,10 @@ from ..case.model import Case
 from ..errors import SolveError
 from ..model import ValveModel
 from ..model.dynamics import LinearisedState, linearise
+from ..model.equilibria import LoadPath, SteadyOptions
+from ..observer import Observer
 from .column import Column, ColumnSolver
-from .observer import Observer
 from .parameters import Place, rebuilder
-from .steady import LoadPath, SteadyOptions
 
 #: Steps over the last one up to which a cubic is trusted ahead of it.
 REACH = 2.0

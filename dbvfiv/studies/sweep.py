@@ -15,10 +15,10 @@ from ..errors import CaseError, SolveError
 from ..flow import Channel
 from ..model import ValveModel
 from ..model.dynamics import Conditions
+from ..model.state import SteadyState
+from ..observer import Observer
 from .modes import require_equilibrium, solving
 from .modes_search import CLEAR, limit_point
-from .observer import Observer
-from .state import SteadyState
 from .sweep_family import Check, Family, FluidFamily, PressureFamily
 
 #: Writing what is done may take this share of the time; a sweep of small cost is written once.

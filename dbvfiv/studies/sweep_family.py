@@ -21,10 +21,10 @@ from eigen import (
 from ..case.axis import Axis
 from ..model import ValveModel
 from ..model.dynamics import Conditions, LinearisedState, linearise
+from ..model.equilibria import LoadPath, SteadyOptions
+from ..model.state import SteadyState
+from ..observer import Observer
 from .modes_search import suited
-from .observer import Observer
-from .state import SteadyState
-from .steady import LoadPath, SteadyOptions
 
 #: Static corrections below this share of the largest are left to the eigenvectors of the check points, which gives a
 #: smaller basis.

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import CaseError
+from ..observer import Observer, Observers
 from ..record.files import reading
 from ..record.header import Header, read_header
-from ..studies.observer import Observer, Observers
 from .file import TransientFile, read_restart
 from .history import PROFILES, SCALARS, History
 from .result import TransientResults

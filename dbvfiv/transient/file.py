@@ -21,11 +21,11 @@ import numpy as np
 
 from ..errors import CaseError
 from ..model import ValveModel
+from ..observer import Observer
 from ..record.files import create, reading, refuse_foreign
 from ..record.header import Header, write_header
 from ..record.layout import Column, read_texts, replace_texts
 from ..record.mesh import MeshData, write_mesh
-from ..studies.observer import Observer
 from .assess import RunVerdict
 from .history import PROFILES, SCALARS
 from .run import TransientRun

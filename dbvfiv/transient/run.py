@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import SolveError
 from ..model import ValveModel
+from ..model.equilibria import model_warnings
 from ..model.valve import QUARTERS
-from ..studies.observer import Observer
-from ..studies.steady import model_warnings
+from ..observer import Observer
 from .assess import RunVerdict, assess, beyond_model
 from .control import step_control
 from .drive import Drive

@@ -9,9 +9,9 @@ import numpy as np
 from ..case.model import Case
 from ..errors import CaseError, SolveError
 from ..model.dynamics import linearise
+from ..model.equilibria import LoadPath, SteadyOptions
 from ..model.newton import NewtonOptions
-from ..studies.observer import Observer
-from ..studies.steady import LoadPath, SteadyOptions
+from ..observer import Observer
 from .equations import ValveMotion
 from .state import MotionState, consistent_state
 

@@ -13,9 +13,9 @@ import pytest
 
 from dbvfiv.api import load
 from dbvfiv.errors import CaseError
+from dbvfiv.observer import Observer
 from dbvfiv.results import load_result
 from dbvfiv.results.closure_run import resume_closure
-from dbvfiv.studies.observer import Observer
 
 COARSE = {
     "mesh.around": 6,

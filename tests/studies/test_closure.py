@@ -11,13 +11,13 @@ import pytest
 
 from dbvfiv.case.model import Case
 from dbvfiv.errors import SolveError
+from dbvfiv.observer import Observer
 from dbvfiv.studies import closure_path
 from dbvfiv.studies.closure import run_closure
 from dbvfiv.studies.closure_energy import EnergyLedger
 from dbvfiv.studies.closure_model import closure_model
 from dbvfiv.studies.closure_opening import Opening, opening
 from dbvfiv.studies.closure_path import ClosureOptions, ClosurePath
-from dbvfiv.studies.observer import Observer
 
 COARSE = {"mesh.around": 8, "mesh.along": 14, "closure.max_step": "4 kPa", "closure.pressures": ["7 kPa", "28 kPa"]}
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from dbvfiv.cli import run
+from dbvfiv.observer import Observer
 from dbvfiv.results.registry import load_result
 from dbvfiv.stability import resume_map, stability_map
 from dbvfiv.studies import map_pool
 from dbvfiv.studies.map import run_map
 from dbvfiv.studies.map_column import MapColumn, MapPlan
 from dbvfiv.studies.map_curves import linked
-from dbvfiv.studies.observer import Observer
 
 AXES = {
     "map.x": "pressure=1000:12000:6",
@@ -112,7 +112,7 @@ def test_two_structural_axes(coarse_case):
 
 def test_a_missing_state_is_a_marked_gap(case, monkeypatch):
     from dbvfiv.errors import SolveError
-    from dbvfiv.studies.steady import LoadPath
+    from dbvfiv.model.equilibria import LoadPath
 
     honest = LoadPath.go_to
 

@@ -14,9 +14,9 @@ import pytest
 
 from dbvfiv.cli import run
 from dbvfiv.errors import CaseError
+from dbvfiv.observer import Observer
 from dbvfiv.results.registry import load_result
 from dbvfiv.stability import onset, resume_onset
-from dbvfiv.studies.observer import Observer
 from dbvfiv.studies.onset_point import OnsetPoint, OnsetSample
 
 RANGE = "pressure=4 kPa:12 kPa:5"
@@ -106,7 +106,7 @@ def test_a_located_point_is_in_the_file_before_its_normal_form(case, tmp_path):
 
 def test_failed_values_are_not_tried_again(case, tmp_path, monkeypatch):
     from dbvfiv.errors import SolveError
-    from dbvfiv.studies.steady import LoadPath
+    from dbvfiv.model.equilibria import LoadPath
 
     honest, tried = LoadPath.go_to, []
 

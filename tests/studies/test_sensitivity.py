@@ -5,8 +5,8 @@ import pytest
 
 from dbvfiv.case.model import Case
 from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.studies import sensitivity
-from dbvfiv.studies.steady import run_steady
 from eigen import SearchOptions, leading_modes
 
 CONDITIONS = Conditions(10.0, 1.0, 0.003)
@@ -15,7 +15,7 @@ CONDITIONS = Conditions(10.0, 1.0, 0.003)
 @pytest.fixture(scope="module")
 def valve():
     model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16}))
-    q = run_steady(model, [6e3]).states[0].q
+    q = find_equilibria(model, [6e3]).states[0].q
     options = SearchOptions(limit_point=-1 / 0.003, left=True)
     return model, q, leading_modes(linearise(model, q, 6e3).pencil(CONDITIONS), 2, options).mode(0)
 

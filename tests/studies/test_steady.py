@@ -8,9 +8,9 @@ import pytest
 from dbvfiv.case.model import Case
 from dbvfiv.errors import SolveError
 from dbvfiv.model import ValveModel
+from dbvfiv.model.equilibria import LoadPath, SteadyOptions, find_equilibria, model_warnings
 from dbvfiv.model.newton import NewtonOptions
-from dbvfiv.studies.observer import Observer
-from dbvfiv.studies.steady import LoadPath, SteadyOptions, model_warnings, run_steady
+from dbvfiv.observer import Observer
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_flow_is_that_of_bernoulli_at_the_outlet(model):
 
 def test_run_keeps_the_order_asked_for(model):
     pressures = [5e3, 20e3, 2e3]
-    result = run_steady(model, pressures)
+    result = find_equilibria(model, pressures)
     assert [state.pressure for state in result.states] == pressures
     assert not result.failures and not result.interrupted
     points = result.summary()["points"]
@@ -97,7 +97,7 @@ def test_failure_is_one_sentence(model, one_sentence):
 
 def test_failed_pressures_are_reported_and_the_list_goes_on(model):
     rest = LoadPath(model).go_to(2e3)
-    result = run_steady(model, [40e3, 2e3], one_iteration(model), start=rest)
+    result = find_equilibria(model, [40e3, 2e3], one_iteration(model), start=rest)
     assert len(result.failures) == 1 and "40000 Pa" in result.failures[0]
     assert [state.pressure for state in result.states] == [2e3]
 
@@ -119,7 +119,7 @@ class Interrupt(Observer):
 
 def test_an_interrupt_keeps_what_is_done(model):
     observer = Interrupt()
-    result = run_steady(model, [2e3, 4e3, 6e3], observer=observer)
+    result = find_equilibria(model, [2e3, 4e3, 6e3], observer=observer)
     assert result.interrupted and observer.ended is True
     assert [state.pressure for state in result.states] == [2e3, 4e3]
 

@@ -11,11 +11,11 @@ from scipy.optimize import brentq
 
 from dbvfiv.contact import ContactLaw, PlaneContact, PressedShell, tributary_area
 from dbvfiv.model.linear import DirectFactor
+from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.shell import Shell, ShellMesh
 from dbvfiv.studies.closure_balance import force_balance
 from dbvfiv.studies.closure_energy import EnergyLedger
-from dbvfiv.studies.load_steps import LoadStepOptions, LoadSteps
 from tests.shell.structures import grid, isotropic_section
 
 E, WIDTH = 5e6, 0.02

@@ -7,7 +7,7 @@ import pytest
 
 from dbvfiv.case.model import Case
 from dbvfiv.model import Conditions, ValveModel, linearise
-from dbvfiv.studies.steady import run_steady
+from dbvfiv.model.equilibria import find_equilibria
 from eigen import SearchOptions, Workspace, leading_modes
 from eigen.certificate import certified_spectrum
 from eigen.transfer import TransferBasis
@@ -21,7 +21,7 @@ def model_of(around, along, **changes):
 
 
 def linearised(model, pressures):
-    return [linearise(model, state.q, state.pressure) for state in run_steady(model, pressures).states]
+    return [linearise(model, state.q, state.pressure) for state in find_equilibria(model, pressures).states]
 
 
 @pytest.fixture(scope="module")

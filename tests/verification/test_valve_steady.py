@@ -16,7 +16,7 @@ import pytest
 
 from dbvfiv.case.model import Case
 from dbvfiv.model import ValveModel
-from dbvfiv.studies.steady import run_steady
+from dbvfiv.model.equilibria import find_equilibria
 from tests.shell.structures import richardson
 
 PRESSURES = (18e3, 29e3, 36e3)
@@ -28,7 +28,7 @@ def states(pressures, around=28, along=48, **changes):
     case = Case().replace(
         {"mesh.around": around, "mesh.along": along} | {k.replace("__", "."): v for k, v in changes.items()}
     )
-    result = run_steady(ValveModel(case), pressures)
+    result = find_equilibria(ValveModel(case), pressures)
     assert not result.failures
     return result.states
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import SolveError
-from ..model.newton import EquilibriumSolver, NewtonOptions, NewtonResult
-from .observer import Observer
+from ..observer import Observer
+from .newton import EquilibriumSolver, NewtonOptions, NewtonResult
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class LoadSteps:
         self.solver = EquilibriumSolver(self.model, self.options.newton)
         self.fallback = EquilibriumSolver(self.model, replace(self.options.newton, line_search="l2"))
         self.slope: np.ndarray | None = None
-        self._step = self.options.first_step
+        self.step = self.options.first_step
 
     def reach(self, target: float) -> Way:
         """Walk to a pressure, Pa; `self.pressure` and `self.q` hold the equilibrium.
@@ -88,7 +88,7 @@ class LoadSteps:
             If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
         """
         smallest = self.options.min_step * max(abs(target), abs(self.pressure))
-        step = np.copysign(min(abs(target - self.pressure), self._step, self.options.max_step), target - self.pressure)
+        step = np.copysign(min(abs(target - self.pressure), self.step, self.options.max_step), target - self.pressure)
         iterations, steps = 0, 0
         while True:
             remaining = target - self.pressure
@@ -99,7 +99,7 @@ class LoadSteps:
             if result.converged:
                 steps += 1
                 self._accept(result, aim)
-                self._step = max(2 * abs(step), self.options.first_step)
+                self.step = max(2 * abs(step), self.options.first_step)
                 if last:
                     return Way(iterations, steps, result)
                 step = np.copysign(min(2 * abs(step), abs(target - self.pressure), self.options.max_step), step)

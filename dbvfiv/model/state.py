@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import ValveModel
-from ..model.valve import QUARTERS
+from .valve import QUARTERS, ValveModel
 
 
 @dataclass(frozen=True)
@@ -19,6 +18,8 @@ class SteadyState:
     pressure : float, Pa
     q : (n,) array
         Free displacements (m) and rotations (rad).
+    nodal : (nn, 5) array
+        Displacements and rotations of all nodes.
     mass_flow : float, kg/s
     outlet_area : float, m2
     outlet_velocity : float, m/s
@@ -43,6 +44,7 @@ class SteadyState:
 
     pressure: float
     q: np.ndarray
+    nodal: np.ndarray
     mass_flow: float
     outlet_area: float
     outlet_velocity: float
@@ -92,6 +94,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     return SteadyState(
         pressure=float(pressure),
         q=np.asarray(q),
+        nodal=nodal,
         mass_flow=model.mass_flow(area, pressure),
         outlet_area=float(QUARTERS * area[0]),
         outlet_velocity=float(speeds[0]),

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SolveError
-from ..model import ValveModel
-from ..model.newton import NewtonOptions
+from ..observer import Observer
 from .load_steps import LoadStepOptions, LoadSteps
-from .observer import Observer
+from .newton import NewtonOptions
 from .state import SteadyState, describe_state
+from .valve import ValveModel
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class SteadyOptions(LoadStepOptions):
 
 
 @dataclass(frozen=True)
-class SteadyResult:
+class Equilibria:
     """Equilibria in the order asked for.
 
     Attributes
@@ -84,13 +84,13 @@ class LoadPath(LoadSteps):
         )
 
 
-def run_steady(
+def find_equilibria(
     model: ValveModel,
     pressures: Iterable[float],
     options: SteadyOptions | None = None,
     observer: Observer | None = None,
     start: SteadyState | None = None,
-) -> SteadyResult:
+) -> Equilibria:
     """Equilibria at a list of inlet pressures, Pa, each reached from the one before.
 
     A pressure that is not reached is reported in `failures` and the list goes on from the last equilibrium; an
@@ -119,7 +119,7 @@ def run_steady(
         warnings.append(sentence)
         observer.warn(sentence)
     observer.end(interrupted)
-    return SteadyResult(model, tuple(states), tuple(failures), tuple(warnings), interrupted)
+    return Equilibria(model, tuple(states), tuple(failures), tuple(warnings), interrupted)
 
 
 def _states(path: LoadPath, pressures: list[float], failures: list[str], observer: Observer) -> Iterator[SteadyState]:

@@ -1,0 +1,299 @@
+"""What a run has found, tables of rows and notes: the same while it goes on, when it has ended, and from a file."""
+
+from __future__ import annotations
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..observer import Observer
+from .files import reading
+from .header import Header, read_header
+from .journal import Journal, read_log
+from .mesh import MeshData, read_mesh
+from .table import TableSpec, pack_documents, read_column, read_rows
+
+
+class Record(ABC):
+    """Rows and notes of one run, to be read.
+
+    Attributes
+    ----------
+    header : Header
+    mesh : MeshData or None
+    path : Path or None
+        Its file.
+    """
+
+    header: Header
+    mesh: MeshData | None
+    path: Path | None
+
+    @abstractmethod
+    def rows(self, table: str) -> int:
+        """How many rows a table has."""
+
+    @abstractmethod
+    def column(self, table: str, name: str) -> np.ndarray:
+        """All rows of a column (rows, ...)."""
+
+    @abstractmethod
+    def value(self, table: str, name: str, row: int) -> Any:
+        """One row of a column."""
+
+    @property
+    @abstractmethod
+    def log(self) -> list[dict[str, Any]]:
+        """All notes in their order; each names its kind as "what"."""
+
+    def notes(self, what: str) -> list[dict[str, Any]]:
+        """Notes of one kind."""
+        return [note for note in self.log if note["what"] == what]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences, each once."""
+        return self._said("warning")
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What was not reached, in sentences."""
+        return self._said("failure")
+
+    def _said(self, what: str) -> tuple[str, ...]:
+        """Sentences of the last attempt: whoever goes on from an earlier one says again what still holds."""
+        log = self.log
+        last = max((i for i, note in enumerate(log) if note["what"] == "begin"), default=0)
+        return tuple(dict.fromkeys(note["text"] for note in log[last:] if note["what"] == what))
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run went to its end."""
+        marks = [note for note in self.log if note["what"] in ("begin", "end")]
+        return bool(marks) and marks[-1]["what"] == "end" and bool(marks[-1]["complete"])
+
+    def table_rows(self, spec: TableSpec, names: Iterable[str] | None = None) -> list[dict[str, Any]]:
+        """Rows of a table as dicts of the columns named, all by default."""
+        chosen = [c.name for c in spec.columns] if names is None else list(names)
+        columns = {name: self.column(spec.name, name) for name in chosen}
+        return [{name: plain(values[i]) for name, values in columns.items()} for i in range(self.rows(spec.name))]
+
+
+class GrowingRecord(Record, Observer):
+    """The record of a run that goes on; what it is given it keeps, in its file too if it has one.
+
+    It is also the observer of the run: progress, items and warnings go on to whoever watches.
+
+    Parameters
+    ----------
+    header : Header
+    mesh : MeshData, optional
+    tables : iterable of TableSpec
+    output : path, optional
+        Result file.
+    watcher : Observer, optional
+    known : Record, optional
+        An earlier attempt that this one goes on from; its rows and notes are the first of this one.
+
+    Raises
+    ------
+    CaseError
+        If the file cannot be written.
+    """
+
+    def __init__(
+        self,
+        header: Header,
+        mesh: MeshData | None,
+        tables: Iterable[TableSpec],
+        output: str | Path | None = None,
+        watcher: Observer | None = None,
+        known: Record | None = None,
+    ):
+        self.header, self.mesh, self.watcher = header, mesh, watcher or Observer()
+        self.path = None if output is None else Path(output)
+        self.tables = {table.name: table for table in tables}
+        self._rows = {name: {c.name: [] for c in table.columns} for name, table in self.tables.items()}
+        self._log: list[dict[str, Any]] = []
+        self._journal: Journal | None = None
+        if known is not None:
+            for name, table in self.tables.items():
+                if known.rows(name):
+                    self.extend(name, {c.name: known.column(name, c.name) for c in table.columns})
+            self._log.extend(known.log)
+        if self.path is not None:
+            self._journal = Journal(self.path, header, mesh, self.tables.values())
+            for name in self.tables:
+                if self.rows(name):
+                    self._journal.extend(name, {c: self.column(name, c) for c in self._rows[name]})
+            if self._log:
+                self._journal.write_log(pack_documents(self._log))
+        self.note("begin")
+
+    # -- reading ----
+
+    def rows(self, table: str) -> int:
+        first = next(iter(self._rows[table].values()))
+        return sum(len(block) for block in first)
+
+    def column(self, table: str, name: str) -> np.ndarray:
+        blocks = self._rows[table][name]
+        if len(blocks) > 1:
+            blocks[:] = [np.concatenate(blocks)]
+        spec = self.tables[table]
+        found = next(c for c in spec.columns if c.name == name)
+        empty = np.empty((0, *spec.shape(found)), object if found.dtype == "text" else found.dtype)
+        return blocks[0] if blocks else empty
+
+    def value(self, table: str, name: str, row: int) -> Any:
+        return self.column(table, name)[row]
+
+    @property
+    def log(self) -> list[dict[str, Any]]:
+        return self._log
+
+    # -- growing ----
+
+    def append(self, table: str, row: Mapping[str, Any]) -> None:
+        """Keep one row."""
+        self.extend(table, {c.name: [row[c.name]] for c in self.tables[table].columns})
+
+    def extend(self, table: str, columns: Mapping[str, Any]) -> None:
+        """Keep rows, given column by column."""
+        spec = self.tables[table]
+        blocks = {}
+        for c in spec.columns:
+            values = np.asarray(columns[c.name], object if c.dtype == "text" else c.dtype)
+            blocks[c.name] = values.reshape(len(columns[c.name]), *spec.shape(c))
+        for name, block in blocks.items():
+            self._rows[table][name].append(block)
+        if self._journal is not None:
+            self._journal.extend(table, blocks)
+
+    def note(self, what: str, **data: Any) -> None:
+        """Keep a note: plain data, arrays included, under a kind of its own."""
+        text = pack_documents([{"what": what} | data])
+        self._log.append(json.loads(text))  # as a file gives it back
+        if self._journal is not None:
+            self._journal.write_log(text)
+
+    def fail(self, sentence: str) -> None:
+        """Keep what was not reached, and say it."""
+        self.note("failure", text=sentence)
+        self.watcher.warn(sentence)
+
+    def conclude(self, complete: bool) -> None:
+        """Note that the run is over."""
+        self.note("end", complete=complete)
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._journal is not None:
+            self._journal.close()
+            self._journal = None
+
+    def __enter__(self) -> GrowingRecord:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    # -- as an observer ----
+
+    def begin(self, study: str, total: int | None) -> None:
+        self.watcher.begin(study, total)
+
+    def progress(self, text: str) -> None:
+        self.watcher.progress(text)
+
+    def item(self, result: object) -> None:
+        self.watcher.item(result)
+
+    def warn(self, sentence: str) -> None:
+        if sentence not in self.warnings:
+            self.note("warning", text=sentence)
+        self.watcher.warn(sentence)
+
+    def end(self, interrupted: bool) -> None:
+        self.watcher.end(interrupted)
+
+
+class StoredRecord(Record):
+    """A record in a file; its columns are read when they are asked for.
+
+    Parameters
+    ----------
+    path : path
+    tables : callable
+        From the mesh to the tables that are read.
+
+    Raises
+    ------
+    CaseError
+        If the file cannot be read.
+    """
+
+    def __init__(self, path: str | Path, tables: Callable[[MeshData | None], Iterable[TableSpec]]):
+        self.path = Path(path)
+        self._columns: dict[tuple[str, str], np.ndarray] = {}
+        with reading(self.path) as file:
+            self.mesh = read_mesh(file) if "mesh" in file else None
+            self.tables = {table.name: table for table in tables(self.mesh)}
+            self._log = read_log(file)
+            self._count = {name: read_rows(file["tables"][name]) for name in self.tables}
+            self.header = replace(read_header(file), complete=self.complete)
+
+    def rows(self, table: str) -> int:
+        return self._count[table]
+
+    def column(self, table: str, name: str) -> np.ndarray:
+        if (table, name) not in self._columns:
+            self._columns[table, name] = self._read(table, name, slice(self._count[table]))
+        return self._columns[table, name]
+
+    def value(self, table: str, name: str, row: int) -> Any:
+        if (table, name) in self._columns:
+            return self._columns[table, name][row]
+        return self._read(table, name, range(self._count[table])[row])
+
+    def _read(self, table: str, name: str, rows: slice | int) -> Any:
+        column = next(c for c in self.tables[table].columns if c.name == name)
+        with reading(self.path) as file:
+            return read_column(file["tables"][table], column, rows)
+
+    @property
+    def log(self) -> list[dict[str, Any]]:
+        return self._log
+
+    @cached_property
+    def size(self) -> int:
+        """Bytes of the file."""
+        return self.path.stat().st_size
+
+
+def copy_record(record: Record, tables: Iterable[TableSpec], path: str | Path) -> None:
+    """Write a record into a file of its own.
+
+    Raises
+    ------
+    CaseError
+        If it cannot be written.
+    """
+    tables = tuple(tables)
+    with Journal(path, record.header, record.mesh, tables) as journal:
+        for table in tables:
+            journal.extend(table.name, {c.name: record.column(table.name, c.name) for c in table.columns})
+        journal.write_log(pack_documents(record.log))
+
+
+def plain(value: Any) -> Any:
+    """Numbers of Python for those of numpy, tuples for points in space; anything else as it is."""
+    if isinstance(value, np.ndarray):
+        return tuple(value.tolist()) if value.shape == (3,) else value
+    return value.item() if isinstance(value, np.generic) else value

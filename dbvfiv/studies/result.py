@@ -1,0 +1,155 @@
+"""What results of all studies have in common: built from a record, whether of a run or of a file."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+from ..case.model import Case
+from ..drawing.files import draw_figures, write_figures
+from ..model import ValveModel
+from ..record.fields import export_result
+from ..record.header import Header
+from ..record.mesh import MeshData
+from ..record.record import Record, copy_record
+from ..record.vtkhdf import Step
+from ..record.whole_valve import WholeValve
+from .session import Session
+from .study import find_study
+
+
+class StudyResult:
+    """A finished or interrupted run; nothing is computed again.
+
+    Derived classes set `kind` and define `summary` and `lines`, and `drawers` and `steps` if they have something to
+    show.
+
+    Parameters
+    ----------
+    record : Record
+    session : Session, optional
+        Where it is at hand; made from the case of the record otherwise, when asked for.
+    """
+
+    kind: ClassVar[str]
+
+    def __init__(self, record: Record, session: Session | None = None):
+        self.record = record
+        if session is not None:
+            self.session = session
+
+    def __repr__(self) -> str:
+        state = "complete" if self.complete else "not complete"
+        return f"<{type(self).__name__} of {self.header.name!r}, {state}>"
+
+    @cached_property
+    def session(self) -> Session:
+        """The case with its model; the model is built when it is asked for."""
+        return Session(self.header.rebuildable_case(), self.header.name)
+
+    @property
+    def header(self) -> Header:
+        """Where it comes from."""
+        return self.record.header
+
+    @property
+    def case(self) -> Case:
+        return self.header.case
+
+    @property
+    def mesh(self) -> MeshData:
+        return self.record.mesh
+
+    @property
+    def model(self) -> ValveModel:
+        """The coupled model of the case."""
+        return self.session.model
+
+    @property
+    def path(self) -> Path | None:
+        """Its file."""
+        return self.record.path
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return self.record.warnings
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What was not reached, in sentences."""
+        return self.record.failures
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run went to its end."""
+        return self.record.complete
+
+    # -- numbers ----
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON."""
+        raise NotImplementedError
+
+    def lines(self) -> list[str]:
+        """The numbers as a table for people."""
+        raise NotImplementedError
+
+    def remarks(self) -> list[str]:
+        """What is left to say when the table has been printed row by row; everything if there is no such table."""
+        return self.lines()
+
+    def shortfall(self) -> str | None:
+        """A clause on what was not reached, "2 of 3 pressures were reached"; None if nothing is missing."""
+        return "Not everything was reached" if self.failures else None
+
+    # -- files and pictures ----
+
+    def save(self, path: str | Path) -> Path:
+        """Write a result file.
+
+        Raises
+        ------
+        CaseError
+        """
+        copy_record(self.record, find_study(self.kind).tables(self.mesh), path)
+        return Path(path)
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Any]]]:
+        """Names of figures and functions that draw them; may take keyword choices such as ``pressure`` or ``mode``."""
+        return iter(())
+
+    def figures(self, only: Sequence[str] = (), **choices: Any) -> dict[str, Any]:
+        """Figures by name.
+
+        Raises
+        ------
+        CaseError
+            For a name that the result has no figure of, or a result without anything to draw.
+        """
+        return draw_figures(self._drawers(choices), only, f"{self.kind} result of {self.header.name!r}")
+
+    def plot(
+        self, folder: str | Path = ".", format: str = "png", only: Sequence[str] = (), **choices: Any
+    ) -> list[Path]:
+        """Write the figures as PNG or SVG files and return their names."""
+        return write_figures(self.figures(only, **choices), folder, format)
+
+    @property
+    def drawable(self) -> bool:
+        """Whether there is anything to draw."""
+        return bool(self._drawers({}))
+
+    def _drawers(self, choices: dict[str, Any]) -> dict[str, Callable[[], Any]]:
+        taken = inspect.signature(self.drawers).parameters
+        return dict(self.drawers(**{name: value for name, value in choices.items() if name in taken}))
+
+    def steps(self, valve: WholeValve) -> Sequence[Step]:
+        """Fields on the valve for ParaView; empty if the result has none."""
+        return ()
+
+    def export(self, path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any) -> Path:
+        """Write a VTKHDF file for ParaView; see `dbvfiv.record.fields`."""
+        return export_result(self, path, quarter, deformed, **choices)

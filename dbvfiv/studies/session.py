@@ -1,0 +1,173 @@
+"""A case with all that is worked out for it once: model, equilibria, and the studies that are asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..case.model import Case
+from ..errors import CaseError
+from ..model import ValveModel
+from ..observer import Observer
+from ..record.files import kind_of
+from ..record.header import Header
+from ..record.mesh import MeshData
+from ..record.record import GrowingRecord, Record, StoredRecord
+from . import KINDS
+from .study import Study, find_study
+
+
+class Session:
+    """What studies ask about a valve.
+
+    Parameters
+    ----------
+    case : Case
+    name : str
+        For titles and file names.
+
+    Attributes
+    ----------
+    model : ValveModel
+        The coupled model, built on first use.
+    mesh : MeshData
+    """
+
+    def __init__(self, case: Case, name: str = "case"):
+        self.case, self.name = case, name
+
+    @cached_property
+    def model(self) -> ValveModel:
+        """The coupled model of the case.
+
+        Raises
+        ------
+        CaseError
+            If the case gives no model.
+        """
+        try:
+            model = ValveModel(self.case)
+            model.shell.energies  # built on first use otherwise, and it is here that an invalid metric shows
+            return model
+        except CaseError:
+            raise
+        except ValueError as error:  # what geometry, mesh and shell refuse
+            raise CaseError(str(error)) from error
+
+    @cached_property
+    def mesh(self) -> MeshData:
+        return MeshData.of(self.model)
+
+    def replace(self, changes: Mapping[str, Any]) -> Session:
+        """A session with some keys of its case changed; the same one if none is.
+
+        The model stays where only keys of studies change.
+        """
+        if not changes:
+            return self
+        session = Session(self.case.replace(changes), self.name)
+        if {key.partition(".")[0] for key in changes} <= set(KINDS):
+            session.__dict__.update({name: self.__dict__[name] for name in ("model", "mesh") if name in self.__dict__})
+        return session
+
+    def perform(
+        self, kind: str, output: str | Path | None = None, observer: Observer | None = None, **choices: Any
+    ) -> Any:
+        """Run a study of the case.
+
+        Parameters
+        ----------
+        kind : str
+            Of the study; see `dbvfiv.studies.KINDS`.
+        output : path, optional
+            Result file, written while the study runs.
+        observer : Observer, optional
+            Is told of progress, items and warnings.
+        choices
+            What the study takes that is no key of the case.
+
+        Returns
+        -------
+        StudyResult
+            Of an interrupted or failed run too: with what it found.
+
+        Raises
+        ------
+        CaseError
+            If the case or the file cannot be used.
+        SolveError
+            If nothing can be found at all.
+        """
+        header = Header.of(kind, self.case, self.name)
+        return self._run(kind, header, output, observer, None, choices)
+
+    def resume(self, known: Record, observer: Observer | None = None, **choices: Any) -> Any:
+        """Go on with a run in its file; `known` is what it holds."""
+        header = Header(**(vars(known.header) | {"case": self.case, "complete": False}))
+        return self._run(header.kind, header, known.path, observer, known, choices)
+
+    def _run(self, kind, header, output, observer, known, choices) -> Any:
+        study = find_study(kind)
+        mesh = self.mesh  # a case that gives no model is told before a file is touched
+        with GrowingRecord(header, mesh, study.tables(mesh), output, observer, known) as record:
+            complete = False
+            try:
+                study.run(self, record, **choices)
+                complete = True
+            except KeyboardInterrupt:
+                record.end(True)
+            else:
+                record.end(False)
+            record.conclude(complete)
+        return study.result(record, self)
+
+
+def read_result(path: str | Path) -> Any:
+    """Read a result file of any kind.
+
+    Raises
+    ------
+    CaseError
+        One sentence: what is wrong with the file.
+    """
+    return _find(path).result(_read(path))
+
+
+def resume_result(path: str | Path, observer: Observer | None = None, changes: Mapping[str, Any] = {}, **choices: Any):
+    """Go on with an interrupted or killed study in its file.
+
+    Parameters
+    ----------
+    changes : mapping
+        Keys of the case that are changed, such as a later end.
+    choices
+        What the study takes that is no key of the case.
+
+    Returns
+    -------
+    StudyResult
+
+    Raises
+    ------
+    CaseError
+        If the file cannot be read or there is nothing left to do.
+    """
+    known = _read(path)
+    if known.complete and not changes:
+        raise CaseError(f"The {known.header.kind} run in {str(path)!r} is complete; there is nothing to resume.")
+    session = Session(known.header.rebuildable_case(), known.header.name).replace(changes)
+    return session.resume(known, observer, **choices)
+
+
+def _find(path: str | Path) -> Study:
+    kind = kind_of(path)
+    try:
+        return find_study(kind)
+    except KeyError:
+        raise CaseError(f"{str(path)!r} holds a result of kind {kind!r}, which this version does not know.") from None
+
+
+def _read(path: str | Path) -> StoredRecord:
+    return StoredRecord(path, _find(path).tables)

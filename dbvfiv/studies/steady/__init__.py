@@ -1,0 +1,1 @@
+"""Equilibria over a list of pressures."""

@@ -1,0 +1,56 @@
+"""What a study is: how it is called, what its file holds, how it runs, what comes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from ..case.model import Case
+from ..record.mesh import MeshData
+from ..record.table import TableSpec
+from . import KINDS
+
+
+@dataclass(frozen=True)
+class Study:
+    """A question that the program answers.
+
+    Attributes
+    ----------
+    kind : str
+        Name of the command, of the section of the case file and of the result.
+    tables : callable
+        From the mesh of a valve to the tables of a result.
+    run : callable
+        ``run(session, record, **choices)`` finds what is asked for and keeps it in the record, a `GrowingRecord`. What
+        the record holds already, from an interrupted attempt, is not computed again. Ctrl-C may end it at any point.
+    result : type
+        `StudyResult` of its records.
+    resumable : bool
+        Whether an interrupted run goes on where it ended.
+    live : callable, optional
+        From the case to what writes an item that was found as a line of a table, as soon as it is; the first line has
+        the head of the table above it. Without it everything is printed at the end.
+    """
+
+    kind: str
+    tables: Callable[[MeshData], tuple[TableSpec, ...]]
+    run: Callable[..., None]
+    result: type[Any]
+    resumable: bool = True
+    live: Callable[[Case], Callable[[Any], str]] | None = None
+
+
+def find_study(kind: str) -> Study:
+    """The study of a kind; its folder is imported when it is first asked for.
+
+    Raises
+    ------
+    KeyError
+        If there is none.
+    """
+    if kind not in KINDS:
+        raise KeyError(kind)
+    return import_module(f"{__package__}.{kind}.study").STUDY
