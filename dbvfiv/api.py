@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from .case import load_case
 from .case.model import Case
-from .case.quantity import Quantity
+from .case.parameters import PARAMETERS
 from .errors import CaseError, SolveError
 
 if TYPE_CHECKING:
@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from .studies.observer import Observer
     from .transient.result import TransientResults
 
-_PRESSURE = Quantity("Pa", "kPa")
-_HIGHEST = 1e7
+_PRESSURE = PARAMETERS["pressure"]
 
 
 class Valve:
@@ -163,7 +162,7 @@ class Valve:
         observer: Observer | None = None,
         **changes: Any,
     ) -> SweepResults:
-        """Modes tracked along pressure, density, alpha or beta.
+        """Modes tracked along a parameter of load, fluid or damping.
 
         Parameters
         ----------
@@ -340,10 +339,10 @@ def read_pressures(given: Iterable[Any], name: str) -> tuple[float, ...]:
     found = []
     for value in given:
         try:
-            pressure = _PRESSURE.parse(_number(value))
+            pressure = _PRESSURE.quantity.parse(_number(value))
         except ValueError as error:
             raise CaseError(f"{name} is given as {value!r}, {error}; {_ALLOWED}.") from None
-        if not 0 < pressure <= _HIGHEST:
+        if not 0 < pressure <= _PRESSURE.high:
             raise CaseError(f"{name} is given as {value!r}; {_ALLOWED}.")
         found.append(pressure)
     if not found:
@@ -351,7 +350,9 @@ def read_pressures(given: Iterable[Any], name: str) -> tuple[float, ...]:
     return tuple(found)
 
 
-_ALLOWED = f"it must be a pressure greater than 0 kPa and at most {_HIGHEST / 1e3:g} kPa, such as '36 kPa' or 36e3 (Pa)"
+_ALLOWED = (
+    f"it must be a pressure greater than 0 kPa and at most {_PRESSURE.high / 1e3:g} kPa, such as '36 kPa' or 36e3 (Pa)"
+)
 
 
 def _number(value: Any) -> Any:
