@@ -85,7 +85,8 @@ class Valve:
         Parameters
         ----------
         pressure : number (Pa), text with a unit, or several of them
-            One pressure gives one state; several, or None for those of the case, give a result with all states.
+            One pressure gives one state; several, or None for those of `Case.steady_pressures`, give a result with all
+            states.
         output : path, optional
             Result file, written state by state.
         observer : Observer, optional
@@ -104,8 +105,9 @@ class Valve:
             not.
         """
         single = isinstance(pressure, (int, float, str)) or hasattr(pressure, "__float__")
-        asked = self.case.steady.pressures if pressure is None else [pressure] if single else pressure
-        result = self._run(read_pressures(asked, "pressure"), output, observer)
+        asked = self.case.steady_pressures() if pressure is None else [pressure] if single else pressure
+        name = "drive.pressure" if pressure is None else "pressure"  # a list of the case was checked with it
+        result = self._run(read_pressures(asked, name), output, observer)
         if not single:
             return result
         if result.failures:

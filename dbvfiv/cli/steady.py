@@ -42,12 +42,12 @@ def command(
 
     dbvfiv steady cases/dbv12.toml -p "18 kPa" -p "36 kPa" -o dbv12.h5
     """
-    from ..api import Valve
+    from ..api import Valve, read_pressures
     from ..errors import SolveError
     from ..results.steady_table import HEAD, row_of
 
     case = read_case(case_file, overrides)
-    wanted = _pressures(case, pressures, overrides)
+    wanted = _given(pressures) if pressures else read_pressures(case.steady_pressures(), "drive.pressure")
     valve = Valve(case, case_file.stem if case_file else "dbv12")
     valve.model  # a case that gives no model is told before the table begins
     if not as_json:
@@ -74,19 +74,10 @@ def command(
         raise SolveError(f"{reached}{kept}.")  # why was said when it happened
 
 
-def _pressures(case, given: list[str] | None, overrides: list[str] | None) -> tuple[float, ...]:
+def _given(texts: list[str]) -> tuple[float, ...]:
     from ..api import read_pressures
 
-    if given:
-        return tuple(
-            p for text in given for p in (_range(text) if ":" in text else read_pressures([text], "--pressure"))
-        )
-    changed = {override.partition("=")[0].strip() for override in overrides or ()}
-    set_here = "drive.pressure" in changed and "steady.pressures" not in changed
-    in_case = "pressure" in case.drive.model_fields_set and "pressures" not in case.steady.model_fields_set
-    if set_here or in_case:
-        return read_pressures([case.drive.pressure], "drive.pressure")
-    return case.steady.pressures
+    return tuple(p for text in texts for p in (_range(text) if ":" in text else read_pressures([text], "--pressure")))
 
 
 def _range(text: str) -> tuple[float, ...]:

@@ -57,6 +57,10 @@ class SteadyResult:
         }
 
 
+#: Passage at the lips over that of the flange from which on a lost equilibrium is put down to it.
+_NEARLY_AS_WIDE = 0.9
+
+
 @dataclass
 class LoadPath(LoadSteps):
     """Walks a valve from one steady state to the next in pressure."""
@@ -69,7 +73,10 @@ class LoadPath(LoadSteps):
         SolveError
             If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
         """
-        way = self.reach(target)
+        try:
+            way = self.reach(target)
+        except SolveError as error:
+            raise SolveError(f"{str(error).removesuffix('.')}{self._too_wide()}.") from None
         last = way.result
         return describe_state(
             self.model,
@@ -81,6 +88,17 @@ class LoadPath(LoadSteps):
             residual=last.residual,
             rounding=last.rounding,
             reason=last.reason,
+        )
+
+    def _too_wide(self) -> str:
+        """Clause on a passage that leaves no finite flow, of the last equilibrium; empty for other causes."""
+        area = self.model.rows.areas(self.model.nodal(self.q))
+        share = area[0] / area[-1]
+        if self.model.case.drive.kind != "flow" or share < _NEARLY_AS_WIDE:
+            return ""
+        return (
+            f"; the passage at the lips had widened to {100 * share:.0f} % of that of the flange, and none as wide as "
+            "the flange has a finite steady flow"
         )
 
 
