@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from .case import load_case
 from .case.model import Case
-from .case.quantity import Quantity
+from .case.parameters import PARAMETERS
 from .errors import CaseError, SolveError
 from .model import ValveModel
 from .studies.session import Session
@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from .results.sweep import SweepResults
     from .transient.result import TransientResults
 
-_PRESSURE = Quantity("Pa", "kPa")
-_HIGHEST = 1e7
+_PRESSURE = PARAMETERS["pressure"]
 
 
 class Valve:
@@ -83,7 +82,8 @@ class Valve:
         Parameters
         ----------
         pressure : number (Pa), text with a unit, or several of them
-            One pressure gives one state; several, or None for those of the case, give a result with all states.
+            One pressure gives one state; several, or None for those of `Case.steady_pressures`, give a result with all
+            states.
         output : path, optional
             Result file, written state by state.
         observer : Observer, optional
@@ -102,8 +102,8 @@ class Valve:
             not.
         """
         single = isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0
-        asked = self.case.steady.pressures if pressure is None else [pressure] if single else pressure
-        pressures = read_pressures(asked, "pressure")
+        asked = self.case.steady_pressures() if pressure is None else [pressure] if single else pressure
+        pressures = read_pressures(asked, "drive.pressure" if pressure is None else "pressure")
         self.model  # shared by what is asked of this valve
         result = self.session.replace({"steady.pressures": list(pressures)}).perform("steady", output, observer)
         if not single:
@@ -162,7 +162,7 @@ class Valve:
         observer: Observer | None = None,
         **changes: Any,
     ) -> SweepResults:
-        """Modes tracked along pressure, density, alpha or beta.
+        """Modes tracked along a parameter of load, fluid or damping.
 
         Parameters
         ----------
@@ -322,10 +322,10 @@ def read_pressures(given: Iterable[Any], name: str) -> tuple[float, ...]:
     found = []
     for value in given:
         try:
-            pressure = _PRESSURE.parse(_number(value))
+            pressure = _PRESSURE.quantity.parse(_number(value))
         except ValueError as error:
             raise CaseError(f"{name} is given as {value!r}, {error}; {_ALLOWED}.") from None
-        if not 0 < pressure <= _HIGHEST:
+        if not 0 < pressure <= _PRESSURE.high:
             raise CaseError(f"{name} is given as {value!r}; {_ALLOWED}.")
         found.append(pressure)
     if not found:
@@ -333,7 +333,9 @@ def read_pressures(given: Iterable[Any], name: str) -> tuple[float, ...]:
     return tuple(found)
 
 
-_ALLOWED = f"it must be a pressure greater than 0 kPa and at most {_HIGHEST / 1e3:g} kPa, such as '36 kPa' or 36e3 (Pa)"
+_ALLOWED = (
+    f"it must be a pressure greater than 0 kPa and at most {_PRESSURE.high / 1e3:g} kPa, such as '36 kPa' or 36e3 (Pa)"
+)
 
 
 def _number(value: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .case.parameters import PARAMETERS, SWEPT
 from .errors import CaseError, SolveError
 
 if TYPE_CHECKING:
@@ -16,12 +17,8 @@ if TYPE_CHECKING:
     from .results.sweep import SweepResults
 
 #: Keyword arguments and the keys of the case that they stand for.
-KEYS = {
-    "pressure": "drive.pressure",
-    "density": "fluid.density",
+KEYS = {name: PARAMETERS[name].key for name in SWEPT} | {
     "continuity": "fluid.continuity",
-    "alpha": "damping.alpha",
-    "beta": "damping.beta",
     "in_vacuo": "modes.in_vacuo",
     "max_frequency": "modes.max_frequency",
 }

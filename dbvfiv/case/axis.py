@@ -3,22 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from .quantity import Quantity
+from .parameters import PARAMETERS, SWEPT, Parameter
 
-PARAMETERS = {
-    "pressure": Quantity("Pa", "kPa"),
-    "density": Quantity("kg/m^3", "kg/m^3"),
-    "alpha": Quantity("1/s", "1/s"),
-    "beta": Quantity("s", "s"),
-}
-KEYS = {
-    "pressure": "drive.pressure",
-    "density": "fluid.density",
-    "alpha": "damping.alpha",
-    "beta": "damping.beta",
-}
 FORM = 'PARAMETER=START:STOP:COUNT, with ":log" behind it for logarithmic steps'
 _LARGEST = 100_000
 
@@ -30,8 +19,7 @@ class Axis:
     Attributes
     ----------
     parameter : str
-        "pressure", "density", "alpha" or "beta", whose ``key`` is that of the case; studies of stability know more, see
-        `stability_axis`.
+        Name of one of `dbvfiv.case.parameters.PARAMETERS`.
     values : tuple of float
         SI values from start to stop.
     log : bool
@@ -44,11 +32,12 @@ class Axis:
 
     @property
     def key(self) -> str:
-        return KEYS[self.parameter]
+        """Key of the case that holds the parameter."""
+        return PARAMETERS[self.parameter].key
 
 
-def parse_axis(text: str, quantities: dict[str, Quantity] = PARAMETERS) -> Axis:
-    """Read ``PARAMETER=START:STOP:COUNT[:log]`` for one of the parameters that have a quantity.
+def parse_axis(text: str, names: Iterable[str] = SWEPT) -> Axis:
+    """Read ``PARAMETER=START:STOP:COUNT[:log]`` for one of the parameters named.
 
     Raises
     ------
@@ -59,18 +48,21 @@ def parse_axis(text: str, quantities: dict[str, Quantity] = PARAMETERS) -> Axis:
         raise ValueError("which is not a text")
     name, equals, span = text.partition("=")
     name, parts = name.strip(), [part.strip() for part in span.split(":")]
-    if name not in quantities:
-        raise ValueError(f"whose parameter is none of {', '.join(quantities)}")
+    if name not in names:
+        raise ValueError(f"whose parameter is none of {', '.join(names)}")
+    row = PARAMETERS[name]
     log = parts[-1] in ("log", "lin") and parts.pop() == "log"
     if not equals or len(parts) != 3:
         raise ValueError("which is not of that form")
-    start, stop = (_value(quantities[name], part) for part in parts[:2])
+    start, stop = (_value(row, part) for part in parts[:2])
     if not parts[2].isascii() or not parts[2].isdigit() or len(parts[2]) > 6 or not 2 <= int(parts[2]) <= _LARGEST:
         raise ValueError(f"whose count is not between 2 and {_LARGEST}")
     if start >= stop:
         raise ValueError("whose start is not below its stop")
-    if start < 0 or (start == 0 and (log or name in ("density", "pressure"))):
+    if start < 0 or (start == 0 and (log or not row.low_included)):
         raise ValueError("whose start is not greater than 0")
+    if start < row.low or stop > row.high:
+        raise ValueError(f"whose range is not within {row.low:g} to {row.high:g}")
     count = int(parts[2])
     if log:
         ratio = math.log(stop / start)
@@ -80,8 +72,8 @@ def parse_axis(text: str, quantities: dict[str, Quantity] = PARAMETERS) -> Axis:
     return Axis(name, (*values[:-1], stop), log)
 
 
-def _value(quantity: Quantity, text: str) -> float:
+def _value(row: Parameter, text: str) -> float:
     try:
-        return quantity.parse(float(text))
+        return row.quantity.parse(float(text))
     except ValueError:
-        return quantity.parse(text)
+        return row.quantity.parse(text)

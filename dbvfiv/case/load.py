@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,15 @@ def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> 
     overridden = set()
     for override in overrides:
         overridden.add(_apply(data, override))
-    return make_case(data, folder=folder, source=name, text=text, overridden=overridden)
+    case = make_case(data, folder=folder, source=name, text=text, overridden=overridden)
+    replace_list_by_pressure(case, overridden)
+    return case
+
+
+def replace_list_by_pressure(case: Case, changed: Collection[tuple[str, ...]]) -> None:
+    """Let a drive.pressure that was changed by itself stand before the list, see `Case.steady_pressures`."""
+    if ("drive", "pressure") in changed and ("steady", "pressures") not in changed:
+        case.steady.model_fields_set.discard("pressures")
 
 
 def make_case(

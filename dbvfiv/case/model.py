@@ -78,6 +78,13 @@ class Case(Section):
             )
         return self
 
+    def steady_pressures(self) -> tuple[float, ...]:
+        """Pressures, Pa, of `steady` where none are asked for: drive.pressure if that was given, or changed later, and
+        steady.pressures was not; else steady.pressures.
+        """
+        alone = "pressure" in self.drive.model_fields_set and "pressures" not in self.steady.model_fields_set
+        return (self.drive.pressure,) if alone else self.steady.pressures
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""
         return self.model_dump(mode="json")
@@ -97,9 +104,14 @@ class Case(Section):
         CaseError
             As ``load_case`` does.
         """
-        from .load import make_case, put
+        from .load import make_case, put, replace_list_by_pressure
 
         data = self.to_dict()
-        for dotted, value in changes.items():
-            put(data, dotted, value)
-        return make_case(data, check_files=False)
+        changed = {put(data, dotted, value) for dotted, value in changes.items()}
+        made = make_case(data, check_files=False)
+        for section in ("drive", "steady"):  # a dictionary holds every key, but not all were given
+            if (section,) not in changed:
+                given = getattr(self, section).model_fields_set | {path[1] for path in changed if path[0] == section}
+                getattr(made, section).model_fields_set.intersection_update(given)
+        replace_list_by_pressure(made, changed)
+        return made

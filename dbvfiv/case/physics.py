@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import StrictBool
 
+from .parameters import PARAMETERS
 from .quantity import Density, Number, Pressure, Rate, Stiffness, Time
 from .section import Section, key
 
@@ -25,14 +26,14 @@ class Shell(Section):
 class Damping(Section):
     """Rayleigh damping C = alpha M + beta K."""
 
-    alpha: Rate = key(5.0, "Factor of the mass matrix.", ge=0, le=1e6)
-    beta: Time = key(0.003, "Factor of the structure's tangent stiffness.", ge=0, le=1e3)
+    alpha: Rate = key(5.0, "Factor of the mass matrix.", **PARAMETERS["alpha"].limits)
+    beta: Time = key(0.003, "Factor of the structure's tangent stiffness.", **PARAMETERS["beta"].limits)
 
 
 class Fluid(Section):
     """The fluid and its conservation laws."""
 
-    density: Density = key(1000.0, "Mass density.", gt=0, le=30000)
+    density: Density = key(1000.0, "Mass density.", **PARAMETERS["density"].limits)
     continuity: Literal["quasi-steady", "storage"] = key(
         "quasi-steady",
         "A U the same at every station (quasi-steady, the thesis), or dA/dt + d(AU)/dz = 0 (storage).",
@@ -49,7 +50,9 @@ class Drive(Section):
     kind: Literal["flow", "uniform"] = key(
         "flow", "Pressure from the flow through the valve, or one uniform pressure without flow."
     )
-    pressure: Pressure = key(18e3, "Inlet pressure (flow), or the pressure on the wall (uniform).", ge=0, le=1e7)
+    pressure: Pressure = key(
+        18e3, "Inlet pressure (flow), or the pressure on the wall (uniform).", ge=0, le=PARAMETERS["pressure"].high
+    )
     side: Literal["inside", "outside"] = key("inside", "Which side of the wall a uniform pressure acts on.")
     unloaded_edge: Number = key(
         3 / 28,

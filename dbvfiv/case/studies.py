@@ -18,6 +18,7 @@ from pydantic import (
 
 from .axis import Axis, parse_axis
 from .drive_table import read_drive_table
+from .parameters import PARAMETERS, listed
 from .quantity import Frequency, Length, Number, Pressure, Rate, Time
 from .section import BrokenRule, Section, key
 from .stability_axis import parse_stability_axis
@@ -37,7 +38,7 @@ def _readable_stability(text: str) -> str:
 
 
 StabilityRange = Annotated[StrictStr, AfterValidator(_readable_stability)]
-LoadPressure = Annotated[Pressure, Field(gt=0, le=1e7)]
+LoadPressure = Annotated[Pressure, Field(**PARAMETERS["pressure"].limits)]
 
 
 class Steady(Section):
@@ -88,10 +89,7 @@ class Onset(Section):
 
     over: StabilityRange = key(
         "density",
-        "The parameter to move: pressure, density, alpha, beta, storage (blend of the continuity laws, 0 "
-        "quasi-steady to 1 storage), thickness (wall "
-        "thickness factor), angle (of the plies, degrees) or strain (level of the rubbers); with "
-        "=START:STOP:COUNT[:log] behind it for another range than "
+        f"The parameter to move: {listed(notes=True)}; with =START:STOP:COUNT[:log] behind it for another range than "
         "the usual one.",
     )
     tolerance: Number = key(1e-9, "Relative accuracy of a located onset on its mesh.", gt=0, le=1e-3)

@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import StrictInt, ValidationInfo, field_validator, model_validator
+from pydantic import PrivateAttr, StrictInt, ValidationInfo, field_validator, model_serializer, model_validator
 
 from .key_points import read_key_points
 from .quantity import Length, Number
 from .section import BrokenRule, Section, key
+
+#: Sizes of the 12-inch valve and its wall at lip and flange, m, and what App. A sets for it: R1, TH1, TH2.
+_TWELVE_INCH = {
+    "duckbill_length": 0.21,
+    "saddle_length": 0.28,
+    "flange_length": 0.07,
+    "lip_half_width": 0.125,
+    "flange_radius": 0.13919,
+}
+_TWELVE_INCH_WALLS = {"measured": (0.012, 0.016), "uniform": (0.01438, 0.01438)}
+_R1, _TH1, _TH2 = 0.00619, 0.00619, 0.00819
+#: What follows from wall and shape where it is not given.
+_FOLLOWING = ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction")
+#: What key points say in place of the case's keys.
+_SHAPE = ("lip_half_width", "lip_radius", "flange_radius", "saddle")
 
 
 class WallStep(Section):
@@ -20,13 +36,23 @@ class WallStep(Section):
 
 
 class Valve(Section):
-    """Shape and wall of the valve; z runs from the lip (0) to the clamped flange."""
+    """Shape and wall of the valve; z runs from the lip (0) to the clamped flange.
+
+    `lip_radius`, `duckbill_wall_deduction` and `flange_wall_deduction` hold numbers also where they were not given.
+    """
 
     duckbill_length: Length = key(0.21, "Length of the duckbill, from the lip.", gt=0, le=100)
     saddle_length: Length = key(0.28, "Length of the saddle between duckbill and flange.", gt=0, le=100)
     flange_length: Length = key(0.07, "Length of the round flange at the inlet.", gt=0, le=100)
     lip_half_width: Length = key(0.125, "Half width of the straight part of the lip (W1).", gt=0, le=100)
-    lip_radius: Length = key(0.00619, "Mid-surface radius of the side edge of the lip (R1).", gt=0, le=10)
+    lip_radius: Length | None = key(
+        None,
+        "Mid-surface radius of the side edge of the lip, and height of its straight part above the closing plane (R1); "
+        "where not given half the wall at the lip, so that the faces touch at rest (6.19 mm in the 12-inch valve, "
+        "App. A).",
+        gt=0,
+        le=10,
+    )
     flange_radius: Length = key(0.13919, "Mid-surface radius of the flange (Rin).", gt=0, le=100)
     saddle: Literal["ruled", "smooth"] = key(
         "ruled", "How the saddle joins duckbill and flange: straight rulings or a smooth blend."
@@ -45,20 +71,36 @@ class Valve(Section):
         min_length=1,
     )
     wall_thickness: Length = key(0.01438, "Wall thickness where wall is uniform.", gt=0, le=10)
-    thickness_factor: Number = key(1.0, "Multiplies the wall thickness everywhere.", gt=0, le=10)
-    initial_gap: Length = key(1e-4, "Half gap between the closed lips that always lets fluid pass.", gt=0, le=1)
-    duckbill_wall_deduction: Length = key(
-        0.00619, "Half wall taken off the flow section of the duckbill (TH1, Th. 4.12).", ge=0, le=10
+    thickness_factor: Number = key(
+        1.0, "Multiplies the wall thickness everywhere; mid-surface and flow section stay.", gt=0, le=10
     )
-    flange_wall_deduction: Length = key(
-        0.00819, "Half wall taken off the flow section of the flange (TH2, Th. 4.14).", ge=0, le=10
+    initial_gap: Length = key(1e-4, "Half gap between the closed lips that always lets fluid pass.", gt=0, le=1)
+    duckbill_wall_deduction: Length | None = key(
+        None,
+        "Half wall taken off the flow section of the duckbill (TH1, Th. 4.12); where not given half the wall at the "
+        "lip, at most lip_radius (6.19 mm in the 12-inch valve, App. A).",
+        ge=0,
+        le=10,
+    )
+    flange_wall_deduction: Length | None = key(
+        None,
+        "Half wall taken off the flow section of the flange (TH2, Th. 4.14); where not given half the wall at the "
+        "flange (8.19 mm in the 12-inch valve, App. A).",
+        ge=0,
+        le=10,
     )
     key_points: Path | None = key(
         None,
         "File of 9 x 15 mid-surface key points (x y z on each line; profiles from lip to flange, "
-        "each from the centre x = 0 to the side edge y = 0) used instead of the parametric shape; "
-        "relative to the case file.",
+        "each from the centre x = 0 to the side edge y = 0) used instead of lip_half_width, lip_radius, flange_radius "
+        "and saddle; the lengths say where duckbill and saddle end on it; relative to the case file.",
     )
+    _following: frozenset[str] = PrivateAttr(frozenset())
+
+    @property
+    def following(self) -> frozenset[str]:
+        """Keys that were not given and follow from wall and shape."""
+        return self._following
 
     @property
     def length(self) -> float:
@@ -67,10 +109,26 @@ class Valve(Section):
 
     def thickness_at(self, z: float) -> float:
         """Wall thickness in m at the axial position ``z`` in m (``thickness_factor`` included)."""
+        return self._wall_at(z) * self.thickness_factor
+
+    def _wall_at(self, z: float) -> float:
         if self.wall == "uniform":
-            return self.wall_thickness * self.thickness_factor
-        step = next((s for s in self.wall_map if z < s.to), self.wall_map[-1])
-        return step.thickness * self.thickness_factor
+            return self.wall_thickness
+        return next((s for s in self.wall_map if z < s.to), self.wall_map[-1]).thickness
+
+    @property
+    def rest_areas(self) -> tuple[float, float]:
+        """Flow areas in m2 of a quarter at rest, at the lip and at the flange, of the parametric shape."""
+        lip = self.lip_half_width * self.lip_radius + 0.25 * math.pi * self.lip_radius**2
+        inner = self.flange_radius - self.flange_wall_deduction
+        return lip - self.duckbill_wall_area, 0.25 * math.pi * inner**2
+
+    @property
+    def duckbill_wall_area(self) -> float:
+        """Part in m2 of the duckbill's section that the wall takes (Th. 4.12), of a quarter, less the initial gap."""
+        inner = max(self.lip_radius - self.duckbill_wall_deduction, 0.0)
+        corner = 0.25 * math.pi * (self.lip_radius**2 - inner**2)
+        return corner + self.lip_half_width * (self.duckbill_wall_deduction - self.initial_gap)
 
     @field_validator("key_points", mode="after")
     @classmethod
@@ -82,8 +140,46 @@ class Valve(Section):
         read_key_points(path)
         return path.resolve()
 
+    @model_serializer(mode="wrap")
+    def _leave_what_follows(self, handler: Any) -> dict[str, Any]:
+        """Without the numbers that follow, so that they follow anew after a change."""
+        return {name: None if name in self._following else value for name, value in handler(self).items()}
+
+    def _fill(self) -> None:
+        """Numbers for the keys that were not given."""
+        before = self._following  # a valve is checked again when it becomes part of a case
+        self._following = frozenset(name for name in _FOLLOWING if getattr(self, name) is None or name in before)
+        lip, flange = self._wall_at(0.0), self._wall_at(self.length)
+        twelve_inch = (
+            self.key_points is None
+            and all(getattr(self, name) == size for name, size in _TWELVE_INCH.items())
+            and (lip, flange) == _TWELVE_INCH_WALLS[self.wall]
+        )
+        numbers = {"lip_radius": _R1 if twelve_inch else 0.5 * lip} if "lip_radius" in self._following else {}
+        radius = numbers.get("lip_radius", self.lip_radius)
+        touching = 0.5 * lip if self.key_points is not None else min(0.5 * lip, radius)
+        numbers["duckbill_wall_deduction"] = _TH1 if twelve_inch and radius == _R1 else touching
+        numbers["flange_wall_deduction"] = _TH2 if twelve_inch else 0.5 * flange
+        self.__dict__.update({name: numbers[name] for name in self._following})
+
     @model_validator(mode="after")
     def _fits_together(self) -> Valve:
+        self._fill()
+        self._check_wall()
+        if self.key_points is None:
+            self._check_sections()
+        else:
+            self._check_key_points()
+        return self
+
+    def _check_key_points(self) -> None:
+        for name in _SHAPE:
+            value = getattr(self, name)
+            if name not in self._following and value != type(self).model_fields[name].default:
+                given = f"{value:g} m" if isinstance(value, float) else repr(value)
+                raise BrokenRule(name, f"{given} beside key_points", "the points give the shape, so leave it out")
+
+    def _check_sections(self) -> None:
         if self.lip_half_width + self.lip_radius > self.flange_radius:
             widest = self.flange_radius - self.lip_radius
             raise BrokenRule(
@@ -103,8 +199,14 @@ class Valve(Section):
                 f"{self.flange_wall_deduction:g} m, which leaves no flow area at the flange",
                 f"it must be less than flange_radius = {self.flange_radius:g} m",
             )
-        self._check_wall()
-        return self
+        lip, flange = self.rest_areas
+        if lip >= flange:
+            name = "initial_gap" if lip - self.lip_half_width * self.initial_gap < flange else "lip_radius"
+            raise BrokenRule(
+                name,
+                f"{getattr(self, name):g} m, which leaves {4e4 * lip:.4g} cm2 between the lips at rest",
+                f"the passage there must be smaller than that of the flange, {4e4 * flange:.4g} cm2",
+            )
 
     def _check_wall(self) -> None:
         if self.wall == "measured":

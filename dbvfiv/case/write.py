@@ -80,7 +80,8 @@ def _keys(section: Section, comments: bool) -> Iterator[str]:
             if comments:
                 yield f'# {name} = "..."'
             continue
-        yield f"{name} = {_value(value, field)}"
+        mark = "# " if name in getattr(section, "following", ()) else ""
+        yield f"{mark}{name} = {_value(value, field)}"
 
 
 def _comment(field: Any) -> Iterator[str]:

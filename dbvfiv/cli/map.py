@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
+from ..case.parameters import listed
 from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json, print_places
 from ._progress import Progress
 
 ORDER = 30
 
-_RANGE = "PARAMETER=START:STOP:COUNT[:log] of pressure, density, alpha, beta, storage, thickness, angle or strain"
+_RANGE = f"PARAMETER=START:STOP:COUNT[:log] of {listed()}"
 
 
 def command(

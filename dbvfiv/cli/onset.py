@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..case.parameters import listed
 from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json, print_places
 from ._progress import Progress
@@ -21,9 +22,7 @@ def command(
         typer.Option(
             "--over",
             metavar="PARAMETER",
-            help="pressure, density, alpha, beta, storage, thickness, angle or strain, with "
-            "=START:STOP:COUNT[:log] for a range of one's own; "
-            "onset.over without it.",
+            help=f"{listed()}, with =START:STOP:COUNT[:log] for a range of one's own; onset.over without it.",
         ),
     ] = None,
     output: Output = None,

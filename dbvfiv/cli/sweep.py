@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from ..case.parameters import SWEPT, listed
 from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json, print_places
 from ._progress import Progress
@@ -21,7 +22,7 @@ def command(
         typer.Option(
             "--over",
             metavar="RANGE",
-            help="PARAMETER=START:STOP:COUNT[:log] of pressure, density, alpha or beta; sweep.over without it.",
+            help=f"PARAMETER=START:STOP:COUNT[:log] of {listed(SWEPT)}; sweep.over without it.",
         ),
     ] = None,
     pressure: Annotated[
@@ -38,7 +39,7 @@ def command(
     overrides: Override = None,
     as_json: AsJson = False,
 ) -> None:
-    """Damping and frequency of the leading modes, followed along pressure, density, alpha or beta.
+    """Damping and frequency of the leading modes, followed along a parameter of load, fluid or damping.
 
     Each mode keeps its number through crossings; "confidence" says how sure each match is. Over density, alpha and beta
     the equilibrium stays and modes are found on a reduced basis that full solves confirm. Ctrl-C keeps what is done.

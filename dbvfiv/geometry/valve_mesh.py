@@ -83,7 +83,7 @@ def valve_mesh(valve: Valve, mesh: Mesh) -> ValveMesh:
         element_z=element_z,
         element_columns=np.tile(np.stack([columns[:-1], columns[1:]], axis=1), (mesh.along, 1)),
         rest_area=np.array([surface.area(level) for level in z]),
-        wall_deduction=wall_deduction(valve, z),
+        wall_deduction=wall_deduction(valve, z, surface),
     )
 
 
@@ -113,14 +113,42 @@ def row_positions(surface: Surface, along: int) -> np.ndarray:
     return np.concatenate([*parts, breaks[-1:]])
 
 
-def wall_deduction(valve: Valve, z: np.ndarray) -> np.ndarray:
+def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
     """Part of the section taken by the wall (Th. 4.12-4.14, App. A): constant on duckbill and flange, linear over the
     saddle.
+
+    Raises
+    ------
+    ValueError
+        If the wall fills the section of the lip or of the flange that key points give.
     """
-    gap = valve.duckbill_wall_deduction - valve.initial_gap
-    duckbill = 0.25 * np.pi * valve.lip_radius**2 + valve.lip_half_width * gap
-    inner = valve.flange_radius - valve.flange_wall_deduction
-    flange = 0.25 * np.pi * (valve.flange_radius**2 - inner**2)
+    if valve.key_points is None:
+        duckbill = valve.duckbill_wall_area
+        inner = valve.flange_radius - valve.flange_wall_deduction
+        flange = 0.25 * np.pi * (valve.flange_radius**2 - inner**2)
+    else:
+        duckbill, flange = _key_point_deductions(valve, surface)
     joint = valve.duckbill_length
     share = np.clip((np.asarray(z) - joint) / valve.saddle_length, 0.0, 1.0)
     return duckbill + share * (flange - duckbill)
+
+
+def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float]:
+    """Areas taken by the wall at the lip and at the flange that key points give.
+
+    A face at the distance h inside a section of length L that turns by a right angle takes h L - pi h^2/4, which is
+    Th. 4.12 and 4.14 for the sections of App. A.
+    """
+    found = []
+    half_walls = (valve.duckbill_wall_deduction, valve.flange_wall_deduction)
+    for place, name, z, half in zip(("lip", "flange"), ("duckbill", "flange"), surface.breaks[[0, -1]], half_walls):
+        points = surface.section(z, np.linspace(0.0, 1.0, 8001))
+        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        gap = valve.initial_gap * max(points[-1, 0] - half, 0.0) if place == "lip" else 0.0
+        found.append(half * length - 0.25 * np.pi * half**2 - gap)
+        if found[-1] >= surface.area(z):
+            raise ValueError(
+                f"The key points of the {place} leave no flow area inside a half wall of {half:g} m; it must be less, "
+                f"see valve.{name}_wall_deduction."
+            )
+    return found[0], found[1]

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..case.parameters import SYSTEM_NAMES
 from ..flow import Channel
 from ..flow.channel import _pressure as channel_pressure
 from ..shell.mass import mass_integrals
@@ -21,7 +22,7 @@ from ..shell.rotation import director
 from .valve import ValveModel
 
 MOTION = ("q", "v", "a", "velocity", "velocity_rate")
-PARAMETERS = ("inlet", "density", "alpha", "beta", "storage")
+PARAMETERS = SYSTEM_NAMES
 
 
 class AnalyticResidual:

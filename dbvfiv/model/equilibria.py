@@ -57,6 +57,10 @@ class Equilibria:
         }
 
 
+#: Passage at the lips over that of the flange from which on a lost equilibrium is put down to it.
+_NEARLY_AS_WIDE = 0.9
+
+
 @dataclass
 class LoadPath(LoadSteps):
     """Walks a valve from one steady state to the next in pressure."""
@@ -69,7 +73,10 @@ class LoadPath(LoadSteps):
         SolveError
             If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
         """
-        way = self.reach(target)
+        try:
+            way = self.reach(target)
+        except SolveError as error:
+            raise SolveError(f"{str(error).removesuffix('.')}{self._too_wide()}.") from None
         last = way.result
         return describe_state(
             self.model,
@@ -81,6 +88,17 @@ class LoadPath(LoadSteps):
             residual=last.residual,
             rounding=last.rounding,
             reason=last.reason,
+        )
+
+    def _too_wide(self) -> str:
+        """Clause on a passage that leaves no finite flow, of the last equilibrium; empty for other causes."""
+        area = self.model.rows.areas(self.model.nodal(self.q))
+        share = area[0] / area[-1]
+        if self.model.case.drive.kind != "flow" or share < _NEARLY_AS_WIDE:
+            return ""
+        return (
+            f"; the passage at the lips had widened to {100 * share:.0f} % of that of the flange, and none as wide as "
+            "the flange has a finite steady flow"
         )
 
 
@@ -120,6 +138,44 @@ def find_equilibria(
         observer.warn(sentence)
     observer.end(interrupted)
     return Equilibria(model, tuple(states), tuple(failures), tuple(warnings), interrupted)
+
+
+def find_equilibrium(model: ValveModel, pressure: float, observer: Observer | None = None) -> SteadyState:
+    """Equilibrium at one inlet pressure, Pa, by load steps from rest.
+
+    Raises
+    ------
+    SolveError
+        If it is not reached.
+    """
+    observer = Observer() if observer is None else observer
+    for sentence in model_warnings(model):
+        observer.warn(sentence)
+    state = LoadPath(model, SteadyOptions.of(model.case), observer=observer).go_to(pressure)
+    for sentence in state_warnings(model, [state]):
+        observer.warn(sentence)
+    return state
+
+
+def redescribe(model: ValveModel, state: SteadyState) -> SteadyState:
+    """An equilibrium as a model with other surroundings of the same structure sees it."""
+    kept = ("converged", "iterations", "load_steps", "residual", "rounding", "reason")
+    return describe_state(model, state.q, state.pressure, **{name: getattr(state, name) for name in kept})
+
+
+def rest_state(model: ValveModel) -> SteadyState:
+    """The valve at rest without pressure, as a state."""
+    return describe_state(
+        model,
+        model.rest(),
+        0.0,
+        converged=True,
+        iterations=0,
+        load_steps=0,
+        residual=0.0,
+        rounding=0.0,
+        reason="at rest without pressure",
+    )
 
 
 def _states(path: LoadPath, pressures: list[float], failures: list[str], observer: Observer) -> Iterator[SteadyState]:

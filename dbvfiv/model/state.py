@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import SolveError
 from .valve import QUARTERS, ValveModel
 
 
@@ -83,11 +84,23 @@ class SteadyState:
 
 
 def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution) -> SteadyState:
-    """Steady state of a model from its unknowns; `solution` holds the fields from `converged` to `reason`."""
+    """Steady state of a model from its unknowns; `solution` holds the fields from `converged` to `reason`.
+
+    Raises
+    ------
+    SolveError
+        If no finite steady flow belongs to the state: the lip is as wide as the flange.
+    """
     nodal = model.nodal(q)
     area = model.rows.areas(nodal)
     density = model.case.fluid.density
     velocity = model.flow.inlet_velocity(area, pressure, density)
+    if not np.isfinite(velocity):
+        raise SolveError(
+            f"At {pressure:.6g} Pa no finite steady flow belongs to the equilibrium: its passage at the lips, "
+            f"{1e4 * QUARTERS * area[0]:.4g} cm2, is not smaller than that of the flange, "
+            f"{1e4 * QUARTERS * area[-1]:.4g} cm2, so no pressure would be left to hold the fluid back."
+        )
     speeds = model.flow.velocities(area, velocity)
     displacement = np.linalg.norm(nodal[:, :3], axis=1)
     where = int(np.argmax(displacement))

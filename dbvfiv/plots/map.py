@@ -14,7 +14,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator
 from scipy.ndimage import distance_transform_edt, label
 
-from ..studies.parameters import LABELS, SCALES
+from ..case.parameters import PARAMETERS
 from .style import new_figure
 
 if TYPE_CHECKING:
@@ -103,9 +103,9 @@ def _panels(result: MapResults):
         for set_scale, axis in ((axes.set_xscale, result.plan.x), (axes.set_yscale, result.plan.y)):
             if axis.log:
                 set_scale("log")
-        axes.set_xlabel(LABELS[result.plan.x.parameter])
+        axes.set_xlabel(PARAMETERS[result.plan.x.parameter].label)
         if number == 0:
-            axes.set_ylabel(LABELS[result.plan.y.parameter])
+            axes.set_ylabel(PARAMETERS[result.plan.y.parameter].label)
         if "storage" not in (result.plan.x.parameter, result.plan.y.parameter):
             axes.set_title(_TITLES.get(law, f"Blend of the continuity laws {law:g}"), loc="left")
         for place, axis in ((axes.xaxis, result.plan.x), (axes.yaxis, result.plan.y)):
@@ -150,7 +150,7 @@ def _edges(axis) -> np.ndarray:
 
 
 def _shown(axis, values):
-    return np.asarray(values) / SCALES.get(axis.parameter, 1.0)
+    return np.asarray(values) / PARAMETERS[axis.parameter].scale
 
 
 def _cells(axes, result: MapResults, values, colours, norm):

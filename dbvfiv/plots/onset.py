@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from ..studies.parameters import LABELS, SCALES
+from ..case.parameters import PARAMETERS
 from .style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def draw(result: OnsetResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
 def onset(result: OnsetResults) -> Figure:
     """Growth rate and frequency of the leading modes, unstable ranges shaded, onsets marked."""
     axis = result.case.onset.axis
-    scale = SCALES.get(axis.parameter, 1.0)
+    scale = PARAMETERS[axis.parameter].scale
     values = result.values / scale
     figure = new_figure(7.2, 5.6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
@@ -106,7 +106,7 @@ def onset(result: OnsetResults) -> Figure:
     top.set_ylabel("Growth rate, 1/s")
     bottom.set_ylabel("Frequency, Hz")
     bottom.set_ylim(bottom=0)
-    bottom.set_xlabel(LABELS[axis.parameter])
+    bottom.set_xlabel(PARAMETERS[axis.parameter].label)
     top.set_title(_title(result), loc="left", fontweight="bold")
     top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2)
     if len(values) > 1:
@@ -129,7 +129,7 @@ def unstable_ranges(result: OnsetResults) -> list[tuple[float, float]]:
 
 
 def _unit(parameter: str) -> str:
-    unit = LABELS[parameter].rpartition(", ")[2] if ", " in LABELS[parameter] else ""
+    unit = PARAMETERS[parameter].shown_unit
     return f" {unit}" if unit else ""
 
 

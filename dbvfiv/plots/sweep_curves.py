@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..results.sweep_table import SHOWN
+from ..case.parameters import PARAMETERS
 from .modes_plane import DANGER, UNSTABLE
 from .style import kilopascals, new_figure
 
@@ -32,12 +32,12 @@ def curves(result: SweepResults) -> Figure:
     """Growth rate, frequency and damping ratio of each branch; crossings of zero growth marked, spans with unstable
     modes shaded.
     """
-    name, unit, factor = SHOWN[result.parameter]
+    shown = PARAMETERS[result.parameter]
     figure = new_figure(7.6, 8.6)
     growth, frequency, ratio = panels = figure.subplots(
         3, 1, sharex=True, gridspec_kw={"height_ratios": [1.25, 1.0, 0.9]}
     )
-    x = result.values * factor
+    x = result.values / shown.scale
     for branch, colour in zip(result.branches, branch_colours(result)):
         size = np.hypot(branch.growth_rate, branch.angular_frequency)
         second = (branch.angular_frequency < 0).any()  # of a pair that two real modes became: both are seen
@@ -56,14 +56,14 @@ def curves(result: SweepResults) -> Figure:
             doubtful = branch.confidence < DOUBTFUL
             axes.plot(x[doubtful], values[doubtful], "x", color=colour, ms=7, mew=1.6)
     for crossing in result.crossings():
-        at = factor * crossing.value
+        at = crossing.value / shown.scale
         growth.plot(at, 0.0, "D", color=UNSTABLE, ms=6, zorder=4)
         # beside the point where there is room
         side = -1 if _share(at, x, result.axis.log) > 0.7 else 1
         text = (
-            f"{at:.4g} {unit}, {crossing.frequency:.3g} Hz"
+            f"{at:.4g} {shown.shown_unit}, {crossing.frequency:.3g} Hz"
             if crossing.frequency > 0
-            else f"{at:.4g} {unit}, no oscillation"
+            else f"{at:.4g} {shown.shown_unit}, no oscillation"
         )
         growth.annotate(
             text,
@@ -85,9 +85,11 @@ def curves(result: SweepResults) -> Figure:
     growth.set_ylabel("Growth rate, 1/s")
     frequency.set_ylabel("Frequency, Hz")
     ratio.set_ylabel("Damping ratio, %")
-    ratio.set_xlabel(f"{name}, {unit}")
+    ratio.set_xlabel(shown.label)
     growth.set_title(
-        f"Modes over {name[0].lower()}{name[1:]}, {surroundings_of(result)}", loc="left", fontweight="bold"
+        f"Modes over {shown.words[0].lower()}{shown.words[1:]}, {surroundings_of(result)}",
+        loc="left",
+        fontweight="bold",
     )
     handles, labels = growth.get_legend_handles_labels()
     if any(np.nanmin(b.confidence, initial=1.0) < DOUBTFUL for b in result.branches):
@@ -114,9 +116,7 @@ def surroundings_of(result: SweepResults) -> str:
     if result.parameter != "density" and case.drive.kind == "flow":
         parts.append(f"{case.fluid.density:g} kg/m³")
     parts += [
-        f"{symbol} = {getattr(case.damping, key):g} {unit}"
-        for key, symbol, unit in (("alpha", "α", "1/s"), ("beta", "β", "s"))
-        if key != result.parameter
+        PARAMETERS[name].text(getattr(case.damping, name)) for name in ("alpha", "beta") if name != result.parameter
     ]
     return ", ".join(parts)
 
@@ -128,9 +128,9 @@ def _share(at: float, x: np.ndarray, log: bool) -> float:
 
 def _shade(axes, result: SweepResults, x: np.ndarray) -> None:
     """Ground red where a mode is unstable, its edges at the crossings."""
-    factor = SHOWN[result.parameter][2]
+    scale = PARAMETERS[result.parameter].scale
     edges = sorted(
-        {float(x[0]), float(x[-1]), *(factor * c.value for c in result.crossings() if x[0] < factor * c.value < x[-1])}
+        {float(x[0]), float(x[-1]), *(c.value / scale for c in result.crossings() if x[0] < c.value / scale < x[-1])}
     )
     for low, high in zip(edges[:-1], edges[1:]):
         inside = result.unstable_count[(x >= low) & (x <= high)]

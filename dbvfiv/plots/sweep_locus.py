@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from ..results.sweep_table import SHOWN
+from ..case.parameters import PARAMETERS
 from .modes_plane import DANGER, UNSTABLE
 from .style import MAGNITUDE, new_figure
 from .sweep_curves import surroundings_of
@@ -31,10 +31,10 @@ def root_locus(result: SweepResults) -> Figure:
     """Growth rate and frequency of each branch, coloured by the parameter; a ring where it begins, crossings of the
     axis marked.
     """
-    name, unit, factor = SHOWN[result.parameter]
+    shown = PARAMETERS[result.parameter]
     figure = new_figure(7.6, 5.4)
     axes = figure.add_subplot()
-    x = result.values * factor
+    x = result.values / shown.scale
     colours = matplotlib.colors.ListedColormap(matplotlib.colormaps[MAGNITUDE](np.linspace(0.0, 0.9, 256)))
     scale = LogNorm(x[0], x[-1]) if result.axis.log else Normalize(x[0], x[-1])
     ends: dict[tuple[float, ...], list[int]] = {}
@@ -57,7 +57,7 @@ def root_locus(result: SweepResults) -> Figure:
     for crossing in result.crossings():
         axes.plot(0.0, crossing.frequency, "D", color=UNSTABLE, ms=6, zorder=5)
         axes.annotate(
-            f"{factor * crossing.value:.4g} {unit}",
+            f"{crossing.value / shown.scale:.4g} {shown.shown_unit}",
             (0.0, crossing.frequency),
             (9, 6),
             textcoords="offset points",
@@ -74,7 +74,7 @@ def root_locus(result: SweepResults) -> Figure:
     axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
     axes.text(0.995, 0.015, "unstable", transform=axes.transAxes, ha="right", va="bottom", color=UNSTABLE, fontsize=9)
     bar = figure.colorbar(ScalarMappable(scale, colours), ax=axes, pad=0.02, aspect=28)
-    bar.set_label(f"{name}, {unit}")
+    bar.set_label(shown.label)
     bar.outline.set_visible(False)
     axes.set_xlabel("Growth rate, 1/s")
     axes.set_ylabel("Frequency, Hz")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from ..case.parameters import PARAMETERS
 from ..record.header import Header, read_header
 from ..record.layout import read_texts
 from ..record.mesh import MeshData, read_mesh
@@ -21,14 +22,6 @@ from .stability_tables import SCAN
 if TYPE_CHECKING:
     from ..model import ValveModel
     from ..studies.onset import OnsetResult
-
-_UNITS = {
-    "pressure": ("kPa", 1e3),
-    "density": ("kg/m3", 1.0),
-    "alpha": ("1/s", 1.0),
-    "beta": ("s", 1.0),
-    "angle": ("deg", 1.0),
-}
 
 
 class OnsetResults(Result):
@@ -113,7 +106,7 @@ class OnsetResults(Result):
         return found
 
     def lines(self) -> list[str]:
-        unit, scale = _UNITS.get(self.parameter, ("", 1.0))
+        unit, scale = PARAMETERS[self.parameter].shown_unit, PARAMETERS[self.parameter].scale
         if not self.points:
             low, high = (self.values[[0, -1]] / scale) if len(self.values) else (math.nan, math.nan)
             state = "unstable" if len(self.values) and self.growth_rates[0, 0] > 0 else "stable"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from ..case.axis import KEYS
+from ..case.parameters import PARAMETERS
 from ..record.files import writing
 from ..record.header import Header, read_header, write_header
 from ..record.layout import TEXT, Column, Table, read_array, read_texts, replace_texts, write_array
@@ -18,7 +18,7 @@ from ..record.mesh import MeshData, read_mesh, write_mesh
 from ..record.result import Result
 from .modes import surroundings
 from .state import SUMMARY
-from .sweep_table import crossing_line, head, rows_of_sweep, units_of
+from .sweep_table import crossing_line, head, rows_of_sweep
 
 if TYPE_CHECKING:
     from ..studies.sweep import SweepResult
@@ -141,7 +141,7 @@ class SweepResults(Result):
     @property
     def units(self) -> str:
         """Of the parameter."""
-        return units_of(self.parameter)
+        return PARAMETERS[self.parameter].quantity.si
 
     @classmethod
     def of(cls, result: SweepResult, header: Header | None = None, warnings: Sequence[str] = ()) -> SweepResults:
@@ -204,7 +204,7 @@ class SweepResults(Result):
             write_mesh(file, self.mesh)
             group = file.create_group("sweep")
             group.attrs["certified"] = self.certified
-            write_array(group, Column("values", self.units, f"Values of {KEYS[self.parameter]}"), self.values)
+            write_array(group, Column("values", self.units, f"Values of {self.axis.key}"), self.values)
             write_array(
                 group,
                 Column("unstable_count", "", "Unstable eigenvalues, both of a pair counted", "i8"),

@@ -6,29 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..case.parameters import PARAMETERS
+
 if TYPE_CHECKING:
     from .sweep import Crossing, SweepResults
-
-#: What each parameter is called and shown in, and the factor from SI to that.
-SHOWN = {
-    "pressure": ("Inlet pressure", "kPa", 1e-3),
-    "density": ("Fluid density", "kg/m³", 1.0),
-    "alpha": ("Mass damping α", "1/s", 1.0),
-    "beta": ("Stiffness damping β", "s", 1.0),
-}
-_SI = {"pressure": "Pa", "density": "kg/m^3", "alpha": "1/s", "beta": "s"}
-
-
-def units_of(parameter: str) -> str:
-    """SI unit of a parameter."""
-    return _SI[parameter]
 
 
 def head(parameter: str) -> tuple[str, str]:
     """Names and units above the table."""
     return (
         f"{parameter:>12} {'growth rate':>12} {'frequency':>11} {'unstable':>9}",
-        f"{_SI[parameter]:>12} {'1/s':>12} {'Hz':>11}",
+        f"{PARAMETERS[parameter].quantity.si:>12} {'1/s':>12} {'Hz':>11}",
     )
 
 
@@ -53,12 +41,12 @@ def rows_of_sweep(result: SweepResults) -> list[str]:
 
 def crossing_line(result: SweepResults, crossing: Crossing) -> str:
     """One sentence on a crossing of zero growth."""
-    _, unit, factor = SHOWN[result.parameter]
+    shown = PARAMETERS[result.parameter]
     becomes = "unstable" if crossing.to_unstable else "stable"
     how = f"at {crossing.frequency:.4g} Hz" if crossing.frequency > 0 else "without oscillation"
     return (
         f"Branch {crossing.branch} becomes {becomes} near {result.parameter} "
-        f"{factor * crossing.value:.4g} {unit} {how} (interpolated)."
+        f"{crossing.value / shown.scale:.4g} {shown.shown_unit} {how} (interpolated)."
     )
 
 

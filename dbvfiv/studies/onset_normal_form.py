@@ -11,11 +11,12 @@ from continuation.hopf import hopf_borders
 from continuation.normal_form import hopf_normal_form
 
 from ..case.model import Case
+from ..case.parameters import PARAMETERS
 from ..errors import SolveError
 from ..model.system import ValveSystem
 from .column import search_options
 from .onset_point import OnsetPoint
-from .parameters import DESIGN, SYSTEM_NAMES, Place, rebuilder
+from .parameters import Place, rebuilder
 from .stability_walk import StabilityWalk
 
 #: What the note of a point begins with where its normal form was not found.
@@ -53,5 +54,5 @@ def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: 
     omega = abs(complex(mode.eigenvalue).imag)
     vector = np.concatenate([mode.q, 1j * omega * mode.q, mode.u])
     left, right = hopf_borders(system.linear(u, mu), omega, vector / np.linalg.norm(vector))
-    name = None if parameter in DESIGN else SYSTEM_NAMES.get(parameter, parameter)
+    name = PARAMETERS[parameter].system_name or None if parameter else None
     return hopf_normal_form(system, u, mu, omega, right, left, name)

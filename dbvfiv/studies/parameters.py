@@ -6,39 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from ..case.model import Case
+from ..case.parameters import CONDITIONS, DESIGN, PARAMETERS
 from ..errors import SolveError
 from ..model import ValveModel
 from ..model.dynamics import Conditions
-
-#: Parameters of the surroundings, which leave the steady state as it is.
-SURROUNDINGS = ("density", "alpha", "beta", "storage")
-#: Parameters of the design, for which the model is built anew.
-DESIGN = ("thickness", "angle", "strain")
-#: Names in `dbvfiv.model.system.ValveSystem`.
-SYSTEM_NAMES = {"pressure": "inlet"}
-#: Labels with units.
-LABELS = {
-    "pressure": "Inlet pressure, kPa",
-    "density": "Fluid density, kg/m³",
-    "alpha": ("Mass damping α, 1/s"),
-    "beta": "Stiffness damping β, s",
-    "storage": "Continuity law (0 quasi-steady, 1 storage)",
-    "thickness": "Wall thickness factor",
-    "angle": "Fibre angle, degrees",
-    "strain": "Strain level of the rubbers",
-}
-UNITS = {
-    "pressure": "Pa",
-    "density": "kg/m3",
-    "alpha": "1/s",
-    "beta": "s",
-    "storage": "",
-    "thickness": "",
-    "angle": "degrees",
-    "strain": "",
-}
-#: What figures divide a parameter by.
-SCALES = {"pressure": 1e3}
 
 
 @dataclass(frozen=True)
@@ -53,7 +24,7 @@ class Place:
     storage : float
         Blend of the continuity laws, 0 quasi-steady, 1 storage.
     design : dict
-        Values of those of `DESIGN` that are not the case's own.
+        Values of those parameters of the design (`dbvfiv.case.parameters.DESIGN`) that are not the case's own.
     """
 
     pressure: float
@@ -89,19 +60,13 @@ class Place:
 
     def mu(self) -> dict[str, float]:
         """Parameters of a `ValveSystem`."""
-        return {
-            "inlet": self.pressure,
-            "density": self.density,
-            "alpha": self.alpha,
-            "beta": self.beta,
-            "storage": self.storage,
-            **self.design,
-        }
+        own = {PARAMETERS[name].system_name: getattr(self, name) for name in CONDITIONS}
+        return {**own, **self.design}
 
 
 def is_surrounding(name: str) -> bool:
     """Whether a parameter leaves the linearised structure as it is."""
-    return name in SURROUNDINGS
+    return PARAMETERS[name].surrounding
 
 
 def check_flow(case: Case) -> None:

@@ -14,9 +14,9 @@ import numpy as np
 
 from continuation import SystemBase
 
+from ..case.parameters import DESIGN, PARAMETERS
 from ..model.system import ValveSystem
 from .map_column import MapPlan
-from .parameters import DESIGN, SYSTEM_NAMES
 
 #: Angular frequency that counts as 1, rad/s.
 RATE = 2 * math.pi * 100.0
@@ -75,7 +75,7 @@ class PlaneSystem(SystemBase):
         axis = self._axes[key]
         a, b = axis.values[0], axis.values[-1]
         rate = self.plan.value(axis, plane[key]) * math.log(b / a) if axis.log else b - a
-        return SYSTEM_NAMES.get(axis.parameter, axis.parameter), rate
+        return PARAMETERS[axis.parameter].system_name or axis.parameter, rate
 
     def state(self, q: np.ndarray, plane) -> np.ndarray:
         return self.valve.state(q, self.mu(plane))

@@ -16,11 +16,14 @@ import numpy as np
 from eigen import Mode
 from eigen.derivative import difference, eigenvalue_derivative
 
+from ..case.parameters import SURROUNDINGS
 from ..errors import SolveError
 from ..model import Conditions, ValveModel, linearise
 from ..model.newton import EquilibriumSolver, NewtonOptions
+from .parameters import redesigned
 
-SURROUNDINGS = ("density", "alpha", "beta")
+#: Parameters of the surroundings that a pencil takes.
+_OF_PENCIL = tuple(name for name in SURROUNDINGS if name in {field.name for field in fields(Conditions)})
 
 
 @dataclass(frozen=True)
@@ -59,10 +62,11 @@ class Sensitivity:
 def parameters_of(model: ValveModel) -> tuple[str, ...]:
     """Every parameter an eigenvalue of this valve can be differentiated by.
 
-    Layers count from 1, inside to outside: "layer 3 angle", "layer 1 thickness" (its share of the wall), "layer 1 c10"
+    Those of `dbvfiv.case.parameters` that a model can be stepped along, and the layers, which count from 1, inside to
+    outside: "layer 3 angle", "layer 1 thickness" (its share of the wall), "layer 1 c10"
     (a constant of its law).
     """
-    names = ["pressure", *SURROUNDINGS, "thickness_factor"]
+    names = ["pressure", *_OF_PENCIL, "thickness"]
     for i, layer in enumerate(model.shell.section.layers, 1):
         names += [f"layer {i} thickness", f"layer {i} angle"]
         names += [f"layer {i} {field.name}" for field in fields(layer.law)]
@@ -119,10 +123,10 @@ def _layer(name: str) -> tuple[int, str]:
 def _value(model, pressure, conditions, name) -> float:
     if name == "pressure":
         return pressure
-    if name in SURROUNDINGS:
+    if name in _OF_PENCIL:
         return getattr(conditions, name)
-    if name == "thickness_factor":
-        return model.case.valve.thickness_factor
+    if name == "thickness":
+        return 1.0
     i, quantity = _layer(name)
     layer = model.shell.section.layers[i]
     return float(getattr(layer if quantity in ("thickness", "angle") else layer.law, quantity))
@@ -130,13 +134,13 @@ def _value(model, pressure, conditions, name) -> float:
 
 def _pencil(model, q, pressure, conditions, name, value):
     """Pencil at the steady state with one parameter changed."""
-    if name in SURROUNDINGS:
+    if name in _OF_PENCIL:
         return linearise(model, q, pressure).pencil(replace(conditions, **{name: value}))
     changed = model
     if name == "pressure":
         pressure = value
-    elif name == "thickness_factor":
-        changed = ValveModel(model.case.replace({"valve.thickness_factor": value}))
+    elif name == "thickness":
+        changed = ValveModel(redesigned(model.case, {name: value}))
     else:
         changed = ValveModel(model.case, _section(model.shell.section, name, value))
     result = EquilibriumSolver(changed, NewtonOptions(tolerance=1e-11)).solve(q, pressure)

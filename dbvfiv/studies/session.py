@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from ..case.model import Case
+from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 from ..model import ValveModel
+from ..model.equilibria import find_equilibrium, redescribe, rest_state
+from ..model.state import SteadyState
 from ..observer import Observer
 from ..record.files import kind_of
 from ..record.header import Header
@@ -17,6 +20,27 @@ from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, StoredRecord
 from . import KINDS
 from .study import Study, find_study
+
+#: Keyword arguments of the Python interface and the keys of the case that they stand for.
+KEYWORDS = {row.name: row.key for row in PARAMETERS.values() if row.swept} | {
+    "continuity": "fluid.continuity",
+    "in_vacuo": "modes.in_vacuo",
+    "max_frequency": "modes.max_frequency",
+}
+
+
+def named_changes(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Changes of a case from keyword arguments; those that are None are left out.
+
+    Raises
+    ------
+    CaseError
+        For a name that is nothing to choose.
+    """
+    unknown = [name for name in given if name not in KEYWORDS]
+    if unknown:
+        raise CaseError(f"{unknown[0]!r} is given, which is nothing to choose here; known are {', '.join(KEYWORDS)}.")
+    return {KEYWORDS[name]: value for name, value in given.items() if value is not None}
 
 
 class Session:
@@ -27,6 +51,8 @@ class Session:
     case : Case
     name : str
         For titles and file names.
+    start : SteadyState, optional
+        An equilibrium that is known already.
 
     Attributes
     ----------
@@ -35,8 +61,8 @@ class Session:
     mesh : MeshData
     """
 
-    def __init__(self, case: Case, name: str = "case"):
-        self.case, self.name = case, name
+    def __init__(self, case: Case, name: str = "case", start: SteadyState | None = None):
+        self.case, self.name, self.start = case, name, start
 
     @cached_property
     def model(self) -> ValveModel:
@@ -71,6 +97,23 @@ class Session:
         if {key.partition(".")[0] for key in changes} <= set(KINDS):
             session.__dict__.update({name: self.__dict__[name] for name in ("model", "mesh") if name in self.__dict__})
         return session
+
+    def equilibrium(self, observer: Observer) -> SteadyState:
+        """The steady state at drive.pressure: the one known already, the valve at rest, or by load steps.
+
+        What is worth knowing about model and state is told to the observer.
+
+        Raises
+        ------
+        SolveError
+            If it is not reached.
+        """
+        model, pressure = self.model, self.case.drive.pressure
+        if self.start is not None and self.start.pressure == pressure:
+            return redescribe(model, self.start)  # flow and jet follow the density of this case
+        if pressure == 0:
+            return rest_state(model)
+        return find_equilibrium(model, pressure, observer)
 
     def perform(
         self, kind: str, output: str | Path | None = None, observer: Observer | None = None, **choices: Any

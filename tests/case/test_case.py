@@ -167,3 +167,28 @@ def test_parameter_ranges():
     assert axis.key == "fluid.density" and axis.values == pytest.approx((1, 10, 100, 1000))
     assert parse_axis("pressure=0.5 kPa:50 kPa:3").values == (500.0, 25250.0, 50000.0)
     assert parse_axis("alpha=0:5:2").values == (0.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    "text, overrides, expected",
+    [
+        ("", [], None),
+        ("[drive]\npressure = 5e3", [], (5e3,)),
+        ("[steady]\npressures = [1e3, 2e3]", [], (1e3, 2e3)),
+        ("[drive]\npressure = 5e3\n[steady]\npressures = [1e3, 2e3]", [], (1e3, 2e3)),
+        ("[steady]\npressures = [1e3, 2e3]", ["drive.pressure=7 kPa"], (7e3,)),
+        ("[drive]\npressure = 5e3", ["steady.pressures=[3e3]"], (3e3,)),
+        ("[steady]\npressures = [1e3, 2e3]", ["drive.pressure=7 kPa", "steady.pressures=[3e3]"], (3e3,)),
+        ("", ["closure.pressures=[4e3]", "drive.pressure=7 kPa"], (7e3,)),
+    ],
+)
+def test_pressures_of_steady(tmp_path, text, overrides, expected):
+    """What was given alone, or last, counts; the same by file, by override and by a change from Python."""
+    (tmp_path / "a.toml").write_text(text)
+    assert load_case(tmp_path / "a.toml", overrides).steady_pressures() == (expected or Case().steady.pressures)
+    case = load_case(tmp_path / "a.toml")
+    changes = {key: value for key, _, value in (o.partition("=") for o in overrides)}
+    changes = {key: value if "[" not in value else [float(value.strip("[]"))] for key, value in changes.items()}
+    changed = case.replace(changes).replace({"fluid.density": 10})
+    assert changed.steady_pressures() == (expected or Case().steady.pressures)
+    assert Case().steady_pressures() == Case().steady.pressures

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 import dbvfiv
+from dbvfiv.studies.session import Session
 
 COARSE = ("--set", "mesh.around=8", "--set", "mesh.along=16")
 KEYS = {
@@ -62,12 +63,8 @@ def test_table_and_file(command_line, tmp_path):
     ],
 )
 def test_which_pressures(monkeypatch, tmp_path, command_line, toml, arguments, expected):
-    from dbvfiv import api
-
     asked = []
-    monkeypatch.setattr(
-        api.Valve, "_run", lambda self, pressures, output, observer: asked.extend(pressures) or sys.exit(0)
-    )
+    monkeypatch.setattr(Session, "perform", lambda self, *_: asked.extend(self.case.steady.pressures) or sys.exit(0))
     (tmp_path / "a.toml").write_text(toml)
     with pytest.raises(SystemExit):
         command_line("steady", tmp_path / "a.toml", *COARSE, *arguments)

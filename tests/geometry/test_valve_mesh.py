@@ -123,7 +123,7 @@ def test_wall_map():
 
 def test_wall_deduction():
     """Th. 4.12-4.14 with the numbers of App. A."""
-    deducted = wall_deduction(VALVE, np.array([0.0, 0.21, 0.35, 0.49, 0.56]))
+    deducted = wall_deduction(VALVE, np.array([0.0, 0.21, 0.35, 0.49, 0.56]), surface_of(VALVE))
     duckbill = np.pi * 0.00619**2 / 4 + 0.125 * (0.00619 - 1e-4)
     flange = np.pi * (0.13919**2 - (0.13919 - 0.00819) ** 2) / 4
     assert deducted == pytest.approx([duckbill, duckbill, (duckbill + flange) / 2, flange, flange], rel=1e-12)

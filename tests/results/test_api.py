@@ -42,3 +42,9 @@ def test_failures_are_raised(coarse_valve, one_sentence):
 def test_nothing_else_is_offered():
     with pytest.raises(AttributeError):
         dbvfiv.laod
+
+
+def test_pressures_are_those_of_the_command_line():
+    """Only drive.pressure given: one state at it, as `dbvfiv steady --set drive.pressure=...` gives."""
+    valve = dbvfiv.load(changes={"mesh.around": 8, "mesh.along": 16, "drive.pressure": "4 kPa"})
+    assert [state.pressure for state in valve.steady().states] == [4e3]

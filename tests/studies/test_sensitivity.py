@@ -27,7 +27,7 @@ def valve():
         "density",
         "alpha",
         "beta",
-        "thickness_factor",
+        "thickness",
         "layer 3 angle",
         "layer 1 thickness",
         "layer 2 c10",

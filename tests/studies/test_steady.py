@@ -128,3 +128,11 @@ def test_uniform_pressure():
     model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 12, "drive.kind": "uniform"}))
     state = LoadPath(model).go_to(2e3)
     assert state.converged and state.mass_flow == 0.0 and state.lip_opening > 0
+
+
+def test_a_state_without_a_finite_flow_is_an_error():
+    """Lips 100 mm apart at rest open beyond the flange: before, a flow of inf was "converged"."""
+    model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16, "valve.initial_gap": "100 mm"}))
+    result = find_equilibria(model, [6e3])
+    assert not result.states
+    assert "no finite steady flow" in result.failures[0] or "No equilibrium" in result.failures[0]

@@ -37,7 +37,7 @@ def command(case: Case, pressures: Pressures = None) -> Request:
 
     dbvfiv steady cases/dbv12.toml -p "18 kPa" -p "36 kPa" -o dbv12.h5
     """
-    return Request({"steady.pressures": list(_read(pressures)) if pressures else None})
+    return Request({"steady.pressures": list(_read(pressures) if pressures else case.steady_pressures())})
 
 
 def _read(texts: Iterable[str]) -> Iterable[float | str]:

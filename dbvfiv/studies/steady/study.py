@@ -12,10 +12,11 @@ from ...errors import SolveError
 from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_warnings
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
+from ...record.states import SUMMARY, read_states, state_row
 from ...record.table import printed_head, printed_row
 from ..session import Session
 from ..study import Study
-from .result import STATES, SUMMARY, SteadyResult, read_states, row_of, tables_of
+from .result import STATES, SteadyResult, tables_of
 
 
 def run_steady(session: Session, record: GrowingRecord) -> None:
@@ -25,7 +26,7 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
     """
     model, pressures = session.model, session.case.steady.pressures
     path = LoadPath(model, SteadyOptions.of(session.case), observer=record)
-    states = read_states(record)
+    states = read_states(record, STATES)
     known = {state.pressure for state in states}
     if states:
         last = len(states) - 1
@@ -45,7 +46,7 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
             except SolveError as error:
                 record.fail(str(error))
                 continue
-            record.append(STATES, row_of(model, state) | _way_on(path))
+            record.append(STATES, state_row(model, state) | _way_on(path))
             states.append(state)
             record.item(state)
     finally:

@@ -1,0 +1,228 @@
+"""The parameters of a valve in its fluid, declared once.
+
+Keys of the case, ranges, sweeps, onsets, maps, sensitivities, figures, tables and help texts read this table; a new
+parameter is one row here and what it does in the model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from .quantity import Quantity
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One row of the table.
+
+    Attributes
+    ----------
+    name : str
+        As it stands in ranges, results and arguments of the Python interface.
+    key : str
+        Key of the case that holds it.
+    quantity : Quantity
+        SI unit of its values.
+    title : str
+        What it is called in figures and tables.
+    symbol : str
+        Of formulas; empty where there is none.
+    shown_unit : str
+        Unit in figures and tables.
+    scale : float
+        What a value is divided by to be in `shown_unit`.
+    low, high : float
+        Values that can be computed, SI.
+    low_included : bool
+        Whether `low` itself can be.
+    usual : tuple
+        Start, stop and count of the range taken where only the name is given; SI.
+    log : bool
+        Whether the usual range has logarithmic steps.
+    moves_equilibrium : bool
+        Whether the steady state changes with it. Those that do not are surroundings: the linearised structure stays.
+    design : bool
+        Whether the model is built anew for each value.
+    swept : bool
+        Whether modes are tracked along it.
+    system_name : str
+        Its name in `dbvfiv.model.system.ValveSystem`; empty for parameters of the design.
+    note : str
+        Added to the name in lists, where the name alone does not say what it is.
+    """
+
+    name: str
+    key: str
+    quantity: Quantity
+    title: str
+    usual: tuple[float, float, int]
+    symbol: str = ""
+    shown_unit: str = ""
+    scale: float = 1.0
+    low: float = 0.0
+    high: float = math.inf
+    low_included: bool = True
+    log: bool = False
+    moves_equilibrium: bool = False
+    design: bool = False
+    swept: bool = False
+    system_name: str = ""
+    note: str = ""
+
+    @property
+    def surrounding(self) -> bool:
+        """Whether it leaves the steady state and the linearised structure as they are."""
+        return not self.moves_equilibrium
+
+    @property
+    def words(self) -> str:
+        """Title and symbol."""
+        return f"{self.title} {self.symbol}".strip()
+
+    @property
+    def label(self) -> str:
+        """Title, symbol and unit, for the axis of a figure."""
+        return f"{self.words}, {self.shown_unit}" if self.shown_unit else self.words
+
+    @property
+    def usual_range(self) -> str:
+        """The usual range as it would be written."""
+        start, stop, count = self.usual
+        return f"{self.name}={start:g}:{stop:g}:{count}" + (":log" if self.log else "")
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """Limits of the case's key, as `section.key` takes them."""
+        return {"ge" if self.low_included else "gt": self.low, "le": self.high}
+
+    def text(self, value: float) -> str:
+        """A value for people, "6 kPa" or "α = 5 1/s"."""
+        shown = f"{value / self.scale:g} {self.shown_unit}".strip()
+        return f"{self.symbol} = {shown}" if self.symbol else shown
+
+
+_TABLE = (
+    Parameter(
+        name="pressure",
+        key="drive.pressure",
+        quantity=Quantity("Pa", "kPa"),
+        title="Inlet pressure",
+        usual=(300.0, 36000.0, 61),
+        shown_unit="kPa",
+        scale=1e3,
+        high=1e7,
+        low_included=False,
+        log=True,
+        moves_equilibrium=True,
+        swept=True,
+        system_name="inlet",
+    ),
+    Parameter(
+        name="density",
+        key="fluid.density",
+        quantity=Quantity("kg/m^3", "kg/m^3"),
+        title="Fluid density",
+        usual=(0.5, 2000.0, 61),
+        shown_unit="kg/m³",
+        high=30000.0,
+        low_included=False,
+        log=True,
+        swept=True,
+        system_name="density",
+    ),
+    Parameter(
+        name="alpha",
+        key="damping.alpha",
+        quantity=Quantity("1/s", "1/s"),
+        title="Mass damping",
+        usual=(0.0, 40.0, 41),
+        symbol="α",
+        shown_unit="1/s",
+        high=1e6,
+        swept=True,
+        system_name="alpha",
+    ),
+    Parameter(
+        name="beta",
+        key="damping.beta",
+        quantity=Quantity("s", "s"),
+        title="Stiffness damping",
+        usual=(0.0002, 0.02, 61),
+        symbol="β",
+        shown_unit="s",
+        high=1e3,
+        log=True,
+        swept=True,
+        system_name="beta",
+    ),
+    Parameter(
+        name="storage",
+        key="fluid.continuity",
+        quantity=Quantity(""),
+        title="Continuity law (0 quasi-steady, 1 storage)",
+        usual=(0.0, 1.0, 21),
+        high=1.0,
+        system_name="storage",
+        note="blend of the continuity laws, 0 quasi-steady to 1 storage",
+    ),
+    Parameter(
+        name="thickness",
+        key="valve.thickness_factor",
+        quantity=Quantity(""),
+        title="Wall thickness factor",
+        usual=(0.6, 1.4, 17),
+        low=0.05,
+        high=10.0,
+        moves_equilibrium=True,
+        design=True,
+        note="factor of the wall thickness",
+    ),
+    Parameter(
+        name="angle",
+        key="layers",
+        quantity=Quantity("deg", "deg"),
+        title="Fibre angle",
+        usual=(20.0, 80.0, 25),
+        shown_unit="degrees",
+        high=90.0,
+        moves_equilibrium=True,
+        design=True,
+        note="of the plies, degrees",
+    ),
+    Parameter(
+        name="strain",
+        key="materials.strain_level",
+        quantity=Quantity("", "%"),
+        title="Strain level of the rubbers",
+        usual=(0.1, 0.6, 21),
+        low=0.1,
+        high=0.6,
+        moves_equilibrium=True,
+        design=True,
+        note="level of the rubbers",
+    ),
+)
+
+#: Every parameter by its name.
+PARAMETERS = {row.name: row for row in _TABLE}
+#: Names of those along which modes are tracked.
+SWEPT = tuple(row.name for row in _TABLE if row.swept)
+#: Names of those of load and surroundings, which a model takes without being built anew.
+CONDITIONS = tuple(row.name for row in _TABLE if not row.design)
+#: Their names in `dbvfiv.model.system.ValveSystem`.
+SYSTEM_NAMES = tuple(PARAMETERS[name].system_name for name in CONDITIONS)
+#: Names of those that leave the steady state as it is.
+SURROUNDINGS = tuple(row.name for row in _TABLE if row.surrounding)
+#: Names of those for which the model is built anew.
+DESIGN = tuple(row.name for row in _TABLE if row.design)
+
+
+def listed(names: Iterable[str] = tuple(PARAMETERS), notes: bool = False) -> str:
+    """Names as words of a sentence, "pressure, density, alpha or beta"; with what they are where `notes` are asked."""
+    words = [
+        f"{name} ({PARAMETERS[name].note})" if notes and PARAMETERS[name].note else PARAMETERS[name].name
+        for name in names
+    ]
+    return ", ".join(words[:-1]) + f" or {words[-1]}" if len(words) > 1 else words[0]

@@ -1,0 +1,134 @@
+"""Steady states in a record: what a user reads off one, its shape, its layers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from ..model import ValveModel
+from ..model.state import SteadyState
+from ..shell.recovery import layer_fields
+from .layout import TEXT, Column, Shown
+from .mesh import MeshData
+from .record import Record, plain
+from .table import TableSpec
+
+#: What a user reads off a state; the names are the keys of the JSON output.
+SUMMARY = (
+    Column("pressure", "Pa", "Inlet pressure", shown=Shown("pressure", "kPa", 9, lambda s: f"{s.pressure / 1e3:.6g}")),
+    Column(
+        "mass_flow",
+        "kg/s",
+        "Mass flow of the whole valve",
+        shown=Shown("mass flow", "kg/s", 10, lambda s: f"{s.mass_flow:.3f}"),
+    ),
+    Column(
+        "outlet_area",
+        "m^2",
+        "Flow area at the lip, whole valve",
+        shown=Shown("lip area", "cm2", 9, lambda s: f"{s.outlet_area * 1e4:.3f}"),
+    ),
+    Column(
+        "outlet_velocity",
+        "m/s",
+        "Jet velocity at the lip",
+        shown=Shown("jet", "m/s", 7, lambda s: f"{s.outlet_velocity:.3f}"),
+    ),
+    Column(
+        "lip_opening",
+        "m",
+        "Displacement in y of the lip at x = z = 0",
+        shown=Shown("lip opening", "mm", 12, lambda s: f"{s.lip_opening * 1e3:.3f}"),
+    ),
+    Column(
+        "max_displacement",
+        "m",
+        "Largest displacement of the mid-surface",
+        shown=Shown(
+            "largest displacement",
+            "mm at z",
+            21,
+            lambda s: f"{s.max_displacement * 1e3:.3f} at {s.max_displacement_position[2] * 1e3:.0f}",
+        ),
+    ),
+    Column("max_displacement_position", "m", "Where it occurs, position at rest"),
+    Column("stops", "", "Lip stops in contact", "i8"),
+    Column("converged", "", "Whether the residual fell below the tolerance", "bool"),
+    Column(
+        "iterations",
+        "",
+        "Newton iterations over all load steps that led here",
+        "i8",
+        shown=Shown("iterations", "", 11, lambda s: f"{s.iterations}"),
+    ),
+    Column("load_steps", "", "Load steps that led here", "i8"),
+    Column(
+        "residual",
+        "",
+        "Unbalanced force over pressure force",
+        shown=Shown("residual", "", 9, lambda s: f"{s.residual:.1e}"),
+    ),
+    Column("rounding", "", "Relative residual that rounding alone explains"),
+    Column("reason", "", "Why the iteration ended", TEXT),
+)
+#: Fields of a state.
+FIELDS = (
+    Column("nodal", "m, rad", "Displacements ux uy uz and two rotations of each node"),
+    Column("station_area", "m^2", "Flow area of a quarter at each row"),
+    Column("station_velocity", "m/s", "Velocity at each row"),
+    Column("station_pressure", "Pa", "Pressure at each row"),
+)
+#: Layers, inside to outside, in their own axes.
+LAYERS = (
+    Column("layers/strain", "", "Green-Lagrange strain E11 E22 2E12 2E13 2E23, element mean"),
+    Column("layers/stress", "Pa", "Second Piola-Kirchhoff stress S11 S22 S12 S13 S23, element mean"),
+    Column("layers/von_mises", "Pa", "Von Mises value of the Cauchy stress, largest in the element"),
+    Column("layers/stretch", "", "Smallest and largest principal stretch in the plane of the layer"),
+)
+STATE_COLUMNS = (*SUMMARY, *FIELDS)
+
+
+def state_table(name: str, mesh: MeshData, further: Iterable[Column] = (), shapes=None) -> TableSpec:
+    """Table of steady states on a mesh.
+
+    Parameters
+    ----------
+    name : str
+    mesh : MeshData
+    further : iterable of Column
+        Columns besides, with their `shapes`.
+    """
+    elements, count = len(mesh.quads), len(mesh.layer_names)
+    row_shapes = dict.fromkeys((c.name for c in FIELDS), (len(mesh.z),)) | {
+        "max_displacement_position": (3,),
+        "nodal": (len(mesh.nodes), 5),
+        "layers/strain": (elements, count, 5),
+        "layers/stress": (elements, count, 5),
+        "layers/von_mises": (elements, count),
+        "layers/stretch": (elements, count, 2),
+    }
+    return TableSpec(name, (*STATE_COLUMNS, *LAYERS, *further), row_shapes | (shapes or {}))
+
+
+def state_row(model: ValveModel, state: SteadyState) -> dict[str, Any]:
+    """A state of a model as a row of such a table."""
+    layers = layer_fields(model.shell, state.q)
+    return {c.name: getattr(state, c.name) for c in STATE_COLUMNS} | {
+        c.name: getattr(layers, c.name.split("/")[1]) for c in LAYERS
+    }
+
+
+def read_states(record: Record, table: str) -> list[SteadyState]:
+    """States that a table of a record holds."""
+    columns = {c.name: record.column(table, c.name) for c in STATE_COLUMNS}
+    states = []
+    for i in range(record.rows(table)):
+        row = {name: plain(values[i]) for name, values in columns.items()}
+        states.append(SteadyState(q=record.mesh.restrict(row["nodal"]), **row))
+    return states
+
+
+def summarise(state: SteadyState) -> dict[str, Any]:
+    """Plain SI numbers of a state for JSON."""
+    values = {c.name: getattr(state, c.name) for c in SUMMARY}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}

@@ -1,0 +1,136 @@
+"""A steady state of a result, and what can be asked about it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..model import ValveModel
+from ..model.state import SteadyState
+from ..record.record import GrowingRecord
+from ..record.states import LAYERS, read_states, summarise
+from ..shell.recovery import LayerFields
+from .result import StudyResult
+from .session import Session, named_changes
+from .study import find_study
+
+
+@dataclass(frozen=True, eq=False)
+class State(SteadyState):
+    """An equilibrium of a result, and what can be asked about it.
+
+    Attributes
+    ----------
+    results : StudyResult
+        The run it belongs to.
+    table : str
+        Where it is kept in that.
+    index : int
+        Its place there.
+
+    Examples
+    --------
+    >>> state = dbvfiv.load().steady(pressure=36e3)     # doctest: +SKIP
+    >>> state.mass_flow, state.layers.von_mises.max()   # doctest: +SKIP
+    """
+
+    results: StudyResult = field(repr=False)
+    table: str = field(repr=False)
+    index: int = field(repr=False)
+
+    def __repr__(self) -> str:
+        numbers = f"{self.mass_flow:.4g} kg/s, lip opening {self.lip_opening * 1e3:.4g} mm"
+        return f"<State at {self.pressure / 1e3:.6g} kPa: {numbers}>"
+
+    @cached_property
+    def layers(self) -> LayerFields:
+        """Strains and stresses of the layers."""
+        record = self.results.record
+        found = {c.name.split("/")[1]: record.value(self.table, c.name, self.index) for c in LAYERS}
+        return LayerFields(record.mesh.layer_names, **found)
+
+    @property
+    def model(self) -> ValveModel:
+        """The coupled model it is a state of."""
+        return self.results.model
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON."""
+        return summarise(self)
+
+    def solution(self) -> SteadyState:
+        """The state by itself, to start from for instance."""
+        return SteadyState(**{f.name: getattr(self, f.name) for f in fields(SteadyState)})
+
+    def modes(
+        self, *, count: int | None = None, output: str | Path | None = None, observer: Any = None, **changes: Any
+    ) -> Any:
+        """Leading modes of this state; fluid and damping may differ from those it was found with.
+
+        Examples
+        --------
+        >>> state.modes(density=1.2, alpha=0).plot("figures")     # doctest: +SKIP
+        """
+        return self._session(changes, {"modes.count": count}).perform("modes", output, observer)
+
+    def sweep(
+        self,
+        over: str | None = None,
+        *,
+        count: int | None = None,
+        output: str | Path | None = None,
+        observer: Any = None,
+        **changes: Any,
+    ) -> Any:
+        """Modes of this state tracked along density, alpha or beta, such as "density=1:1000:40:log"."""
+        return self._session(changes, {"sweep.over": over, "sweep.count": count}).perform("sweep", output, observer)
+
+    def _session(self, given: dict[str, Any], keys: dict[str, Any]) -> Session:
+        changes = {"drive.pressure": self.pressure} | named_changes(given) | keys
+        session = self.results.session.replace({key: value for key, value in changes.items() if value is not None})
+        session.start = self.solution()
+        return session
+
+    def plot(self, folder: str | Path = ".", format: str = "png") -> list[Path]:
+        """Write the figures of this state alone."""
+        return gather_states([self]).plot(folder, format)
+
+    def save(self, path: str | Path) -> Path:
+        """Write a result file with this state alone."""
+        return gather_states([self]).save(path)
+
+    def export(self, path: str | Path, quarter: bool = False, deformed: bool = False) -> Path:
+        """Write this state for ParaView."""
+        return gather_states([self]).export(path, quarter, deformed)
+
+
+def states_of(result: StudyResult, table: str) -> tuple[State, ...]:
+    """The states that a table of a result holds."""
+    found = enumerate(read_states(result.record, table))
+    return tuple(State(**vars(state), results=result, table=table, index=i) for i, state in found)
+
+
+def gather_states(states: Sequence[State]) -> Any:
+    """A steady result with some states of a result, at least one."""
+    origin = states[0].results
+    study = find_study("steady")
+    (table,) = study.tables(origin.mesh)
+    record = GrowingRecord(replace(origin.header, kind="steady"), origin.mesh, (table,))
+    for sentence in origin.warnings:
+        record.warn(sentence)
+    for state in states:
+        held = {c.name for c in origin.record.tables[state.table].columns}
+        row = {
+            c.name: origin.record.value(state.table, c.name, state.index)
+            if c.name in held
+            else np.full(table.shape(c), np.nan)
+            for c in table.columns
+        }
+        record.append(table.name, row)
+    record.conclude(origin.complete)
+    return study.result(record, origin.session)

@@ -1,0 +1,84 @@
+"""The table of parameters: every reader agrees with it."""
+
+import inspect
+
+import pytest
+
+import dbvfiv.api_modes
+from dbvfiv.case import Case, CaseError
+from dbvfiv.case.describe import allowed_words, walk
+from dbvfiv.case.parameters import CONDITIONS, DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, listed
+from dbvfiv.case.stability_axis import parse_stability_axis
+from dbvfiv.model.analytic import PARAMETERS as RESIDUAL
+from dbvfiv.model.dynamics import Conditions
+from dbvfiv.studies.parameters import Place
+
+
+@pytest.mark.parametrize("row", PARAMETERS.values(), ids=PARAMETERS)
+def test_every_parameter_has_its_place_in_the_case(row):
+    keys = {info.key: info for info in walk()}
+    assert row.key in keys
+    if row.swept:
+        assert keys[row.key].unit == row.quantity.si
+
+
+@pytest.mark.parametrize("row", PARAMETERS.values(), ids=PARAMETERS)
+def test_usual_range_is_one(row):
+    axis = parse_stability_axis(row.name)
+    assert (axis.values[0], axis.values[-1], len(axis.values)) == row.usual
+    assert axis.log == row.log and axis.key == row.key
+
+
+@pytest.mark.parametrize("name", ["density", "alpha", "beta"])
+def test_limits_of_keys_are_those_of_the_table(name):
+    row = PARAMETERS[name]
+    assert Case().replace({row.key: row.high}) is not None
+    with pytest.raises(CaseError, match="at most"):
+        Case().replace({row.key: row.high * 1.01})
+    section, key = row.key.split(".")
+    words = allowed_words(type(getattr(Case(), section)).model_fields[key])
+    assert ("at least" in words) == row.low_included
+
+
+def test_ranges_end_where_the_key_does():
+    # 40000 kg/m3 is no density of a case and was one of an axis
+    with pytest.raises(CaseError, match="whose range is not within 0 to 30000"):
+        Case().replace({"onset.over": "density=1:40000:5"})
+    with pytest.raises(CaseError, match="whose range is not within"):
+        Case().replace({"sweep.over": "pressure=1 kPa:11 MPa:5"})
+    with pytest.raises(CaseError, match="whose range is not within 0 to 1"):
+        Case().replace({"onset.over": "storage=0:2:5"})
+
+
+def test_groups():
+    assert SURROUNDINGS == ("density", "alpha", "beta", "storage")
+    assert DESIGN == ("thickness", "angle", "strain")
+    assert SWEPT == ("pressure", "density", "alpha", "beta")
+    assert RESIDUAL == ("inlet", "density", "alpha", "beta", "storage")
+    assert set(inspect.signature(Conditions).parameters) < set(SURROUNDINGS)
+
+
+def test_a_place_knows_every_parameter():
+    place = Place.of(Case())
+    assert [place.value(name) for name in CONDITIONS] == [18e3, 1000.0, 5.0, 0.003, 0.0]
+    assert set(place.at(angle=30).mu()) == {*RESIDUAL, "angle"}
+
+
+def test_words():
+    assert PARAMETERS["pressure"].label == "Inlet pressure, kPa"
+    assert PARAMETERS["alpha"].label == "Mass damping α, 1/s"
+    assert PARAMETERS["thickness"].label == "Wall thickness factor"
+    assert PARAMETERS["pressure"].text(6e3) == "6 kPa"
+    assert PARAMETERS["beta"].text(0.003) == "β = 0.003 s"
+    assert listed(SWEPT) == "pressure, density, alpha or beta"
+    assert "strain (level of the rubbers)" in listed(notes=True)
+
+
+@pytest.mark.parametrize("command", ["sweep", "onset", "map"])
+def test_help_lists_the_table(command_line, command):
+    words = " ".join(command_line(command, "--help").out.replace("│", " ").split())
+    assert listed(SWEPT if command == "sweep" else PARAMETERS) in words
+
+
+def test_arguments_of_the_python_interface():
+    assert {name: dbvfiv.api_modes.KEYS[name] for name in SWEPT} == {name: PARAMETERS[name].key for name in SWEPT}
