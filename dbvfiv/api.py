@@ -12,16 +12,17 @@ from .case.model import Case
 from .case.parameters import PARAMETERS
 from .errors import CaseError, SolveError
 from .model import ValveModel
-from .studies.session import Session
-from .studies.steady.result import State, SteadyResult
+from .studies.modes.result import ModesResult
+from .studies.session import Session, named_changes
+from .studies.state import State
+from .studies.steady.result import SteadyResult
+from .studies.sweep.result import SweepResult
 
 if TYPE_CHECKING:
     from .observer import Observer
     from .results.closure import ClosureResults
     from .results.map import MapResults
-    from .results.modes import ModesResults
     from .results.onset import OnsetResults
-    from .results.sweep import SweepResults
     from .transient.result import TransientResults
 
 _PRESSURE = PARAMETERS["pressure"]
@@ -122,7 +123,7 @@ class Valve:
         output: str | Path | None = None,
         observer: Observer | None = None,
         **changes: Any,
-    ) -> ModesResults:
+    ) -> ModesResult:
         """Leading modes of the coupled valve at one pressure: growth rates, frequencies, shapes, and whether the state
         is stable.
 
@@ -149,9 +150,8 @@ class Valve:
         >>> found = dbvfiv.load().modes("6 kPa", density=10, alpha=0)     # doctest: +SKIP
         >>> found.modes[0].growth_rate, found.stable                      # doctest: +SKIP
         """
-        from .api_modes import changed, modes_of
-
-        return modes_of(changed(self, {"pressure": pressure} | changes, {"modes.count": count}), None, output, observer)
+        keys = {"drive.pressure": pressure, "modes.count": count}
+        return self._ask(keys, changes).perform("modes", output, observer)
 
     def sweep(
         self,
@@ -161,7 +161,7 @@ class Valve:
         output: str | Path | None = None,
         observer: Observer | None = None,
         **changes: Any,
-    ) -> SweepResults:
+    ) -> SweepResult:
         """Modes tracked along a parameter of load, fluid or damping.
 
         Parameters
@@ -173,9 +173,7 @@ class Valve:
         output, observer, changes
             As for `modes`; also pressure, for sweeps over something else.
         """
-        from .api_modes import changed, sweep_of
-
-        return sweep_of(changed(self, changes, {"sweep.over": over, "sweep.count": count}), None, output, observer)
+        return self._ask({"sweep.over": over, "sweep.count": count}, changes).perform("sweep", output, observer)
 
     def closure(
         self,
@@ -285,11 +283,17 @@ class Valve:
         >>> run = dbvfiv.load("cases/light-fluid.toml").transient()      # doctest: +SKIP
         >>> run.verdict["verdict"], run.history["lip_opening"]           # doctest: +SKIP
         """
-        from .api_modes import changed
         from .transient.api import transient
 
-        valve = changed(self, changes, {"transient.duration": duration})
+        keys = {"transient.duration": duration} | named_changes(changes)
+        valve = self.replace({key: value for key, value in keys.items() if value is not None})
         return transient(valve.model, valve.name, output, observer)
+
+    def _ask(self, keys: Mapping[str, Any], given: Mapping[str, Any]) -> Session:
+        """The session with keys and named arguments put into its case; None stands for nothing given."""
+        self.model  # shared by what is asked of this valve
+        changes = keys | named_changes(given)
+        return self.session.replace({key: value for key, value in changes.items() if value is not None})
 
 
 def load(case: str | Path | Case | None = None, changes: Mapping[str, Any] | None = None) -> Valve:

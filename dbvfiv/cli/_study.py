@@ -15,6 +15,9 @@ from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
 from ._output import print_json, print_places
 from ._progress import Progress
 
+#: What a command of a study may take from what all share.
+_SHARED = ("case", "plots")
+
 
 def study_commands() -> list[tuple[str, ModuleType]]:
     """Names and command modules of all studies."""
@@ -24,13 +27,16 @@ def study_commands() -> list[tuple[str, ModuleType]]:
 def make_command(kind: str, module: ModuleType) -> Callable[..., None]:
     """A command with the options of a study between the case file and what all studies share."""
     hints = get_type_hints(module.command, include_extras=True)
-    own = [p for name, p in inspect.signature(module.command).parameters.items() if name != "case"]
+    own = [p for name, p in inspect.signature(module.command).parameters.items() if name not in _SHARED]
+
+    taken = [name for name in inspect.signature(module.command).parameters if name in _SHARED]
 
     def command(
         case_file: Path | None, output: Path | None, plots: Path | None, overrides, as_json: bool, **given: Any
     ) -> None:
         case = read_case(case_file, overrides)
-        request = module.command(case, **given)
+        shared = {"case": case, "plots": plots}
+        request = module.command(**{name: shared[name] for name in taken}, **given)
         changes = {key: value for key, value in request.changes.items() if value is not None}
         choices = {name: value for name, value in request.choices.items() if value is not None}
         # what is heavy to import is loaded when a case has been read

@@ -14,6 +14,9 @@ from .newton import NewtonOptions
 from .state import SteadyState, describe_state
 from .valve import ValveModel
 
+#: Unbalanced force over pressure force above which a state is no equilibrium of its model.
+_UNBALANCED = 1e-4
+
 
 @dataclass(frozen=True)
 class SteadyOptions(LoadStepOptions):
@@ -176,6 +179,33 @@ def rest_state(model: ValveModel) -> SteadyState:
         rounding=0.0,
         reason="at rest without pressure",
     )
+
+
+def require_equilibrium(model: ValveModel, state: SteadyState) -> None:
+    """Refuse a state that is no equilibrium of a model.
+
+    Raises
+    ------
+    SolveError
+    """
+    if not state.converged:
+        raise SolveError(
+            f"The steady state at {state.pressure:.6g} Pa has not converged (residual "
+            f"{state.residual:.1e}), so it has no modes; find the equilibrium first."
+        )
+    if len(state.q) != model.size:
+        raise SolveError(
+            f"The steady state at {state.pressure:.6g} Pa belongs to another mesh, so it has no modes in this model."
+        )
+    scale = model.force_scale(state.q, state.pressure)
+    unbalanced = float(np.linalg.norm(model.residual(state.q, state.pressure)))
+    allowed = max(_UNBALANCED * scale, 1e3 * model.rounding(state.q, model.tangent(state.q, state.pressure)))
+    if not unbalanced <= allowed:
+        raise SolveError(
+            f"The state at {state.pressure:.6g} Pa is no equilibrium of this model: its unbalanced force is "
+            f"{unbalanced:.2g} N against "
+            f"{scale:.2g} N of pressure, so it has no modes; find the equilibrium first."
+        )
 
 
 def _states(path: LoadPath, pressures: list[float], failures: list[str], observer: Observer) -> Iterator[SteadyState]:

@@ -16,15 +16,15 @@ from ..record.whole_valve import WholeValve
 from .style import kilopascals, new_figure
 
 if TYPE_CHECKING:
-    from ..results.state import State
-    from ..results.steady import SteadyResults
+    from ..studies.state import State
+    from ..studies.steady.result import SteadyResult
 
 #: Turbo without its nearly black ends.
 COLOURS = ListedColormap(matplotlib.colormaps["turbo"](np.linspace(0.08, 0.95, 256)))
 _LIGHT = np.array([-0.35, -0.45, 0.82])
 
 
-def draw(result: SteadyResults, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SteadyResult, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
     state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
     yield "deformed", lambda: deformed(state)

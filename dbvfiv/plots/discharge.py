@@ -12,11 +12,11 @@ from . import published
 from .style import ACCENT, COMPUTED, PUBLISHED, new_figure
 
 if TYPE_CHECKING:
-    from ..results.state import State
-    from ..results.steady import SteadyResults
+    from ..studies.state import State
+    from ..studies.steady.result import SteadyResult
 
 
-def draw(result: SteadyResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SteadyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name."""
     if result.case.drive.kind == "flow":
         yield "head-discharge", lambda: head_discharge(result)
@@ -25,12 +25,12 @@ def draw(result: SteadyResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "deflection", lambda: deflection(result)
 
 
-def ordered(result: SteadyResults) -> list[State]:
+def ordered(result: SteadyResult) -> list[State]:
     """States from low to high pressure."""
     return sorted(result.states, key=lambda state: state.pressure)
 
 
-def head_discharge(result: SteadyResults) -> Figure:
+def head_discharge(result: SteadyResult) -> Figure:
     """Pressure drop over mass flow (compare Fig. 7-4 of the thesis)."""
     states = ordered(result)
     figure, axes = _axes("Mass flow, kg/s", "Pressure drop, kPa")
@@ -52,7 +52,7 @@ def head_discharge(result: SteadyResults) -> Figure:
     return _finish(figure, axes, "Head and discharge")
 
 
-def area_discharge(result: SteadyResults) -> Figure:
+def area_discharge(result: SteadyResult) -> Figure:
     """Lip area over mass flow (compare Fig. 7-5 of the thesis)."""
     states = ordered(result)
     figure, axes = _axes("Mass flow, kg/s", "Flow area at the lip, cm²")
@@ -62,7 +62,7 @@ def area_discharge(result: SteadyResults) -> Figure:
     return _finish(figure, axes, "Lip area and discharge")
 
 
-def jet_velocity(result: SteadyResults) -> Figure:
+def jet_velocity(result: SteadyResult) -> Figure:
     """Jet velocity over pressure (compare Fig. 7-7 of the thesis)."""
     states = ordered(result)
     figure, axes = _axes("Pressure drop, kPa", "Velocity, m/s")
@@ -83,7 +83,7 @@ def jet_velocity(result: SteadyResults) -> Figure:
     return _finish(figure, axes, "Jet velocity")
 
 
-def deflection(result: SteadyResults) -> Figure:
+def deflection(result: SteadyResult) -> Figure:
     """Lip opening and largest displacement over pressure."""
     states = ordered(result)
     figure, axes = _axes("Pressure, kPa", "Displacement, mm")
@@ -95,7 +95,7 @@ def deflection(result: SteadyResults) -> Figure:
     return _finish(figure, axes, "Deflection of the wall", from_zero=all(s.lip_opening >= 0 for s in states))
 
 
-def _name(result: SteadyResults) -> str:
+def _name(result: SteadyResult) -> str:
     return f"dbvfiv, {result.header.name}"
 
 

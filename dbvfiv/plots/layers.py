@@ -12,11 +12,11 @@ from .style import MAGNITUDE, kilopascals, new_figure
 
 if TYPE_CHECKING:
     from ..record.mesh import MeshData
-    from ..results.state import State
-    from ..results.steady import SteadyResults
+    from ..studies.state import State
+    from ..studies.steady.result import SteadyResult
 
 
-def draw(result: SteadyResults, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SteadyResult, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
     state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
     yield "layer-stress", lambda: layer_stress(state)

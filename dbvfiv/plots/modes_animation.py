@@ -14,13 +14,13 @@ from .modes_shapes import ModeSurface
 from .style import new_figure, style
 
 if TYPE_CHECKING:
-    from ..results.mode import ModeShape
-    from ..results.modes import ModesResults
+    from ..studies.modes.mode import ModeShape
+    from ..studies.modes.result import ModesResult
 
 _PICTURES_A_SECOND, _DOTS = 15, 90
 
 
-def animate_mode(result: ModesResults, mode: ModeShape, path: str | Path, frames: int = 24) -> Path:
+def animate_mode(result: ModesResult, mode: ModeShape, path: str | Path, frames: int = 24) -> Path:
     """Write one cycle of a mode, endlessly repeated, growth or decay left out; of a mode that does not oscillate, a
     slow to and fro.
 

@@ -14,22 +14,22 @@ from .shapes import mark_pieces
 from .style import COMPUTED, REST, new_figure
 
 if TYPE_CHECKING:
-    from ..results.mode import ModeShape
-    from ..results.modes import ModesResults
+    from ..studies.modes.mode import ModeShape
+    from ..studies.modes.result import ModesResult
 
 _PHASES, _DRAWN = 10, 3
 #: Part of the largest swing below which a phase means nothing.
 _STILL = 0.02
 
 
-def draw(result: ModesResults, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ModesResult, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of modes, each with its name: of the first three modes, or of one."""
     chosen = result.modes[:_DRAWN] if mode is None else [result.mode(mode)]
     for each in chosen:
         yield f"centre-line-{each.number}", lambda each=each: centre_line(result, each)
 
 
-def centre_line(result: ModesResults, mode: ModeShape) -> Figure:
+def centre_line(result: ModesResult, mode: ModeShape) -> Figure:
     """Line x = 0 over one cycle (compare Fig. 7-16 of Wang 2014): its place, its swing in y, and how the motion lags
     along it.
     """

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from .style import COMPUTED, PUBLISHED, kilopascals, new_figure
 
 if TYPE_CHECKING:
-    from ..results.modes import ModesResults
+    from ..studies.modes.result import ModesResult
 
 STABLE, UNSTABLE = COMPUTED, PUBLISHED
 #: Ground of the unstable half-plane.
@@ -19,13 +19,13 @@ DANGER = "#c0392b14"
 _RATIOS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7)
 
 
-def draw(result: ModesResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ModesResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of modes, each with its name."""
     if result.modes:
         yield "eigenvalues", lambda: eigenvalues(result)
 
 
-def eigenvalues(result: ModesResults) -> Figure:
+def eigenvalues(result: ModesResult) -> Figure:
     """Growth rate and frequency of each mode, numbered as in the table; rays of constant damping ratio; where
     eigenvalues accumulate.
     """
@@ -75,14 +75,14 @@ def eigenvalues(result: ModesResults) -> Figure:
     return figure
 
 
-def conditions(result: ModesResults) -> str:
+def conditions(result: ModesResult) -> str:
     """Pressure and fluid as they stand in titles."""
     where = "at rest" if result.state.pressure == 0 else f"at {kilopascals(result.state.pressure)}"
     fluid = "in vacuo" if in_vacuo(result) else f"{result.case.fluid.density:g} kg/m³"
     return f"{where}, {fluid}"
 
 
-def in_vacuo(result: ModesResults) -> bool:
+def in_vacuo(result: ModesResult) -> bool:
     return result.case.modes.in_vacuo or result.case.drive.kind != "flow"
 
 

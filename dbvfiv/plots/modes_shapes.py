@@ -17,13 +17,13 @@ from .modes_plane import UNSTABLE, conditions, mode_title
 from .style import new_figure
 
 if TYPE_CHECKING:
-    from ..results.mode import ModeShape
-    from ..results.modes import ModesResults
+    from ..studies.modes.mode import ModeShape
+    from ..studies.modes.result import ModesResult
 
 _PANELS = 6
 
 
-def draw(result: ModesResults, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ModesResult, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of modes, each with its name."""
     if mode is not None:
         yield f"mode-shape-{mode}", lambda: mode_shapes(result, [result.mode(mode)])
@@ -31,7 +31,7 @@ def draw(result: ModesResults, mode: int | None = None) -> Iterator[tuple[str, C
         yield "mode-shapes", lambda: mode_shapes(result, result.modes[:_PANELS])
 
 
-def mode_shapes(result: ModesResults, modes) -> Figure:
+def mode_shapes(result: ModesResult, modes) -> Figure:
     """Modes at the phase of their largest displacement, all quarters, coloured by the amplitude over a cycle."""
     columns = min(2, len(modes))
     rows = -(-len(modes) // columns)
@@ -65,12 +65,12 @@ class ModeSurface:
 
     Parameters
     ----------
-    result : ModesResults
+    result : ModesResult
     mode : ModeShape
     valve : WholeValve, optional
     """
 
-    def __init__(self, result: ModesResults, mode: ModeShape, valve: WholeValve | None = None):
+    def __init__(self, result: ModesResult, mode: ModeShape, valve: WholeValve | None = None):
         self.valve = valve or WholeValve.of(result.mesh)
         self.mode = mode
         self.amplitude = mode.drawn_amplitude(result.state)

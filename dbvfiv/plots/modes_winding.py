@@ -12,15 +12,15 @@ from .modes_plane import STABLE, UNSTABLE, conditions
 from .style import COMPUTED, new_figure
 
 if TYPE_CHECKING:
-    from ..results.modes import ModesResults
+    from ..studies.modes.result import ModesResult
 
 
-def draw(result: ModesResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ModesResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of modes, each with its name."""
     yield "winding", lambda: winding(result)
 
 
-def winding(result: ModesResults) -> Figure:
+def winding(result: ModesResult) -> Figure:
     """Winding of the determinant from zero frequency up: it ends at the number of eigenvalues to the right, and rises
     past those that are unstable.
     """
@@ -60,7 +60,7 @@ def winding(result: ModesResults) -> Figure:
 _TEXT = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "fontsize": 9, "color": "0.3"}
 
 
-def _mark_modes(axes, result: ModesResults) -> None:
+def _mark_modes(axes, result: ModesResult) -> None:
     """Lines at the frequencies of the modes, their numbers above, staggered where they are close."""
     step = np.diff(np.log10(axes.get_xlim()))[0] / 35
     last, level = -np.inf, 0

@@ -12,7 +12,7 @@ from .shapes import mark_pieces
 from .style import kilopascals, new_figure, pressure_colours, some_of
 
 if TYPE_CHECKING:
-    from ..results.steady import SteadyResults
+    from ..studies.steady.result import SteadyResult
 
 _QUARTERS = 4
 _PANELS = (
@@ -22,13 +22,13 @@ _PANELS = (
 )
 
 
-def draw(result: SteadyResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SteadyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name."""
     if result.case.drive.kind == "flow":
         yield "passage", lambda: passage(result)
 
 
-def passage(result: SteadyResults) -> Figure:
+def passage(result: SteadyResult) -> Figure:
     """Pressure, velocity and flow area over the distance from the lip; the fluid flows from right to left."""
     figure = new_figure(7.2, 7.4)
     panels = figure.subplots(3, 1, sharex=True)

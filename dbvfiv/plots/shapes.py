@@ -12,16 +12,16 @@ from .discharge import ordered
 from .style import REST, kilopascals, new_figure, pressure_colours, some_of
 
 if TYPE_CHECKING:
-    from ..results.steady import SteadyResults
+    from ..studies.steady.result import SteadyResult
 
 
-def draw(result: SteadyResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SteadyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name."""
     yield "lip-shapes", lambda: lip_shapes(result)
     yield "centre-line", lambda: centre_line(result)
 
 
-def lip_shapes(result: SteadyResults) -> Figure:
+def lip_shapes(result: SteadyResult) -> Figure:
     """Mid-surface of the lip at several pressures, all four quarters (compare Fig. 7-10 of the thesis)."""
     figure = new_figure(7.2, 4.4)
     axes = figure.add_subplot()
@@ -39,7 +39,7 @@ def lip_shapes(result: SteadyResults) -> Figure:
     return figure
 
 
-def centre_line(result: SteadyResults) -> Figure:
+def centre_line(result: SteadyResult) -> Figure:
     """Deformed lines of the two symmetry planes: y over z at x = 0 and x over z at y = 0."""
     figure = new_figure(7.2, 6.2)
     upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1, 1]})
@@ -61,7 +61,7 @@ def centre_line(result: SteadyResults) -> Figure:
     return figure
 
 
-def mark_pieces(result: SteadyResults, *panels) -> None:
+def mark_pieces(result: SteadyResult, *panels) -> None:
     """Thin lines where duckbill, saddle and flange meet."""
     valve = result.case.valve
     if valve.key_points is not None:

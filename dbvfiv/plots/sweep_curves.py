@@ -15,20 +15,20 @@ from .modes_plane import DANGER, UNSTABLE
 from .style import kilopascals, new_figure
 
 if TYPE_CHECKING:
-    from ..results.sweep import SweepResults
+    from ..studies.sweep.result import SweepResult
 
 #: Confidence below which a match is drawn as doubtful.
 DOUBTFUL = 0.5
 _STABLE_GROUND = "#1f4e790d"
 
 
-def draw(result: SweepResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SweepResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a sweep, each with its name."""
     if len(result.values) > 1 and result.branches:
         yield "sweep", lambda: curves(result)
 
 
-def curves(result: SweepResults) -> Figure:
+def curves(result: SweepResult) -> Figure:
     """Growth rate, frequency and damping ratio of each branch; crossings of zero growth marked, spans with unstable
     modes shaded.
     """
@@ -101,13 +101,13 @@ def curves(result: SweepResults) -> Figure:
     return figure
 
 
-def branch_colours(result: SweepResults) -> list:
+def branch_colours(result: SweepResult) -> list:
     """A colour for each branch, the same in all figures."""
     wheel = list(matplotlib.colormaps["tab10"].colors) + list(matplotlib.colormaps["Dark2"].colors)
     return [wheel[i % len(wheel)] for i in range(len(result.branches))]
 
 
-def surroundings_of(result: SweepResults) -> str:
+def surroundings_of(result: SweepResult) -> str:
     """What is not swept, as it stands in titles."""
     case = result.case
     parts = []
@@ -126,7 +126,7 @@ def _share(at: float, x: np.ndarray, log: bool) -> float:
     return float((place(at) - place(x[0])) / (place(x[-1]) - place(x[0])))
 
 
-def _shade(axes, result: SweepResults, x: np.ndarray) -> None:
+def _shade(axes, result: SweepResult, x: np.ndarray) -> None:
     """Ground red where a mode is unstable, its edges at the crossings."""
     scale = PARAMETERS[result.parameter].scale
     edges = sorted(

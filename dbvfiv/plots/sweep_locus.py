@@ -18,16 +18,16 @@ from .style import MAGNITUDE, new_figure
 from .sweep_curves import surroundings_of
 
 if TYPE_CHECKING:
-    from ..results.sweep import SweepResults
+    from ..studies.sweep.result import SweepResult
 
 
-def draw(result: SweepResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: SweepResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a sweep, each with its name."""
     if len(result.values) > 1 and result.branches:
         yield "root-locus", lambda: root_locus(result)
 
 
-def root_locus(result: SweepResults) -> Figure:
+def root_locus(result: SweepResult) -> Figure:
     """Growth rate and frequency of each branch, coloured by the parameter; a ring where it begins, crossings of the
     axis marked.
     """

@@ -17,8 +17,9 @@ from ..record.header import Header, read_header
 from ..record.layout import Table, read_texts
 from ..record.mesh import MeshData, read_mesh
 from ..record.result import Result
+from ..record.states import LAYERS
+from ..shell.recovery import LayerFields, layer_fields
 from .closure_table import BUCKLING, FIELDS, HEAD, OPENED, PATH, REVERSAL, SUMMARY, row_of
-from .state import LAYERS, LayerData, layers_of
 
 if TYPE_CHECKING:
     from ..model.state import SteadyState
@@ -44,13 +45,13 @@ class PressedState:
     results : ClosureResults
     """
 
-    def __init__(self, results: ClosureResults, values: Mapping[str, Any], read_layers: Callable[[], LayerData]):
+    def __init__(self, results: ClosureResults, values: Mapping[str, Any], read_layers: Callable[[], LayerFields]):
         vars(self).update(values)
         self.results = results
         self._read_layers = read_layers
 
     @cached_property
-    def layers(self) -> LayerData:
+    def layers(self) -> LayerFields:
         """Strains and stresses of the layers."""
         return self._read_layers()
 
@@ -134,7 +135,7 @@ class ClosureResults(Result):
             replace(header, complete=not (result.interrupted or (closing is not None and closing.interrupted))),
             MeshData.of(model),
             [row_from(model, state) for state in result.states],
-            lambda i: layers_of(model, result.states[i].q),
+            lambda i: layer_fields(model.shell, result.states[i].q),
             path_rows(result.path),
             buckling_rows(model, result.buckling),
             opened_rows(result.opened),
@@ -150,10 +151,10 @@ class ClosureResults(Result):
     def read(cls, file: h5py.File, path: Path) -> ClosureResults:
         names = tuple(file["mesh/layer_names"].asstr()[:])
 
-        def read_layers(row: int) -> LayerData:
+        def read_layers(row: int) -> LayerFields:
             with reading(path) as again:
                 layers = Table(again["states"], LAYERS)
-                return LayerData(names, **{c.name.split("/")[1]: layers.read(c.name, row) for c in LAYERS})
+                return LayerFields(names, **{c.name.split("/")[1]: layers.read(c.name, row) for c in LAYERS})
 
         return cls(
             read_header(file),

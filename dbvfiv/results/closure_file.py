@@ -11,11 +11,12 @@ from ..record.files import KeptFile, create, reopen
 from ..record.header import Header, write_header
 from ..record.layout import Table, read_texts, replace_texts
 from ..record.mesh import MeshData, write_mesh
+from ..record.states import LAYERS
+from ..shell.recovery import LayerFields, layer_fields
 from ..studies.closure_buckling import Buckling
 from ..studies.closure_path import PathRestart
 from .closure import buckling_rows, opened_rows, path_rows, reference_opening, row_from
 from .closure_table import BUCKLING, FIELDS, OPENED, PATH, RESTART, REVERSAL, SUMMARY
-from .state import LAYERS, LayerData, layers_of
 
 if TYPE_CHECKING:
     from ..studies.closing import ClosingResult
@@ -146,7 +147,7 @@ class ClosureFile(KeptFile, Observer):
         table = self._tables["restart"]
         table.group.attrs["rows"] = self._states.rows
         table.append({"step": at.step, "slope": at.slope, "multiplier": at.multiplier, "energy": at.energy} | counts)
-        self.keep(row_from(self.model, state), layers_of(self.model, state.q))
+        self.keep(row_from(self.model, state), layer_fields(self.model.shell, state.q))
 
     def _follow(self, points, buckling) -> None:
         """Keep what is new on the path."""
@@ -159,7 +160,7 @@ class ClosureFile(KeptFile, Observer):
                 self._tables[name].append(row)
             self._kept[name] += len(rows)
 
-    def keep(self, row: Mapping[str, Any], layers: LayerData) -> None:
+    def keep(self, row: Mapping[str, Any], layers: LayerFields) -> None:
         """Keep a state from its columns and layers."""
         count = len(row["stiffness_eigenvalues"])
         if count != self._file["states/stiffness_eigenvalues"].shape[1] and not self._states.rows:

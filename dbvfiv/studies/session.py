@@ -43,6 +43,16 @@ def named_changes(given: Mapping[str, Any]) -> dict[str, Any]:
     return {KEYWORDS[name]: value for name, value in given.items() if value is not None}
 
 
+def describe_surroundings(case: Case) -> dict[str, Any]:
+    """Fluid and damping of a case, for JSON."""
+    return {
+        "density": case.fluid.density,
+        "continuity": case.fluid.continuity,
+        "alpha": case.damping.alpha,
+        "beta": case.damping.beta,
+    }
+
+
 class Session:
     """What studies ask about a valve.
 

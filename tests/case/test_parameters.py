@@ -4,7 +4,6 @@ import inspect
 
 import pytest
 
-import dbvfiv.api_modes
 from dbvfiv.case import Case, CaseError
 from dbvfiv.case.describe import allowed_words, walk
 from dbvfiv.case.parameters import CONDITIONS, DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, listed
@@ -12,6 +11,7 @@ from dbvfiv.case.stability_axis import parse_stability_axis
 from dbvfiv.model.analytic import PARAMETERS as RESIDUAL
 from dbvfiv.model.dynamics import Conditions
 from dbvfiv.studies.parameters import Place
+from dbvfiv.studies.session import KEYWORDS
 
 
 @pytest.mark.parametrize("row", PARAMETERS.values(), ids=PARAMETERS)
@@ -81,4 +81,4 @@ def test_help_lists_the_table(command_line, command):
 
 
 def test_arguments_of_the_python_interface():
-    assert {name: dbvfiv.api_modes.KEYS[name] for name in SWEPT} == {name: PARAMETERS[name].key for name in SWEPT}
+    assert {name: KEYWORDS[name] for name in SWEPT} == {name: PARAMETERS[name].key for name in SWEPT}

@@ -6,7 +6,7 @@ import pytest
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.record.whole_valve import WholeValve
-from dbvfiv.results.steady import SteadyResults
+from dbvfiv.studies.steady.result import SteadyResult
 
 vtk = pytest.importorskip("vtk")
 from vtk.util.numpy_support import vtk_to_numpy  # noqa: E402
@@ -77,7 +77,7 @@ def test_states_in_any_order_become_increasing_times(tmp_path, coarse_run):
 
 
 def test_nothing_to_export_is_a_sentence(tmp_path, coarse_run, one_sentence):
-    empty: SteadyResults = coarse_run.only()
+    empty: SteadyResult = coarse_run.only()
     with pytest.raises(CaseError) as caught:
         empty.export(tmp_path)
     assert one_sentence(str(caught.value))

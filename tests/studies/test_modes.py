@@ -12,9 +12,9 @@ from dbvfiv.case.model import Case
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.dynamics import Conditions, dynamic_residual, linearise
-from dbvfiv.model.equilibria import LoadPath
+from dbvfiv.model.equilibria import LoadPath, rest_state
 from dbvfiv.observer import Observer
-from dbvfiv.studies.modes import ModesOptions, rest_state, run_modes
+from dbvfiv.studies.modes.run import ModesOptions, run_modes
 from eigen import SearchOptions
 
 LIGHT = Conditions(10.0, 0.0, 0.003)

@@ -14,8 +14,8 @@ from dbvfiv.model import ValveModel
 from dbvfiv.model.dynamics import Conditions
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
-from dbvfiv.studies.modes import ModesOptions, run_modes
-from dbvfiv.studies.sweep import SweepOptions, run_sweep
+from dbvfiv.studies.modes.run import ModesOptions, run_modes
+from dbvfiv.studies.sweep.run import SweepOptions, run_sweep
 
 LIGHT = Conditions(10.0, 0.0, 0.003)
 OPTIONS = SweepOptions(count=4)

@@ -11,19 +11,20 @@ from eigen import (
     CertifiedSpectrum,
     CoupledPencil,
     SearchOptions,
-    SingularShiftError,
     Spectrum,
     TransferBasis,
     certified_spectrum,
 )
 
-from ..errors import CaseError, SolveError
-from ..flow import Channel
-from ..model import ValveModel
-from ..model.dynamics import Conditions, linearise
-from ..model.state import SteadyState, describe_state
-from ..observer import Observer
-from .modes_search import suited
+from ...errors import CaseError
+from ...flow import Channel
+from ...model import ValveModel
+from ...model.dynamics import Conditions, linearise
+from ...model.equilibria import require_equilibrium
+from ...model.state import SteadyState
+from ...observer import Observer
+from ..modes_search import suited
+from ..solving import solving
 
 #: Unbalanced force over pressure force above which a state is no equilibrium of its model.
 _UNBALANCED = 1e-4
@@ -60,7 +61,7 @@ class ModesOptions:
 
 
 @dataclass(frozen=True)
-class ModesResult:
+class FoundModes:
     """Leading modes of one state.
 
     Attributes
@@ -119,7 +120,7 @@ def run_modes(
     conditions: Conditions | None = None,
     options: ModesOptions | None = None,
     observer: Observer | None = None,
-) -> ModesResult:
+) -> FoundModes:
     """Leading modes of a steady state.
 
     Parameters
@@ -181,7 +182,7 @@ def run_modes(
 
 def _described(
     model, state, conditions, in_vacuo, certified: CertifiedSpectrum, pencil: CoupledPencil, linear, notes
-) -> ModesResult:
+) -> FoundModes:
     """Shapes, areas and pressures of the eigenvectors, scaled to a largest displacement of 1."""
     spectrum = certified.spectrum
     shapes, scales = [], []
@@ -196,7 +197,7 @@ def _described(
         by_area, by_velocity, _, _ = pencil.fluid_at(value)
         pressure[:, i] = by_area @ change[:, i] + by_velocity @ spectrum.u[:, i]
     velocity = spectrum.u[0] if pencil.b else np.zeros(len(spectrum), complex)
-    return ModesResult(
+    return FoundModes(
         model,
         state,
         conditions,
@@ -226,60 +227,3 @@ def _largest(nodal: np.ndarray) -> complex:
     where = int(np.argmax(reach))
     phase = np.sqrt(turning[where] / abs(turning[where])) if abs(turning[where]) > 0 else 1.0
     return complex(reach[where] * phase) if reach[where] > 0 else 1.0 + 0j
-
-
-def require_equilibrium(model: ValveModel, state: SteadyState) -> None:
-    """Refuse a state that is no equilibrium of a model.
-
-    Raises
-    ------
-    SolveError
-    """
-    if not state.converged:
-        raise SolveError(
-            f"The steady state at {state.pressure:.6g} Pa has not converged (residual "
-            f"{state.residual:.1e}), so it has no modes; find the equilibrium first."
-        )
-    if len(state.q) != model.size:
-        raise SolveError(
-            f"The steady state at {state.pressure:.6g} Pa belongs to another mesh, so it has no modes in this model."
-        )
-    scale = model.force_scale(state.q, state.pressure)
-    unbalanced = float(np.linalg.norm(model.residual(state.q, state.pressure)))
-    allowed = max(_UNBALANCED * scale, 1e3 * model.rounding(state.q, model.tangent(state.q, state.pressure)))
-    if not unbalanced <= allowed:
-        raise SolveError(
-            f"The state at {state.pressure:.6g} Pa is no equilibrium of this model: its unbalanced force is "
-            f"{unbalanced:.2g} N against "
-            f"{scale:.2g} N of pressure, so it has no modes; find the equilibrium first."
-        )
-
-
-def rest_state(model: ValveModel) -> SteadyState:
-    """The valve at rest without pressure, as a state."""
-    return describe_state(
-        model,
-        model.rest(),
-        0.0,
-        converged=True,
-        iterations=0,
-        load_steps=0,
-        residual=0.0,
-        rounding=0.0,
-        reason="at rest without pressure",
-    )
-
-
-class solving:
-    """Turns what an eigenvalue search refuses into a sentence that names the pressure."""
-
-    def __init__(self, pressure: float):
-        self.pressure = pressure
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind, error, _trace) -> None:
-        if isinstance(error, (SingularShiftError, np.linalg.LinAlgError)):
-            said = str(error).rstrip(".")
-            raise SolveError(f"The modes at {self.pressure:.6g} Pa were not found: {said}.") from error

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..record.layout import Column
-
-if TYPE_CHECKING:
-    from ..studies.modes import ModesResult
-    from .state import State
+from ...record.layout import Column
+from ..state import State
+from .run import FoundModes
 
 #: One row for each mode in a result file.
 MODE = (
@@ -114,7 +112,7 @@ class ModeShape:
         }
 
 
-def rows_of(result: ModesResult) -> list[dict[str, Any]]:
+def rows_of(result: FoundModes) -> list[dict[str, Any]]:
     """Columns of the modes of a run."""
     spectrum = result.spectrum
     stations = result.areas.shape[1:]

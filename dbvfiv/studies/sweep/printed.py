@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..case.parameters import PARAMETERS
+from ...case.parameters import PARAMETERS
+from .run import SweepPoint
 
 if TYPE_CHECKING:
-    from .sweep import Crossing, SweepResults
+    from .result import Crossing, SweepResult
 
 
 def head(parameter: str) -> tuple[str, str]:
@@ -20,15 +21,15 @@ def head(parameter: str) -> tuple[str, str]:
     )
 
 
-def row_of(point: Any) -> str:
-    """One line for a value just solved (`dbvfiv.studies.sweep.SweepPoint`): the leading mode and the number of unstable
+def point_row(point: SweepPoint) -> str:
+    """One line for a value just solved: the leading mode and the number of unstable
     eigenvalues.
     """
     leading = point.eigenvalues[0] if len(point.eigenvalues) else complex(np.nan, np.nan)
     return _row(point.value, leading.real, abs(leading.imag) / (2 * np.pi), point.unstable_count)
 
 
-def rows_of_sweep(result: SweepResults) -> list[str]:
+def rows_of_sweep(result: SweepResult) -> list[str]:
     """One line for each value: the leading branch."""
     rows = []
     for i, value in enumerate(result.values):
@@ -39,7 +40,7 @@ def rows_of_sweep(result: SweepResults) -> list[str]:
     return rows
 
 
-def crossing_line(result: SweepResults, crossing: Crossing) -> str:
+def crossing_line(result: SweepResult, crossing: Crossing) -> str:
     """One sentence on a crossing of zero growth."""
     shown = PARAMETERS[result.parameter]
     becomes = "unstable" if crossing.to_unstable else "stable"

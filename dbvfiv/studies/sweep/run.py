@@ -10,16 +10,17 @@ import numpy as np
 
 from eigen import Branches, SearchOptions, Spectrum, TrackOptions, track
 
-from ..case.axis import Axis
-from ..errors import CaseError, SolveError
-from ..flow import Channel
-from ..model import ValveModel
-from ..model.dynamics import Conditions
-from ..model.state import SteadyState
-from ..observer import Observer
-from .modes import require_equilibrium, solving
-from .modes_search import CLEAR, limit_point
-from .sweep_family import Check, Family, FluidFamily, PressureFamily
+from ...case.axis import Axis
+from ...errors import CaseError, SolveError
+from ...flow import Channel
+from ...model import ValveModel
+from ...model.dynamics import Conditions
+from ...model.equilibria import require_equilibrium
+from ...model.state import SteadyState
+from ...observer import Observer
+from ..modes_search import CLEAR, limit_point
+from ..solving import solving
+from .family import Check, Family, FluidFamily, PressureFamily
 
 #: Writing what is done may take this share of the time; a sweep of small cost is written once.
 _KEEPING = 0.05
@@ -78,7 +79,7 @@ class SweepPoint:
 
 
 @dataclass(frozen=True)
-class SweepResult:
+class FoundBranches:
     """Branches of modes along a parameter.
 
     Attributes
@@ -120,8 +121,8 @@ def run_sweep(
     options: SweepOptions | None = None,
     observer: Observer | None = None,
     state: SteadyState | None = None,
-    keep: Callable[[SweepResult], None] | None = None,
-) -> SweepResult:
+    keep: Callable[[FoundBranches], None] | None = None,
+) -> FoundBranches:
     """Follow the leading modes along a parameter.
 
     Over density, alpha or beta the state stays, so modes are found on a basis that is certified against full solves;
@@ -224,7 +225,7 @@ class _Run:
             now = time.monotonic()
             self.keep_at = now + max(_KEEP_AFTER, (now - start) / _KEEPING)
 
-    def result(self, interrupted: bool, failures) -> SweepResult:
+    def result(self, interrupted: bool, failures) -> FoundBranches:
         values = np.array([point.value for point in self.points])
         points, solves, found = tuple(self.points), len(self.spectra), self.branches
         if found is None and len(values):  # as far as it came, from the spectra kept
@@ -237,7 +238,7 @@ class _Run:
         checks, notes = self.family.checks(values) if len(values) and not interrupted else (self.family.done, ())
         certified = bool(checks) and not interrupted and all(check.holds for check in checks)
         counts = np.array([point.unstable_count for point in points], int)
-        return SweepResult(
+        return FoundBranches(
             self.model,
             self.axis,
             values,

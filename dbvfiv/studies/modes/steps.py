@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..record.fields import motion
-from ..record.vtkhdf import Step
+from ...record.fields import motion
+from ...record.vtkhdf import Step
+from ...record.whole_valve import WholeValve
+from .mode import ModeShape
 
 if TYPE_CHECKING:
-    from ..record.whole_valve import WholeValve
-    from .mode import ModeShape
-    from .modes import ModesResults
+    from .result import ModesResult
 
 
 @dataclass(frozen=True)
 class _ModeSteps(Sequence):
     """Modes as steps, made one at a time; "time" is the number of the mode."""
 
-    result: ModesResults
+    result: ModesResult
     valve: WholeValve
 
     def __len__(self) -> int:
@@ -52,7 +52,7 @@ class _CycleSteps(Sequence):
     nothing oscillates.
     """
 
-    result: ModesResults
+    result: ModesResult
     valve: WholeValve
     mode: ModeShape
     phases: int
@@ -69,13 +69,13 @@ class _CycleSteps(Sequence):
         return Step(value, points, {"thickness": self.valve.cells(mesh.thickness)})
 
 
-def mode_steps(result: ModesResults, valve: WholeValve) -> Sequence[Step]:
+def mode_steps(result: ModesResult, valve: WholeValve) -> Sequence[Step]:
     """All modes: the equilibrium as ``displacement``, shapes as ``mode_real``, ``mode_imag`` and ``mode_amplitude``
     (largest 1).
     """
     return _ModeSteps(result, valve)
 
 
-def cycle_steps(result: ModesResults, valve: WholeValve, mode: ModeShape, phases: int = 24) -> Sequence[Step]:
+def cycle_steps(result: ModesResult, valve: WholeValve, mode: ModeShape, phases: int = 24) -> Sequence[Step]:
     """One cycle of a mode about the equilibrium, at an amplitude that shows well; growth or decay is left out."""
     return _CycleSteps(result, valve, mode, phases)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
-from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
-from ._output import print_json, print_places
-from ._progress import Progress
+from ...case.model import Case
+from ...errors import CaseError
+from ..request import Request, number_or_text
 
 ORDER = 25
 
 
 def command(
-    case_file: CaseFile = None,
+    case: Case,
     pressure: Annotated[
         str | None,
         typer.Option(
@@ -31,17 +32,14 @@ def command(
     in_vacuo: Annotated[
         bool, typer.Option("--in-vacuo", help="Leave the fluid out: the structure under its steady pressures alone.")
     ] = False,
-    output: Output = None,
-    plots: PlotFolder = None,
     animate: Annotated[
         list[int] | None,
         typer.Option(
             "--animate", metavar="N", help="Write a GIF of one cycle of mode N into --plots; may be repeated."
         ),
     ] = None,
-    overrides: Override = None,
-    as_json: AsJson = False,
-) -> None:
+    plots: Path | None = None,
+) -> Request:
     """Leading modes of one steady state: growth rate, frequency, damping ratio, residual, and whether the state is
     stable.
 
@@ -51,32 +49,16 @@ def command(
 
     dbvfiv modes cases/dbv12.toml -p "6 kPa" --density 10 --set damping.alpha=0 -o modes.h5 --plots figures --animate 1
     """
-    from ..api import Valve
-    from ..errors import CaseError
-
-    case = read_case(case_file, overrides)
     if animate and plots is None:
         raise CaseError("--animate needs --plots DIR, the folder that the GIF is written into.")
-    valve = Valve(case, case_file.stem if case_file else "dbv12")
-    given = {"density": number_or_text(density), "in_vacuo": in_vacuo or None}
-    result = valve.modes(
-        number_or_text(pressure), count=count, output=output, observer=Progress(quiet=as_json), **given
-    )
-    figures = result.plot(plots) if plots is not None else []
-    figures += [result.animate(plots / f"mode-{number}.gif", number) for number in animate or ()]
-    if as_json:
-        print_json(
-            result.summary()
-            | {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]}
-        )
-        return
-    print("\n".join(result.lines()))
-    print_places(output, figures, plots)
 
+    def further(result: Any) -> list[Path]:
+        return [result.animate(plots / f"mode-{number}.gif", number) for number in animate or ()]
 
-def number_or_text(value: str | None) -> float | str | None:
-    """A number where an option is one; texts with units as they are."""
-    try:
-        return None if value is None else float(value)
-    except ValueError:
-        return value
+    changes = {
+        "drive.pressure": number_or_text(pressure),
+        "fluid.density": number_or_text(density),
+        "modes.count": count,
+        "modes.in_vacuo": in_vacuo or None,
+    }
+    return Request(changes, further=further)

@@ -18,13 +18,13 @@ from eigen import (
     unstable_count,
 )
 
-from ..case.axis import Axis
-from ..model import ValveModel
-from ..model.dynamics import Conditions, LinearisedState, linearise
-from ..model.equilibria import LoadPath, SteadyOptions
-from ..model.state import SteadyState
-from ..observer import Observer
-from .modes_search import suited
+from ...case.axis import Axis
+from ...model import ValveModel
+from ...model.dynamics import Conditions, LinearisedState, linearise
+from ...model.equilibria import LoadPath, SteadyOptions
+from ...model.state import SteadyState
+from ...observer import Observer
+from ..modes_search import suited
 
 #: Static corrections below this share of the largest are left to the eigenvectors of the check points, which gives a
 #: smaller basis.

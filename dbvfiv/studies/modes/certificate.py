@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import h5py
 import numpy as np
 
-from ..record.layout import Column, read_array, write_array
-
-if TYPE_CHECKING:
-    from ..studies.modes import ModesResult
+from .run import FoundModes
 
 _ATTRIBUTES = (
     "agrees",
@@ -28,10 +24,6 @@ _ATTRIBUTES = (
     "complete_above",
     "band",
     "rejected",
-)
-_CURVE = (
-    Column("frequency", "Hz", "Points on the line at which the determinant was evaluated"),
-    Column("phase", "rad", "Continuous phase of the determinant against that of a stable structure"),
 )
 
 
@@ -89,7 +81,7 @@ class Certificate:
     phase: np.ndarray
 
     @classmethod
-    def of(cls, result: ModesResult) -> Certificate:
+    def of(cls, result: FoundModes) -> Certificate:
         certified, spectrum, count = result.certified, result.spectrum, result.certified.count
         error = certified.response_error
         return cls(
@@ -112,19 +104,15 @@ class Certificate:
             phase=count.phase,
         )
 
-    def write(self, group: h5py.Group) -> None:
-        group.attrs["stable"] = {True: "yes", False: "no", None: "unknown"}[self.stable]
-        for name in _ATTRIBUTES:
-            group.attrs[name] = getattr(self, name)
-        for column in _CURVE:
-            write_array(group, column, getattr(self, column.name))
+    def note(self) -> dict[str, Any]:
+        """All of it as a note of a record."""
+        return dict(vars(self))
 
     @classmethod
-    def read(cls, group: h5py.Group) -> Certificate:
-        attributes = {name: group.attrs[name] for name in _ATTRIBUTES}
-        plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
-        stable = {"yes": True, "no": False, "unknown": None}[group.attrs["stable"]]
-        return cls(stable=stable, **plain, **{column.name: read_array(group, column) for column in _CURVE})
+    def read(cls, note: dict[str, Any]) -> Certificate:
+        """From a note of a record."""
+        values = {name: note[name] for name in cls.__dataclass_fields__}
+        return cls(**values | {name: np.array(values[name], float) for name in ("frequency", "phase")})
 
     @property
     def verdict(self) -> str:

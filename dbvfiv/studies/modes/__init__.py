@@ -1,0 +1,1 @@
+"""Leading modes of one steady state, and whether it is stable."""

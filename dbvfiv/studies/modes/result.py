@@ -1,0 +1,130 @@
+"""Leading modes of one state: what their file holds and what can be read off them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from ...errors import CaseError
+from ...plots import modes_centre_line, modes_plane, modes_shapes, modes_winding
+from ...plots.modes_animation import animate_mode
+from ...record.mesh import MeshData
+from ...record.states import state_table
+from ...record.table import TableSpec
+from ...record.vtkhdf import Step
+from ...record.whole_valve import WholeValve
+from ..result import StudyResult
+from ..session import describe_surroundings
+from ..state import State, states_of
+from .certificate import Certificate
+from .mode import MODE, ModeShape
+from .steps import cycle_steps, mode_steps
+
+STATE, MODES = "state", "modes"
+HEAD = (
+    "  mode   growth rate    frequency   damping ratio   residual",
+    "                 1/s           Hz",
+)
+
+
+def tables_of(mesh: MeshData) -> tuple[TableSpec, TableSpec]:
+    """Tables of a result on a mesh: the state and its modes."""
+    stations = len(mesh.z)
+    shapes = {"shape": (len(mesh.nodes), 5), "area": (stations,), "pressure": (stations,)}
+    return state_table(STATE, mesh), TableSpec(MODES, MODE, shapes, chunk=8)
+
+
+class ModesResult(StudyResult):
+    """Leading modes, by falling growth rate.
+
+    Attributes
+    ----------
+    modes : tuple of ModeShape
+    state : State
+        The equilibrium they belong to.
+    certificate : Certificate
+    stable : bool or None
+    notes : tuple of str
+        What the search and its certificate have to say.
+
+    Examples
+    --------
+    >>> modes = dbvfiv.load().steady(pressure="6 kPa").modes(density=10)    # doctest: +SKIP
+    >>> modes.modes[0].growth_rate, modes.modes[0].frequency, modes.stable  # doctest: +SKIP
+    """
+
+    kind = "modes"
+
+    @cached_property
+    def modes(self) -> tuple[ModeShape, ...]:
+        (_, table) = tables_of(self.mesh)
+        return tuple(ModeShape(number=i + 1, **row) for i, row in enumerate(self.record.table_rows(table)))
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        return Certificate.read(self.record.notes("certificate")[-1])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return tuple(note["text"] for note in self.record.notes("remark"))
+
+    @property
+    def stable(self) -> bool | None:
+        return self.certificate.stable
+
+    @cached_property
+    def state(self) -> State:
+        """The equilibrium, with its layers and figures."""
+        return states_of(self, STATE)[0]
+
+    def mode(self, number: int) -> ModeShape:
+        """A mode by its number, from 1.
+
+        Raises
+        ------
+        CaseError
+        """
+        if not 1 <= number <= len(self.modes):
+            raise CaseError(
+                f"There is no mode {number} in the {self.kind} result of {self.header.name!r}; it has "
+                f"{len(self.modes)}."
+            )
+        return self.modes[number - 1]
+
+    def summary(self) -> dict[str, Any]:
+        return {
+            "state": self.state.summary() | describe_surroundings(self.case) | {"in_vacuo": self.case.modes.in_vacuo},
+            "modes": [mode.summary() for mode in self.modes],
+            "unstable_count": self.certificate.unstable_count,
+            "unstable_count_independent": self.certificate.unstable_count_independent,
+            "stable": self.stable,
+            "certificate": self.certificate.summary(),
+            "notes": list(self.notes),
+            "warnings": list(self.warnings),
+        }
+
+    def lines(self) -> list[str]:
+        rows = [
+            f"{m.number:6d}{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:16.4f}{m.residual:11.1e}"
+            for m in self.modes
+        ]
+        return [*HEAD, *rows, "", self.certificate.verdict, *(f"Note: {note}" for note in self.notes)]
+
+    def steps(self, valve: WholeValve, mode: int | None = None, phases: int = 24) -> Sequence[Step]:
+        """The modes one after the other, or one cycle of one of them; see `dbvfiv.studies.modes.steps`."""
+        return mode_steps(self, valve) if mode is None else cycle_steps(self, valve, self.mode(mode), phases)
+
+    def drawers(self, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        """Eigenvalues, shapes, centre lines and the independent count; of one mode alone if it is named."""
+        yield from modes_plane.draw(self)
+        yield from modes_shapes.draw(self, mode)
+        yield from modes_centre_line.draw(self, mode)
+        yield from modes_winding.draw(self)
+
+    def animate(self, path: str | Path, mode: int = 1, frames: int = 24) -> Path:
+        """Write a GIF of one cycle of a mode."""
+        return animate_mode(self, self.mode(mode), path, frames)

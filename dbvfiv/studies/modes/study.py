@@ -1,0 +1,31 @@
+"""How leading modes of a steady state are found and kept."""
+
+from __future__ import annotations
+
+from ...record.record import GrowingRecord
+from ...record.states import state_row
+from ..session import Session
+from ..study import Study
+from .certificate import Certificate
+from .mode import rows_of
+from .result import MODES, STATE, ModesResult, tables_of
+from .run import ModesOptions, run_modes
+
+
+def run(session: Session, record: GrowingRecord) -> None:
+    """Leading modes of the steady state at drive.pressure."""
+    if record.notes("certificate"):
+        return
+    model = session.model
+    state = session.equilibrium(record)
+    found = run_modes(model, state, options=ModesOptions.of(session.case), observer=record)
+    if not record.rows(STATE):
+        record.append(STATE, state_row(model, state))
+    for row in rows_of(found)[record.rows(MODES) :]:
+        record.append(MODES, row)
+    for sentence in found.notes:
+        record.note("remark", text=sentence)
+    record.note("certificate", **Certificate.of(found).note())
+
+
+STUDY = Study("modes", tables_of, run, ModesResult)

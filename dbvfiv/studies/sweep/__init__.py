@@ -1,0 +1,1 @@
+"""Modes tracked along one parameter."""

@@ -1,0 +1,48 @@
+"""``dbvfiv sweep``: modes tracked along a parameter."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ...case.parameters import SWEPT, listed
+from ..request import Request, number_or_text
+
+ORDER = 26
+
+
+def command(
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over",
+            metavar="RANGE",
+            help=f"PARAMETER=START:STOP:COUNT[:log] of {listed(SWEPT)}; sweep.over without it.",
+        ),
+    ] = None,
+    pressure: Annotated[
+        str | None, typer.Option("--pressure", "-p", metavar="P", help="Inlet pressure in place of drive.pressure.")
+    ] = None,
+    density: Annotated[
+        str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
+    ] = None,
+    count: Annotated[
+        int | None, typer.Option("--count", "-n", metavar="N", help="How many leading modes to follow.")
+    ] = None,
+) -> Request:
+    """Damping and frequency of the leading modes, followed along a parameter of load, fluid or damping.
+
+    Each mode keeps its number through crossings; "confidence" says how sure each match is. Over density, alpha and beta
+    the equilibrium stays and modes are found on a reduced basis that full solves confirm. Ctrl-C keeps what is done.
+
+    dbvfiv sweep cases/dbv12.toml -p "6 kPa" --set damping.alpha=0 --over density=1:1000:40:log -o sweep.h5 --plots
+    figures
+    """
+    changes = {
+        "sweep.over": over,
+        "sweep.count": count,
+        "drive.pressure": number_or_text(pressure),
+        "fluid.density": number_or_text(density),
+    }
+    return Request(changes)
