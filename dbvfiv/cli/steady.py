@@ -18,7 +18,8 @@ Pressures = Annotated[
         "--pressure",
         "-p",
         metavar="P",
-        help="Inlet pressure, 36e3 (Pa) or '36 kPa', or a range '2 kPa:50 kPa:12'; may be repeated.",
+        help="Static inlet pressure, 36e3 (Pa), '36 kPa', '2 m' (head of the fluid), '2 mH2O', or a range "
+        "'2 kPa:50 kPa:12'; may be repeated.",
     ),
 ]
 
@@ -47,7 +48,11 @@ def command(
     from ..results.steady_table import HEAD, row_of
 
     case = read_case(case_file, overrides)
-    wanted = _given(pressures) if pressures else read_pressures(case.steady_pressures(), "drive.pressure")
+    wanted = (
+        _given(pressures, case.fluid.density)
+        if pressures
+        else read_pressures(case.steady_pressures(), "drive.pressure")
+    )
     valve = Valve(case, case_file.stem if case_file else "dbv12")
     valve.model  # a case that gives no model is told before the table begins
     if not as_json:
@@ -74,18 +79,19 @@ def command(
         raise SolveError(f"{reached}{kept}.")  # why was said when it happened
 
 
-def _given(texts: list[str]) -> tuple[float, ...]:
+def _given(texts: list[str], density: float) -> tuple[float, ...]:
     from ..api import read_pressures
 
-    return tuple(p for text in texts for p in (_range(text) if ":" in text else read_pressures([text], "--pressure")))
+    found = (_range(t, density) if ":" in t else read_pressures([t], "--pressure", density) for t in texts)
+    return tuple(pressure for pressures in found for pressure in pressures)
 
 
-def _range(text: str) -> tuple[float, ...]:
+def _range(text: str, density: float) -> tuple[float, ...]:
     from ..case.axis import parse_axis
     from ..errors import CaseError
 
     try:
-        return parse_axis(f"pressure={text}").values
+        return parse_axis(f"pressure={text}", density=density).values
     except ValueError as error:
         raise CaseError(
             f"--pressure is given as {text!r}, {error}; a range is START:STOP:COUNT, with ':log' behind it "

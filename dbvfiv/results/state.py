@@ -21,13 +21,16 @@ if TYPE_CHECKING:
 
 #: What a user reads off a state; the names are the keys of the JSON output.
 SUMMARY = (
-    Column("pressure", "Pa", "Inlet pressure"),
+    Column("pressure", "Pa", "Static pressure at the flange, over that of the surroundings"),
+    Column("head", "m", "The same as a head of the fluid"),
     Column("mass_flow", "kg/s", "Mass flow of the whole valve"),
+    Column("volume_flow", "m^3/s", "Volume flow of the whole valve"),
     Column("outlet_area", "m^2", "Flow area at the lip, whole valve"),
     Column("outlet_velocity", "m/s", "Jet velocity at the lip"),
     Column("max_displacement", "m", "Largest displacement of the mid-surface"),
     Column("max_displacement_position", "m", "Where it occurs, position at rest"),
-    Column("lip_opening", "m", "Displacement in y of the lip at x = z = 0"),
+    Column("lip_opening", "m", "Full clear opening between the inner faces of both lips at x = z = 0"),
+    Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
     Column("stops", "", "Lip stops in contact", "i8"),
     Column("converged", "", "Whether the residual fell below the tolerance", "bool"),
     Column("iterations", "", "Newton iterations over all load steps that led here", "i8"),
@@ -41,7 +44,7 @@ FIELDS = (
     Column("nodal", "m, rad", "Displacements ux uy uz and two rotations of each node"),
     Column("station_area", "m^2", "Flow area of a quarter at each row"),
     Column("station_velocity", "m/s", "Velocity at each row"),
-    Column("station_pressure", "Pa", "Pressure at each row"),
+    Column("station_pressure", "Pa", "Static pressure at each row"),
 )
 #: Layers, inside to outside, in their own axes.
 LAYERS = (
@@ -86,12 +89,17 @@ class State:
     Attributes
     ----------
     pressure : float, Pa
+        Static, at the flange.
+    head : float, m
+        The same as a head of the fluid.
     mass_flow : float, kg/s
+    volume_flow : float, m3/s
     outlet_area : float, m2
     outlet_velocity : float, m/s
     max_displacement : float, m
     max_displacement_position : (3,) tuple, m, at rest
-    lip_opening : float, m
+    lip_opening, lip_displacement : float, m
+        Full clear opening between the lips, and displacement of one of them, at x = z = 0.
     stops, converged, iterations, load_steps, residual, rounding, reason
         See `dbvfiv.studies.state.SteadyState`.
     nodal : (nn, 5) m and rad
@@ -106,12 +114,15 @@ class State:
     """
 
     pressure: float
+    head: float
     mass_flow: float
+    volume_flow: float
     outlet_area: float
     outlet_velocity: float
     max_displacement: float
     max_displacement_position: tuple[float, float, float]
     lip_opening: float
+    lip_displacement: float
     stops: int
     converged: bool
     iterations: int

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 _COLUMNS = (
-    ("pressure", "kPa", 9, lambda s: f"{s.pressure / 1e3:.6g}"),
+    ("pressure", "static kPa", 10, lambda s: f"{s.pressure / 1e3:.6g}"),
+    ("head", "m", 8, lambda s: f"{s.head:.4g}"),
     ("mass flow", "kg/s", 10, lambda s: f"{s.mass_flow:.3f}"),
+    ("flow", "L/s", 9, lambda s: f"{s.volume_flow * 1e3:.5g}"),
     ("lip area", "cm2", 9, lambda s: f"{s.outlet_area * 1e4:.3f}"),
     ("jet", "m/s", 7, lambda s: f"{s.outlet_velocity:.3f}"),
     ("lip opening", "mm", 12, lambda s: f"{s.lip_opening * 1e3:.3f}"),
