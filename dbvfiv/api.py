@@ -104,7 +104,7 @@ class Valve:
         """
         single = isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0
         asked = self.case.steady_pressures() if pressure is None else [pressure] if single else pressure
-        pressures = read_pressures(asked, "drive.pressure" if pressure is None else "pressure")
+        pressures = read_pressures(asked, "drive.pressure" if pressure is None else "pressure", self.case.fluid.density)
         self.model  # shared by what is asked of this valve
         result = self.session.replace({"steady.pressures": list(pressures)}).perform("steady", output, observer)
         if not single:
@@ -207,7 +207,8 @@ class Valve:
         """
         from .results.closure_run import start_closure
 
-        pressures = read_pressures(self.case.closure.pressures if pressure is None else pressure, "pressure")
+        asked = self.case.closure.pressures if pressure is None else pressure
+        pressures = read_pressures(asked, "pressure", self.case.fluid.density)
         return start_closure(
             self.case.replace({"closure.pressures": list(pressures)}), self.name, in_time, output, observer
         )
@@ -315,8 +316,8 @@ def load(case: str | Path | Case | None = None, changes: Mapping[str, Any] | Non
     return Valve(made.replace(changes) if changes else made, name)
 
 
-def read_pressures(given: Iterable[Any], name: str) -> tuple[float, ...]:
-    """Pressures in Pa from numbers and texts with units.
+def read_pressures(given: Iterable[Any], name: str, density: float | None = None) -> tuple[float, ...]:
+    """Pressures in Pa from numbers and texts with units, heads of a fluid of that density, kg/m3, included.
 
     Raises
     ------
@@ -326,7 +327,7 @@ def read_pressures(given: Iterable[Any], name: str) -> tuple[float, ...]:
     found = []
     for value in given:
         try:
-            pressure = _PRESSURE.quantity.parse(_number(value))
+            pressure = _PRESSURE.quantity.parse(_number(value), density)
         except ValueError as error:
             raise CaseError(f"{name} is given as {value!r}, {error}; {_ALLOWED}.") from None
         if not 0 < pressure <= _PRESSURE.high:

@@ -20,9 +20,9 @@ from scipy.optimize import brentq
 import dbvfiv
 
 QUANTITIES = {
-    "lip amplitude, mm": ("lip_opening", "amplitude", 1e3),
-    "lip mean, mm": ("lip_opening", "mean", 1e3),
-    "period, ms": ("lip_opening", "period", 1e3),
+    "lip amplitude, mm": ("lip_displacement", "amplitude", 1e3),
+    "lip mean, mm": ("lip_displacement", "mean", 1e3),
+    "period, ms": ("lip_displacement", "period", 1e3),
     "flow amplitude, kg/s": ("mass_flow", "amplitude", 1.0),
     "flow mean, kg/s": ("mass_flow", "mean", 1.0),
 }
@@ -85,7 +85,7 @@ def _on(base, mesh: str, step: float):
 
 
 def _row(mesh: str, step: float, result) -> dict:
-    lip = result.verdict["lip_opening"]
+    lip = result.verdict["lip_displacement"]
     numbers = {}
     for name, (signal, key, factor) in QUANTITIES.items():
         value = result.verdict[signal][key]  # None where no cycle was found

@@ -116,13 +116,13 @@ def _run(case, path: Path, last):
 
 
 def _moving(case, last) -> bool:
-    return last is not None and last.verdict["lip_opening"]["amplitude"] > 0.5 * case.transient.kick_opening
+    return last is not None and last.verdict["lip_displacement"]["amplitude"] > 0.5 * case.transient.kick_opening
 
 
 def _row(way: str, result) -> dict:
     """Numbers of a run; m, kg/s, Hz, 1/s."""
     verdict, h = result.verdict, result.history
-    lip, flow = verdict["lip_opening"], verdict["mass_flow"]
+    lip, flow = verdict["lip_displacement"], verdict["mass_flow"]
     late = h["time"] >= 0.5 * h["time"][-1]
     trend = (lip["amplitude_trend"] or 0.0) * (lip["frequency"] or 0.0)
     return {
@@ -132,8 +132,8 @@ def _row(way: str, result) -> dict:
         "decided": verdict["decided"],
         "amplitude": lip["amplitude"],
         "mean": lip["mean"],
-        "smallest": h["lip_opening"][late].min(),
-        "largest": h["lip_opening"][late].max(),
+        "smallest": h["lip_displacement"][late].min(),
+        "largest": h["lip_displacement"][late].max(),
         "frequency": lip["frequency"],
         "flow_amplitude": flow["amplitude"],
         "flow_mean": flow["mean"],
@@ -144,7 +144,7 @@ def _row(way: str, result) -> dict:
         "stops": h["stops"][late].max(),
         "time": verdict["time"],
         "steps": verdict["steps"],
-        "growth_rate": growth(h["time"], h["lip_opening"], lip["period"]),
+        "growth_rate": growth(h["time"], h["lip_displacement"], lip["period"]),
     }
 
 

@@ -80,7 +80,7 @@ def statistics(result, since: float) -> dict:
     h = result.history
     kept = h["time"] >= since
     t, step = h["time"][kept], h["step"][kept]
-    lip, flow, area = 1e3 * h["lip_opening"][kept], h["mass_flow"][kept], 1e4 * h["smallest_area"][kept]
+    lip, flow, area = 1e3 * h["lip_displacement"][kept], h["mass_flow"][kept], 1e4 * h["smallest_area"][kept]
 
     def mean(x, part=slice(None)):
         return float(np.average(x[part], weights=step[part]))

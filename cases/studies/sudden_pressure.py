@@ -138,7 +138,7 @@ def _row(run) -> dict:
         "monotone": bool(np.all(np.diff(flow[opened]) > -1e-7 * steady)),
         "smallest": flow.min() / steady,
         "verdict": run.verdict["verdict"],
-        "lip": run.history["lip_opening"][at],
+        "lip": run.history["lip_displacement"][at],
         "evaluations": int(run.history["evaluations"].sum()),
         "balance": np.abs(run.history["balance"]).max() / run.history["pressure_work"].max(),
     }

@@ -36,8 +36,9 @@ class Axis:
         return PARAMETERS[self.parameter].key
 
 
-def parse_axis(text: str, names: Iterable[str] = SWEPT) -> Axis:
-    """Read ``PARAMETER=START:STOP:COUNT[:log]`` for one of the parameters named.
+def parse_axis(text: str, names: Iterable[str] = SWEPT, density: float | None = None) -> Axis:
+    """Read ``PARAMETER=START:STOP:COUNT[:log]`` for one of the parameters named; pressures may be heads of a
+    fluid whose density, kg/m3, is given.
 
     Raises
     ------
@@ -54,7 +55,7 @@ def parse_axis(text: str, names: Iterable[str] = SWEPT) -> Axis:
     log = parts[-1] in ("log", "lin") and parts.pop() == "log"
     if not equals or len(parts) != 3:
         raise ValueError("which is not of that form")
-    start, stop = (_value(row, part) for part in parts[:2])
+    start, stop = (_value(row, part, density) for part in parts[:2])
     if not parts[2].isascii() or not parts[2].isdigit() or len(parts[2]) > 6 or not 2 <= int(parts[2]) <= _LARGEST:
         raise ValueError(f"whose count is not between 2 and {_LARGEST}")
     if start >= stop:
@@ -72,8 +73,8 @@ def parse_axis(text: str, names: Iterable[str] = SWEPT) -> Axis:
     return Axis(name, (*values[:-1], stop), log)
 
 
-def _value(row: Parameter, text: str) -> float:
+def _value(row: Parameter, text: str, density: float | None) -> float:
     try:
         return row.quantity.parse(float(text))
     except ValueError:
-        return row.quantity.parse(text)
+        return row.quantity.parse(text, density)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from .quantity import Quantity
 
-_TIME, _PRESSURE = Quantity("s", "s"), Quantity("Pa", "kPa")
+_TIME, _PRESSURE = Quantity("s", "s"), Quantity("Pa", "kPa", head=True)
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import model_validator
+from pydantic import ValidationInfo, model_validator
 
 from . import physics, studies
 from .materials import DEFAULT_LAYERS, Layer, Materials
+from .parameters import PARAMETERS
 from .section import BrokenRule, Section, key
 from .valve import Mesh, Valve
 
@@ -46,6 +47,20 @@ class Case(Section):
     map: studies.StabilityMap = key(studies.StabilityMap(), "Stability over two parameters.")
     transient: studies.Transient = key(studies.Transient(), "A time history.")
     closure: studies.Closure = key(studies.Closure(), "Back pressure on the outside, no flow.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _find_density(cls, data: Any, info: ValidationInfo) -> Any:
+        """Density of the fluid, for pressures given as heads of it."""
+        if isinstance(info.context, dict) and isinstance(data, Mapping):
+            fluid = data.get("fluid")
+            given = fluid.get("density") if isinstance(fluid, Mapping) else getattr(fluid, "density", None)
+            row = PARAMETERS["density"]
+            try:
+                info.context["density"] = cls().fluid.density if given is None else row.quantity.parse(given)
+            except ValueError:
+                info.context["density"] = None  # refused where it stands
+        return data
 
     @model_validator(mode="after")
     def _goes_together(self) -> Case:

@@ -107,8 +107,8 @@ _TABLE = (
     Parameter(
         name="pressure",
         key="drive.pressure",
-        quantity=Quantity("Pa", "kPa"),
-        title="Inlet pressure",
+        quantity=Quantity("Pa", "kPa", head=True),
+        title="Static inlet pressure",
         usual=(300.0, 36000.0, 61),
         shown_unit="kPa",
         scale=1e3,

@@ -51,7 +51,10 @@ class Drive(Section):
         "flow", "Pressure from the flow through the valve, or one uniform pressure without flow."
     )
     pressure: Pressure = key(
-        18e3, "Inlet pressure (flow), or the pressure on the wall (uniform).", ge=0, le=PARAMETERS["pressure"].high
+        18e3,
+        "Static pressure at the flange over that of the surroundings (flow), or the pressure on the wall (uniform).",
+        ge=0,
+        le=PARAMETERS["pressure"].high,
     )
     side: Literal["inside", "outside"] = key("inside", "Which side of the wall a uniform pressure acts on.")
     unloaded_edge: Number = key(

@@ -1,7 +1,8 @@
 """Numbers with units: ``"36 kPa"``, ``"12 mm"``, ``"54 deg"``, ``"10 %"`` become SI floats.
 
-A bare number is taken as SI. Strings carry a unit of the right dimension; a
-fraction such as ``"3/28"`` is accepted where a plain number is asked for.
+A pressure may also be a head: ``"2 m"`` of the fluid (metres alone: ``"2 mm"`` is a slip), ``"2 mH2O"`` of water. A
+bare number is taken as SI. Strings carry a unit of the right dimension; a fraction such as ``"3/28"`` is accepted where
+a plain number is asked for.
 """
 
 from __future__ import annotations
@@ -19,6 +20,10 @@ from pydantic_core import core_schema
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*((?:1?\s*/\s*)?[A-Za-zµμ°%][A-Za-zµμ°%0-9/*^. ()-]{{0,40}})?\s*")
 _FRACTION = re.compile(rf"\s*({_NUMBER})\s*/\s*({_NUMBER})\s*")
+
+#: Standard gravity, m/s2, and the density of the water in mH2O, kg/m3.
+GRAVITY, WATER = 9.80665, 1000.0
+_HEAD_OF_WATER = re.compile(r"(mm|cm|dm|m|in|ft)\s*H2O")
 
 # SI unit -> what such a quantity is called in messages and in the reference
 DIMENSION = {
@@ -62,6 +67,30 @@ def _angle_like(unit_text: str) -> bool:
     return bool(re.fullmatch(r"(deg|degree|degrees|°|rad|radian|radians|mrad|gon|grad|arcmin|turn)", unit_text))
 
 
+def head_of(pressure: float, density: float) -> float:
+    """Head, m, of a fluid, kg/m3, that a pressure, Pa, carries."""
+    return pressure / (density * GRAVITY)
+
+
+def _head(text: str, density: float | None) -> float | None:
+    """Pressure, Pa, of a head; None for a text that is no head.
+
+    Raises
+    ------
+    ValueError
+        For a head of a fluid whose density is not known.
+    """
+    match = _QUANTITY.fullmatch(text)
+    unit = (match[2] or "").strip() if match else ""
+    water = _HEAD_OF_WATER.fullmatch(unit)
+    if unit != "m" and water is None:
+        return None
+    if water is None and density is None:
+        raise ValueError("which is a head, and the density of the fluid is not known here; mH2O or a pressure is")
+    weight = GRAVITY * (WATER if water else density)
+    return float(f"{float(match[1]) * _factor(water[1] if water else unit, 'm') * weight:.15g}")
+
+
 def _to_si(text: str, si: str) -> float:
     fraction = _FRACTION.fullmatch(text)
     if fraction and si == "":
@@ -95,13 +124,22 @@ class Quantity:
         The SI unit the validated value is in (``"deg"`` for angles).
     shown : str
         The unit in which case files and tables show it.
+    head : bool
+        Whether it is a pressure of the fluid, which may also be given as a head.
     """
 
     si: str
     shown: str = ""
+    head: bool = False
 
-    def parse(self, given: Any) -> float:
+    def parse(self, given: Any, density: float | None = None) -> float:
         """Return the SI value of a number or a string with a unit.
+
+        Parameters
+        ----------
+        given : object
+        density : float, optional
+            Of the fluid, kg/m3, for heads of it.
 
         Raises
         ------
@@ -116,7 +154,8 @@ class Quantity:
             except OverflowError:
                 raise ValueError("which is too large") from None
         elif isinstance(given, str):
-            value = _to_si(given, self.si)
+            value = _head(given, density) if self.head else None
+            value = _to_si(given, self.si) if value is None else value
         else:
             raise ValueError("which is not a number")
         if not math.isfinite(value):
@@ -138,11 +177,14 @@ class Quantity:
         return text if self.parse(text) == value else value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler):
-        return core_schema.no_info_before_validator_function(self.parse, handler(source))
+        def parse(given: Any, info: core_schema.ValidationInfo) -> float:
+            return self.parse(given, (info.context or {}).get("density"))
+
+        return core_schema.with_info_before_validator_function(parse, handler(source))
 
 
 Length = Annotated[float, Quantity("m", "mm")]
-Pressure = Annotated[float, Quantity("Pa", "kPa")]
+Pressure = Annotated[float, Quantity("Pa", "kPa", head=True)]
 Modulus = Annotated[float, Quantity("Pa", "MPa")]
 Density = Annotated[float, Quantity("kg/m^3", "kg/m^3")]
 Time = Annotated[float, Quantity("s", "s")]

@@ -178,7 +178,9 @@ class Transient(Section):
     kick_mode: StrictInt = key(
         1, "Which oscillating mode the push follows, counted by growth rate from 1.", ge=1, le=100
     )
-    kick_opening: Length = key(1e-4, "Lip opening of the push.", gt=0, le=1)
+    kick_opening: Length = key(
+        1e-4, "Displacement in y of one lip by the push; the clear opening changes by twice that.", gt=0, le=1
+    )
     start_file: Path | None = key(None, "Result file of the state to start from, relative to the case file.")
     start_state: StrictInt = key(-1, "Which state of start_file, from 0; negative ones count from the end.")
     ramp: Time = key(0.0, "Time in which the pressure rises from zero; zero applies it at once.", ge=0, le=1e5)

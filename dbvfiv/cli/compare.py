@@ -44,10 +44,10 @@ def command(
     width = max(len(name) for name in names) + 2
     print(f"{'':<{width}}{'last kg/s':>11}{'lip mm':>9}{'amplitude mm':>14}{'Hz':>8}  verdict")
     for name, result in zip(names, results):
-        lip, h = result.verdict["lip_opening"], result.history
+        lip, h = result.verdict["lip_displacement"], result.history
         frequency = "-" if lip["frequency"] is None else f"{lip['frequency']:.3f}"
         print(
-            f"{name:<{width}}{h['mass_flow'][-1]:>11.5g}{1e3 * h['lip_opening'][-1]:>9.4g}"
+            f"{name:<{width}}{h['mass_flow'][-1]:>11.5g}{1e3 * h['lip_displacement'][-1]:>9.4g}"
             f"{1e3 * lip['amplitude']:>14.4g}{frequency:>8}  {result.verdict['verdict']}"
         )
     print(f"Wrote {path}.")

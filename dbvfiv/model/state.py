@@ -6,29 +6,39 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..case.quantity import head_of
 from ..errors import SolveError
+from .lip import LipCentre
 from .valve import QUARTERS, ValveModel
 
 
 @dataclass(frozen=True)
 class SteadyState:
-    """An equilibrium; flow and areas are those of the whole valve, station data those of a quarter.
+    """An equilibrium; flow and areas are those of the whole valve, station data those of a quarter. Pressures are
+    static ones, over that of the surroundings.
 
     Attributes
     ----------
     pressure : float, Pa
+        At the flange; of a uniform load, on the wall.
+    head : float, m
+        The same as a head of the fluid.
     q : (n,) array
         Free displacements (m) and rotations (rad).
     nodal : (nn, 5) array
         Displacements and rotations of all nodes.
     mass_flow : float, kg/s
+    volume_flow : float, m3/s
     outlet_area : float, m2
     outlet_velocity : float, m/s
     max_displacement : float, m
     max_displacement_position : (3,) tuple, m
         Where it occurs, on the mid-surface at rest.
     lip_opening : float, m
-        Displacement in y at x = z = 0.
+        Full clear opening between the inner faces of both lips at x = z = 0; never below zero, see
+        `dbvfiv.model.lip.LipCentre.opening`.
+    lip_displacement : float, m
+        Displacement in y of the mid-surface of one lip there.
     station_area, station_velocity, station_pressure : (m,) arrays, m2 (a quarter), m/s, Pa
     stops : int
         Lip stops in contact.
@@ -44,14 +54,17 @@ class SteadyState:
     """
 
     pressure: float
+    head: float
     q: np.ndarray
     nodal: np.ndarray
     mass_flow: float
+    volume_flow: float
     outlet_area: float
     outlet_velocity: float
     max_displacement: float
     max_displacement_position: tuple[float, float, float]
     lip_opening: float
+    lip_displacement: float
     station_area: np.ndarray
     station_velocity: np.ndarray
     station_pressure: np.ndarray
@@ -62,25 +75,6 @@ class SteadyState:
     residual: float
     rounding: float
     reason: str
-
-    def summary(self) -> dict:
-        """Plain SI numbers for JSON."""
-        return {
-            "pressure": self.pressure,
-            "mass_flow": self.mass_flow,
-            "outlet_area": self.outlet_area,
-            "outlet_velocity": self.outlet_velocity,
-            "max_displacement": self.max_displacement,
-            "max_displacement_position": list(self.max_displacement_position),
-            "lip_opening": self.lip_opening,
-            "stops": self.stops,
-            "converged": self.converged,
-            "iterations": self.iterations,
-            "load_steps": self.load_steps,
-            "residual": self.residual,
-            "rounding": self.rounding,
-            "reason": self.reason,
-        }
 
 
 def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution) -> SteadyState:
@@ -104,16 +98,21 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     speeds = model.flow.velocities(area, velocity)
     displacement = np.linalg.norm(nodal[:, :3], axis=1)
     where = int(np.argmax(displacement))
+    lip = LipCentre(model.mesh, model.shell)
+    mass_flow = model.mass_flow(area, pressure)
     return SteadyState(
         pressure=float(pressure),
+        head=head_of(pressure, density),
         q=np.asarray(q),
         nodal=nodal,
-        mass_flow=model.mass_flow(area, pressure),
+        mass_flow=mass_flow,
+        volume_flow=mass_flow / density,
         outlet_area=float(QUARTERS * area[0]),
         outlet_velocity=float(speeds[0]),
         max_displacement=float(displacement[where]),
         max_displacement_position=tuple(float(value) for value in model.mesh.nodes[where]),
-        lip_opening=float(nodal[model.mesh.rows[0, 0], 1]),
+        lip_opening=lip.opening(q),
+        lip_displacement=lip.displacement(q),
         station_area=area,
         station_velocity=speeds,
         station_pressure=model.flow.steady_pressure(area, pressure),

@@ -91,8 +91,8 @@ def deflection(result: SteadyResult) -> Figure:
     axes.plot(
         p, [s.max_displacement * 1e3 for s in states], "s-", color=ACCENT, ms=4.5, label="largest, anywhere on the wall"
     )
-    axes.plot(p, [s.lip_opening * 1e3 for s in states], "o-", color=COMPUTED, label="lip centre, in y")
-    return _finish(figure, axes, "Deflection of the wall", from_zero=all(s.lip_opening >= 0 for s in states))
+    axes.plot(p, [s.lip_displacement * 1e3 for s in states], "o-", color=COMPUTED, label="lip centre, in y")
+    return _finish(figure, axes, "Deflection of the wall", from_zero=all(s.lip_displacement >= 0 for s in states))
 
 
 def _name(result: SteadyResult) -> str:

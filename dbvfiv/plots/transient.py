@@ -137,11 +137,11 @@ def centre_line(result: TransientResults, count: int = 6) -> Figure:
 
 
 def phase_portrait(result: TransientResults) -> Figure:
-    """Velocity of the lip over its opening; the last cycles stand out."""
+    """Velocity of the lip over its displacement; the last cycles stand out."""
     h = result.history
     figure = new_figure(6.0, 4.6)
     axes = figure.add_subplot()
-    x, v = 1e3 * h["lip_opening"], h["lip_velocity"]
+    x, v = 1e3 * h["lip_displacement"], h["lip_velocity"]
     axes.plot(x, v, color="0.75", lw=0.7, label="whole run")
     rows = _cycle_rows(result)
     rows = np.concatenate(
@@ -149,7 +149,7 @@ def phase_portrait(result: TransientResults) -> Figure:
     )  # a cycle is no whole number of steps: one more closes the loop
     axes.plot(x[rows], v[rows], color=COMPUTED, lw=1.8, label="last cycle" if result.cycle else "last fifth of the run")
     axes.plot(x[0], v[0], "o", color=ACCENT, label="start")
-    axes.set_xlabel("Lip opening, mm")
+    axes.set_xlabel("Displacement of a lip, mm")
     axes.set_ylabel("Its velocity, m/s")
     axes.set_title("Phase portrait of the lip", loc="left", fontweight="bold")
     axes.legend(loc="best")

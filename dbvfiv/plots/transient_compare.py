@@ -81,9 +81,9 @@ def compare(results: Sequence[TransientResults]) -> Figure:
 
 
 def _last_cycles(result: TransientResults, count: int = 2) -> tuple[slice, np.ndarray]:
-    """Rows of the last cycles, and times, ms, from the instant at which the lip's opening rises through its mean."""
+    """Rows of the last cycles, and times, ms, from the instant at which the lip rises through its mean."""
     h = result.history
-    t, x = h["time"], h["lip_opening"] - result.verdict["lip_opening"]["mean"]
+    t, x = h["time"], h["lip_displacement"] - result.verdict["lip_displacement"]["mean"]
     period = result.cycle[1] - result.cycle[0]
     rising = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0) & (t[1:] <= t[-1] - count * period))
     if not len(rising):

@@ -15,12 +15,24 @@ from .table import TableSpec
 
 #: What a user reads off a state; the names are the keys of the JSON output.
 SUMMARY = (
-    Column("pressure", "Pa", "Inlet pressure", shown=Shown("pressure", "kPa", 9, lambda s: f"{s.pressure / 1e3:.6g}")),
+    Column(
+        "pressure",
+        "Pa",
+        "Static pressure at the flange, over that of the surroundings",
+        shown=Shown("pressure", "static kPa", 10, lambda s: f"{s.pressure / 1e3:.6g}"),
+    ),
+    Column("head", "m", "The same as a head of the fluid", shown=Shown("head", "m", 8, lambda s: f"{s.head:.4g}")),
     Column(
         "mass_flow",
         "kg/s",
         "Mass flow of the whole valve",
         shown=Shown("mass flow", "kg/s", 10, lambda s: f"{s.mass_flow:.3f}"),
+    ),
+    Column(
+        "volume_flow",
+        "m^3/s",
+        "Volume flow of the whole valve",
+        shown=Shown("flow", "L/s", 9, lambda s: f"{s.volume_flow * 1e3:.5g}"),
     ),
     Column(
         "outlet_area",
@@ -37,7 +49,7 @@ SUMMARY = (
     Column(
         "lip_opening",
         "m",
-        "Displacement in y of the lip at x = z = 0",
+        "Full clear opening between the inner faces of both lips at x = z = 0",
         shown=Shown("lip opening", "mm", 12, lambda s: f"{s.lip_opening * 1e3:.3f}"),
     ),
     Column(
@@ -51,6 +63,7 @@ SUMMARY = (
             lambda s: f"{s.max_displacement * 1e3:.3f} at {s.max_displacement_position[2] * 1e3:.0f}",
         ),
     ),
+    Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
     Column("max_displacement_position", "m", "Where it occurs, position at rest"),
     Column("stops", "", "Lip stops in contact", "i8"),
     Column("converged", "", "Whether the residual fell below the tolerance", "bool"),
@@ -76,7 +89,7 @@ FIELDS = (
     Column("nodal", "m, rad", "Displacements ux uy uz and two rotations of each node"),
     Column("station_area", "m^2", "Flow area of a quarter at each row"),
     Column("station_velocity", "m/s", "Velocity at each row"),
-    Column("station_pressure", "Pa", "Pressure at each row"),
+    Column("station_pressure", "Pa", "Static pressure at each row"),
 )
 #: Layers, inside to outside, in their own axes.
 LAYERS = (

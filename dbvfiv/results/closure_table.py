@@ -22,7 +22,8 @@ SUMMARY = (
     Column("overlap", "m", "Deepest overlap of the inner faces"),
     Column("least_opening", "m^2", "Smallest passage left, whole valve"),
     Column("least_opening_position", "m", "Where it is, from the lip"),
-    Column("lip_opening", "m", "Displacement in y of the lip at x = z = 0"),
+    Column("lip_opening", "m", "Full clear opening between the inner faces of both lips at x = z = 0"),
+    Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
     Column("max_displacement", "m", "Largest displacement of the mid-surface"),
     Column("max_displacement_position", "m", "Where it occurs, position at rest"),
     Column("largest_strain", "", "Largest elongation or shortening of a layer in its plane"),
@@ -72,7 +73,8 @@ BUCKLING = (
 )
 OPENED = (
     Column("pressure", "Pa", "Inlet pressure"),
-    Column("lip_opening", "m", "Displacement in y of the lip at x = z = 0"),
+    Column("lip_opening", "m", "Full clear opening between the inner faces of both lips at x = z = 0"),
+    Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
     Column("outlet_area", "m^2", "Flow area at the lip, whole valve"),
     Column("mass_flow", "kg/s", "Mass flow, whole valve"),
 )
@@ -92,7 +94,8 @@ RESTART = (
 REVERSAL = (
     Column("time", "s", "Time"),
     Column("inlet_pressure", "Pa", "Pressure of the drive"),
-    Column("lip_opening", "m", "Displacement in y of the lip at x = z = 0"),
+    Column("lip_opening", "m", "Full clear opening between the inner faces of both lips at x = z = 0"),
+    Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
     Column("least_opening", "m^2", "Narrowest passage between the inner faces, whole valve"),
     Column("mass_flow", "kg/s", "Mass flow through the lip, whole valve; negative backwards"),
     Column("lowest_pressure", "Pa", "Lowest pressure of the fluid in the valve"),

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..case.model import Case
 from ..errors import SolveError
+from ..model.lip import LipCentre
 from ..observer import Observer
 from ..transient.control import ControlOptions, FixedSteps
 from ..transient.scheme import scheme
@@ -58,7 +59,10 @@ class ClosingSample:
     time : float, s
     inlet_pressure : float, Pa
     lip_opening : float, m
-        Displacement in y of the lip at x = z = 0.
+        Full clear opening between the inner faces of both lips at x = z = 0; never below zero, see
+        `dbvfiv.model.lip.LipCentre.opening`.
+    lip_displacement : float, m
+        Displacement in y of the mid-surface of one lip there.
     least_opening : float, m2
         Narrowest passage between the inner faces.
     mass_flow : float, kg/s
@@ -72,6 +76,7 @@ class ClosingSample:
     time: float
     inlet_pressure: float
     lip_opening: float
+    lip_displacement: float
     least_opening: float
     mass_flow: float
     lowest_pressure: float
@@ -204,10 +209,12 @@ def _sample(model: ContactValve, motion: ClosingMotion, state, load) -> ClosingS
         raise SolveError(f"The state at {state.time:.6g} s is not finite.")
     passage = measure(model.mesh, model.shell, model.contact, nodal)
     open_area = motion.fluid.open_area(load.area)
+    lip = LipCentre(model.mesh, model.shell)
     return ClosingSample(
         time=float(state.time),
         inlet_pressure=float(load.inlet),
-        lip_opening=float(nodal[model.mesh.rows[0, 0], 1]),
+        lip_opening=lip.opening(state.q),
+        lip_displacement=lip.displacement(state.q),
         least_opening=float(QUARTERS * passage.area.min()),
         mass_flow=float(QUARTERS * motion.conditions.density * load.speed[0] * open_area[0]),
         lowest_pressure=float(load.pressure.min()),

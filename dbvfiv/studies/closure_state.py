@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..model.lip import LipCentre
 from ..shell.recovery import layer_fields
 from .closure_balance import force_balance
 from .closure_model import ClosureModel
@@ -49,7 +50,10 @@ class ClosureState:
         Smallest passage left.
     least_opening_position : float, m
     lip_opening : float, m
-        Displacement in y at x = z = 0.
+        Full clear opening between the inner faces of both lips at x = z = 0; never below zero, see
+        `dbvfiv.model.lip.LipCentre.opening`.
+    lip_displacement : float, m
+        Displacement in y of the mid-surface of one lip there.
     max_displacement : float, m
     max_displacement_position : (3,) tuple, m, at rest
     largest_strain : float
@@ -94,6 +98,7 @@ class ClosureState:
     least_opening: float
     least_opening_position: float
     lip_opening: float
+    lip_displacement: float
     max_displacement: float
     max_displacement_position: tuple[float, float, float]
     largest_strain: float
@@ -155,6 +160,7 @@ def describe_closure(
     stress = layers.von_mises.max(axis=0)
     displacement = np.linalg.norm(nodal[:, :3], axis=1)
     where = int(np.argmax(displacement))
+    centre = LipCentre(model.mesh, pressed.shell)
     return ClosureState(
         pressure=float(pressure),
         q=np.asarray(q),
@@ -172,7 +178,8 @@ def describe_closure(
         overlap=float(max(0.0, -faces[movable[face.nodes]].min(initial=0.0))),
         least_opening=float(QUARTERS * passage.area.min()),
         least_opening_position=float(passage.z[passage.narrowest]),
-        lip_opening=float(nodal[model.mesh.rows[0, 0], 1]),
+        lip_opening=centre.opening(q),
+        lip_displacement=centre.displacement(q),
         max_displacement=float(displacement[where]),
         max_displacement_position=tuple(float(value) for value in model.mesh.nodes[where]),
         largest_strain=float(strain.max()),

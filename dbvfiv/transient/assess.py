@@ -1,4 +1,4 @@
-"""The verdict on a run: on its mass flow and its lip opening, with the equilibrium's residual at hand."""
+"""The verdict on a run: on its mass flow and the displacement of its lip, with the equilibrium's residual at hand."""
 
 from __future__ import annotations
 
@@ -18,11 +18,13 @@ ATMOSPHERE = 101_325.0
 
 @dataclass(frozen=True)
 class RunVerdict:
-    """Verdicts on the two signals and what they say together.
+    """Verdicts on the signals and what mass flow and lip displacement say together.
 
     Attributes
     ----------
-    mass_flow, lip_opening : Verdict
+    mass_flow, lip_displacement : Verdict
+    lip_opening : Verdict
+        Of the clear opening, which is cut off at zero and says nothing more; amplitudes are about twice as large.
     residual : float
         Unbalanced force at the end over pressure force; not a number while the pressure changes.
     steps : int
@@ -30,6 +32,7 @@ class RunVerdict:
     """
 
     mass_flow: Verdict
+    lip_displacement: Verdict
     lip_opening: Verdict
     residual: float
     steps: int
@@ -38,22 +41,23 @@ class RunVerdict:
     @property
     def name(self) -> str:
         """The livelier of the two: a flow can look settled while the lip still moves."""
-        names = (self.mass_flow.name, self.lip_opening.name)
+        names = (self.mass_flow.name, self.lip_displacement.name)
         return max(names, key=_LIVELINESS.index)
 
     @property
     def decided(self) -> bool:
         """Whether both agree and more of the same would not change them."""
-        return self.mass_flow.decided and self.lip_opening.decided and self.mass_flow.name == self.lip_opening.name
+        lip = self.lip_displacement
+        return self.mass_flow.decided and lip.decided and self.mass_flow.name == lip.name
 
     @property
     def governing(self) -> Verdict:
         """The verdict that gives the name."""
-        return self.mass_flow if self.mass_flow.name == self.name else self.lip_opening
+        return self.mass_flow if self.mass_flow.name == self.name else self.lip_displacement
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON: name and numbers of the mass flow, then each signal by itself."""
-        flow, lip = self.mass_flow.summary(), self.lip_opening.summary()
+        flow = self.mass_flow.summary()
         top = {key: flow[key] for key in ("amplitude", "frequency", "mean", "cycles_observed", "periodicity_error")}
         return {
             "verdict": self.name,
@@ -64,7 +68,8 @@ class RunVerdict:
             "time": self.time,
             "residual": self.residual if np.isfinite(self.residual) else None,
             "mass_flow": flow,
-            "lip_opening": lip,
+            "lip_opening": self.lip_opening.summary(),
+            "lip_displacement": self.lip_displacement.summary(),
         }
 
 
@@ -88,9 +93,8 @@ def assess(
     time = history["time"]
     chosen = time >= since
     known = residual if np.isfinite(residual) else None
-    found = [
-        judge(time[chosen], history[name][chosen], options, residual=known) for name in ("mass_flow", "lip_opening")
-    ]
+    signals = ("mass_flow", "lip_displacement", "lip_opening")
+    found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in signals]
     closed = judge(time[chosen], history["smallest_area"][chosen], options, closed_below=CLOSED * gap)
     if closed.name == "closed":
         reason = "The smallest flow area stays at that of the lip gap at rest."

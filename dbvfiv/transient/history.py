@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..model.lip import LipCentre
 from ..model.valve import QUARTERS
 from ..record.layout import Column
 from .equations import Step, ValveMotion
@@ -14,7 +15,7 @@ from .stepper import StepResult
 #: One number a step; of the whole valve.
 SCALARS = (
     Column("time", "s", "Time"),
-    Column("inlet_pressure", "Pa", "Inlet pressure"),
+    Column("inlet_pressure", "Pa", "Static pressure at the flange"),
     Column("mass_flow", "kg/s", "Mass flow leaving at the lip"),
     Column("inlet_mass_flow", "kg/s", "Mass flow entering at the flange"),
     Column("outlet_area", "m^2", "Flow area at the lip; below zero where the lips cross"),
@@ -22,8 +23,9 @@ SCALARS = (
     Column("throat", "m", "Axial position of the smallest area, from the lip"),
     Column("inlet_velocity", "m/s", "Velocity at the flange"),
     Column("outlet_velocity", "m/s", "Jet velocity at the lip"),
-    Column("lip_opening", "m", "Displacement in y of the lip at x = z = 0"),
-    Column("lip_velocity", "m/s", "Its rate"),
+    Column("lip_opening", "m", "Full clear opening between the inner faces of both lips at x = z = 0"),
+    Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
+    Column("lip_velocity", "m/s", "Rate of the lip displacement"),
     Column("stops", "", "Lip stops in contact, of a quarter"),
     Column("kinetic_energy", "J", "Kinetic energy of the wall"),
     Column("strain_energy", "J", "Strain energy of the wall"),
@@ -66,7 +68,7 @@ class Reader:
         self.motion, self.energy, self.work, self.dissipation = motion, energy, work, dissipation
         model = motion.model
         index = model.shell.dofs.index
-        self._lip = index[model.mesh.rows[0, 0], 1]
+        self._lip = LipCentre(model.mesh, model.shell)
         centre = index[model.mesh.rows[:, 0], 1]
         self._centre, self._moves = np.maximum(centre, 0), centre >= 0
         self._inlet_area = float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
@@ -103,8 +105,9 @@ class Reader:
             "throat": float(model.mesh.z[throat]),
             "inlet_velocity": load.speed[-1],
             "outlet_velocity": load.speed[0],
-            "lip_opening": state.q[self._lip],
-            "lip_velocity": state.v[self._lip],
+            "lip_opening": self._lip.opening(state.q),
+            "lip_displacement": self._lip.displacement(state.q),
+            "lip_velocity": self._lip.displacement(state.v),
             "stops": model.stops.touching(state.q),
             "kinetic_energy": QUARTERS * kinetic,
             "strain_energy": QUARTERS * strain,

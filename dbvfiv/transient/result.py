@@ -173,7 +173,7 @@ class TransientResults(Result):
         h = self.history
         last = {
             name: float(h[name][-1])
-            for name in ("mass_flow", "lip_opening", "outlet_area", "inlet_pressure", "balance")
+            for name in ("mass_flow", "lip_opening", "lip_displacement", "outlet_area", "inlet_pressure", "balance")
         }
         return {
             **self.verdict,
@@ -193,9 +193,13 @@ class TransientResults(Result):
             ),
             verdict["reason"],
             "",
-            "                     last         mean    amplitude    frequency   cycles   periodicity error",
+            "                         last         mean    amplitude    frequency   cycles   periodicity error",
         ]
-        for name, unit, factor in (("mass_flow", "kg/s", 1.0), ("lip_opening", "mm", 1e3)):
+        for name, unit, factor in (
+            ("mass_flow", "kg/s", 1.0),
+            ("lip_opening", "mm", 1e3),
+            ("lip_displacement", "mm", 1e3),
+        ):
             found = verdict[name]
             numbers = (
                 factor * h[name][-1],
@@ -207,7 +211,7 @@ class TransientResults(Result):
             cells = "".join(f"{'-' if value is None else f'{value:.5g}':>13}" for value in numbers)
             error = found["periodicity_error"]
             lines.append(
-                f"{name.replace('_', ' '):<12}{cells}{found['cycles_observed']:>9}"
+                f"{name.replace('_', ' '):<16}{cells}{found['cycles_observed']:>9}"
                 f"{'-' if error is None else f'{error:.2g}':>20}   {unit}, Hz"
             )
         return lines
@@ -215,7 +219,7 @@ class TransientResults(Result):
     @cached_property
     def cycle(self) -> tuple[float, float] | None:
         """Start and end, s, of the last cycle; None without one."""
-        frequency = (self.verdict.get("lip_opening") or {}).get("frequency")
+        frequency = (self.verdict.get("lip_displacement") or {}).get("frequency")
         if not frequency:
             return None
         end = float(self.history["time"][-1])

@@ -70,7 +70,10 @@ def steady_positions(model, inlet: float) -> np.ndarray:
 def kicked(
     motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, number: int, opening: float
 ) -> tuple[MotionState, Kick]:
-    """Steady state pushed along its oscillating mode of a number, counted by growth rate from 1, by a lip opening."""
+    """Steady state pushed along its oscillating mode of a number, counted by growth rate from 1.
+
+    The push moves the lip by `opening` in y, m, half of what the clear opening changes by.
+    """
     from eigen import leading_modes
 
     model = motion.model

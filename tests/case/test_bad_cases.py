@@ -110,7 +110,7 @@ BAD = {
     "fibre fraction above one": ("[materials.fibre]\nkind='halpin-tsai'\nfibre_fraction='120 %'", "fibre_fraction"),
     "material density negative": ("[materials.A]\nkind='neo-hookean'\nshear_modulus=1e6\ndensity=-1", "density"),
     "no pressures": ("[steady]\npressures = []", "steady.pressures is given as an empty list"),
-    "pressure list with a length": ("[steady]\npressures = [1000, '3 m']", r"steady\.pressures\.1.*not a pressure"),
+    "pressure list with a length": ("[steady]\npressures = [1000, '3 mm']", r"steady\.pressures\.1.*not a pressure"),
     "tolerance too large": ("[steady]\ntolerance = 1", "steady.tolerance"),
     "no modes": ("[modes]\ncount = 0", "modes.count"),
     "sweep over nothing": ("[sweep]\nover = 'density'", "sweep.over.*START:STOP:COUNT"),

@@ -65,7 +65,7 @@ def test_a_place_knows_every_parameter():
 
 
 def test_words():
-    assert PARAMETERS["pressure"].label == "Inlet pressure, kPa"
+    assert PARAMETERS["pressure"].label == "Static inlet pressure, kPa"
     assert PARAMETERS["alpha"].label == "Mass damping α, 1/s"
     assert PARAMETERS["thickness"].label == "Wall thickness factor"
     assert PARAMETERS["pressure"].text(6e3) == "6 kPa"

@@ -20,6 +20,9 @@ KEYS = {
     "max_displacement",
     "max_displacement_position",
     "lip_opening",
+    "lip_displacement",
+    "head",
+    "volume_flow",
     "converged",
     "iterations",
     "residual",
@@ -59,6 +62,8 @@ def test_table_and_file(command_line, tmp_path):
         ("[steady]\npressures = [1e3, 2e3]", ["--set", "drive.pressure=3 kPa"], [3e3]),
         ("[steady]\npressures = [1e3, 2e3]", ["--set", "drive.pressure=3 kPa", "-p", "5 kPa"], [5e3]),
         ("", ["-p", "1 kPa:3 kPa:3", "-p", 4000], [1e3, 2e3, 3e3, 4e3]),
+        ("[fluid]\ndensity = 800", ["-p", "2 m", "-p", "1 mH2O:2 mH2O:2"], [15690.64, 9806.65, 19613.3]),
+        ("[fluid]\ndensity = 800", ["-p", "1 m:2 m:2"], [7845.32, 15690.64]),
         ("", [], [2e3, 6e3, 12e3, 18e3, 24e3, 29e3, 36e3, 50e3]),
     ],
 )
@@ -72,7 +77,8 @@ def test_which_pressures(monkeypatch, tmp_path, command_line, toml, arguments, e
 
 
 @pytest.mark.parametrize(
-    "pressure", ["nan", "inf", "-3", "-36 kPa", "0", "1e9", "5 m", "much", "", "1:2", "5:1:3", "1:2:0", "a:b:c"]
+    "pressure",
+    ["nan", "inf", "-3", "-36 kPa", "0", "1e9", "5 mm", "2000 m", "much", "", "1:2", "5:1:3", "1:2:0", "a:b:c"],
 )
 def test_impossible_pressures(command_line, one_sentence, tmp_path, pressure):
     outcome = command_line("steady", "--pressure", pressure, "-o", tmp_path / "r.h5")

@@ -50,7 +50,7 @@ def test_lips_are_closed_symmetric_curves(figures, coarse_run):
         assert x[0] == pytest.approx(x[-1]) and y[0] == pytest.approx(y[-1])
         assert x.max() == pytest.approx(-x.min()) and y.max() == pytest.approx(-y.min())
     opening = max(moved[-1].get_ydata()) - max(rest.get_ydata())
-    assert opening == pytest.approx(coarse_run.states[-1].lip_opening * 1e3)
+    assert opening == pytest.approx(coarse_run.states[-1].lip_displacement * 1e3)
 
 
 def test_one_panel_for_each_layer(figures, coarse_run):

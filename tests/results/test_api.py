@@ -31,7 +31,7 @@ def test_failures_are_raised(coarse_valve, one_sentence):
     with pytest.raises(SolveError) as caught:
         coarse_valve.replace({"steady.max_iterations": 2, "steady.min_step": 0.3}).steady(pressure=100)
     assert "No equilibrium" in str(caught.value)
-    for pressure in (-1, float("nan"), "3 m", [], True, None.__class__):
+    for pressure in (-1, float("nan"), "3 mm", [], True, None.__class__):
         with pytest.raises((CaseError, TypeError)):
             coarse_valve.steady(pressure=pressure)
     with pytest.raises(CaseError) as caught:

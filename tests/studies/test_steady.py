@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbvfiv.case.load import make_case, parse_toml
 from dbvfiv.case.model import Case
-from dbvfiv.errors import SolveError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions, find_equilibria, model_warnings
+from dbvfiv.model.lip import LipCentre
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.observer import Observer
 
@@ -46,7 +48,53 @@ def test_flow_is_that_of_bernoulli_at_the_outlet(model):
     assert state.station_pressure[0] == pytest.approx(0.0, abs=1e-9) and state.station_pressure[-1] == pytest.approx(
         18e3
     )
-    assert state.lip_opening > 0.01
+    assert state.lip_displacement > 0.01
+    assert state.head == pytest.approx(18e3 / (9.80665 * density), rel=1e-14)
+    assert state.volume_flow == pytest.approx(state.mass_flow / density, rel=1e-14)
+
+
+def test_lip_opening_is_the_distance_between_the_faces(model):
+    """47.7 mm at 18 kPa where the displacement of one lip, 23.8 mm, was called the opening before.
+
+    At rest 2 (6.19 - 6) mm are left between the faces; a state adds twice the displacement and what the turn of the
+    director gives back of the half wall.
+    """
+    centre = LipCentre(model.mesh, model.shell)
+    assert centre.half_wall == pytest.approx(0.006)
+    assert centre.opening(model.rest()) == pytest.approx(0.38e-3, rel=1e-9) and centre.displacement(model.rest()) == 0
+    state = LoadPath(model).go_to(18e3)
+    nodal = model.nodal(state.q)
+    node = model.mesh.rows[0, 0]
+    assert state.lip_displacement == nodal[node, 1]
+    director = model.shell.directors(nodal)[0][node]
+    face = model.mesh.nodes[node] + nodal[node, :3] - 0.006 * director
+    assert state.lip_opening == pytest.approx(2 * face[1], rel=1e-12)
+    assert state.lip_opening > 2 * state.lip_displacement + 0.38e-3
+    crossed = np.zeros_like(nodal)
+    crossed[node, 1] = -0.001
+    assert centre.opening(model.shell.dofs.restrict(crossed)) == 0.0
+
+
+def test_lip_opening_knows_the_wall(model):
+    thin = ValveModel(model.case.replace({"valve.thickness_factor": 0.5}))
+    assert LipCentre(thin.mesh, thin.shell).opening(thin.rest()) == pytest.approx(2 * (0.00619 - 0.003), rel=1e-9)
+
+
+def test_heads_of_the_fluid():
+    """Metres of the fluid, whatever the order of keys, and metres of water."""
+    for text in ("[fluid]\ndensity = 800\n[drive]\npressure = '2 m'", "drive.pressure = '2 m'\nfluid.density = 800"):
+        assert make_case(parse_toml(text)).drive.pressure == pytest.approx(2 * 800 * 9.80665, rel=1e-14)
+    assert Case().replace({"drive.pressure": "2 m"}).drive.pressure == pytest.approx(19613.3, rel=1e-14)
+    for text in ("2 mH2O", "200 cmH2O", "2000mmH2O"):
+        case = Case().replace({"drive.pressure": text, "fluid.density": 10, "steady.pressures": [text]})
+        assert case.drive.pressure == case.steady.pressures[0] == pytest.approx(19613.3, rel=1e-12)
+    changed = Case().replace({"fluid.density": 10}).replace({"closure.pressures": ["3 m"]})
+    assert changed.closure.pressures == pytest.approx((3 * 10 * 9.80665,), rel=1e-14)
+    for key, given in (("drive.pressure", "2 mm"), ("sweep.over", "pressure=1 m:2 m:3"), ("fluid.density", "2 m")):
+        with pytest.raises(CaseError):
+            Case().replace({key: given})
+    with pytest.raises(CaseError, match="modulus|pressure"):
+        Case().replace({"materials.rubber": {"kind": "neo-hookean", "shear_modulus": "2 m", "density": 1000}})
 
 
 def test_run_keeps_the_order_asked_for(model):
@@ -127,7 +175,7 @@ def test_an_interrupt_keeps_what_is_done(model):
 def test_uniform_pressure():
     model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 12, "drive.kind": "uniform"}))
     state = LoadPath(model).go_to(2e3)
-    assert state.converged and state.mass_flow == 0.0 and state.lip_opening > 0
+    assert state.converged and state.mass_flow == 0.0 and state.lip_displacement > 0
 
 
 def test_a_state_without_a_finite_flow_is_an_error():

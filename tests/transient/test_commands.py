@@ -23,6 +23,7 @@ def test_transient_and_what_reads_it(command_line, tmp_path):
         assert key in document
         assert key in document["mass_flow"] or key in ("steps", "time")
         assert key in document["lip_opening"] or key in ("steps", "time")
+        assert key in document["lip_displacement"] or key in ("steps", "time")
     assert document["steps"] == 20 and document["time"] == pytest.approx(0.02)
     drawn = {p.name for p in figures.iterdir()}
     assert {

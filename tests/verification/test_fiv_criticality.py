@@ -62,7 +62,7 @@ class Onset:
             "transient.step": 4e-4,
         }
         history = transient(ValveModel(self.case.replace(changes))).history
-        time, lip = np.array(history["time"]), np.array(history["lip_opening"]) - self.steady
+        time, lip = np.array(history["time"]), np.array(history["lip_displacement"]) - self.steady
         period = 1.0 / self.point.frequency
         starts = np.arange(0.1, time[-1] - period, period)
         amplitude = np.array([0.5 * np.ptp(lip[(time >= a) & (time < a + period)]) for a in starts])

@@ -79,7 +79,7 @@ def three_routes(
         options = replace(RunOptions.of(model.case), step=StepOptions(tolerance=1e-8, floor=1e-13))
         run = Runner(model, options).start()
         assert not run.failures
-        x = run.history["lip_opening"] - q[lip]
+        x = run.history["lip_displacement"] - q[lip]
         rings.append(ringing(x / PUSH, step))
     first, second = rings[-2:]
     ratio = (steps[-1] / steps[-2]) ** 2

@@ -20,7 +20,8 @@ Pressures = Annotated[
         "--pressure",
         "-p",
         metavar="P",
-        help="Inlet pressure, 36e3 (Pa) or '36 kPa', or a range '2 kPa:50 kPa:12'; may be repeated.",
+        help="Static inlet pressure, 36e3 (Pa), '36 kPa', '2 m' (head of the fluid), '2 mH2O', or a range "
+        "'2 kPa:50 kPa:12'; may be repeated.",
     ),
 ]
 
@@ -37,20 +38,22 @@ def command(case: Case, pressures: Pressures = None) -> Request:
 
     dbvfiv steady cases/dbv12.toml -p "18 kPa" -p "36 kPa" -o dbv12.h5
     """
-    return Request({"steady.pressures": list(_read(pressures) if pressures else case.steady_pressures())})
+    return Request(
+        {"steady.pressures": list(_read(pressures, case.fluid.density) if pressures else case.steady_pressures())}
+    )
 
 
-def _read(texts: Iterable[str]) -> Iterable[float | str]:
+def _read(texts: Iterable[str], density: float) -> Iterable[float | str]:
     for text in texts:
         if ":" in text:
-            yield from _range(text)
+            yield from _range(text, density)
         else:
             yield number_or_text(text)
 
 
-def _range(text: str) -> tuple[float, ...]:
+def _range(text: str, density: float) -> tuple[float, ...]:
     try:
-        return parse_axis(f"pressure={text}").values
+        return parse_axis(f"pressure={text}", density=density).values
     except ValueError as error:
         raise CaseError(
             f"--pressure is given as {text!r}, {error}; a range is START:STOP:COUNT, with ':log' behind it for "
