@@ -44,8 +44,8 @@ class Channel(FlowLaw):
     Raises
     ------
     ValueError
-        If the positions do not increase, two terms share the name of a parameter, or a head does not go with the square
-        of the speeds.
+        If the positions do not increase, two terms share the name of a parameter, or heads and momenta do not go with
+        the square of the speeds and the speeds.
     """
 
     DATA = ("step", "floor", "terms")
@@ -77,17 +77,16 @@ class Channel(FlowLaw):
         if twice:
             raise ValueError(f"Two parts of the flow have a parameter '{twice[0]}'.")
         parameters = self.values({"inlet": 0.0, "density": 1.0})
-        area = np.linspace(2.0, 5.0, self.count)
-        for sign in (1.0, -1.0) if self.terms else ():
-            for term in self.terms:
-                heads = []
-                for size in (1.0, 3.0):
-                    speed = sign * size / area
-                    heads.append(np.asarray(term.head(Stream(area, 0.0 * area, speed, speed[-1:]), parameters)))
-                if not np.allclose(heads[1], 9.0 * heads[0], rtol=1e-9, atol=0.0):
+        for term in self.terms:
+            for sign in (1.0, -1.0):
+                (head, momentum), (more_head, more_momentum) = (
+                    [np.asarray(part(_trial(self.count, size), parameters)) for part in (term.head, term.momentum)]
+                    for size in (sign, 3.0 * sign)
+                )
+                if not (np.allclose(more_head, 9.0 * head) and np.allclose(more_momentum, 3.0 * momentum)):
                     raise ValueError(
-                        f"The head of {type(term).__name__} does not go with the square of the speeds, so equilibria "
-                        f"would depend on the fluid's density."
+                        f"Heads must go with the square of the speeds and momenta with the speeds, or equilibria would "
+                        f"depend on the fluid's density; those of {type(term).__name__} do not."
                     )
 
     @property
@@ -180,6 +179,13 @@ class Channel(FlowLaw):
     def stepping(self, density: float) -> ReversibleFluid:
         """Evaluators for time steps, in which the flow may run either way."""
         return ReversibleFluid(self, density)
+
+
+def _trial(count: int, size: float) -> Stream:
+    """A stream of some size to try terms on."""
+    area = np.linspace(2.0, 5.0, count)
+    speed = size / area
+    return Stream(area, size * np.linspace(0.1, 0.3, count), speed, speed[-1:])
 
 
 def _upstream(step, values):

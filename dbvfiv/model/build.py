@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..case.model import Case
 from ..flow import Channel, FlowLaw, UniformLoad
+from ..flow.terms import terms_of
 from ..geometry import ValveMesh, valve_mesh
 from ..materials.library import law_from_case
 from ..materials.orthotropic import OrthotropicPly
@@ -41,4 +42,4 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
         return UniformLoad(len(mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
     gap_area = mesh.rest_area[0] - mesh.wall_deduction[0]
     storage = 1.0 if case.fluid.continuity == "storage" else 0.0
-    return Channel(mesh.z, case.fluid.area_floor * gap_area, storage, case.fluid.unsteady)
+    return Channel(mesh.z, case.fluid.area_floor * gap_area, storage, case.fluid.unsteady, terms_of(case))
