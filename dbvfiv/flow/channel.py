@@ -5,40 +5,25 @@
 Stations run from the outlet (first) to the inlet (last) and keep their places along the axis, as in the thesis's
 program (App. A). U is the inlet velocity. Continuity is blended between two laws by `storage` in 0..1: A_k U_k = A_in U
 - storage * integral_in^k dA/dt ds, so 0 is the quasi-steady law of the thesis and 1 the conservation of volume under
-moving walls.
+moving walls. Terms add losses and inertances: see `dbvfiv.flow.term`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-
-@dataclass(frozen=True)
-class FluidOperators:
-    """Linearised flow about a steady state: with a the area and u the inlet-velocity disturbances,
-
-    p = (area0 + lambda area1 + lambda^2 area2) a + (velocity0 + lambda velocity1) u,   p_outlet = 0.
-
-    Attributes
-    ----------
-    area0, area1, area2 : (m, m) arrays, Pa/m2, Pa s/m2, Pa s2/m2
-    velocity0, velocity1 : (m,) arrays, Pa s/m, Pa s2/m
-    """
-
-    area0: np.ndarray
-    area1: np.ndarray
-    area2: np.ndarray
-    velocity0: np.ndarray
-    velocity1: np.ndarray
+from .heads import outward_head, reversible_head
+from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
+from .reversed import ReversibleFluid
+from .term import FlowTerm, Stream
 
 
-class Channel:
-    """Flow through m stations.
+class Channel(FlowLaw):
+    """Flow through m stations; its one unknown is the inlet velocity, its one equation the pressure at the outlet.
 
     Parameters
     ----------
@@ -51,194 +36,159 @@ class Channel:
         Blend of the continuity laws, 0 quasi-steady, 1 storage.
     unsteady : bool
         Keep the term d/dt integral U ds.
+    terms : sequence of FlowTerm
+        Losses and inertances on the way.
+    reversible : bool
+        Let flow that is drawn in lose its head; see `dbvfiv.flow.heads`. Small motions of an outward flow are the same.
+
+    Raises
+    ------
+    ValueError
+        If the positions do not increase, two terms share the name of a parameter, or heads and momenta do not go with
+        the square of the speeds and the speeds.
     """
 
-    def __init__(self, z: np.ndarray, floor: float, storage: float = 0.0, unsteady: bool = True):
-        self.step = np.diff(np.asarray(z, float))
+    DATA = ("step", "floor", "terms")
+    STATIC = ("unsteady", "reversible")
+    inner_names = ("inlet velocity",)
+
+    def __init__(
+        self,
+        z: np.ndarray,
+        floor: float,
+        storage: float = 0.0,
+        unsteady: bool = True,
+        terms: Sequence[FlowTerm] = (),
+        reversible: bool = False,
+    ):
+        self.z = np.asarray(z, float)
+        self.step = np.diff(self.z)
         if np.any(self.step <= 0):
             raise ValueError("The stations of a channel must have increasing positions from the outlet to the inlet.")
-        self.z = np.asarray(z, float)
         self.floor = float(floor)
         self.storage = float(storage)
-        self.unsteady = bool(unsteady)
+        self.unsteady, self.reversible = bool(unsteady), bool(reversible)
+        self.terms = tuple(terms)
+        self._check_terms()
+
+    def _check_terms(self) -> None:
+        names = self.names
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"Two parts of the flow have a parameter '{twice[0]}'.")
+        parameters = self.values({"inlet": 0.0, "density": 1.0})
+        for term in self.terms:
+            for sign in (1.0, -1.0):
+                (head, momentum), (more_head, more_momentum) = (
+                    [np.asarray(part(_trial(self.count, size), parameters)) for part in (term.head, term.momentum)]
+                    for size in (sign, 3.0 * sign)
+                )
+                if not (np.allclose(more_head, 9.0 * head) and np.allclose(more_momentum, 3.0 * momentum)):
+                    raise ValueError(
+                        f"Heads must go with the square of the speeds and momenta with the speeds, or equilibria would "
+                        f"depend on the fluid's density; those of {type(term).__name__} do not."
+                    )
 
     @property
     def count(self) -> int:
-        return len(self.z)
+        return len(self.step) + 1
 
-    # -- steady flow
+    @property
+    def parameters(self) -> tuple[FlowParameter, ...]:
+        own = (
+            FlowParameter("inlet", "Pa", "inlet pressure"),
+            FlowParameter("density", "kg/m3", "density of the fluid"),
+            FlowParameter("storage", "1", "blend of the continuity laws", self.storage),
+        )
+        return own + tuple(parameter for term in self.terms for parameter in term.parameters)
+
+    # -- the definition
     # ----
 
-    def steady_pressure(self, area: np.ndarray, inlet: float) -> np.ndarray:
-        """Pressures (m,), Pa, of steady flow driven by the inlet pressure, Pa; independent of the fluid's density."""
-        return np.asarray(_steady(area, inlet, self.floor))
+    def speeds(self, area, area_rate, velocity, storage):
+        """Speeds (m,) at the stations; traceable."""
+        open_, opening = jax.jvp(lambda a: above_floor(a, self.floor), (area,), (area_rate,))
+        discharge = open_[-1] * velocity - storage * _upstream(self.step, opening)
+        return discharge / open_
 
-    def steady_operator(self, area: np.ndarray, inlet: float) -> tuple[np.ndarray, np.ndarray]:
-        """Steady pressures (m,) and their derivative (m, m) with respect to the areas."""
-        pressure, slope = _steady_both(area, inlet, self.floor)
-        return np.asarray(pressure), np.asarray(slope)
+    def heads(self, area, area_rate, inner, parameters):
+        """Heads (m,) from the inlet to each station, m2/s2: Bernoulli's and those of the terms; traceable."""
+        speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
+        head = (reversible_head if self.reversible else outward_head)(speed, inner[0])
+        if self.terms:
+            head = head + self.term_heads(Stream(area, area_rate, speed, inner), parameters)
+        return head
 
-    def steady_second(self, area, inlet, a, b) -> np.ndarray:
-        """Second directional derivative (m,) of the steady pressures along a and b (m,)."""
-        return np.asarray(_steady_second(area, inlet, a, b, self.floor))
-
-    def steady_third(self, area, inlet, a, b, c) -> np.ndarray:
-        """Third directional derivative (m,) of the steady pressures."""
-        return np.asarray(_steady_third(area, inlet, a, b, c, self.floor))
-
-    def inlet_velocity(self, area: np.ndarray, inlet: float, density: float) -> float:
-        """Steady inlet velocity, m/s."""
-        open_ = np.asarray(_open(jnp.asarray(area), self.floor))
-        ratio = (open_[-1] / open_[0]) ** 2 - 1.0
-        return float(np.sqrt(2.0 * inlet / (density * ratio))) if ratio > 0 else np.inf
-
-    def velocities(self, area: np.ndarray, velocity: float) -> np.ndarray:
-        """Steady velocities (m,) at all stations from the inlet velocity."""
-        open_ = np.asarray(_open(jnp.asarray(area), self.floor))
-        return velocity * open_[-1] / open_
-
-    # -- unsteady flow
-    # ----
-
-    def pressure(self, area, rate, acceleration, velocity, velocity_rate, inlet, density) -> np.ndarray:
-        """Pressures (m,), Pa, for areas (m,), their first and second time derivatives, the inlet velocity and its rate.
-
-        The first entry is the outlet pressure, which the flow equation sets to zero.
+    def psi(self, area, area_rate, inner, parameters):
+        """Momentum per density and area of the fluid before each station (m,), m2/s: the integral of the speed from the
+        inlet, and what the terms add; traceable.
         """
-        return np.asarray(
-            _pressure(
-                self.step,
-                self.floor,
-                self.storage,
-                self.unsteady,
-                area,
-                rate,
-                acceleration,
-                velocity,
-                velocity_rate,
-                inlet,
-                density,
-            )
-        )
+        speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
+        psi = _upstream(self.step, speed)
+        if self.terms:
+            psi = psi + self.term_momenta(Stream(area, area_rate, speed, inner), parameters)
+        return psi
 
-    def operators(
-        self, area, inlet: float, density: float, rate=None, acceleration=None, velocity=None, velocity_rate=0.0
-    ) -> FluidOperators:
-        """Linearisation at a state; at the steady state of these areas unless rates are given."""
-        zero = np.zeros(self.count)
-        rate = zero if rate is None else rate
-        acceleration = zero if acceleration is None else acceleration
-        velocity = self.inlet_velocity(area, inlet, density) if velocity is None else velocity
-        parts = _operators(
-            self.step,
-            self.floor,
-            self.storage,
-            self.unsteady,
-            area,
-            rate,
-            acceleration,
-            velocity,
-            velocity_rate,
-            inlet,
-            density,
-        )
-        return FluidOperators(*(np.asarray(part) for part in parts))
+    def term_heads(self, stream: Stream, parameters):
+        """Heads (m,) that the terms add; traceable."""
+        return sum((term.head(stream, parameters) for term in self.terms), jnp.zeros_like(stream.speed))
 
+    def term_momenta(self, stream: Stream, parameters):
+        """Momenta (m,) that the terms add; traceable."""
+        return sum((term.momentum(stream, parameters) for term in self.terms), jnp.zeros_like(stream.speed))
 
-class UniformLoad:
-    """A uniform pressure without flow, in place of a `Channel`.
+    def equations(self, motion: FlowMotion, parameters):
+        area, rate, acceleration, inner, inner_rate = motion
+        inertia = 0.0
+        if self.unsteady:
+            momentum = lambda a, r, u: self.psi(a, r, u, parameters)  # noqa: E731
+            _, inertia = jax.jvp(momentum, (area, rate, inner), (rate, acceleration, inner_rate))
+        head = self.heads(area, rate, inner, parameters)
+        p = parameters["inlet"] - parameters["density"] * (head + inertia)
+        return p.at[0].set(0.0), p[:1]
 
-    Parameters
-    ----------
-    count : int
-        Number of stations.
-    sign : +1 (inside) or -1 (outside)
-    """
+    def _blend(self, parameters):
+        return parameters["storage"] if self.unsteady else 0.0
 
-    def __init__(self, count: int, sign: float):
-        self.count = count
-        self.sign = float(sign)
+    # -- the steady flow, in closed form
+    # ----
 
-    def steady_pressure(self, area, inlet):
-        return np.full(self.count, self.sign * inlet)
+    def steady_start(self, area, parameters):
+        open_ = above_floor(area, self.floor)
+        ratio = jnp.maximum((open_[-1] / open_[0]) ** 2 - 1.0, 0.1)
+        return jnp.sqrt(2.0 * jnp.abs(parameters["inlet"]) / (parameters["density"] * ratio))[None] + 1e-3
 
-    def steady_operator(self, area, inlet):
-        return self.steady_pressure(area, inlet), np.zeros((self.count, self.count))
+    def steady(self, area, parameters):
+        """Bernoulli's pressures, which depend on ratios of areas only; heads go with the square of the discharge.
 
-    def steady_second(self, area, inlet, a, b):
-        return np.zeros(self.count)
+        An inlet velocity that no pressure holds back is infinite.
+        """
+        open_ = above_floor(area, self.floor)
+        total = open_**-2.0
+        still = jnp.zeros_like(area)
+        ratio = (open_[-1] / open_[0]) ** 2 - 1.0
+        inlet, kinetic = parameters["inlet"], total[-1]
+        if self.terms:
+            unit = Stream(area, still, 1.0 / open_, 1.0 / open_[-1:])
+            lost = 2.0 * self.term_heads(unit, parameters)
+            total, ratio = total + lost, ratio + lost[0] * open_[-1] ** 2
+        pressure = inlet * (total[0] - total) / (total[0] - kinetic)
+        speed = jnp.sqrt(2.0 * inlet / (parameters["density"] * jnp.where(ratio > 0, ratio, 1.0)))
+        return pressure, jnp.where(ratio > 0, speed, jnp.inf)[None]
 
-    def steady_third(self, area, inlet, a, b, c):
-        return np.zeros(self.count)
-
-    def inlet_velocity(self, area, inlet, density):
-        return 0.0
-
-    def velocities(self, area, velocity):
-        return np.zeros(self.count)
+    def stepping(self, density: float) -> ReversibleFluid:
+        """Evaluators for time steps, in which the flow may run either way."""
+        return ReversibleFluid(self, density)
 
 
-def _open(area, floor):
-    """Area that stays above the floor: floor + softplus(area - floor), within 1e-8 of the area from twenty floors
-    upwards.
-    """
-    return floor * (1.0 + jax.nn.softplus(area / floor - 1.0))
-
-
-@jax.jit
-def _steady(area, inlet, floor):
-    inverse = _open(area, floor) ** -2.0
-    return inlet * (inverse[0] - inverse) / (inverse[0] - inverse[-1])
-
-
-@jax.jit
-def _steady_both(area, inlet, floor):
-    return _steady(area, inlet, floor), jax.jacfwd(_steady)(area, inlet, floor)
-
-
-def _along(function, *directions):
-    for direction in directions:
-        function = partial(lambda inner, v, u: jax.jvp(inner, (u,), (v,))[1], function, direction)
-    return function
-
-
-@jax.jit
-def _steady_second(area, inlet, a, b, floor):
-    return _along(lambda x: _steady(x, inlet, floor), a, b)(area)
-
-
-@jax.jit
-def _steady_third(area, inlet, a, b, c, floor):
-    return _along(lambda x: _steady(x, inlet, floor), a, b, c)(area)
+def _trial(count: int, size: float) -> Stream:
+    """A stream of some size to try terms on."""
+    area = np.linspace(2.0, 5.0, count)
+    speed = size / area
+    return Stream(area, size * np.linspace(0.1, 0.3, count), speed, speed[-1:])
 
 
 def _upstream(step, values):
     """Trapezoidal integral of values (m,) from the inlet (last) to each station."""
     pieces = 0.5 * step * (values[1:] + values[:-1])
     return jnp.concatenate([jnp.cumsum(pieces[::-1])[::-1], jnp.zeros(1)])
-
-
-def _flow(step, floor, storage, area, rate, velocity):
-    """Velocities at the stations and their integral from the inlet."""
-    open_, opening = jax.jvp(lambda a: _open(a, floor), (area,), (rate,))
-    discharge = open_[-1] * velocity - storage * _upstream(step, opening)
-    speed = discharge / open_
-    return speed, _upstream(step, speed)
-
-
-@partial(jax.jit, static_argnums=(3,))
-def _pressure(step, floor, storage, unsteady, area, rate, acceleration, velocity, velocity_rate, inlet, density):
-    flow = partial(_flow, step, floor, storage if unsteady else 0.0)
-    (speed, _), (_, inertia) = jax.jvp(flow, (area, rate, velocity), (rate, acceleration, velocity_rate))
-    if not unsteady:
-        inertia = 0.0
-    return inlet - density * (0.5 * (speed**2 - velocity**2) + inertia)
-
-
-@partial(jax.jit, static_argnums=(3,))
-def _operators(step, floor, storage, unsteady, area, rate, acceleration, velocity, velocity_rate, inlet, density):
-    def pressure(*state):
-        return _pressure(step, floor, storage, unsteady, *state, inlet, density)
-
-    state = (area, rate, acceleration, jnp.asarray(velocity, float), jnp.asarray(velocity_rate, float))
-    return jax.jacfwd(pressure, argnums=(0, 1, 2, 3, 4))(*state)

@@ -13,16 +13,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..case.parameters import SYSTEM_NAMES
-from ..flow import Channel
-from ..flow.channel import _pressure as channel_pressure
+from ..flow import FlowMotion
+from ..flow.derivatives import along
 from ..shell.mass import mass_integrals
 from ..shell.reference import SHAPE, SLOPE
 from ..shell.rotation import director
 from .valve import ValveModel
 
-MOTION = ("q", "v", "a", "velocity", "velocity_rate")
-PARAMETERS = SYSTEM_NAMES
+#: Parameters of the damping; those of the flow law come before them.
+DAMPING = ("alpha", "beta")
 
 
 class AnalyticResidual:
@@ -30,20 +29,26 @@ class AnalyticResidual:
 
     Parameters
     ----------
-    model : ValveModel with flow
+    model : ValveModel
 
-    The residual is a vector (n + 1,): forces, then the outlet pressure. A motion is a tuple (q, v, a, velocity,
-    velocity_rate), parameters a dict with the keys of `PARAMETERS`. Second and third derivatives are taken about
-    motions with v = 0. Lip stops are piecewise linear and have none.
+    The residual is a vector (n + l,): forces, then the flow's own equations. A motion is a tuple (q, v, a, inner,
+    inner_rate) with the flow's unknowns (l,), one number where there is one; parameters a dict with the keys of
+    `parameters`. Second and third derivatives are taken about motions with v = 0. Lip stops are piecewise linear and
+    have none.
+
+    Attributes
+    ----------
+    parameters : tuple of str
+        Names of the parameters: those of the flow law, then alpha and beta.
     """
 
     def __init__(self, model: ValveModel):
-        if not isinstance(model.flow, Channel):
-            raise ValueError("The analytic residual serves valves driven by flow, not by a uniform pressure.")
         shell = model.shell
         self.model = model
-        self._static = (model.size, bool(model.flow.unsteady))
+        self.parameters = (*model.flow.names, *DAMPING)
+        self._forces, self._inner = slice(model.size), (model.flow.inner,)
         self._arrays = {
+            "flow": model.flow,
             "quads": jnp.asarray(shell.mesh.quads),
             "nodes": jnp.asarray(shell.mesh.nodes),
             "free": jnp.asarray(np.flatnonzero(shell.dofs.free)),
@@ -54,48 +59,67 @@ class AnalyticResidual:
             "loaded": jnp.asarray(model.loaded),
             "rows": jnp.asarray(model.mesh.rows),
             "offset": jnp.asarray(model.rows.offset),
-            "step": jnp.asarray(model.flow.step),
-            "floor": jnp.asarray(model.flow.floor),
         }
 
+    def _shaped(self, motion) -> tuple:
+        q, v, a, inner, inner_rate = motion
+        return (q, v, a, *(np.reshape(np.asarray(x, float), self._inner) for x in (inner, inner_rate)))
+
+    def _unit(self, name: str) -> dict:
+        if name not in self.parameters:
+            raise ValueError(f"The residual has no parameter '{name}'; it has {', '.join(self.parameters)}.")
+        return {key: 1.0 if key == name else 0.0 for key in self.parameters}
+
+    def _given(self, parameters) -> dict:
+        return {key: parameters[key] for key in self.parameters}
+
     def value(self, motion, parameters) -> np.ndarray:
-        """Residual (n + 1,)."""
-        out = np.array(_value(self._static, motion, parameters, self._arrays))
+        """Residual (n + l,)."""
+        motion, parameters = self._shaped(motion), self._given(parameters)
+        out = np.array(_value(motion, parameters, self._arrays))
         force, structure = self.model.structure(motion[0])
-        out[:-1] += force + parameters["beta"] * (self.model.shell.dofs.matrix(structure) @ motion[1])
+        out[self._forces] += force + parameters["beta"] * (self.model.shell.dofs.matrix(structure) @ motion[1])
         return out
 
     def second(self, motion, parameters, a, b) -> np.ndarray:
-        """Second directional derivative (n + 1,) along two motions."""
+        """Second directional derivative (n + l,) along two motions."""
         self._check_at_rest(motion)
-        out = np.array(_second(self._static, motion, parameters, a, b, self._arrays))
+        motion, parameters = self._shaped(motion), self._given(parameters)
+        a, b = self._shaped(a), self._shaped(b)
+        out = np.array(_form_of_remainder(motion, parameters, (a, b), self._arrays))
         form = partial(_form, self.model.shell.second, motion[0])
         # form(a0, b0) + beta (form(a0, b1) + form(a1, b0)), in one evaluation where one of the motions has no velocity
         beta = parameters["beta"]
-        out[:-1] += form(a[0] + beta * a[1], b[0] + beta * b[1]) - beta**2 * form(a[1], b[1])
+        out[self._forces] += form(a[0] + beta * a[1], b[0] + beta * b[1]) - beta**2 * form(a[1], b[1])
         return out
 
     def third(self, motion, parameters, a, b, c) -> np.ndarray:
-        """Third directional derivative (n + 1,) along three motions."""
+        """Third directional derivative (n + l,) along three motions."""
         self._check_at_rest(motion)
-        out = np.array(_third(self._static, motion, parameters, a, b, c, self._arrays))
+        motion, parameters = self._shaped(motion), self._given(parameters)
+        a, b, c = self._shaped(a), self._shaped(b), self._shaped(c)
+        out = np.array(_form_of_remainder(motion, parameters, (a, b, c), self._arrays))
         form = partial(_form, self.model.shell.third, motion[0])
         beta = parameters["beta"]
-        out[:-1] += form(a[0], b[0], c[0] + beta * c[1]) + beta * (form(a[0], b[1], c[0]) + form(a[1], b[0], c[0]))
+        out[self._forces] += form(a[0], b[0], c[0] + beta * c[1]) + beta * (
+            form(a[0], b[1], c[0]) + form(a[1], b[0], c[0])
+        )
         return out
 
     def parameter_slope(self, motion, parameters, name: str) -> np.ndarray:
-        """Derivative (n + 1,) with respect to a parameter, at v = 0."""
+        """Derivative (n + l,) with respect to a parameter, at v = 0."""
         self._check_at_rest(motion)
-        return np.array(_parameter_slope(self._static, motion, parameters, _unit(name), self._arrays))
+        motion, parameters = self._shaped(motion), self._given(parameters)
+        return np.array(_parameter_slope(motion, parameters, self._unit(name), self._arrays))
 
     def mixed(self, motion, parameters, a, name: str) -> np.ndarray:
-        """Derivative (n + 1,) along a motion and with respect to a parameter, at v = 0."""
+        """Derivative (n + l,) along a motion and with respect to a parameter, at v = 0."""
         self._check_at_rest(motion)
-        out = np.array(_mixed(self._static, motion, parameters, a, _unit(name), self._arrays))
+        motion, parameters, a = self._shaped(motion), self._given(parameters), self._shaped(a)
+        out = np.array(_mixed(motion, parameters, a, self._unit(name), self._arrays))
         if name == "beta":
             _, structure = self.model.structure(motion[0])
-            out[:-1] += self.model.shell.dofs.matrix(structure) @ a[1]
+            out[self._forces] += self.model.shell.dofs.matrix(structure) @ a[1]
         return out
 
     @staticmethod
@@ -109,12 +133,6 @@ def _form(form, q, *directions):
     it.
     """
     return form(q, *directions) if all(np.any(direction) for direction in directions) else 0.0
-
-
-def _unit(name: str) -> dict:
-    if name not in PARAMETERS:
-        raise ValueError(f"The residual has no parameter '{name}'; it has {', '.join(PARAMETERS)}.")
-    return {key: jnp.asarray(1.0 if key == name else 0.0) for key in PARAMETERS}
 
 
 def _expand(values, arrays):
@@ -160,59 +178,36 @@ def _areas(nodal, arrays):
     return jnp.sum(0.5 * (y[:, 1:] + y[:, :-1]) * (x[:, 1:] - x[:, :-1]), axis=1) + arrays["offset"]
 
 
-def _remainder(static, motion, parameters, arrays):
-    """Everything but the structure's own force: inertia, mass damping, load and outlet pressure."""
-    _, unsteady = static
-    q, v, a, velocity, velocity_rate = motion
+def _remainder(motion, parameters, arrays):
+    """Everything but the structure's own force: inertia, mass damping, load and the flow's own equations."""
+    q, v, a, inner, inner_rate = motion
     nodal, rate, acceleration = (_expand(field, arrays) for field in (q, v, a))
     areas = lambda x: _areas(x, arrays)  # noqa: E731
     opening = lambda x, r: jax.jvp(areas, (x,), (r,))  # noqa: E731
     (area, area_rate), (_, area_acceleration) = jax.jvp(opening, (nodal, rate), (rate, acceleration))
-    p = channel_pressure(
-        arrays["step"],
-        arrays["floor"],
-        parameters["storage"],
-        unsteady,
-        area,
-        area_rate,
-        area_acceleration,
-        velocity,
-        velocity_rate,
-        parameters["inlet"],
-        parameters["density"],
-    )
-    load = _pressure_force(nodal, p.at[0].set(0.0)[arrays["stations"]], arrays)
+    passage = FlowMotion(area, area_rate, area_acceleration, inner, inner_rate)
+    p, rest = arrays["flow"].equations(passage, parameters)
+    load = _pressure_force(nodal, p[arrays["stations"]], arrays)
     force = _inertia(nodal, rate, acceleration, parameters["alpha"], arrays) - load
-    return jnp.concatenate([force.ravel()[arrays["free"]], p[:1]])
+    return jnp.concatenate([force.ravel()[arrays["free"]], rest])
 
 
-def _along(function, *directions):
-    for direction in directions:
-        function = partial(lambda inner, v, u: jax.jvp(inner, (u,), (v,))[1], function, direction)
-    return function
+@jax.jit
+def _value(motion, parameters, arrays):
+    return _remainder(motion, parameters, arrays)
 
 
-@partial(jax.jit, static_argnums=0)
-def _value(static, motion, parameters, arrays):
-    return _remainder(static, motion, parameters, arrays)
+@jax.jit
+def _form_of_remainder(motion, parameters, directions, arrays):
+    return along(lambda m: _remainder(m, parameters, arrays), *directions)(motion)
 
 
-@partial(jax.jit, static_argnums=0)
-def _second(static, motion, parameters, a, b, arrays):
-    return _along(lambda m: _remainder(static, m, parameters, arrays), a, b)(motion)
+@jax.jit
+def _parameter_slope(motion, parameters, unit, arrays):
+    return along(lambda p: _remainder(motion, p, arrays), unit)(parameters)
 
 
-@partial(jax.jit, static_argnums=0)
-def _third(static, motion, parameters, a, b, c, arrays):
-    return _along(lambda m: _remainder(static, m, parameters, arrays), a, b, c)(motion)
-
-
-@partial(jax.jit, static_argnums=0)
-def _parameter_slope(static, motion, parameters, unit, arrays):
-    return _along(lambda p: _remainder(static, motion, p, arrays), unit)(parameters)
-
-
-@partial(jax.jit, static_argnums=0)
-def _mixed(static, motion, parameters, a, unit, arrays):
-    slope = lambda m: _along(lambda p: _remainder(static, m, p, arrays), unit)(parameters)  # noqa: E731
-    return _along(slope, a)(motion)
+@jax.jit
+def _mixed(motion, parameters, a, unit, arrays):
+    slope = lambda m: along(lambda p: _remainder(m, p, arrays), unit)(parameters)  # noqa: E731
+    return along(slope, a)(motion)

@@ -1,8 +1,10 @@
-"""From a case to the shell it describes."""
+"""From a case to the shell and the flow it describes."""
 
 from __future__ import annotations
 
 from ..case.model import Case
+from ..flow import Channel, FlowLaw, UniformLoad
+from ..flow.terms import terms_of
 from ..geometry import ValveMesh, valve_mesh
 from ..materials.library import law_from_case
 from ..materials.orthotropic import OrthotropicPly
@@ -32,3 +34,12 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
         planes=[(mesh.rows[:, 0], 0), (mesh.rows[:, -1], 1)],
     )
     return mesh, Shell(surface, section or build_section(case), free_unknowns(mesh), case.shell.metric)
+
+
+def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
+    """Flow law of a case on the stations of its mesh."""
+    if case.drive.kind == "uniform":
+        return UniformLoad(len(mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
+    gap_area = mesh.rest_area[0] - mesh.wall_deduction[0]
+    storage = 1.0 if case.fluid.continuity == "storage" else 0.0
+    return Channel(mesh.z, case.fluid.area_floor * gap_area, storage, case.fluid.unsteady, terms_of(case))

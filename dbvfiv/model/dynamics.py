@@ -1,11 +1,11 @@
 """The valve in motion: the time-dependent residual of the coupled system and its exact linearisation about a steady
 state.
 
-    M(q) a + h(q, v) + alpha M v + beta K_s(q) v + f(q) - G(q) p = 0,     p_outlet = 0
+    M(q) a + h(q, v) + alpha M v + beta K_s(q) v + f(q) - G(q) p = 0,     e = 0
 
-with h the inertia quadratic in the velocities (turning directors), K_s the structure's own tangent, and p the station
+with h the inertia quadratic in the velocities (turning directors), K_s the structure's own tangent, p the station
 pressures of the unsteady flow through the areas A(q) with rates A' = J v and A'' = J a + d2A[v, v]. The unknowns are q
-and the inlet velocity U.
+and those of the flow law, the inlet velocity U for one.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from eigen import CoupledPencil
 
-from ..flow import Channel
+from ..flow import FlowLaw, FlowMotion
 from .valve import ValveModel
 
 
@@ -43,9 +43,7 @@ class Conditions:
         return cls(case.fluid.density, case.damping.alpha, case.damping.beta)
 
 
-def dynamic_residual(
-    model: ValveModel, conditions: Conditions, inlet: float, q, v, a, velocity: float, velocity_rate: float
-):
+def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q, v, a, inner, inner_rate):
     """Residual of the coupled equations of motion.
 
     Parameters
@@ -54,14 +52,14 @@ def dynamic_residual(
         Inlet pressure, Pa.
     q, v, a : (n,) arrays
         Unknowns, their velocities and accelerations.
-    velocity, velocity_rate : float
-        Inlet velocity, m/s, and its rate, m/s2.
+    inner, inner_rate : (l,) arrays
+        The flow's own unknowns and their rates; one number will do where there is one, the inlet velocity, m/s.
 
     Returns
     -------
     force : (n,) array, N and N m
-    outlet : float, Pa
-        Pressure at the outlet, to vanish.
+    rest : (l,) array
+        Residuals of the flow's own equations: the pressure at the outlet, Pa, to vanish.
     """
     matrix = model.shell.dofs.matrix
     nodal, nodal_rate = model.nodal(q), model.nodal(v)
@@ -73,23 +71,10 @@ def dynamic_residual(
         + model.shell.convective_inertia(q, v)
     )
     slope = model.rows.jacobian(nodal)
-    area = model.rows.areas(nodal)
-    if isinstance(model.flow, Channel):
-        p = model.flow.pressure(
-            area,
-            slope @ v,
-            slope @ a + model.rows.second(nodal_rate, nodal_rate),
-            velocity,
-            velocity_rate,
-            inlet,
-            conditions.density,
-        )
-        outlet = float(p[0])
-        p = p.copy()
-        p[0] = 0.0
-    else:
-        p, outlet = model.flow.steady_pressure(area, inlet), velocity
-    return force - model.pressure_force(nodal, p), outlet
+    passage = model.rows.areas(nodal), slope @ v, slope @ a + model.rows.second(nodal_rate, nodal_rate)
+    given = {"inlet": inlet, "density": conditions.density}
+    p, rest = model.flow.evaluate(FlowMotion(*passage, inner, inner_rate), given)
+    return force - model.pressure_force(nodal, p), rest
 
 
 @dataclass(frozen=True)
@@ -140,43 +125,24 @@ class LinearisedState:
             False leaves the fluid out altogether: motions in vacuo of the stressed structure, the steady pressures kept
             as follower loads.
         storage : float, optional
-            Blend of the continuity laws, 0 quasi-steady to 1 storage; the model's own by default.
+            Blend of the continuity laws, 0 quasi-steady to 1 storage; the law's own by default.
         """
         damped = self.damped(conditions.alpha, conditions.beta)
         flow = self.model.flow
-        if not fluid or not isinstance(flow, Channel):
+        if not fluid or not flow.has_fluid:
             return CoupledPencil(damped.M, damped.C, damped.K)
         if not flow.unsteady:
             _, slope = flow.steady_operator(self.area, self.inlet)
             return damped.replace(A0=slope)
-        storage = flow.storage if storage is None else storage
-        parts = fluid_parts(flow, self.area, self.inlet, conditions.density, storage)
-        return damped.replace(**parts)
+        return damped.replace(**fluid_parts(flow, self.area, self.inlet, conditions.density, storage))
 
 
 def fluid_parts(
-    flow: Channel, area: np.ndarray, inlet: float, density: float, storage: float, velocity: float | None = None
-) -> dict:
-    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow or at a given inlet velocity."""
-    if storage != flow.storage:
-        flow = Channel(flow.z, flow.floor, storage, flow.unsteady)
-    parts = flow.operators(area, inlet, density, velocity=velocity)
-    kept = {
-        "A0": parts.area0.copy(),
-        "A1": parts.area1.copy(),
-        "A2": parts.area2.copy(),
-        "B0": parts.velocity0[:, None].copy(),
-        "B1": parts.velocity1[:, None].copy(),
-    }
-    for value in kept.values():
-        value[0] = 0.0  # the outlet pressure vanishes
-    return kept | {
-        "R0": parts.area0[:1],
-        "R1": parts.area1[:1],
-        "R2": parts.area2[:1],
-        "S0": parts.velocity0[None, :1],
-        "S1": parts.velocity1[None, :1],
-    }
+    flow: FlowLaw, area: np.ndarray, inlet: float, density: float, storage: float | None = None, inner=None
+) -> dict[str, np.ndarray]:
+    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow or at given inner unknowns (l,)."""
+    given = {"inlet": inlet, "density": density} | ({} if storage is None else {"storage": storage})
+    return flow.linearise_still(area, given, inner).parts()
 
 
 def linearise(model: ValveModel, q: np.ndarray, inlet: float) -> LinearisedState:

@@ -1,10 +1,10 @@
-"""The valve as a System of `continuation`: B(u, mu) u' = F(u, mu) with u = (q, v, U).
+"""The valve as a System of `continuation`: B(u, mu) u' = F(u, mu) with u = (q, v, U), U the flow law's l unknowns.
 
-    q' = v,    (M - G A2 J) v' - G B1 U' = -r(q, v, U),    R2 J v' + S1 U' = -p_outlet(q, v, U)
+    q' = v,    (M - G A2 J) v' - G B1 U' = -r(q, v, U),    R2 J v' + S1 U' = -e(q, v, U)
 
-Rates of velocity enter linearly, so the mass matrix depends on the state only. Parameters: inlet pressure, fluid
-density, Rayleigh alpha and beta, and the blend of the continuity laws; whatever else a case holds is a design
-parameter, for which the model is built anew.
+Rates of velocity enter linearly, so the mass matrix depends on the state only. Parameters: those of the flow law (inlet
+pressure, fluid density, the blend of the continuity laws), Rayleigh alpha and beta; whatever else a case holds is a
+design parameter, for which the model is built anew.
 """
 
 from __future__ import annotations
@@ -19,9 +19,12 @@ from continuation import OutOfDomain, Spectrum, SystemBase
 from eigen import CoupledPencil, SearchOptions, SingularShiftError, Workspace, leading_modes
 from eigen.pencil import real_apply
 
-from .analytic import PARAMETERS, AnalyticResidual
-from .dynamics import Conditions, fluid_parts
+from ..flow import FlowMotion
+from .analytic import DAMPING, AnalyticResidual
 from .valve import ValveModel
+
+#: Names that no design parameter has, whether the flow law depends on them or not.
+CONDITIONS = ("inlet", "density", "storage", *DAMPING)
 
 
 class ValveSystem(SystemBase):
@@ -31,9 +34,14 @@ class ValveSystem(SystemBase):
     ----------
     model : ValveModel
     rebuild : callable, optional
-        From the design parameters (a dict) to a model; lets names outside `PARAMETERS` be continuation parameters.
+        From the design parameters (a dict) to a model; lets names outside `parameters` be continuation parameters.
     search : SearchOptions, optional
         How leading eigenvalues are sought.
+
+    Attributes
+    ----------
+    parameters : tuple of str
+        Names of the flow law's parameters, then alpha and beta.
     """
 
     constant_mass = False
@@ -50,7 +58,9 @@ class ValveSystem(SystemBase):
         self._residuals: dict[tuple, AnalyticResidual] = {}
         self._search = search or SearchOptions()
         self._length = float(np.ptp(model.mesh.nodes[:, 2]))
-        self.size = 2 * model.size + 1
+        self.parameters = (*model.flow.names, *DAMPING)
+        self._inner = model.flow.inner
+        self.size = 2 * model.size + self._inner
 
     # -- layout
     # ----
@@ -59,11 +69,12 @@ class ValveSystem(SystemBase):
         """State u of a steady valve with displacements q."""
         model = self.model(mu)
         area = model.rows.areas(model.nodal(q))
-        return np.concatenate([q, np.zeros(model.size), [model.flow.inlet_velocity(area, mu["inlet"], mu["density"])]])
+        return np.concatenate([q, np.zeros(model.size), model.flow.steady_inner(area, mu)])
 
-    def split(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    def split(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Displacements (n,), velocities (n,) and the flow's unknowns (l,) of a state."""
         n = self._base.size
-        return u[:n], u[n : 2 * n], u[2 * n]
+        return u[:n], u[n : 2 * n], u[2 * n :]
 
     @cached_property
     def state_weights(self) -> np.ndarray:
@@ -80,7 +91,8 @@ class ValveSystem(SystemBase):
         return self._models_get(self._design(mu))
 
     def _design(self, mu) -> tuple:
-        return tuple(sorted((key, float(value)) for key, value in mu.items() if key not in PARAMETERS))
+        known = {*self.parameters, *CONDITIONS}
+        return tuple(sorted((key, float(value)) for key, value in mu.items() if key not in known))
 
     def _models_get(self, key: tuple) -> ValveModel:
         if key not in self._models:
@@ -101,17 +113,21 @@ class ValveSystem(SystemBase):
         return self._residuals[key]
 
     def _at(self, u, mu):
-        q, v, velocity = self.split(np.asarray(u, float))
+        q, v, inner = self.split(np.asarray(u, float))
         zero = np.zeros_like(q)
-        return (q, v, zero, velocity, 0.0), {name: float(mu[name]) for name in PARAMETERS}
+        return (q, v, zero, inner, np.zeros_like(inner)), self._values(mu)
 
-    @staticmethod
-    def _static(u_direction, n):
-        return (u_direction[:n], u_direction[n : 2 * n], np.zeros(n), u_direction[2 * n], 0.0)
+    def _values(self, mu) -> dict[str, float]:
+        """Parameters by name, those of the flow that are not in mu by default."""
+        return self.model(mu).flow.values(mu) | {name: float(mu[name]) for name in DAMPING}
 
-    @staticmethod
-    def _rates(u_rate, n):
-        return (np.zeros(n), np.zeros(n), u_rate[n : 2 * n], 0.0, u_rate[2 * n])
+    def _static(self, u_direction, n):
+        q, v, inner = self.split(u_direction)
+        return (q, v, np.zeros(n), inner, np.zeros_like(inner))
+
+    def _rates(self, u_rate, n):
+        _, v_rate, inner_rate = self.split(u_rate)
+        return (np.zeros(n), np.zeros(n), v_rate, np.zeros_like(inner_rate), inner_rate)
 
     def _still(self, u, mu):
         """Motion and parameters of a state at rest; others are not needed, since equilibria do not move."""
@@ -130,12 +146,14 @@ class ValveSystem(SystemBase):
         return np.concatenate([motion[1], -self._analytic(mu).value(motion, parameters)])
 
     def residual_norm(self, residual) -> float:
-        """Largest of the force imbalance over the load of 1 Pa, outlet pressure in Pa and velocity mismatch."""
+        """Largest of the force imbalance over the load of 1 Pa, the flow's equations in their units (Pa) and velocity
+        mismatch.
+        """
         n = self._base.size
         return float(
             max(
                 np.linalg.norm(residual[n : 2 * n]) / self._unit_load,
-                abs(residual[2 * n]),
+                np.abs(residual[2 * n :]).max(initial=0.0),
                 np.abs(residual[:n]).max() / self._length,
             )
         )
@@ -145,13 +163,11 @@ class ValveSystem(SystemBase):
         return self._base.force_scale(self._base.rest(), 1.0)
 
     def linear(self, u, mu) -> ValveLinearisation:
-        q, v, velocity = self.split(np.asarray(u, float))
-        model = self.model(mu)
-        pencil = pencil_at(model, q, velocity, mu)
-        return ValveLinearisation(pencil)
+        q, _, inner = self.split(np.asarray(u, float))
+        return ValveLinearisation(pencil_at(self.model(mu), q, inner, mu))
 
     def d_parameter(self, u, mu, name):
-        if name not in PARAMETERS:
+        if name not in self.parameters:
             return super().d_parameter(u, mu, name)
         motion, parameters = self._still(u, mu)
         return np.concatenate(
@@ -172,7 +188,7 @@ class ValveSystem(SystemBase):
         return np.concatenate([np.zeros(n), -self._analytic(mu).third(motion, parameters, *directions)])
 
     def d2_parameter(self, u, mu, name, a):
-        if name not in PARAMETERS:
+        if name not in self.parameters:
             return super().d2_parameter(u, mu, name, a)
         motion, parameters = self._still(u, mu)
         n = self._base.size
@@ -192,35 +208,33 @@ class ValveSystem(SystemBase):
         return np.concatenate([np.zeros(n), forms])
 
     def mass_parameter(self, u, mu, name, c):
-        if name not in PARAMETERS:
+        if name not in self.parameters:
             return super().mass_parameter(u, mu, name, c)
         motion, parameters = self._still(u, mu)
         n = self._base.size
         return np.concatenate([np.zeros(n), self._analytic(mu).mixed(motion, parameters, self._rates(c, n), name)])
 
     def spectrum(self, u, mu, count, near=None):
-        q, _, velocity = self.split(np.asarray(u, float))
-        pencil = pencil_at(self.model(mu), q, velocity, mu)
+        q, _, inner = self.split(np.asarray(u, float))
+        pencil = pencil_at(self.model(mu), q, inner, mu)
         options = self._search if near is None else replace(self._search, shifts=(near,))
         found = leading_modes(pencil, count, options)
         vectors = np.concatenate([found.q, found.eigenvalues * found.q, found.u])
         return Spectrum(found.eigenvalues, vectors, np.ones(len(found), bool), found.applications)
 
 
-def pencil_at(model: ValveModel, q, velocity: float, mu) -> CoupledPencil:
-    """Pencil at any state at rest, in equilibrium or not; mu holds the parameters."""
+def pencil_at(model: ValveModel, q, inner, mu) -> CoupledPencil:
+    """Pencil at any state at rest, in equilibrium or not, with the flow's unknowns (l,); mu holds the parameters."""
     matrix = model.shell.dofs.matrix
     nodal = model.nodal(q)
     area = model.rows.areas(nodal)
-    zero = np.zeros_like(area)
-    p = np.array(model.flow.pressure(area, zero, zero, velocity, 0.0, mu["inlet"], mu["density"]))
-    p[0] = 0.0
+    still = FlowMotion.still(area, np.asarray(inner, float))
+    p, _ = model.flow.evaluate(still, mu)
     _, structure = model.structure(q)
     stiffness = matrix(model.follower_stiffness(nodal, p, structure))
     mass, own = matrix(model.mass(q)), matrix(structure)
-    conditions = Conditions(mu["density"], mu["alpha"], mu["beta"])
-    parts = fluid_parts(model.flow, area, mu["inlet"], conditions.density, mu["storage"], velocity)
-    damping = conditions.alpha * mass + conditions.beta * own
+    damping = mu["alpha"] * mass + mu["beta"] * own
+    parts = model.flow.linearise(still, mu).parts()
     return CoupledPencil(mass, damping, stiffness, model.station_forces(nodal), model.rows.jacobian(nodal), **parts)
 
 
@@ -234,7 +248,7 @@ class ValveLinearisation:
 
     def __init__(self, pencil: CoupledPencil):
         self.pencil = pencil
-        self.size = 2 * pencil.n + 1
+        self.size = 2 * pencil.n + pencil.b
         self._at_zero = None
 
     def _parts(self, x):

@@ -18,11 +18,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case.model import Case
-from ..flow import Channel, RowAreas, UniformLoad
+from ..flow import RowAreas
 from ..geometry import ValveMesh
 from ..shell import Section
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
-from .build import build_shell
+from .build import build_flow, build_shell
 from .linear import CoupledFactor
 from .supports import lip_stops
 
@@ -78,12 +78,7 @@ class ValveModel:
         self.station_of_node = np.empty(len(self.mesh.nodes), np.int64)
         self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
         self.loaded = loaded_share(self.mesh, case)
-        gap_area = self.mesh.rest_area[0] - self.mesh.wall_deduction[0]
-        if case.drive.kind == "flow":
-            storage = 1.0 if case.fluid.continuity == "storage" else 0.0
-            self.flow = Channel(self.mesh.z, case.fluid.area_floor * gap_area, storage, case.fluid.unsteady)
-        else:
-            self.flow = UniformLoad(len(self.mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
+        self.flow = build_flow(case, self.mesh)
         self._stop_slots = dofs.diagonal_slots[self.stops.unknowns]
 
     # -- layout

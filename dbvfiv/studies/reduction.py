@@ -18,7 +18,6 @@ import scipy.sparse as sp
 from eigen import CoupledPencil, SingularShiftError
 from eigen.factorization import MumpsFactorization, StructureMatrices
 
-from ..flow import Channel
 from ..model.dynamics import LinearisedState, fluid_parts
 
 #: Power of sqrt(density) that each part of the fluid goes with.
@@ -96,11 +95,11 @@ class UnitFluid:
 
     def _computed(self, storage: float) -> dict[str, np.ndarray]:
         linear, m = self.linear, len(self.linear.area)
-        if isinstance(self.flow, Channel) and self.flow.unsteady:
+        if self.flow.unsteady:
             return fluid_parts(self.flow, linear.area, linear.inlet, 1.0, storage)
         zero = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
         parts = {name: np.zeros(zero[name[0]]) for name in POWERS}
-        if isinstance(self.flow, Channel):
+        if self.flow.has_fluid:
             parts["A0"] = self.flow.steady_operator(linear.area, linear.inlet)[1]
         return parts
 

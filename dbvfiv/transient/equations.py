@@ -2,9 +2,9 @@
 
     M(q) a + h(q, v) + alpha M v + beta w + F - G(q) p = 0,     p_outlet = 0
 
-F is the internal force of shell and stops and w its rate. F and the flow's psi (see `fluid`) are kept in the state as
-quantities of first order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent with the tangent without
-an evaluation of it.
+F is the internal force of shell and stops and w its rate. F and the flow's psi (see `dbvfiv.flow.stepping`) are kept in
+the state as quantities of first order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent with the
+tangent without an evaluation of it.
 """
 
 from __future__ import annotations
@@ -13,12 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..flow import Channel
 from ..model import ValveModel
 from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
 from .kernels import inertia_force, kinetic_energy, row_motion, strain_energy
-from .reversible import ReversibleFluid
 
 
 @dataclass(frozen=True)
@@ -119,8 +117,8 @@ class ValveMotion:
     def __init__(self, model: ValveModel, conditions: Conditions | None = None):
         self.model = model
         self.conditions = Conditions.of(model.case) if conditions is None else conditions
-        self.moving_fluid = isinstance(model.flow, Channel) and model.flow.unsteady
-        self.fluid = ReversibleFluid(model.flow, self.conditions.density) if self.moving_fluid else None
+        self.moving_fluid = model.flow.unsteady
+        self.fluid = model.flow.stepping(self.conditions.density) if self.moving_fluid else None
         self.size = model.size
         self.stations = model.stations
         shell = model.shell
@@ -321,7 +319,7 @@ class ValveMotion:
             return self.solve(load.force - forces, 0.0)[0], load
         rows, fluid = model.rows, self.fluid
         area, rate = self._passage(nodal, v)
-        by_area, by_rate, by_speed = (fluid.integrate(slope) for slope in fluid.slopes(area, rate, speed))
+        by_area, by_rate, by_speed = fluid.psi_slopes(area, rate, speed)
         bend = rows.second(model.nodal(v), model.nodal(v))
         known = by_area @ rate + by_rate @ bend
         load = self.load(q, v, q, v, self._instant(speed, known, inlet), speed)

@@ -93,7 +93,7 @@ class Reader:
         density = motion.conditions.density
         area = load.area
         throat = int(np.argmin(area))
-        out = density * load.speed[0] * self._open(area[0])
+        out = density * load.speed[0] * float(self.motion.model.flow.open_area(area[0]))
         balance = kinetic + strain + stop - self.energy - self.work + self.dissipation
         return {
             "time": state.time,
@@ -121,10 +121,6 @@ class Reader:
             "station_area": area,
             "centre_line": np.where(self._moves, state.q[self._centre], 0.0),
         }
-
-    def _open(self, area: float) -> float:
-        floor = getattr(self.motion.model.flow, "floor", 0.0)
-        return float(floor * (1.0 + np.logaddexp(0.0, area / floor - 1.0))) if floor else float(area)
 
 
 class History:

@@ -7,10 +7,10 @@ import pytest
 
 from dbvfiv.case.model import Case
 from dbvfiv.flow import Channel
+from dbvfiv.flow.reversed import ReversibleFluid
+from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.studies.closing import ClosingResult, ClosingSample, Turn, run_closing
 from dbvfiv.studies.closing_motion import ContactValve
-from dbvfiv.transient.fluid import MovingFluid
-from dbvfiv.transient.reversible import ReversibleFluid
 
 COARSE = {"mesh.around": 6, "mesh.along": 10, "closure.pressures": ["10 kPa"]}
 

@@ -17,7 +17,6 @@ from eigen import (
 )
 
 from ...errors import CaseError
-from ...flow import Channel
 from ...model import ValveModel
 from ...model.dynamics import Conditions, linearise
 from ...model.equilibria import require_equilibrium
@@ -144,7 +143,7 @@ def run_modes(
     options = ModesOptions.of(model.case) if options is None else options
     observer = Observer() if observer is None else observer
     require_equilibrium(model, state)
-    without_fluid = options.in_vacuo or not isinstance(model.flow, Channel)
+    without_fluid = options.in_vacuo or not model.flow.has_fluid
     if not without_fluid and state.pressure <= 0:
         raise CaseError(
             "Coupled modes need an inlet pressure greater than 0, because without one the velocity of an "

@@ -12,7 +12,6 @@ from eigen import Branches, SearchOptions, Spectrum, TrackOptions, track
 
 from ...case.axis import Axis
 from ...errors import CaseError, SolveError
-from ...flow import Channel
 from ...model import ValveModel
 from ...model.dynamics import Conditions
 from ...model.equilibria import require_equilibrium
@@ -154,7 +153,7 @@ def run_sweep(
     conditions = Conditions.of(model.case) if conditions is None else conditions
     options = SweepOptions.of(model.case) if options is None else options
     observer = Observer() if observer is None else observer
-    if axis.parameter == "density" and not isinstance(model.flow, Channel):
+    if axis.parameter == "density" and not model.flow.has_fluid:
         raise CaseError(
             "sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose "
             "pressure, alpha or beta."

@@ -1,0 +1,282 @@
+"""What every flow law is: one traceable definition, and what callers ask of it.
+
+A law relates m station pressures to the areas of a passage, their first two rates, and l unknowns of its own, which l
+equations fix. `FlowLaw.equations` writes this down once, in jax. Steady flow, linearised operators and second and third
+derivatives follow from it in `dbvfiv.flow.derivatives`, for any law. What a time step evaluates thousands of times has
+faster forms beside it (`dbvfiv.flow.stepping`), tested against it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from . import derivatives
+
+
+class FlowMotion(NamedTuple):
+    """A passage in motion and the law's own unknowns.
+
+    Attributes
+    ----------
+    area, area_rate, area_acceleration : (m,) arrays
+        m2, m2/s, m2/s2, from the outlet to the inlet.
+    inner, inner_rate : (l,) arrays
+        The law's unknowns and their rates.
+    """
+
+    area: Any
+    area_rate: Any
+    area_acceleration: Any
+    inner: Any
+    inner_rate: Any
+
+    @classmethod
+    def still(cls, area, inner) -> FlowMotion:
+        """A passage at rest; the arrays may be traced."""
+        none = np.zeros(np.shape(area))
+        return cls(area, none, none, inner, np.zeros(np.shape(inner)))
+
+
+@dataclass(frozen=True)
+class FlowParameter:
+    """A number that a law depends on.
+
+    Attributes
+    ----------
+    name, unit, meaning : str
+    value : float, optional
+        What it is unless given; without it, it must be given.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    value: float | None = None
+
+
+@dataclass(frozen=True)
+class FluidOperators:
+    """Linearised flow: with a the area and u the inner disturbances,
+
+    p = (A0 + lambda A1 + lambda^2 A2) a + (B0 + lambda B1) u
+    0 = (R0 + lambda R1 + lambda^2 R2) a + (S0 + lambda S1) u
+
+    Attributes
+    ----------
+    A0, A1, A2 : (m, m) arrays, Pa/m2, Pa s/m2, Pa s2/m2
+    B0, B1 : (m, l) arrays
+    R0, R1, R2 : (l, m) arrays
+    S0, S1 : (l, l) arrays
+    """
+
+    A0: np.ndarray
+    A1: np.ndarray
+    A2: np.ndarray
+    B0: np.ndarray
+    B1: np.ndarray
+    R0: np.ndarray
+    R1: np.ndarray
+    R2: np.ndarray
+    S0: np.ndarray
+    S1: np.ndarray
+
+    def parts(self) -> dict[str, np.ndarray]:
+        """The arrays by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+def above_floor(area, floor):
+    """Area that stays above a floor: floor + softplus(area - floor), within 1e-8 of the area from twenty floors
+    upwards; traceable.
+    """
+    return floor * (1.0 + jax.nn.softplus(area / floor - 1.0))
+
+
+class Traceable:
+    """An object that may be an argument of a compiled jax function.
+
+    A subclass names its attributes that are numbers or arrays (`DATA`, other traceable objects among them) and those
+    that decide which code is traced (`STATIC`, hashable). Traced code sees these attributes only. A function is
+    compiled once for each class and choice of `STATIC`, whatever the numbers.
+    """
+
+    DATA: ClassVar[tuple[str, ...]] = ()
+    STATIC: ClassVar[tuple[str, ...]] = ()
+
+    def __init_subclass__(cls, **options):
+        super().__init_subclass__(**options)
+        jax.tree_util.register_pytree_node(cls, cls._flatten, cls._unflatten)
+
+    def _flatten(self):
+        return [getattr(self, name) for name in self.DATA], tuple(getattr(self, name) for name in self.STATIC)
+
+    @classmethod
+    def _unflatten(cls, static, data):
+        made = object.__new__(cls)
+        made.__dict__.update(zip(cls.DATA, data))
+        made.__dict__.update(zip(cls.STATIC, static))
+        return made
+
+
+class FlowLaw(Traceable, ABC):
+    """Pressures at the stations of a passage.
+
+    A subclass gives `inner_names`, `parameters`, `count` and `equations`; the first inner unknown of a law with a fluid
+    is the inlet velocity, m/s. Its steady flow is then found by Newton's
+    method from `steady_start`; a law that knows it in closed form overrides `steady` by it.
+
+    Attributes
+    ----------
+    inner_names : tuple of str
+        The law's own unknowns.
+    floor : float
+        Smallest area that the fluid sees, m2; 0 without such a floor.
+    has_fluid : bool
+        Whether a fluid moves: its density matters, and small motions of the wall change the pressures.
+    unsteady : bool
+        Whether rates matter; without, the steady law holds at every instant and the inner unknowns follow from the
+        passage.
+    """
+
+    inner_names: ClassVar[tuple[str, ...]] = ()
+    floor: float = 0.0
+    has_fluid: bool = True
+    unsteady: bool = True
+
+    @property
+    @abstractmethod
+    def count(self) -> int:
+        """Number m of stations."""
+
+    @property
+    def inner(self) -> int:
+        """Number l of the law's own unknowns and equations."""
+        return len(self.inner_names)
+
+    @property
+    @abstractmethod
+    def parameters(self) -> tuple[FlowParameter, ...]:
+        """The numbers that the equations depend on, inlet pressure and density among them."""
+
+    @abstractmethod
+    def equations(self, motion: FlowMotion, parameters: Mapping[str, Any]) -> tuple[Any, Any]:
+        """Pressures (m,), Pa, and residuals (l,) of the law's own equations; traceable by jax.
+
+        A pressure that an equation sets to zero is zero among the pressures; what is left of it is the residual.
+        """
+
+    def at_rest(self, area, inner, parameters: Mapping[str, Any]) -> tuple[Any, Any]:
+        """`equations` of a passage at rest with constant inner unknowns; traceable."""
+        return self.equations(FlowMotion.still(area, inner), parameters)
+
+    def steady_start(self, area, parameters: Mapping[str, Any]):
+        """Where the search for the steady inner unknowns (l,) starts; traceable."""
+        return jnp.ones(self.inner)
+
+    def steady(self, area, parameters: Mapping[str, Any]) -> tuple[Any, Any]:
+        """Pressures (m,) and inner unknowns (l,) of the steady flow; traceable. Not numbers where there is none."""
+        return derivatives.solve_steady(self, area, parameters)
+
+    def stepping(self, density: float):
+        """Evaluators for time steps; see `dbvfiv.flow.stepping.MovingFluid`.
+
+        Raises
+        ------
+        NotImplementedError
+            If the law has none.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no evaluators for time steps.")
+
+    # -- parameters
+    # ----
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    def values(self, given: Mapping[str, float]) -> dict[str, float]:
+        """All parameters by name: those among the given conditions, which may hold others, the rest by default.
+
+        Raises
+        ------
+        ValueError
+            If a parameter without a default is not given.
+        """
+        found = {}
+        for parameter in self.parameters:
+            value = given.get(parameter.name, parameter.value)
+            if value is None:
+                raise ValueError(f"The flow needs a value of its parameter '{parameter.name}' ({parameter.meaning}).")
+            found[parameter.name] = float(value)
+        return found
+
+    # -- evaluation
+    # ----
+
+    def steady_pressure(self, area: np.ndarray, inlet: float) -> np.ndarray:
+        """Pressures (m,), Pa, of steady flow driven by the inlet pressure, Pa; independent of the fluid's density."""
+        return np.asarray(derivatives.steady_pressure(self, area, self._driven(inlet)))
+
+    def steady_operator(self, area: np.ndarray, inlet: float) -> tuple[np.ndarray, np.ndarray]:
+        """Steady pressures (m,) and their derivative (m, m) with respect to the areas."""
+        pressure, slope = derivatives.steady_operator(self, area, self._driven(inlet))
+        return np.asarray(pressure), np.asarray(slope)
+
+    def steady_second(self, area, inlet, a, b) -> np.ndarray:
+        """Second directional derivative (m,) of the steady pressures along a and b (m,)."""
+        return np.asarray(derivatives.steady_form(self, area, self._driven(inlet), (a, b)))
+
+    def steady_third(self, area, inlet, a, b, c) -> np.ndarray:
+        """Third directional derivative (m,) of the steady pressures."""
+        return np.asarray(derivatives.steady_form(self, area, self._driven(inlet), (a, b, c)))
+
+    def _driven(self, inlet: float) -> dict[str, float]:
+        """Parameters for steady pressures: no law's equilibria depend on density."""
+        return self.values({"inlet": inlet, "density": 1.0})
+
+    def steady_inner(self, area: np.ndarray, given: Mapping[str, float]) -> np.ndarray:
+        """Inner unknowns (l,) of the steady flow under given parameters."""
+        return np.asarray(derivatives.steady_inner(self, area, self.values(given)))
+
+    def inlet_velocity(self, area: np.ndarray, inlet: float, density: float) -> float:
+        """Steady inlet velocity, m/s: the first inner unknown of every law with a fluid."""
+        return float(self.steady_inner(area, {"inlet": inlet, "density": density})[0]) if self.has_fluid else 0.0
+
+    def velocities(self, area: np.ndarray, velocity: float) -> np.ndarray:
+        """Steady velocities (m,) at all stations from the inlet velocity; zero without a fluid."""
+        if not self.has_fluid:
+            return np.zeros(self.count)
+        open_ = self.open_area(area)
+        return velocity * open_[-1] / open_
+
+    def open_area(self, area):
+        """Area that the fluid sees: it stays above the floor."""
+        return self.floor * (1.0 + np.logaddexp(0.0, area / self.floor - 1.0)) if self.floor else area
+
+    def evaluate(self, motion: FlowMotion, given: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Pressures (m,) and residuals (l,) of `equations`, as numpy arrays."""
+        pressure, residual = derivatives.equations(self, self._shaped(motion), self.values(given))
+        return np.array(pressure), np.array(residual)
+
+    def linearise(self, motion: FlowMotion, given: Mapping[str, float]) -> FluidOperators:
+        """Derivatives of pressures and equations at a motion."""
+        parts = derivatives.linearised(self, self._shaped(motion), self.values(given))
+        return FluidOperators(*(np.asarray(part) for part in parts))
+
+    def linearise_still(self, area: np.ndarray, given: Mapping[str, float], inner=None) -> FluidOperators:
+        """Derivatives at a passage at rest, in steady flow unless the inner unknowns are given."""
+        inner = self.steady_inner(area, given) if inner is None else inner
+        return self.linearise(FlowMotion.still(np.asarray(area), np.asarray(inner, float)), given)
+
+    def _shaped(self, motion: FlowMotion) -> FlowMotion:
+        shape = (self.inner,)
+        inner, rate = np.reshape(motion.inner, shape), np.reshape(motion.inner_rate, shape)
+        return motion._replace(inner=inner.astype(float), inner_rate=rate.astype(float))

@@ -1,0 +1,48 @@
+"""Terms that a streamline may carry besides Bernoulli's: losses, inertances."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from .law import FlowParameter, Traceable
+
+
+class Stream(NamedTuple):
+    """The streamline as a term sees it.
+
+    Attributes
+    ----------
+    area, area_rate : (m,) arrays
+        m2, m2/s, from the outlet to the inlet.
+    speed : (m,) array
+        Of the fluid at the stations, m/s; negative inwards.
+    inner : (l,) array
+        The law's own unknowns; the first is the inlet velocity, m/s.
+    """
+
+    area: Any
+    area_rate: Any
+    speed: Any
+    inner: Any
+
+
+class FlowTerm(Traceable):
+    """A loss or an inertance on the way from the pressure that drives the flow to the stations.
+
+    The pressures become p_k - rho [head_k + d/dt momentum_k]. Heads go with the square of the speeds and momenta with
+    the speeds themselves, so that equilibria do not depend on density; a head that opposes the flow either way goes
+    with U|U|. Both methods are traceable by jax and return (m,) arrays, or one number for all stations.
+    """
+
+    @property
+    def parameters(self) -> tuple[FlowParameter, ...]:
+        """The numbers that the term depends on, each with its value."""
+        return ()
+
+    def head(self, stream: Stream, parameters):
+        """Head lost before each station, m2/s2."""
+        return 0.0
+
+    def momentum(self, stream: Stream, parameters):
+        """Momentum per density and area of the fluid before each station, m2/s, that the term adds."""
+        return 0.0

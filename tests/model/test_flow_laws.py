@@ -1,0 +1,177 @@
+"""The coupled valve with flow laws of none, one and three unknowns and with terms: one contract for all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from continuation import System
+from dbvfiv.flow import Channel
+from dbvfiv.model import Conditions, dynamic_residual, linearise
+from dbvfiv.model.analytic import AnalyticResidual
+from dbvfiv.model.contract import EquilibriumModel, MotionForms
+from dbvfiv.model.newton import NewtonOptions
+from dbvfiv.model.system import ValveSystem
+from dbvfiv.studies.steady import LoadPath, SteadyOptions
+from dbvfiv.transient.equations import ValveMotion
+from dbvfiv.transient.scheme import scheme
+from dbvfiv.transient.state import consistent_state
+from dbvfiv.transient.stepper import StepOptions, Stepper
+from eigen import leading_modes
+from tests.flow.test_adding_a_law import LipLoss, Pipe
+from tests.flow.vessel import Vessel
+
+PRESSURE = 5e3
+MU = {"inlet": PRESSURE, "density": 20.0, "alpha": 2.0, "beta": 0.001, "storage": 0.6}
+LAWS = ["uniform", "bare", "terms", "vessel"]
+
+
+def with_law(make_model, name: str):
+    """A small valve whose flow has another law."""
+    small = {"mesh__around": 6, "mesh__along": 8}
+    if name == "uniform":
+        return make_model(drive__kind="uniform", **small)
+    model = make_model(fluid__continuity="storage", **small)
+    terms = (LipLoss(0.4), Pipe(2.0, 0.3)) if name == "terms" else ()
+    law = Channel(model.flow.z, model.flow.floor, 1.0, terms=terms)
+    model.flow = Vessel(law, 2e-7, 0.5) if name == "vessel" else law
+    return model
+
+
+@pytest.fixture(scope="module", params=LAWS)
+def settled(request, make_model):
+    """Model and equilibrium, as exact as rounding allows."""
+    model = with_law(make_model, request.param)
+    path = LoadPath(model, SteadyOptions(NewtonOptions(1e-13)))
+    path.go_to(PRESSURE)
+    return model, path.q
+
+
+def test_contracts_are_fulfilled(settled):
+    model, _ = settled
+    assert isinstance(model, EquilibriumModel)
+    assert isinstance(AnalyticResidual(model), MotionForms)
+    assert isinstance(ValveSystem(model), System)
+
+
+def test_the_steady_state_is_one_of_the_equations_of_motion(settled):
+    model, q = settled
+    system = ValveSystem(model)
+    u = system.state(q, MU)
+    assert system.size == 2 * model.size + model.flow.inner
+    assert np.abs(system.residual(u, MU)).max() < 1e-8 * PRESSURE
+    assert system.parameters == (*model.flow.names, "alpha", "beta")
+
+
+def difference(function, step):
+    f = [function(k * step) for k in (-2, -1, 1, 2)]
+    return (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step)
+
+
+def directions(system, u, number):
+    """Smooth directions that all unknowns take part in; the flow's by their own size."""
+    generator, n = np.random.default_rng(6), (system.size - len(system.split(u)[2])) // 2
+    for _ in range(number):
+        yield np.concatenate(
+            [
+                1e-3 * generator.standard_normal(n),
+                np.zeros(n),
+                0.1 * np.abs(u[2 * n :]) * generator.standard_normal(len(u) - 2 * n),
+            ]
+        )
+
+
+def opened(model, q):
+    """Away from the equilibrium, opened so far that no stop changes sides."""
+    nodal = model.nodal(q)
+    nodal[:, 1] += 0.02 * np.clip(1 - model.mesh.nodes[:, 2] / 0.49, 0, 1) ** 2
+    return model.shell.dofs.restrict(nodal)
+
+
+def test_linearisation_and_forms_against_differences(settled):
+    model, q = settled
+    system = ValveSystem(model)
+    q = opened(model, q)
+    u = system.state(q, MU)
+    a, b = directions(system, u, 2)
+    blocks = [slice(0, model.size), slice(model.size, 2 * model.size), slice(2 * model.size, None)]
+    linear = system.linear(u, MU)
+    for found, expected, tolerance in (
+        (linear.matvec(a), difference(lambda h: system.residual(u + h * a, MU), 1e-3), 1e-6),
+        (system.d2(u, MU, a, b), difference(lambda h: system.linear(u + h * b, MU).matvec(a), 1e-3), 1e-5),
+        (system.mass_d(u, MU, b, a), difference(lambda h: system.linear(u + h * a, MU).mass_matvec(b), 1e-3), 1e-5),
+    ):
+        for block in blocks:
+            scale = np.abs(expected[block]).max(initial=0.0)
+            assert np.abs(found[block] - expected[block]).max(initial=0.0) <= tolerance * scale + 1e-12
+    for name in model.flow.names:
+        known = model.flow.values(MU)[name]
+        step = 1e-3 * known
+        slope = difference(lambda h: system.residual(u, MU | {name: known + h}), step)
+        rounding = 1e-14 * np.abs(model.structure(q)[0]).max() / step  # of forces, which some parameters do not move
+        found = system.d_parameter(u, MU, name)
+        assert found == pytest.approx(slope, rel=1e-6, abs=1e-8 * np.abs(slope).max() + rounding)
+
+
+@pytest.mark.slow
+def test_third_derivatives_with_three_unknowns(make_model):
+    model = with_law(make_model, "vessel")
+    system = ValveSystem(model)
+    u = system.state(opened(model, model.rest()), MU)
+    a, b = directions(system, u, 2)
+    expected = difference(lambda h: system.d2(u + h * b, MU, a, b), 1e-3)
+    found = system.d3(u, MU, a, b, b)
+    for block in (slice(0, 2 * model.size), slice(2 * model.size, None)):
+        assert np.abs(found[block] - expected[block]).max() <= 1e-4 * np.abs(expected[block]).max()
+
+
+def test_modes_satisfy_the_equations_of_motion(settled):
+    """The time-dependent residual along Re(shape exp(lambda t)) vanishes to first order in the amplitude."""
+    model, q = settled
+    conditions = Conditions(MU["density"], MU["alpha"], MU["beta"])
+    pencil = linearise(model, q, PRESSURE).pencil(conditions)
+    assert pencil.b == model.flow.inner
+    found = leading_modes(pencil, 2)
+    mode = found.mode(int(np.argmax(found.eigenvalues.imag)))
+    steady = model.flow.steady_inner(model.rows.areas(model.nodal(q)), MU)
+    value, shape, inner = mode.eigenvalue, mode.q / np.abs(mode.q).max(), mode.u / np.abs(mode.q).max()
+
+    def left(size):
+        moved = [size * (value**k * shape).real for k in range(3)]
+        force, rest = dynamic_residual(
+            model, conditions, PRESSURE, q + moved[0], moved[1], moved[2],
+            steady + size * inner.real, size * (value * inner).real,
+        )  # fmt: skip
+        inertia = np.linalg.norm(model.shell.dofs.matrix(model.mass(q)) @ moved[2])
+        return np.linalg.norm(force) / inertia, np.abs(rest).max(initial=0.0)
+
+    (force, rest), (half_force, half_rest) = left(1e-5), left(5e-6)
+    assert force < 5e-2 and half_force == pytest.approx(force / 2, rel=0.1)
+    assert half_rest == pytest.approx(rest / 4, rel=0.1)
+
+
+@pytest.mark.parametrize("name", ["bare", "terms"])
+def test_a_small_push_along_a_mode_follows_it_in_time(make_model, name):
+    """Growth and frequency of the leading oscillating mode, from half a period of time steps: to the square of the step
+    of the motion linear in the push.
+    """
+    model = with_law(make_model, name)
+    path = LoadPath(model, SteadyOptions(NewtonOptions(1e-13)))
+    path.go_to(PRESSURE)
+    q, conditions = path.q, Conditions(20.0, 0.0, 0.0003)
+    found = leading_modes(linearise(model, q, PRESSURE).pencil(conditions), 4)
+    mode = found.mode(int(np.flatnonzero(found.eigenvalues.imag > 1.0)[0]))
+    value, scale = mode.eigenvalue, 1e-6 / np.abs(mode.q).max()
+    shape = scale * mode.q
+    speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(q)), PRESSURE, conditions.density)
+    duration, errors = np.pi / value.imag, []
+    for steps in (100, 200):
+        motion = ValveMotion(model, conditions)
+        pushed = speed + float((scale * mode.u[0]).real)
+        state = consistent_state(motion, 0.0, q + shape.real, (value * shape).real, pushed, PRESSURE)
+        stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: PRESSURE, StepOptions(tolerance=1e-7))
+        for _ in range(steps):
+            state = stepper.step(state, duration / steps).state
+        expected = (np.exp(value * duration) * shape).real
+        errors.append(np.linalg.norm(state.q - q - expected) / np.linalg.norm(expected))
+    assert errors[0] < 2e-2 and errors[1] < 0.35 * errors[0]
