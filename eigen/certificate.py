@@ -97,22 +97,22 @@ def certified_spectrum(
 
     winding = counted()
     if (
-        winding.number > _listed(spectrum, winding)
+        winding.number > listed_unstable(spectrum, winding)
         and len(spectrum)
         and spectrum.growth_rate[-1] > winding.line
         and np.isinf(spectrum.band)
     ):
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
-    if winding.number != _listed(spectrum, winding) and np.isfinite(spectrum.band):
+    if winding.number != listed_unstable(spectrum, winding) and np.isfinite(spectrum.band):
         # the spectrum, and the basis, speak for a band only; count in the same
         winding = counted(band=0.999 * spectrum.band)
-        if winding.number > _listed(spectrum, winding) and spectrum.growth_rate[-1] > winding.line:
+        if winding.number > listed_unstable(spectrum, winding) and spectrum.growth_rate[-1] > winding.line:
             band = SearchOptions() if options is None else options
             spectrum = leading_modes(
                 pencil, winding.number + 2, replace(band, max_frequency=spectrum.band), workspace=workspace
             )
-    listed = _listed(spectrum, winding)
+    listed = listed_unstable(spectrum, winding)
     error = None
     if not small and not exact:
         error = response_error(pencil, basis, _checks(spectrum, winding, check_points))
@@ -123,10 +123,10 @@ def certified_spectrum(
     )
 
 
-def _listed(spectrum, winding) -> int:
-    """Eigenvalues of the spectrum in the region of the count."""
-    inside = np.flatnonzero(spectrum.frequency <= winding.band)
-    return spectrum.select(inside).count_right_of(winding.line)
+def listed_unstable(spectrum: Spectrum, count: Count) -> int:
+    """Number of eigenvalues of a spectrum in the region of a count, conjugates counted apart."""
+    inside = np.flatnonzero(spectrum.frequency <= count.band)
+    return spectrum.select(inside).count_right_of(count.line)
 
 
 def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> float:

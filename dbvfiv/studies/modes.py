@@ -21,7 +21,7 @@ from ..errors import CaseError, SolveError
 from ..flow import Channel
 from ..model import ValveModel
 from ..model.dynamics import Conditions, linearise
-from .modes_search import suited
+from ..model.leading import select_search
 from .observer import Observer
 from .state import SteadyState, describe_state
 
@@ -158,8 +158,9 @@ def run_modes(
     with solving(state.pressure):
         # without stiffness damping the band follows from the structural frequencies
         basis = TransferBasis(pencil, modes=_BASIS if conditions.beta > 0 else max(_BASIS, options.count))
-        search, notes = suited(options.search, conditions, basis, options.count)
-        certified = certified_spectrum(pencil, options.count, search, basis=basis)
+        search = select_search(options.search, conditions, lambda n: basis.structural_frequencies[:n], options.count)
+        certified = certified_spectrum(pencil, options.count, search.options, basis=basis)
+    notes = search.notes
     certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))
     if np.isfinite(certified.count.band):
         notes = (

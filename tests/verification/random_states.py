@@ -1,4 +1,4 @@
-"""A seeded sampler of steady states and conditions over everything a valve may meet, for tests of the eigenvalue search.
+"""A seeded sampler of steady states and conditions over all a valve may meet, for tests of the eigenvalue search.
 
 Equilibria depend on the pressure alone, so a few dozen pressures carry thousands of states.
 """
