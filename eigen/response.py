@@ -8,8 +8,6 @@ zeros right of the line are the eigenvalues counted, the structure's own among t
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
@@ -17,6 +15,9 @@ import scipy.sparse as sp
 from .condensation import condensed_matrix
 from .factorization import SingularShiftError, StructureMatrices, SuperluFactorization, is_positive_definite, superlu
 from .pencil import CoupledPencil, real_apply
+
+#: Numbers at most in one stack of dense matrices.
+_STACK = 1_000_000
 
 
 class Determinant:
@@ -135,45 +136,59 @@ class Determinant:
 
         NaN where the structure is singular to the last bit.
         """
-        self.evaluations += 1
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore", la.LinAlgWarning)
+        return complex(self.at([z])[0])
+
+    def at(self, places) -> np.ndarray:
+        """The same at many places, shape (k,); a dense pencil is evaluated in stacks."""
+        places = np.asarray(places, complex)
+        self.evaluations += places.size
+        stack = max(1, int(_STACK / self.pencil.n**2)) if self._dense else 1
+        pieces = [self._tried(places[i : i + stack]) for i in range(0, places.size, stack)]
+        return np.concatenate(pieces) if pieces else np.zeros(0, complex)
+
+    def _tried(self, z):
+        with np.errstate(all="ignore"):
             try:
-                return self._evaluate(complex(z))
-            except SingularShiftError:
-                return complex(np.nan, np.nan)
+                H, total = self._structure_at(z) if self._dense else self._sparse_structure_at(complex(z[0]))
+            except (SingularShiftError, np.linalg.LinAlgError):
+                if z.size == 1:
+                    return np.full(1, complex(np.nan, np.nan))
+                return np.concatenate([self._tried(z[[i]]) for i in range(z.size)])
+            return total + self._fluid_log(self.line + z, H)
 
-    def _evaluate(self, z):
+    def _structure_at(self, z):
+        """H at a stack of places, shape (k, m, m), and log det D - log det D_ref there."""
+        s = (self.line + z)[:, None, None]
+        M, C, K, Cr, Kr = self._parts
+        D = s * s * M + s * C + K
+        H = self._J @ np.linalg.solve(D, self._G[None].astype(complex))
+        if self.structure_is_reference:
+            return H, np.zeros(z.size)
+        z = z[:, None, None]
+        return H, _log_determinant(D) - _log_determinant(z * z * M + z * Cr + Kr)
+
+    def _sparse_structure_at(self, z):
         p, s = self.pencil, self.line + z
-        if self._dense:
-            M, C, K, Cr, Kr = self._parts
-            lu = la.lu_factor(s * s * M + s * C + K, check_finite=False)
-            H = self._J @ la.lu_solve(lu, self._G, check_finite=False)
-            total = 0.0
-            if not self.structure_is_reference:
-                total = _dense_log(lu) - _dense_log(la.lu_factor(z * z * M + z * Cr + Kr, check_finite=False))
-        else:
-            self._factor.refactor(self._structure.values(s).astype(complex))
-            H = real_apply(p.J, self._factor.solve(p.G.toarray().astype(complex)))
-            total = 0.0
-            if not self.structure_is_reference:
-                self._twin_factor.refactor(self._twin.values(z).astype(complex))
-                total = self._factor.log_determinant() - self._twin_factor.log_determinant()
-        small = condensed_matrix(*p.fluid_at(s), H)
-        if small.size:
-            if self._scale is None:  # constant positive factors leave the phase alone
-                size = np.abs(small).max(axis=1)
-                self._scale = np.where(size > 0, size, 1.0)
-            sign, size = np.linalg.slogdet(small / self._scale[:, None])
-            total = total + complex(size, np.angle(sign))
-        return complex(total)
+        self._factor.refactor(self._structure.values(s).astype(complex))
+        H = real_apply(p.J, self._factor.solve(p.G.toarray().astype(complex)))[None]
+        if self.structure_is_reference:
+            return H, np.zeros(1)
+        self._twin_factor.refactor(self._twin.values(z).astype(complex))
+        return H, np.array([self._factor.log_determinant() - self._twin_factor.log_determinant()])
+
+    def _fluid_log(self, s, H):
+        small = condensed_matrix(*self.pencil.fluid_at(s[:, None, None]), H)
+        if not small.size:
+            return np.zeros(s.size)
+        if self._scale is None:  # constant positive factors leave the phase alone
+            size = np.abs(small[0]).max(axis=1)
+            self._scale = np.where(size > 0, size, 1.0)
+        return _log_determinant(small / self._scale[:, None])
 
 
-def _dense_log(lu) -> complex:
-    factor, pivots = lu
-    diagonal = np.diagonal(factor)
-    swaps = int(np.sum(pivots != np.arange(pivots.size)))
-    return complex(np.log(np.abs(diagonal)).sum(), np.angle(diagonal).sum() + np.pi * (swaps % 2))
+def _log_determinant(stack) -> np.ndarray:
+    sign, size = np.linalg.slogdet(stack)
+    return size + 1j * np.angle(sign)
 
 
 def _gap(a, b) -> float:
