@@ -8,6 +8,8 @@ zeros right of the line are the eigenvalues counted, the structure's own among t
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
@@ -18,6 +20,10 @@ from .pencil import CoupledPencil, real_apply
 
 #: Numbers at most in one stack of dense matrices.
 _STACK = 1_000_000
+#: Order up to which a structure is represented by its eigenvectors.
+_MODAL_BELOW = 160
+#: Condition of those eigenvectors beyond which it is not.
+_LARGEST_CONDITION = 1e6
 
 
 class Determinant:
@@ -80,6 +86,7 @@ class Determinant:
         if self._dense:
             self._parts = [x.toarray() for x in (p.M, p.C, p.K, *self._reference)]
             self._G, self._J = p.G.toarray(), p.J.toarray()
+            self._modes = _StructureModes.of(*self._parts[:3], self._G, self._J) if p.n <= _MODAL_BELOW else None
             return
         self._structure = StructureMatrices(p)
         self._factor = SuperluFactorization(self._structure)
@@ -123,13 +130,13 @@ class Determinant:
         """
         if not self._dense:
             return np.zeros(0, complex)
-        M, _, _, C, K = self._parts
-        n = M.shape[0]
-        form = np.block(
-            [[np.zeros((n, n)), np.eye(n)], [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]]
-        )
-        values = la.eigvals(form)
+        values = self._every_reference_zero
         return values[values.imag > 0]
+
+    @cached_property
+    def _every_reference_zero(self):
+        M, _, _, C, K = self._parts
+        return la.eigvals(_first_order(M, C, K))
 
     def __call__(self, z: complex) -> complex:
         """log |ratio| + i arg ratio at line + z; the argument is known modulo 2 pi.
@@ -158,6 +165,11 @@ class Determinant:
 
     def _structure_at(self, z):
         """H at a stack of places, shape (k, m, m), and log det D - log det D_ref there."""
+        if self._modes is not None:
+            H, total = self._modes.response(self.line + z)
+            if self.structure_is_reference:
+                return H, np.zeros(z.size)
+            return H, total - np.log(z[:, None] - self._every_reference_zero).sum(axis=1)
         s = (self.line + z)[:, None, None]
         M, C, K, Cr, Kr = self._parts
         D = s * s * M + s * C + K
@@ -184,6 +196,34 @@ class Determinant:
             size = np.abs(small[0]).max(axis=1)
             self._scale = np.where(size > 0, size, 1.0)
         return _log_determinant(small / self._scale[:, None])
+
+
+class _StructureModes:
+    """J (s^2 M + s C + K)^-1 G and det / det M of a small structure from its eigenvectors."""
+
+    def __init__(self, values, motions, forces):
+        self.values, self.motions, self.forces = values, motions, forces
+
+    @classmethod
+    def of(cls, M, C, K, G, J) -> _StructureModes | None:
+        """None where the eigenvectors are too close to each other to stand in for solves."""
+        n = M.shape[0]
+        values, vectors = la.eig(_first_order(M, C, K))
+        force = np.vstack([np.zeros_like(G), la.solve(M, G, assume_a="pos")])
+        scale = np.repeat([1.0, 1.0 / (np.abs(values).max(initial=0.0) or 1.0)], n)
+        if not np.linalg.cond(scale[:, None] * vectors) < _LARGEST_CONDITION:
+            return None
+        return cls(values, J @ vectors[:n], la.solve(vectors, force.astype(complex)))
+
+    def response(self, s):
+        """H, shape (k, m, m), and log det D - log det M, shape (k,)."""
+        distance = s[:, None] - self.values
+        return (self.motions / distance[:, None, :]) @ self.forces, np.log(distance).sum(axis=1)
+
+
+def _first_order(M, C, K):
+    n = M.shape[0]
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]])
 
 
 def _log_determinant(stack) -> np.ndarray:
