@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .condensation import Workspace, condensed_matrix
+from .distant import distant_pairs, joined
 from .factorization import StructureMatrices, SuperluFactorization
 from .options import SearchOptions
 from .pencil import CoupledPencil, real_apply
@@ -48,8 +49,12 @@ class CertifiedSpectrum:
 
     @property
     def stable(self) -> bool | None:
-        """True or False if both routes agree, else None; for the band counted."""
-        return self.unstable_count == 0 if self.agrees else None
+        """False if any pair listed is unstable, which is proof; True, for the band counted, if both routes agree that
+        there is none; else None.
+        """
+        if self.spectrum.count_right_of(self.count.line):
+            return False
+        return True if self.agrees else None
 
 
 def certified_spectrum(
@@ -104,6 +109,14 @@ def certified_spectrum(
     ):
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
+    asked = None if options is None else options.max_frequency
+    if model is not pencil and asked is None and winding.number > listed_unstable(spectrum, winding):
+        distant = distant_pairs(pencil, spectrum, model, basis, winding.line, options or SearchOptions())
+        if distant is not None:
+            spectrum = joined(spectrum, distant, winding.line)
+            basis = basis.enlarged(distant.q)
+            model = basis.reduced(pencil)
+            winding = counted()
     if winding.number != listed_unstable(spectrum, winding) and np.isfinite(spectrum.band):
         # the spectrum, and the basis, speak for a band only; count in the same
         winding = counted(band=0.999 * spectrum.band)
@@ -147,7 +160,7 @@ def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> 
 
 def _checks(spectrum, winding, number):
     """Frequencies to compare at: those of the leading modes, where the count is decided."""
-    frequencies = [f for f in spectrum.frequency if f > 0][:number]
+    frequencies = [f for f in spectrum.frequency if 0 < f <= winding.band][:number]
     return frequencies or list(winding.frequencies[1:2])
 
 
@@ -155,7 +168,10 @@ def _statement(spectrum, winding, listed, agrees, error):
     where = "" if winding.line == 0 else f" with a growth rate above {winding.line:.4g} 1/s"
     where += "" if np.isinf(winding.band) else f" up to {winding.band:.4g} Hz"
     if agrees:
-        return f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree."
+        beyond = spectrum.count_right_of(winding.line) - listed
+        return f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree" + (
+            f"; {beyond} more are listed beyond that band." if beyond else "."
+        )
     if not winding.certain:
         return (
             f"The spectrum lists {listed} unstable eigenvalues{where}; the independent count "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
@@ -81,6 +83,13 @@ class TransferBasis:
         columns = [part for v in vectors for part in ((v.real, v.imag) if np.iscomplexobj(v) else (v,))]
         self._extend(np.hstack(columns), compression)
         return self.size
+
+    def enlarged(self, *vectors, compression: float = 1e-7) -> TransferBasis:
+        """A larger basis; this one stays as it is."""
+        other = copy(self)
+        other._projected = {}
+        other.enlarge(*vectors, compression=compression)
+        return other
 
     def _extend(self, X, compression: float = 1e-10):
         """M-orthonormalise X against V and keep the directions that matter."""

@@ -108,9 +108,8 @@ class ModesResult:
         One unstable pair that satisfies the equations is proof that they do not. If none is listed and the independent
         count does not confirm it, or only up to some frequency: None.
         """
-        if self.certified.unstable_count:
-            return False
-        return self.certified.stable if np.isinf(self.certified.count.band) else None
+        known = self.certified.stable
+        return known if known is False or np.isinf(self.certified.count.band) else None
 
 
 def run_modes(
