@@ -1,7 +1,8 @@
 """Spectra of large sparse quadratic pencils with a low-rank, frequency-dependent coupling."""
 
-from .certificate import CertifiedSpectrum, certified_spectrum
+from .certificate import CertifiedSpectrum, certified_spectrum, listed_unstable
 from .condensation import Workspace
+from .coverage import CLEAR
 from .derivative import PencilDerivative, difference, eigenvalue_derivative
 from .factorization import SingularShiftError
 from .options import SearchOptions
@@ -11,10 +12,11 @@ from .search import leading_modes
 from .spectrum import Mode, Spectrum
 from .sweep import Sweep, sweep
 from .tracking import Branches, TrackOptions, track
-from .transfer import TransferBasis
+from .transfer import TransferBasis, lowest_frequencies
 from .winding import Count, unstable_count
 
 __all__ = [
+    "CLEAR",
     "Branches",
     "CertifiedSpectrum",
     "Count",
@@ -34,6 +36,8 @@ __all__ = [
     "difference",
     "eigenvalue_derivative",
     "leading_modes",
+    "listed_unstable",
+    "lowest_frequencies",
     "sweep",
     "track",
     "unstable_count",

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .condensation import Workspace, condensed_matrix
+from .distant import distant_pairs, joined
 from .factorization import StructureMatrices, SuperluFactorization
 from .options import SearchOptions
 from .pencil import CoupledPencil, real_apply
@@ -48,8 +49,12 @@ class CertifiedSpectrum:
 
     @property
     def stable(self) -> bool | None:
-        """True or False if both routes agree, else None; for the band counted."""
-        return self.unstable_count == 0 if self.agrees else None
+        """False if any pair listed is unstable, which is proof; True, for the band counted, if both routes agree that
+        there is none; else None.
+        """
+        if self.spectrum.count_right_of(self.count.line):
+            return False
+        return True if self.agrees else None
 
 
 def certified_spectrum(
@@ -97,22 +102,30 @@ def certified_spectrum(
 
     winding = counted()
     if (
-        winding.number > _listed(spectrum, winding)
+        winding.number > listed_unstable(spectrum, winding)
         and len(spectrum)
         and spectrum.growth_rate[-1] > winding.line
         and np.isinf(spectrum.band)
     ):
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
-    if winding.number != _listed(spectrum, winding) and np.isfinite(spectrum.band):
+    asked = None if options is None else options.max_frequency
+    if model is not pencil and asked is None and winding.number > listed_unstable(spectrum, winding):
+        distant = distant_pairs(pencil, spectrum, model, basis, winding.line, options or SearchOptions())
+        if distant is not None:
+            spectrum = joined(spectrum, distant, winding.line)
+            basis = basis.enlarged(distant.q)
+            model = basis.reduced(pencil)
+            winding = counted()
+    if winding.number != listed_unstable(spectrum, winding) and np.isfinite(spectrum.band):
         # the spectrum, and the basis, speak for a band only; count in the same
         winding = counted(band=0.999 * spectrum.band)
-        if winding.number > _listed(spectrum, winding) and spectrum.growth_rate[-1] > winding.line:
+        if winding.number > listed_unstable(spectrum, winding) and spectrum.growth_rate[-1] > winding.line:
             band = SearchOptions() if options is None else options
             spectrum = leading_modes(
                 pencil, winding.number + 2, replace(band, max_frequency=spectrum.band), workspace=workspace
             )
-    listed = _listed(spectrum, winding)
+    listed = listed_unstable(spectrum, winding)
     error = None
     if not small and not exact:
         error = response_error(pencil, basis, _checks(spectrum, winding, check_points))
@@ -123,10 +136,10 @@ def certified_spectrum(
     )
 
 
-def _listed(spectrum, winding) -> int:
-    """Eigenvalues of the spectrum in the region of the count."""
-    inside = np.flatnonzero(spectrum.frequency <= winding.band)
-    return spectrum.select(inside).count_right_of(winding.line)
+def listed_unstable(spectrum: Spectrum, count: Count) -> int:
+    """Number of eigenvalues of a spectrum in the region of a count, conjugates counted apart."""
+    inside = np.flatnonzero(spectrum.frequency <= count.band)
+    return spectrum.select(inside).count_right_of(count.line)
 
 
 def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> float:
@@ -147,7 +160,7 @@ def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> 
 
 def _checks(spectrum, winding, number):
     """Frequencies to compare at: those of the leading modes, where the count is decided."""
-    frequencies = [f for f in spectrum.frequency if f > 0][:number]
+    frequencies = [f for f in spectrum.frequency if 0 < f <= winding.band][:number]
     return frequencies or list(winding.frequencies[1:2])
 
 
@@ -155,7 +168,10 @@ def _statement(spectrum, winding, listed, agrees, error):
     where = "" if winding.line == 0 else f" with a growth rate above {winding.line:.4g} 1/s"
     where += "" if np.isinf(winding.band) else f" up to {winding.band:.4g} Hz"
     if agrees:
-        return f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree."
+        beyond = spectrum.count_right_of(winding.line) - listed
+        return f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree" + (
+            f"; {beyond} more are listed beyond that band." if beyond else "."
+        )
     if not winding.certain:
         return (
             f"The spectrum lists {listed} unstable eigenvalues{where}; the independent count "

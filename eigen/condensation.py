@@ -179,13 +179,18 @@ class ShiftedPencil:
 
 
 def condensed_matrix(A, B, R, S, H) -> np.ndarray:
-    """[I - A H, -B; R H, S], the full pencil condensed to (p, U), shape (m + b, m + b).
+    """[I - A H, -B; R H, S], the full pencil condensed to (p, U), shape (..., m + b, m + b).
 
     Its determinant times that of the structure is the determinant of the full pencil; kept
-    bordered, the fluid brings no poles of its own.
+    bordered, the fluid brings no poles of its own. Stacks of matrices give a stack.
     """
-    m, b = B.shape
-    return np.block([[np.eye(m) - A @ H, -B], [R @ H, S]]) if m + b else np.zeros((0, 0))
+    m, b = B.shape[-2:]
+    out = np.empty((*H.shape[:-2], m + b, m + b), np.result_type(A, B, R, S, H))
+    out[..., :m, :m] = np.eye(m) - A @ H
+    out[..., :m, m:] = -B
+    out[..., m:, :m] = R @ H
+    out[..., m:, m:] = S
+    return out
 
 
 def _scale(matrix, axis):

@@ -129,8 +129,9 @@ def near_shift(
     subspace : int, optional
         Largest Krylov basis; default twice the number wanted, or the whole of a small space.
     max_restarts, patience : int
-        Give up after so many restarts, or after `patience` of them without a further pair:
-        next to a limit point of eigenvalues no number of restarts helps.
+        Give up after so many restarts, or after `patience` of them that neither brought a further
+        pair nor halved the error of the next: next to a limit point of eigenvalues no number of
+        restarts helps, while in a dense spectrum all pairs converge late and together.
     transposed : bool
         Left vectors (conjugated) instead of right ones, from the same factor.
     limit_point : float, optional
@@ -164,8 +165,7 @@ def near_shift(
         stopping.enough = lambda theta: enough(shifted.shift + 1.0 / theta, 1.0 / np.abs(theta).min())
         stopping.matrix = SLEPc.DS.MatType.A
     solver.setStoppingTest(stopping)
-    if stopping.limit:
-        solver.setMonitor(stopping.watch)
+    solver.setMonitor(stopping.watch)
     subspace = subspace or (size if size <= 5 * wanted else max(2 * wanted, wanted + 24))
     solver.setDimensions(wanted, min(size, subspace))
     start = shell.createVecRight()
@@ -194,13 +194,19 @@ class _Patience:
     def __init__(self, patience, reasons, limit=0.0):
         self.patience, self.reasons, self.limit = patience, reasons, limit
         self.best, self.since = 0, 0
+        self.error = np.inf  # smallest seen of the first pair that has not converged
         self.ritz = np.zeros(0)
         self.at_limit = False
         self.enough = None
         self.matrix = None
 
-    def watch(self, _solver, _restart, _converged, ritz, _errors):
+    def watch(self, _solver, restart, converged, ritz, errors):
         self.ritz = np.abs(np.array(ritz))
+        if converged > self.best:
+            self.error = np.inf
+        error = errors[converged] if converged < len(errors) else 0.0
+        if 0.0 < error <= 0.5 * self.error:
+            self.error, self.since = error, restart
 
     def __call__(self, _solver, restart, max_restarts, converged, wanted):
         if converged >= wanted:

@@ -8,7 +8,7 @@ zeros right of the line are the eigenvalues counted, the structure's own among t
 
 from __future__ import annotations
 
-import warnings
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as la
@@ -17,6 +17,13 @@ import scipy.sparse as sp
 from .condensation import condensed_matrix
 from .factorization import SingularShiftError, StructureMatrices, SuperluFactorization, is_positive_definite, superlu
 from .pencil import CoupledPencil, real_apply
+
+#: Numbers at most in one stack of dense matrices.
+_STACK = 1_000_000
+#: Order up to which a structure is represented by its eigenvectors.
+_MODAL_BELOW = 160
+#: Condition of those eigenvectors beyond which it is not.
+_LARGEST_CONDITION = 1e6
 
 
 class Determinant:
@@ -79,6 +86,7 @@ class Determinant:
         if self._dense:
             self._parts = [x.toarray() for x in (p.M, p.C, p.K, *self._reference)]
             self._G, self._J = p.G.toarray(), p.J.toarray()
+            self._modes = _StructureModes.of(*self._parts[:3], self._G, self._J) if p.n <= _MODAL_BELOW else None
             return
         self._structure = StructureMatrices(p)
         self._factor = SuperluFactorization(self._structure)
@@ -122,58 +130,105 @@ class Determinant:
         """
         if not self._dense:
             return np.zeros(0, complex)
-        M, _, _, C, K = self._parts
-        n = M.shape[0]
-        form = np.block(
-            [[np.zeros((n, n)), np.eye(n)], [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]]
-        )
-        values = la.eigvals(form)
+        values = self._every_reference_zero
         return values[values.imag > 0]
+
+    @cached_property
+    def _every_reference_zero(self):
+        M, _, _, C, K = self._parts
+        return la.eigvals(_first_order(M, C, K))
 
     def __call__(self, z: complex) -> complex:
         """log |ratio| + i arg ratio at line + z; the argument is known modulo 2 pi.
 
         NaN where the structure is singular to the last bit.
         """
-        self.evaluations += 1
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore", la.LinAlgWarning)
+        return complex(self.at([z])[0])
+
+    def at(self, places) -> np.ndarray:
+        """The same at many places, shape (k,); a dense pencil is evaluated in stacks."""
+        places = np.asarray(places, complex)
+        self.evaluations += places.size
+        stack = max(1, int(_STACK / self.pencil.n**2)) if self._dense else 1
+        pieces = [self._tried(places[i : i + stack]) for i in range(0, places.size, stack)]
+        return np.concatenate(pieces) if pieces else np.zeros(0, complex)
+
+    def _tried(self, z):
+        with np.errstate(all="ignore"):
             try:
-                return self._evaluate(complex(z))
-            except SingularShiftError:
-                return complex(np.nan, np.nan)
+                H, total = self._structure_at(z) if self._dense else self._sparse_structure_at(complex(z[0]))
+            except (SingularShiftError, np.linalg.LinAlgError):
+                if z.size == 1:
+                    return np.full(1, complex(np.nan, np.nan))
+                return np.concatenate([self._tried(z[[i]]) for i in range(z.size)])
+            return total + self._fluid_log(self.line + z, H)
 
-    def _evaluate(self, z):
+    def _structure_at(self, z):
+        """H at a stack of places, shape (k, m, m), and log det D - log det D_ref there."""
+        if self._modes is not None:
+            H, total = self._modes.response(self.line + z)
+            if self.structure_is_reference:
+                return H, np.zeros(z.size)
+            return H, total - np.log(z[:, None] - self._every_reference_zero).sum(axis=1)
+        s = (self.line + z)[:, None, None]
+        M, C, K, Cr, Kr = self._parts
+        D = s * s * M + s * C + K
+        H = self._J @ np.linalg.solve(D, self._G[None].astype(complex))
+        if self.structure_is_reference:
+            return H, np.zeros(z.size)
+        z = z[:, None, None]
+        return H, _log_determinant(D) - _log_determinant(z * z * M + z * Cr + Kr)
+
+    def _sparse_structure_at(self, z):
         p, s = self.pencil, self.line + z
-        if self._dense:
-            M, C, K, Cr, Kr = self._parts
-            lu = la.lu_factor(s * s * M + s * C + K, check_finite=False)
-            H = self._J @ la.lu_solve(lu, self._G, check_finite=False)
-            total = 0.0
-            if not self.structure_is_reference:
-                total = _dense_log(lu) - _dense_log(la.lu_factor(z * z * M + z * Cr + Kr, check_finite=False))
-        else:
-            self._factor.refactor(self._structure.values(s).astype(complex))
-            H = real_apply(p.J, self._factor.solve(p.G.toarray().astype(complex)))
-            total = 0.0
-            if not self.structure_is_reference:
-                self._twin_factor.refactor(self._twin.values(z).astype(complex))
-                total = self._factor.log_determinant() - self._twin_factor.log_determinant()
-        small = condensed_matrix(*p.fluid_at(s), H)
-        if small.size:
-            if self._scale is None:  # constant positive factors leave the phase alone
-                size = np.abs(small).max(axis=1)
-                self._scale = np.where(size > 0, size, 1.0)
-            sign, size = np.linalg.slogdet(small / self._scale[:, None])
-            total = total + complex(size, np.angle(sign))
-        return complex(total)
+        self._factor.refactor(self._structure.values(s).astype(complex))
+        H = real_apply(p.J, self._factor.solve(p.G.toarray().astype(complex)))[None]
+        if self.structure_is_reference:
+            return H, np.zeros(1)
+        self._twin_factor.refactor(self._twin.values(z).astype(complex))
+        return H, np.array([self._factor.log_determinant() - self._twin_factor.log_determinant()])
+
+    def _fluid_log(self, s, H):
+        small = condensed_matrix(*self.pencil.fluid_at(s[:, None, None]), H)
+        if not small.size:
+            return np.zeros(s.size)
+        if self._scale is None:  # constant positive factors leave the phase alone
+            size = np.abs(small[0]).max(axis=1)
+            self._scale = np.where(size > 0, size, 1.0)
+        return _log_determinant(small / self._scale[:, None])
 
 
-def _dense_log(lu) -> complex:
-    factor, pivots = lu
-    diagonal = np.diagonal(factor)
-    swaps = int(np.sum(pivots != np.arange(pivots.size)))
-    return complex(np.log(np.abs(diagonal)).sum(), np.angle(diagonal).sum() + np.pi * (swaps % 2))
+class _StructureModes:
+    """J (s^2 M + s C + K)^-1 G and det / det M of a small structure from its eigenvectors."""
+
+    def __init__(self, values, motions, forces):
+        self.values, self.motions, self.forces = values, motions, forces
+
+    @classmethod
+    def of(cls, M, C, K, G, J) -> _StructureModes | None:
+        """None where the eigenvectors are too close to each other to stand in for solves."""
+        n = M.shape[0]
+        values, vectors = la.eig(_first_order(M, C, K))
+        force = np.vstack([np.zeros_like(G), la.solve(M, G, assume_a="pos")])
+        scale = np.repeat([1.0, 1.0 / (np.abs(values).max(initial=0.0) or 1.0)], n)
+        if not np.linalg.cond(scale[:, None] * vectors) < _LARGEST_CONDITION:
+            return None
+        return cls(values, J @ vectors[:n], la.solve(vectors, force.astype(complex)))
+
+    def response(self, s):
+        """H, shape (k, m, m), and log det D - log det M, shape (k,)."""
+        distance = s[:, None] - self.values
+        return (self.motions / distance[:, None, :]) @ self.forces, np.log(distance).sum(axis=1)
+
+
+def _first_order(M, C, K):
+    n = M.shape[0]
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]])
+
+
+def _log_determinant(stack) -> np.ndarray:
+    sign, size = np.linalg.slogdet(stack)
+    return size + 1j * np.angle(sign)
 
 
 def _gap(a, b) -> float:

@@ -53,7 +53,12 @@ def first_shift(pencil, aim, options, workspace) -> float:
 
 
 def next_shift(pencil, found, aim, options, workspace) -> complex:
-    """The natural real shift where the band was far off, then complex ones up the band."""
+    """The natural real shift where the band was far off, then complex ones up the band.
+
+    Where nothing converged the spectrum is dense as seen from afar, as heavy fluids make it: go closer.
+    """
+    if not found.values.size and all(isinstance(s, float) for s in found.shifts):
+        return min(found.shifts) / 3.0
     if options.limit_point is not None:  # a larger disc hugs the line through the limit point
         return 3.0 * max(abs(s) for s in found.shifts)
     if options.max_frequency is not None and len(found.shifts) == 1:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
@@ -49,18 +51,11 @@ class TransferBasis:
     def __init__(self, pencil: CoupledPencil, *, modes: int = 24, compression: float = 1e-7):
         self._G, self._J, self._M = pencil.G, pencil.J, pencil.M
         self._projected: dict[int, tuple[object, np.ndarray]] = {}
-        symmetric = ((pencil.K + pencil.K.T) * 0.5).tocsr()
-        n = pencil.n
-        modes = min(modes, n)
-        if modes >= n - 1 or n < 60:
-            values, vectors = la.eigh(symmetric.toarray(), pencil.M.toarray())
-            values, vectors = values[:modes], vectors[:, :modes]
-        else:
-            values, vectors = _lowest_modes(symmetric, pencil.M, modes)
-        self.structural_frequencies = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
-        self.V = np.zeros((n, 0))
+        values, vectors = _lowest_modes(pencil, modes)
+        self.structural_frequencies = _frequencies(values)
+        self.V = np.zeros((pencil.n, 0))
         self._extend(vectors)
-        if pencil.m and self.V.shape[1] < n:
+        if pencil.m and self.V.shape[1] < pencil.n:
             self._extend(self._static_corrections(pencil, values), compression)
 
     @property
@@ -88,6 +83,13 @@ class TransferBasis:
         columns = [part for v in vectors for part in ((v.real, v.imag) if np.iscomplexobj(v) else (v,))]
         self._extend(np.hstack(columns), compression)
         return self.size
+
+    def enlarged(self, *vectors, compression: float = 1e-7) -> TransferBasis:
+        """A larger basis; this one stays as it is."""
+        other = copy(self)
+        other._projected = {}
+        other.enlarge(*vectors, compression=compression)
+        return other
 
     def _extend(self, X, compression: float = 1e-10):
         """M-orthonormalise X against V and keep the directions that matter."""
@@ -144,8 +146,44 @@ class TransferBasis:
         return self.V @ vectors
 
 
-def _lowest_modes(stiffness, mass, count):
-    """Lowest modes of a symmetric pencil by shift and invert a little below zero."""
+def lowest_frequencies(pencil: CoupledPencil, count: int) -> np.ndarray:
+    """Lowest frequencies of the undamped symmetric structure in vacuo, (K + K^T)/2 and M.
+
+    Parameters
+    ----------
+    pencil : CoupledPencil
+    count : int
+
+    Returns
+    -------
+    ndarray, shape (min(count, n),)
+        Hz, ascending; an unstable one counts as zero.
+
+    Examples
+    --------
+    >>> pencil = CoupledPencil(M=np.eye(2), C=np.zeros((2, 2)), K=(2 * np.pi) ** 2 * np.diag([1.0, 4.0]))
+    >>> np.round(lowest_frequencies(pencil, 2), 6)
+    array([1., 2.])
+    """
+    return _frequencies(_lowest_modes(pencil, count)[0])
+
+
+def _frequencies(squares):
+    return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+
+
+def _lowest_modes(pencil, count):
+    """Squares of the lowest angular frequencies of the symmetric structure, ascending, and its modes."""
+    symmetric = ((pencil.K + pencil.K.T) * 0.5).tocsr()
+    count = min(count, pencil.n)
+    if count >= pencil.n - 1 or pencil.n < 60:
+        values, vectors = la.eigh(symmetric.toarray(), pencil.M.toarray())
+        return values[:count], vectors[:, :count]
+    return _lowest_by_inverse(symmetric, pencil.M, count)
+
+
+def _lowest_by_inverse(stiffness, mass, count):
+    """Lowest modes of a large symmetric pencil by shift and invert a little below zero."""
     unit = np.median(stiffness.diagonal()) / np.median(mass.diagonal())
     structure = StructureMatrices(CoupledPencil(M=mass, C=sp.csr_matrix(mass.shape), K=stiffness))
     factor = MumpsFactorization(structure)

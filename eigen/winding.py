@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,14 +120,22 @@ class _Walk:
         self.f, self.max_points = determinant, max_points
         self.turn = np.inf if band is None else 2 * np.pi * band
         self.values: dict[float, complex] = {}
+        self.known: list[float] = []
         self.notes: list[str] = []
 
-    def _add(self, omega):
-        if not any(abs(omega - w) <= 1e-12 * omega for w in self.values):
-            value = self.f(self._place(omega))
+    def _add(self, *omegas):
+        """Evaluate at places that are not known yet."""
+        new: list[float] = []
+        for omega in map(float, omegas):
+            i = bisect_left(self.known, omega)
+            if all(abs(omega - w) > 1e-12 * omega for w in self.known[max(0, i - 1) : i + 1]):
+                self.known.insert(i, omega)
+                new.append(omega)
+        for omega, value in zip(new, self.f.at([self._place(w) for w in new])):
             if np.isfinite(value):
-                self.values[omega] = value
+                self.values[omega] = complex(value)
             else:
+                self.known.remove(omega)
                 self._complain(f"An eigenvalue lies on the line, at {omega / (2 * np.pi):.6g} Hz.")
 
     def _place(self, t):
@@ -142,19 +151,16 @@ class _Walk:
         self.smallest = 1e-9 * scale
         self.values.setdefault(0.0, 0j)  # kept as a place even where the value is lost
         steps = scale * 10.0 ** np.arange(-3, 1.01, 0.25)
-        for omega in steps:
-            self._add(float(omega))
+        places = list(steps)
         if np.isfinite(self.turn):
-            for omega in (self.turn, *(self.turn + steps)):
-                self._add(float(omega))
+            places += [self.turn, *(self.turn + steps)]
         for h in hints:
             if h.imag == 0 or abs(h.imag) > self.turn:
                 continue
             width = max(abs(h.real - self.f.line), 1e-9 * abs(h))
-            for offset in (-10, -3, -1, 0, 1, 3, 10):
-                omega = abs(h.imag) + offset * width
-                if omega > 0 and len(self.values) < self.max_points // 2:
-                    self._add(float(omega))
+            beside = [abs(h.imag) + offset * width for offset in (-10, -3, -1, 0, 1, 3, 10)]
+            places += [omega for omega in beside if omega > 0]
+        self._add(*places[: self.max_points // 2])
         top = max(self.values)
         settled = 0
         for _ in range(40):
@@ -184,20 +190,22 @@ class _Walk:
             wanted = self._suspects(omegas)
             if not wanted.size:
                 return
+            middles = []
             for i in wanted:
                 a, b = omegas[i], omegas[i + 1]
                 where = f"{b / (2 * np.pi):.6g} Hz"
                 if b - a <= 1e-11 * b or b <= self.smallest:
                     self.notes.append(f"An eigenvalue lies on the line, near {where}.")
                     return
-                if len(self.values) >= self.max_points:
+                if len(self.values) + len(middles) >= self.max_points:
                     self.notes.append(f"{self.max_points} points did not resolve the phase near {where}.")
                     return
                 # bisect in proportion over a wide interval, in length over a narrow one
-                middle = np.sqrt(a * b) if a > 0 and b > 4 * a else 0.5 * (a + b)
-                self._add(float(middle))
-                if float(middle) not in self.values:
-                    self._complain(f"The phase could not be resolved near {where}.")
+                middles.append(float(np.sqrt(a * b) if a > 0 and b > 4 * a else 0.5 * (a + b)))
+            self._add(*middles)
+            for middle in middles:
+                if middle not in self.values:
+                    self._complain(f"The phase could not be resolved near {middle / (2 * np.pi):.6g} Hz.")
                     return
 
     def _suspects(self, omegas):

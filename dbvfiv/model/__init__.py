@@ -1,6 +1,19 @@
 """The coupled valve and its exact linearisation."""
 
 from .dynamics import Conditions, LinearisedState, dynamic_residual, linearise
+from .leading import BandOrigin, LeadingSearch, growth_floor, limit_point, select_search
 from .valve import Tangent, ValveModel
 
-__all__ = ["Conditions", "LinearisedState", "Tangent", "ValveModel", "dynamic_residual", "linearise"]
+__all__ = [
+    "BandOrigin",
+    "Conditions",
+    "LeadingSearch",
+    "LinearisedState",
+    "Tangent",
+    "ValveModel",
+    "dynamic_residual",
+    "growth_floor",
+    "limit_point",
+    "linearise",
+    "select_search",
+]

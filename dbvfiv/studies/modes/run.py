@@ -20,9 +20,9 @@ from ...errors import CaseError
 from ...model import ValveModel
 from ...model.dynamics import Conditions, linearise
 from ...model.equilibria import require_equilibrium
+from ...model.leading import select_search
 from ...model.state import SteadyState
 from ...observer import Observer
-from ..modes_search import suited
 from ..solving import solving
 
 #: Unbalanced force over pressure force above which a state is no equilibrium of its model.
@@ -108,9 +108,8 @@ class FoundModes:
         One unstable pair that satisfies the equations is proof that they do not. If none is listed and the independent
         count does not confirm it, or only up to some frequency: None.
         """
-        if self.certified.unstable_count:
-            return False
-        return self.certified.stable if np.isinf(self.certified.count.band) else None
+        known = self.certified.stable
+        return known if known is False or np.isinf(self.certified.count.band) else None
 
 
 def run_modes(
@@ -158,8 +157,9 @@ def run_modes(
     with solving(state.pressure):
         # without stiffness damping the band follows from the structural frequencies
         basis = TransferBasis(pencil, modes=_BASIS if conditions.beta > 0 else max(_BASIS, options.count))
-        search, notes = suited(options.search, conditions, basis, options.count)
-        certified = certified_spectrum(pencil, options.count, search, basis=basis)
+        search = select_search(options.search, conditions, lambda n: basis.structural_frequencies[:n], options.count)
+        certified = certified_spectrum(pencil, options.count, search.options, basis=basis)
+    notes = search.notes
     certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))
     if np.isfinite(certified.count.band):
         notes = (

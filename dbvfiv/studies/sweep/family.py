@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import Protocol
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from eigen import (
     Workspace,
     certified_spectrum,
     leading_modes,
+    listed_unstable,
+    lowest_frequencies,
     unstable_count,
 )
 
@@ -22,15 +25,17 @@ from ...case.axis import Axis
 from ...model import ValveModel
 from ...model.dynamics import Conditions, LinearisedState, linearise
 from ...model.equilibria import LoadPath, SteadyOptions
+from ...model.leading import LeadingSearch, select_search
 from ...model.state import SteadyState
 from ...observer import Observer
-from ..modes_search import suited
 
 #: Static corrections below this share of the largest are left to the eigenvectors of the check points, which gives a
 #: smaller basis.
 _COMPRESSION = 1e-3
 #: Further places at most at which an enlarged basis is checked.
 _FRESH = 4
+#: Share of a band in which unstable eigenvalues are counted: its end must not cut through a mode.
+COUNTED = 0.999
 
 
 @dataclass(frozen=True)
@@ -94,7 +99,8 @@ class FluidFamily:
         self.done: tuple[Check, ...] = ()
         self.notes: tuple[str, ...] = ()
         self.small = self.linear
-        self.search = options.search
+        self._searches: WeakKeyDictionary[CoupledPencil, LeadingSearch] = WeakKeyDictionary()
+        self._frequencies = np.zeros(0)
         self.errors: dict[float, float] = {}
         self.workspace = Workspace()
 
@@ -134,54 +140,65 @@ class FluidFamily:
         before.
         """
         conditions, count = self.conditions_at(value), self.options.count
-        search, self.notes = suited(self.options.search, conditions, basis, count)
-        self.search = replace(search, limit_point=None)
+        search = self._selected(value)
+        self.notes = self.notes or search.notes
         pencil = self._full(value)
 
         def error(full: Spectrum) -> float:
             damping = conditions.alpha * basis.project(pencil.M) + conditions.beta * basis.project(
                 self.linear.structure
             )
-            small = self._reduced(basis.reduced(pencil, damping=damping), count + 4, left=False).eigenvalues
+            small = self._reduced(basis.reduced(pencil, damping=damping), search, count + 4, left=False).eigenvalues
             return max((float(np.abs(small - x).min() / abs(x)) for x in full.eigenvalues), default=0.0)
 
         # a basis of structural modes alone misses at the first place, and is enlarged by vectors of both sides
-        full = leading_modes(pencil, count, replace(search, left=not self.errors), workspace=self.workspace)
+        full = leading_modes(pencil, count, replace(search.options, left=not self.errors), workspace=self.workspace)
         self.errors[value] = error(full)
         if self.errors[value] <= self.options.tolerance:
             return True
         if full.left_q is None:
-            full = leading_modes(pencil, count, replace(search, left=True), workspace=self.workspace)
+            full = leading_modes(pencil, count, replace(search.options, left=True), workspace=self.workspace)
         basis.enlarge(full.q, full.left_q)
         self.errors[value] = error(full)
         return False
 
-    def _reduced(self, pencil: CoupledPencil, count: int, left: bool) -> Spectrum:
+    def _reduced(self, pencil: CoupledPencil, search: LeadingSearch, count: int, left: bool) -> Spectrum:
+        options = search.options
         return leading_modes(
-            pencil,
-            count,
-            SearchOptions(self.search.max_frequency, tolerance=self.search.tolerance, method="dense", left=left),
+            pencil, count, SearchOptions(options.max_frequency, tolerance=options.tolerance, method="dense", left=left)
         )
+
+    def _selected(self, value: float) -> LeadingSearch:
+        return select_search(self.options.search, self.conditions_at(value), self._lowest, self.options.count)
+
+    def _lowest(self, count: int) -> np.ndarray:
+        """Structural frequencies of the one state."""
+        if len(self._frequencies) < count:
+            self._frequencies = lowest_frequencies(self._full(self.axis.values[0]), count)
+        return self._frequencies[:count]
 
     def _full(self, value: float) -> CoupledPencil:
         return self.linear.pencil(self.conditions_at(value))
 
     def pencil(self, value: float) -> CoupledPencil:
         """On the basis."""
-        return self.small.pencil(self.conditions_at(value))
+        pencil = self.small.pencil(self.conditions_at(value))
+        self._searches[pencil] = self._selected(value)
+        return pencil
 
     def solve(self, pencil: CoupledPencil, count: int) -> Spectrum:
-        return self._reduced(pencil, count, left=True)
+        return self._reduced(pencil, self._searches[pencil], count, left=True)
 
     def checks(self, values: np.ndarray) -> tuple[tuple[Check, ...], tuple[str, ...]]:
         checks = []
         for value, error in sorted(self.errors.items()):
             pencil = self.pencil(value)
             spectrum = self.solve(pencil, self.options.count)
-            count = unstable_count(pencil, hints=spectrum.eigenvalues)
-            listed = spectrum.count_right_of(count.line)
+            band = COUNTED * self._searches[pencil].band
+            count = unstable_count(pencil, hints=spectrum.eigenvalues, band=band if np.isfinite(band) else None)
+            listed = listed_unstable(spectrum, count)
             if listed < count.number:
-                listed = self.solve(pencil, pencil.n).count_right_of(count.line)
+                listed = listed_unstable(self.solve(pencil, pencil.n), count)
             checks.append(
                 Check(
                     value,
@@ -210,7 +227,8 @@ class PressureFamily:
         self.done: tuple[Check, ...] = ()
         self.notes: tuple[str, ...] = ()
         self.pressure = 0.0
-        self.search: SearchOptions | None = None
+        self._searches: WeakKeyDictionary[CoupledPencil, LeadingSearch] = WeakKeyDictionary()
+        self._bands: dict[float, LeadingSearch] = {}
 
     def conditions_at(self, value: float) -> Conditions:
         return self.conditions
@@ -226,26 +244,33 @@ class PressureFamily:
                 if near.pressure != self.path.pressure:
                     self.path.q, self.path.pressure, self.path.slope = near.q, near.pressure, None
             self.known[value] = self.path.go_to(value)
-        state = self.known[value]
-        return linearise(self.model, state.q, value).pencil(self.conditions)
+        pencil = linearise(self.model, self.known[value].q, value).pencil(self.conditions)
+        if value not in self._bands:
+            self._bands[value] = select_search(
+                self.options.search, self.conditions, lambda n: lowest_frequencies(pencil, n), self.options.count
+            )
+        self._searches[pencil] = self._bands[value]
+        return pencil
 
     def solve(self, pencil: CoupledPencil, count: int) -> Spectrum:
-        if self.search is None:
-            self.search, self.notes = suited(self.options.search, self.conditions, TransferBasis(pencil), count)
-        return leading_modes(pencil, count, replace(self.search, left=True), workspace=self.workspace)
+        options = replace(self._searches[pencil].options, left=True)
+        return leading_modes(pencil, count, options, workspace=self.workspace)
 
     def checks(self, values: np.ndarray) -> tuple[tuple[Check, ...], tuple[str, ...]]:
         checks = []
         for index in np.unique(np.linspace(0, len(values) - 1, min(self.options.checks, len(values))).astype(int)):
             value = float(values[index])
             self.observer.progress(f"independent count at {value:.6g} Pa")
-            found = certified_spectrum(self.pencil(value), self.options.count, self.search, workspace=self.workspace)
+            pencil = self.pencil(value)
+            options = self._searches[pencil].options
+            found = certified_spectrum(pencil, self.options.count, options, workspace=self.workspace)
             error = float(found.spectrum.residual.max(initial=0.0))
             accurate = error <= self.options.search.tolerance
             checks.append(
                 Check(value, error, found.unstable_count, found.unstable_count_independent, found.agrees, accurate)
             )
         self.done = tuple(checks)
+        self.notes = max(self._bands.values(), key=lambda search: search.band).notes
         return self.done, self.notes
 
     def states(self, values: np.ndarray) -> tuple[SteadyState, ...]:

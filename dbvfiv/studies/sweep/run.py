@@ -15,9 +15,9 @@ from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ...model.dynamics import Conditions
 from ...model.equilibria import require_equilibrium
+from ...model.leading import growth_floor
 from ...model.state import SteadyState
 from ...observer import Observer
-from ..modes_search import CLEAR, limit_point
 from ..solving import solving
 from .family import Check, Family, FluidFamily, PressureFamily
 
@@ -256,11 +256,9 @@ def _shown(branches: Branches, family: Family, values: np.ndarray) -> Branches:
     """Branches clearly right of the limit point -1/beta, numbered from 1 by their largest growth rate."""
     eigenvalues, confidence = branches.eigenvalues.copy(), branches.confidence.copy()
     for column, value in enumerate(values):
-        limit = limit_point(family.conditions_at(value))
-        if limit is not None:
-            beyond = eigenvalues[:, column].real <= CLEAR * limit
-            eigenvalues[beyond, column] = np.nan
-            confidence[beyond, column] = np.nan
+        beyond = eigenvalues[:, column].real <= growth_floor(family.conditions_at(value).beta)
+        eigenvalues[beyond, column] = np.nan
+        confidence[beyond, column] = np.nan
     there = np.isfinite(eigenvalues.real)
     kept = np.flatnonzero(there.any(axis=1))
     highest = np.where(there[kept], eigenvalues[kept].real, -np.inf).max(axis=1, initial=-np.inf)

@@ -1,0 +1,129 @@
+"""Which modes of the valve count as leading: one rule for every study that searches a spectrum."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from eigen import CLEAR, SearchOptions
+
+from .dynamics import Conditions
+
+#: Room above the highest structural frequency that a band is made for.
+ROOM = 1.05
+
+
+class BandOrigin(Enum):
+    """Where the band that a search covers comes from."""
+
+    NONE = "none"  #: no band: stiffness damping orders the modes
+    ASKED = "asked"  #: named by who asks
+    STRUCTURE = "structure"  #: holds as many structural frequencies as modes are wanted
+
+
+@dataclass(frozen=True)
+class LeadingSearch:
+    """How leading modes are searched for under given conditions.
+
+    Attributes
+    ----------
+    options : SearchOptions
+        For `eigen.leading_modes` and `eigen.certified_spectrum`.
+    origin : BandOrigin
+    frequencies : int
+        Structural frequencies in vacuo that a band of the origin STRUCTURE holds.
+    """
+
+    options: SearchOptions
+    origin: BandOrigin
+    frequencies: int = 0
+
+    @property
+    def band(self) -> float:
+        """Upper end of the band, Hz; infinite without one."""
+        return np.inf if self.options.max_frequency is None else self.options.max_frequency
+
+    @property
+    def floor(self) -> float:
+        """Growth rate down to which modes can be listed, 1/s; minus infinity without a limit point."""
+        return -np.inf if self.options.limit_point is None else CLEAR * self.options.limit_point
+
+    @property
+    def note(self) -> str | None:
+        """What a reader of the result has to know about the band, in a sentence."""
+        if self.origin is not BandOrigin.STRUCTURE:
+            return None
+        return (
+            f"Without stiffness damping growth rates do not order the modes, so the search covers the band up "
+            f"to {self.band:.4g} Hz, which holds {self.frequencies} structural frequencies in vacuo; "
+            f"modes.max_frequency chooses another."
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The note, if there is one, as a tuple."""
+        return () if self.note is None else (self.note,)
+
+
+def limit_point(beta: float) -> float | None:
+    """Growth rate at which infinitely many eigenvalues accumulate under stiffness damping, 1/s; None without it."""
+    return -1.0 / beta if beta > 0 else None
+
+
+def growth_floor(beta: float) -> float:
+    """Growth rate down to which modes can be listed, clear of the limit point, 1/s; minus infinity without damping."""
+    limit = limit_point(beta)
+    return -np.inf if limit is None else CLEAR * limit
+
+
+def select_search(
+    options: SearchOptions,
+    conditions: Conditions,
+    structural_frequencies: Callable[[int], np.ndarray],
+    count: int,
+) -> LeadingSearch:
+    """How the leading modes of a state are searched for.
+
+    Stiffness damping orders modes by frequency until they reach the limit point -1/beta: leading modes are those of
+    largest growth rate, right of it. Without it growth rates of high modes do not fall, so that "leading" has a meaning
+    within a band of frequencies only: the one asked for, or one that holds as many structural frequencies in vacuo as
+    modes are wanted. A band that was asked for is respected under any damping.
+
+    Parameters
+    ----------
+    options : SearchOptions
+        What was asked for.
+    conditions : Conditions
+        Of which only the stiffness damping matters.
+    structural_frequencies : callable
+        From a number to that many lowest frequencies of the undamped structure in vacuo at the state, Hz, ascending;
+        fewer where there are no more. Called only where they decide. `eigen.lowest_frequencies` computes them.
+    count : int
+        Modes wanted, a conjugate pair being one.
+
+    Returns
+    -------
+    LeadingSearch
+
+    Examples
+    --------
+    >>> found = select_search(SearchOptions(), Conditions(10.0, 0.0, 0.0), lambda n: np.array([14.0, 20.0]), 2)
+    >>> round(found.band, 6), found.origin.value
+    (21.0, 'structure')
+    >>> select_search(SearchOptions(), Conditions(10.0, 0.0, 0.003), lambda n: np.zeros(0), 2).options.limit_point
+    -333.3333333333333
+    """
+    asked = BandOrigin.NONE if options.max_frequency is None else BandOrigin.ASKED
+    limit = limit_point(conditions.beta)
+    if limit is not None:
+        return LeadingSearch(replace(options, limit_point=limit), asked)
+    if asked is BandOrigin.ASKED:
+        return LeadingSearch(options, asked)
+    known = np.asarray(structural_frequencies(count), float)[:count]
+    highest = float(known.max(initial=0.0))
+    if not highest > 0:
+        return LeadingSearch(options, asked)  # nothing that oscillates: any band would be arbitrary
+    return LeadingSearch(replace(options, max_frequency=ROOM * highest), BandOrigin.STRUCTURE, len(known))

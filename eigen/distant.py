@@ -1,0 +1,87 @@
+"""Unstable pairs beyond the band of a search, where an independent count says that there are some."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .condensation import Workspace
+from .dense import all_pairs
+from .options import SearchOptions
+from .pairs import SAME, Found, normalised
+from .pencil import CoupledPencil
+from .residual import acceptable, newton
+from .spectrum import Spectrum
+from .transfer import TransferBasis
+
+#: Pairs looked for at most.
+MOST = 4
+#: Relative distance that a pair may move from the reduced pencil to the full one.
+MOVED = 0.05
+
+
+def distant_pairs(
+    pencil: CoupledPencil,
+    spectrum: Spectrum,
+    reduced: CoupledPencil,
+    basis: TransferBasis,
+    line: float,
+    options: SearchOptions,
+) -> Found | None:
+    """Unstable pairs of the full pencil near those that the reduced pencil has beyond the band of a spectrum.
+
+    Each is brought to the full pencil by Newton steps and has to pass the residual test like any other; the fastest
+    growing ones are tried.
+
+    Parameters
+    ----------
+    line : float
+        Growth rate above which a pair counts as unstable, 1/s.
+
+    Returns
+    -------
+    Found or None
+        None if there is no band, left vectors are wanted as well, or none was found.
+    """
+    if not np.isfinite(spectrum.band) or spectrum.left_q is not None:
+        return None
+    values, q, u, _, _ = all_pairs(reduced, left=False)
+    beyond = np.flatnonzero((values.real > line) & (values.imag > 2 * np.pi * spectrum.band))
+    workspace, pairs = Workspace(), []
+    for i in beyond[np.argsort(-values.real[beyond])][:MOST]:
+        pair = newton(pencil, values[i], basis.lift(q[:, i]), u[:, i], workspace=workspace, tolerance=options.tolerance)
+        value, _, _, residual, backward = pair
+        near = abs(value - values[i]) <= MOVED * abs(values[i])
+        known = [abs(value - x) <= SAME * abs(x) for x in (*spectrum.eigenvalues, *(other[0] for other in pairs))]
+        if near and value.real > line and acceptable(residual, backward, options.tolerance) and not any(known):
+            pairs.append(pair)
+    if not pairs:
+        return None
+    values, q, u, residual, backward = (np.stack(part, axis=-1) for part in zip(*pairs))
+    return Found(values, *normalised(q, u), residual, backward)
+
+
+def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
+    """The spectrum with further unstable pairs, sorted; as long as was asked for, if not more are unstable."""
+    new = {
+        "eigenvalues": found.values,
+        "q": found.q,
+        "u": found.u,
+        "residual": found.residual,
+        "backward_error": found.backward,
+    }
+    parts = {name: np.concatenate([getattr(spectrum, name), part], axis=-1) for name, part in new.items()}
+    order = np.lexsort((parts["eigenvalues"].imag, -parts["eigenvalues"].real))
+    order = order[: max(spectrum.asked, int(np.sum(parts["eigenvalues"].real > line)))]
+    frequencies = ", ".join(f"{value.imag / (2 * np.pi):.4g}" for value in found.values)
+    note = (
+        f"Unstable modes at {frequencies} Hz lie beyond the band up to {spectrum.band:.4g} Hz in which the list is "
+        f"complete; the independent count pointed to them."
+    )
+    return replace(
+        spectrum,
+        **{name: part[..., order] for name, part in parts.items()},
+        refined=spectrum.refined + found.values.size,
+        notes=(*spectrum.notes, note),
+    )

@@ -1,0 +1,87 @@
+"""The search for leading modes at random states over all a valve may meet: none fails, none is slow, and the spectrum
+agrees with the independent count; on samples both are held against all eigenvalues.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from dbvfiv.model import select_search
+from eigen import CertifiedSpectrum, SearchOptions, TransferBasis, certified_spectrum
+from eigen.dense import all_eigenvalues
+from tests.verification.random_states import RandomState, linearised_states, random_pressures, random_states
+
+COUNT = 10
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What the search said about one state."""
+
+    state: RandomState
+    certified: CertifiedSpectrum
+
+
+def examined(around: int, along: int, number: int, seed: int, pressures: int) -> list[Examined]:
+    states = linearised_states(around, along, random_pressures(pressures, seed))
+    bases, out = {}, []
+    for state in random_states(states, number, seed):
+        pencil = state.pencil
+        if state.linear.inlet not in bases:  # it depends on the state of the structure alone
+            bases[state.linear.inlet] = TransferBasis(pencil)
+        basis = bases[state.linear.inlet]
+        lowest = basis.structural_frequencies
+        search = select_search(SearchOptions(), state.conditions, lambda n, known=lowest: known[:n], COUNT)
+        out.append(Examined(state, certified_spectrum(pencil, COUNT, search.options, basis=basis)))
+    return out
+
+
+def judge(results: list[Examined], exact_every: int) -> None:
+    """Everything that is asked of a sample."""
+    work = np.array([r.certified.spectrum.applications for r in results])
+    points = np.array([r.certified.count.evaluations for r in results])
+    open_ends = [r for r in results if not r.certified.agrees]
+    print(
+        f"\n{len(results)} states, {len(open_ends)} left open; applications of the operator {np.median(work):.0f} "
+        f"(median) to {work.max()}, points of the count {np.median(points):.0f} to {points.max()}"
+    )
+    for r in open_ends:
+        print(f"  {r.state}: {r.certified.statement}")
+        assert not r.certified.stable and r.certified.statement
+    assert len(open_ends) <= 0.005 * len(results)
+    assert work.max() <= 20 * np.median(work) and points.max() <= 20 * np.median(points)
+    for r in results:
+        spectrum = r.certified.spectrum
+        assert len(spectrum) and spectrum.residual.max() <= 1e-8, str(r.state)
+        assert spectrum.status == "complete" or spectrum.notes, str(r.state)
+    for r in results[::exact_every]:
+        against_all_eigenvalues(r)
+
+
+def against_all_eigenvalues(result: Examined) -> None:
+    """Both routes against all eigenvalues of the full first-order pencil by a dense method."""
+    spectrum, count = result.certified.spectrum, result.certified.count
+    every = all_eigenvalues(result.state.pencil)
+    every = every[np.argsort(-every.real)]
+    if spectrum.status == "complete":
+        inside = every[every.imag <= 2 * np.pi * spectrum.band * (1 + 1e-9)][: len(spectrum)]
+        unit = np.abs(inside).max()
+        assert np.abs(inside.real - spectrum.growth_rate).max() < 1e-7 * unit, str(result.state)
+    if result.certified.agrees:
+        there = every[(every.real > count.line) & (every.imag <= 2 * np.pi * count.band)]
+        assert result.certified.unstable_count == np.where(there.imag > 0, 2, 1).sum(), str(result.state)
+
+
+def test_three_hundred_random_states():
+    judge(examined(8, 14, 300, seed=0, pressures=20), exact_every=60)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("around", "along", "number", "seed"), [(8, 14, 5000, 1), (11, 19, 2500, 2), (14, 24, 2200, 3)]
+)
+def test_many_random_states(around, along, number, seed):
+    judge(examined(around, along, number, seed, pressures=60), exact_every=200)
