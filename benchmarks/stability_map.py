@@ -11,7 +11,6 @@ import time
 import numpy as np
 
 from dbvfiv.case import load_case
-from dbvfiv.studies.column import search_options
 from dbvfiv.studies.map import run_map
 from dbvfiv.studies.map_column import MapPlan
 from dbvfiv.studies.stability_walk import StabilityWalk
@@ -56,11 +55,9 @@ def stability_map():
             continue
         for i, j in part:
             place = plan.place(plan.x.values[i], plan.y.values[j], plan.laws[0])
-            linear = walk.linear(place)
+            family = walk.family(place)
             begun, own = time.perf_counter(), time.process_time()
-            spectrum = leading_modes(
-                linear.pencil(place.conditions, storage=place.storage), 6, search_options(place.beta)
-            )
+            spectrum = leading_modes(family.pencil(place.condition), 6, family.search(place.condition))
             seconds.append((time.perf_counter() - begun, time.process_time() - own))
             direct.append((i, j, complex(spectrum.eigenvalues[0]), spectrum.unstable_count))
     one, one_work = np.median(seconds, axis=0)

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from eigen.columns import DIRECT
+
 from ..case.model import Case
 from ..errors import SolveError
-from .column import DIRECT
 from .map_checks import Check, check_cells
 from .map_column import CELLS, MapColumn, MapPlan
 from .map_curves import OnsetCurve, continued, linked

@@ -9,10 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
+from eigen import Column, Condition
+from eigen.columns import MISSING
+
 from ..case.axis import Axis
 from ..case.model import Case
 from ..errors import CaseError, SolveError
-from .column import MISSING, Column
 from .crossings import Sample, Scan, locate
 from .parameters import Place, is_surrounding
 from .stability_walk import StabilityWalk
@@ -162,28 +164,41 @@ def _law(
     if not is_surrounding(along.parameter):
         return _state_by_state(plan, walk, places)
     column = walk.column(places)
-    sample = column.eigenvalues or (
-        lambda condition: (
-            walk.spectrum(places[0].at(**dict(zip(("density", "alpha", "beta", "storage"), condition)))).eigenvalues
-        )
+    sample = column.eigenvalues or (lambda condition: walk.column([_under(places[0], condition)]).leading[0])
+    cell = column.cell or (lambda condition: walk.column([_under(places[0], condition)]))
+    scan = Scan(
+        lambda other: sample(plan.place(value, other, law).condition),
+        along.log,
+        lambda other: bool(cell(plan.place(value, other, law).condition).certified[0]),
     )
-    scan = Scan(lambda other: sample(plan.place(value, other, law).condition), along.log)
     # what the cells know need not be found again
-    scan.samples.update({float(v): Sample(float(v), row) for v, row in zip(along.values, column.leading)})
+    scan.samples.update(_known(along, column))
     return column, _onsets(scan, along)
+
+
+def _under(place: Place, condition: Condition) -> Place:
+    """The same steady state under another condition."""
+    return place.at(**dict(zip(("density", "alpha", "beta", "storage"), condition)))
+
+
+def _known(along: Axis, column: Column) -> dict[float, Sample]:
+    rows = zip(along.values, column.leading, column.certified)
+    return {float(v): Sample(float(v), row, bool(sure)) for v, row, sure in rows}
 
 
 def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):
     """Both axes change the steady state: every cell has its own, solved directly."""
     parts = [walk.column([place]) for place in places]
-    names = ("growth_rate", "frequency", "second", "unstable", "counted", "certain", "how")
-    column = Column(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names}, error=0.0)
-    by_value = dict(zip(plan.along.values, places))
+    names = ("growth_rate", "frequency", "second", "unstable", "counted", "certain", "how", "line", "band")
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    column = Column(**joined, error=0.0, leading=[part.leading[0] for part in parts])
     parameter = plan.along.parameter
-    scan = Scan(
-        lambda other: walk.spectrum(by_value.get(other) or places[0].at(**{parameter: other})).eigenvalues,
-        plan.along.log,
-    )
+
+    def cell(other: float) -> Column:
+        return walk.column([places[0].at(**{parameter: other})])
+
+    scan = Scan(lambda other: cell(other).leading[0], plan.along.log, lambda other: bool(cell(other).certified[0]))
+    scan.samples.update(_known(plan.along, column))
     return column, _onsets(scan, plan.along)
 
 
