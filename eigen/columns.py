@@ -130,9 +130,10 @@ class ColumnSolver:
             return self._directly(reduction, conditions)
         places = _spread(conditions, snapshots)
         banded = any(np.isfinite(family.reach(conditions[i]).band) for i in places)
-        fine = reduction.fine([conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
+        first = reduction.wide if banded else reduction.coarse
+        fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
         error = _error(reduction, fine, conditions, _between(places))
-        column = self._on(reduction, fine, conditions, error)
+        column = self._on(first, fine, conditions, error)
 
         def eigenvalues(condition):
             condition = Condition(*condition)
@@ -143,16 +144,16 @@ class ColumnSolver:
             return complex(reduction.correction(fine.near(condition, eigenvalue), condition)[0])
 
         def cell(condition):
-            return self._on(reduction, fine, [Condition(*condition)], error)
+            return self._on(first, fine, [Condition(*condition)], error)
 
         return replace(column, eigenvalues=eigenvalues, corrected=corrected, cell=cell)
 
-    def _on(self, reduction: FamilyReduction, fine: ReducedFamily, conditions, error: float) -> Column:
-        """Cells on a small model, those without a certificate directly."""
-        family = reduction.family
+    def _on(self, first: ReducedFamily, fine: ReducedFamily, conditions, error: float) -> Column:
+        """Cells on a small model, counted on that of the first stage; those without a certificate directly."""
+        family = first.family
         values = fine.eigenvalues(conditions)
         leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
-        column = _column(leading, values, count_unstable(reduction.coarse, conditions, leading), error)
+        column = _column(leading, values, count_unstable(first, conditions, leading), error)
         return self._repaired(column, family, conditions, np.flatnonzero(~column.certified))
 
     def direct(self, family: PencilFamily, condition, count: int = 6):
@@ -169,7 +170,9 @@ class ColumnSolver:
     def _directly(self, reduction: FamilyReduction, conditions) -> Column:
         family, cells = reduction.family, len(conditions)
         spectra = [self.direct(family, c) for c in conditions]
-        counts = count_unstable(reduction.coarse, conditions, [s.eigenvalues[:1] for s in spectra])
+        banded = any(np.isfinite(family.reach(c).band) for c in conditions)
+        first = reduction.wide if banded else reduction.coarse
+        counts = count_unstable(first, conditions, [s.eigenvalues[:1] for s in spectra])
         column = _blank(cells, counts)
         for i, spectrum in enumerate(spectra):
             _enter(column, i, spectrum)

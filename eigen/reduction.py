@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from .factorization import MumpsFactorization, SingularShiftError, StructureMatrices
 from .family import Condition, PencilFamily
 from .pencil import CoupledPencil, real_apply
+from .transfer import TransferBasis
 
 #: Power of sqrt(inertia) that each part of the coupling goes with.
 POWERS = {"A0": 0, "A1": 1, "A2": 2, "B0": 0, "B1": 1, "R0": 0, "R1": 1, "R2": 2, "S0": 0, "S1": 1}
@@ -27,6 +28,8 @@ COMPRESSION = 1e-4
 SNAPSHOT = 0.75
 #: Low motions that inertia corrections are made for.
 MOTIONS = 20
+#: Lowest motions of the structure taken where a band is searched.
+LOWEST = 24
 
 
 class StaticSolver:
@@ -240,6 +243,14 @@ class FamilyReduction:
         moving = self.solver.solve(inertia @ lowest)
         return ReducedFamily(family, np.hstack([first, moving]), COMPRESSION)
 
+    @cached_property
+    def wide(self) -> ReducedFamily:
+        """First stage with the lowest motions of the structure itself, for bands that damping does not end."""
+        family = self.family
+        structure = CoupledPencil(family.mass, sp.csr_matrix(family.mass.shape), family.stiffness)
+        lowest = TransferBasis(structure, modes=LOWEST).V
+        return ReducedFamily(family, np.hstack([lowest, self.coarse.V]), COMPRESSION)
+
     def residual(self, values, q, u, condition: Condition, left: bool = False):
         """T(lambda) x of pairs, or T^H w of left vectors: force part (n, k) and inner part (b, k)."""
         family, s = self.family, np.conj(values) if left else values
@@ -271,11 +282,11 @@ class FamilyReduction:
         scale = 1.0 / (1.0 + pairs.values * condition.beta)
         return pairs.q - self.solver.solve(force) * scale, pairs.w - self.solver.solve_transposed(back) * np.conj(scale)
 
-    def fine(self, conditions, most: int = 4) -> ReducedFamily:
-        """Second stage: a space made of corrected leading vectors at some conditions."""
+    def fine(self, first: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:
+        """Second stage: a space made of the corrected leading vectors of a first one at some conditions."""
         columns = []
         for condition in conditions:
-            right, left = self.corrected(self.coarse.pairs(condition, most, SNAPSHOT), condition)
+            right, left = self.corrected(first.pairs(condition, most, SNAPSHOT), condition)
             columns += [right.real, right.imag, left.real, left.imag]
         return ReducedFamily(self.family, np.hstack(columns), 3e-7)
 

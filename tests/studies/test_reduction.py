@@ -69,7 +69,10 @@ def test_the_error_estimate_sees_a_poor_space(family):
     reduction, condition = FamilyReduction(family), Condition(10.0, 0.0, 0.003, 0.0)
     good, poor = (
         np.abs(reduction.correction(pairs, condition) / pairs.values)
-        for pairs in (reduction.fine([condition]).pairs(condition, 1), reduction.coarse.pairs(condition, 1))
+        for pairs in (
+            reduction.fine(reduction.coarse, [condition]).pairs(condition, 1),
+            reduction.coarse.pairs(condition, 1),
+        )
     )
     assert good[0] < 1e-8 and good[0] < 0.05 * poor[0]
 
