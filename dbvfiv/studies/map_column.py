@@ -16,6 +16,7 @@ from ..case.axis import Axis
 from ..case.model import Case
 from ..errors import CaseError, SolveError
 from .crossings import Sample, Scan, locate
+from .map_correction import OnsetCorrection
 from .parameters import Place, is_surrounding
 from .stability_walk import StabilityWalk
 
@@ -100,9 +101,10 @@ class MapColumn:
         0 for a column of the grid, more for one that was put between two of them.
     cells : dict of (laws, cells) arrays
         See `CELLS`.
-    onsets : (k, 4) array
-        Law (its number), value along the column, frequency in Hz, and +1 where a mode becomes unstable along the
-        column, -1 where it ceases to be.
+    onsets : (k, 5) array
+        Law (its number), value along the column, frequency in Hz, +1 where a mode becomes unstable along the column, -1
+        where it ceases to be, and the growth rate over the size of the eigenvalue that the full matrices leave there,
+        NaN where it was not corrected by them.
     error : float
         Largest estimated relative error of a leading eigenvalue.
     failure : str
@@ -130,7 +132,7 @@ class MapColumn:
             "certified": np.zeros(shape, bool),
             "how": np.full(shape, MISSING),
         }
-        return cls(value, level, cells, np.zeros((0, 4)), np.nan, sentence, seconds)
+        return cls(value, level, cells, np.zeros((0, 5)), np.nan, sentence, seconds)
 
 
 def solve_column(plan: MapPlan, walk: StabilityWalk, value: float, level: int = 0) -> MapColumn:
@@ -149,16 +151,14 @@ def solve_column(plan: MapPlan, walk: StabilityWalk, value: float, level: int = 
         value,
         level,
         cells,
-        np.array(onsets, float).reshape(-1, 4),
+        np.array(onsets, float).reshape(-1, 5),
         max(column.error for column in columns),
         "",
         time.process_time() - started,
     )
 
 
-def _law(
-    plan: MapPlan, walk: StabilityWalk, value: float, law: float
-) -> tuple[Column, list[tuple[float, float, float]]]:
+def _law(plan: MapPlan, walk: StabilityWalk, value: float, law: float) -> tuple[Column, list[tuple[float, ...]]]:
     along = plan.along
     places = [plan.place(value, other, law) for other in along.values]
     if not is_surrounding(along.parameter):
@@ -173,7 +173,20 @@ def _law(
     )
     # what the cells know need not be found again
     scan.samples.update(_known(along, column))
-    return column, _onsets(scan, along)
+    found = _onsets(scan, along)
+    if column.corrected is None:
+        return column, found
+
+    correct = OnsetCorrection(
+        column,
+        lambda other: plan.place(value, other, law).condition,
+        lambda other: walk.spectrum(plan.place(value, other, law)).eigenvalues,
+    )
+    onsets = []
+    for other, frequency, direction, _ in found:
+        other, frequency, left = correct(other, frequency)
+        onsets.append((other, frequency, direction, left))
+    return column, onsets
 
 
 def _under(place: Place, condition: Condition) -> Place:
@@ -202,11 +215,13 @@ def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):
     return column, _onsets(scan, plan.along)
 
 
-def _onsets(scan: Scan, along: Axis) -> list[tuple[float, float, float]]:
+def _onsets(scan: Scan, along: Axis) -> list[tuple[float, float, float, float]]:
+    """Value, frequency, direction, and what is left of the growth rate over the size of the eigenvalue."""
     found = []
     for crossing in scan.run(along.values):
         value = locate(scan, crossing, LOCATED)
-        eigenvalue = scan.at(value).eigenvalues[crossing.index]
+        eigenvalue = complex(scan.at(value).eigenvalues[crossing.index])
         direction = 1.0 if crossing.high.unstable > crossing.low.unstable else -1.0
-        found.append((value, abs(eigenvalue.imag) / (2 * np.pi), direction))
+        left = abs(eigenvalue.real) / max(abs(eigenvalue), 1.0)
+        found.append((value, abs(eigenvalue.imag) / (2 * np.pi), direction, left))
     return found

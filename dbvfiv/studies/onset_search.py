@@ -149,6 +149,26 @@ class OnsetSearch:
             return self.walk.column([place])
         return self._column.cell(place.condition)
 
+    def uncertainties(self) -> list[str]:
+        """Sentences about what is not known: stretches of the scan without a certificate, and a band that was searched
+        instead of all frequencies.
+        """
+        name, said, joined = self.options.parameter, [], []
+        for low, high in self.scan.uncertain:
+            if joined and joined[-1][1] == low:
+                joined[-1][1] = high
+            else:
+                joined.append([low, high])
+        for low, high in joined:
+            said.append(
+                f"Between {name} = {low:.6g} and {high:.6g} spectrum and independent count do not agree everywhere, so "
+                "nothing is claimed there."
+            )
+        band = self.walk.search(self.place(self.options.values[0])).max_frequency
+        if band is not None:
+            said.append(f"Modes were searched for up to {band:.4g} Hz; modes.max_frequency chooses another end.")
+        return said
+
     # -- points
     # ----
 

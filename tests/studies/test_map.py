@@ -49,7 +49,7 @@ def test_every_cell_is_certified_and_checks_agree(whole):
 def test_onsets_of_columns_lie_between_cells_of_opposite_sign(whole):
     y = np.array(whole.plan.y.values)
     for column in whole.columns:
-        for _, along, frequency, direction in column.onsets:
+        for _, along, frequency, direction, _ in column.onsets:
             below, above = column.cells["growth_rate"][0][y < along][-1], column.cells["growth_rate"][0][y > along][0]
             assert np.sign(above - below) == direction and below * above < 0 and frequency > 10
 
