@@ -189,13 +189,17 @@ class ColumnSolver:
         return self._recounted(column, family, conditions, [i for i in cells if not column.certificate(i).agrees])
 
     def _recounted(self, column: Column, family, conditions, cells) -> Column:
-        """Cells that still lack agreement, with a count of their own on a basis of structural modes."""
+        """Cells that still lack agreement, with a count of their own on a basis of structural modes.
+
+        The vectors of the spectrum join that basis: a mode that is all but neutral would otherwise stand on either side
+        of the line by the error of the basis alone.
+        """
         for i in cells:
-            pencil = family.pencil(conditions[i])
+            pencil, options = family.pencil(conditions[i]), family.search(conditions[i])
             try:
-                found = certified_spectrum(
-                    pencil, 6, family.search(conditions[i]), workspace=self._workspace, basis=TransferBasis(pencil)
-                )
+                basis = TransferBasis(pencil)
+                basis.enlarge(leading_modes(pencil, 6, options, workspace=self._workspace).q)
+                found = certified_spectrum(pencil, 6, options, workspace=self._workspace, basis=basis)
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue
             if len(found.spectrum):
