@@ -172,10 +172,20 @@ def _ordered(found) -> tuple[MapColumn, ...]:
 
 def _doubts(plan: MapPlan, ordered, checks) -> list[str]:
     """Sentences about cells that are not certified or fail a check."""
-    doubtful = sum(int((~c.cells["certified"]).sum()) for c in ordered if not c.failure)
+    doubtful = sum(int((~c.cells["certified"]).sum()) for c in ordered if not c.failure and c.level == 0)
     said = []
     if doubtful:
-        said.append(f"In {doubtful} cells the spectrum and the independent count disagree or the count is uncertain.")
+        said.append(
+            f"{doubtful} cells are uncertain: spectrum and independent count disagree, or the count is not certain; "
+            "they are called neither stable nor unstable."
+        )
+    bands = [c.band for c in ordered if not c.failure and np.isfinite(c.band)]
+    if bands:
+        said.append(
+            f"Modes were searched for up to {min(bands):.4g} Hz"
+            + (f" to {max(bands):.4g} Hz, by the column" if max(bands) > min(bands) else "")
+            + "; modes.max_frequency chooses another end."
+        )
     for check in checks:
         if not check.agrees:
             said.append(

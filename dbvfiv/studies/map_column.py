@@ -111,6 +111,8 @@ class MapColumn:
         Why there is no column; empty if there is one.
     seconds : float
         Processor time.
+    band : float
+        Hz; modes were searched for up to it, infinite for all. Not kept in files.
     """
 
     value: float
@@ -120,6 +122,7 @@ class MapColumn:
     error: float
     failure: str = ""
     seconds: float = 0.0
+    band: float = math.inf
 
     @classmethod
     def missing(cls, plan: MapPlan, value: float, level: int, sentence: str, seconds: float = 0.0) -> MapColumn:
@@ -155,6 +158,7 @@ def solve_column(plan: MapPlan, walk: StabilityWalk, value: float, level: int = 
         max(column.error for column in columns),
         "",
         time.process_time() - started,
+        min(float(column.band.min()) for column in columns),
     )
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eigen import Certificate
+
 from ..case.model import Case
 from ..errors import CaseError, SolveError
 from .crossings import WATCHED, Crossing, Scan, locate
@@ -210,8 +212,8 @@ class OnsetSearch:
         eigenvalue = complex(mode.eigenvalue)
         gains = crossing.high.unstable > crossing.low.unstable
         width = ASIDE * abs(value) if value else ASIDE * (self.options.values[-1] - self.options.values[0])
-        (below, sure), (above, too) = (self._side(v, eigenvalue) for v in (value - width, value + width))
-        confirmed, note = _confirmed(below, above, gains, sure and too)
+        (below, one), (above, two) = (self._side(v, eigenvalue) for v in (value - width, value + width))
+        confirmed, note = _confirmed(below, above, gains, one.agrees and two.agrees, max(one.line, two.line))
         edge = min(below.unstable, above.unstable) == 0
         bracket = (crossing.low.value, crossing.high.value)
         frequency = abs(eigenvalue.imag) / (2 * np.pi)
@@ -269,16 +271,16 @@ class OnsetSearch:
             )
         return spectrum.mode(int(np.argmin(apart)))
 
-    def _side(self, value: float, eigenvalue: complex) -> tuple[Side, bool]:
-        """What the full pencil says at a value, and whether that is certified."""
+    def _side(self, value: float, eigenvalue: complex) -> tuple[Side, Certificate]:
+        """What the full pencil says at a value, and what vouches for it."""
         cell = self.walk.column([self.place(value)])
         values, certificate = cell.leading[0], cell.certificate(0)
         crossing = complex(values[int(np.argmin(np.abs(values - eigenvalue)))])
         side = Side(value, crossing, float(values[0].real), certificate.unstable, certificate.counted)
-        return side, certificate.agrees
+        return side, certificate
 
 
-def _confirmed(below: Side, above: Side, gains: bool, certified: bool) -> tuple[bool, str]:
+def _confirmed(below: Side, above: Side, gains: bool, certified: bool, line: float) -> tuple[bool, str]:
     for side in (below, above):
         if side.unstable != side.counted:
             return (
@@ -291,6 +293,8 @@ def _confirmed(below: Side, above: Side, gains: bool, certified: bool) -> tuple[
     if not certified:
         return False, "the independent count beside it is uncertain."
     first, second = (below, above) if gains else (above, below)
+    if first.eigenvalue.real < 0 < second.eigenvalue.real and first.unstable == second.unstable and line > 0:
+        return False, f"the independent count looks right of {line:.4g} 1/s only, where an undamped wall ends."
     if not (first.eigenvalue.real < 0 < second.eigenvalue.real and first.unstable < second.unstable):
         return (
             False,
