@@ -1,5 +1,5 @@
-"""A map of 64 x 64 cells over pressure and density at 28 x 48, every cell with its certificate, against that many
-independent eigenvalue solves.
+"""Maps of 64 x 64 cells over pressure and density at 28 x 48: every cell with its certificate, against that many
+independent eigenvalue solves; and whole maps with their exact onset curves.
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ import time
 import numpy as np
 
 from dbvfiv.case import load_case
-from dbvfiv.studies.column import search_options
 from dbvfiv.studies.map import run_map
 from dbvfiv.studies.map_column import MapPlan
 from dbvfiv.studies.stability_walk import StabilityWalk
 from eigen import leading_modes
 
-from .registry import Row, benchmark
+from .registry import Row, benchmark, seconds
 
 CELLS = 64
 SAMPLE = 20
@@ -46,7 +45,7 @@ def stability_map():
     plan, walk = MapPlan.of(case), StabilityWalk(case)
     random = np.random.default_rng(1)
     picks = sorted((int(i), int(j)) for i, j in random.integers(0, CELLS, (SAMPLE, 2)))
-    direct, seconds = [], []
+    direct, each = [], []
     for part in (picks[: SAMPLE // 2], None, picks[SAMPLE // 2 :]):
         if part is None:  # in the middle, so that a slow spell of the machine meets both
             started, before = time.perf_counter(), _processor()
@@ -56,14 +55,12 @@ def stability_map():
             continue
         for i, j in part:
             place = plan.place(plan.x.values[i], plan.y.values[j], plan.laws[0])
-            linear = walk.linear(place)
+            family = walk.family(place)
             begun, own = time.perf_counter(), time.process_time()
-            spectrum = leading_modes(
-                linear.pencil(place.conditions, storage=place.storage), 6, search_options(place.beta)
-            )
-            seconds.append((time.perf_counter() - begun, time.process_time() - own))
+            spectrum = leading_modes(family.pencil(place.condition), 6, family.search(place.condition))
+            each.append((time.perf_counter() - begun, time.process_time() - own))
             direct.append((i, j, complex(spectrum.eigenvalues[0]), spectrum.unstable_count))
-    one, one_work = np.median(seconds, axis=0)
+    one, one_work = np.median(each, axis=0)
     growth, frequency, unstable = (result.grid(name)[0] for name in ("growth_rate", "frequency", "unstable"))
     error = max(
         abs(complex(growth[j, i], 2 * np.pi * frequency[j, i]) - value) / abs(value) for i, j, value, _ in direct
@@ -101,6 +98,56 @@ def stability_map():
         target=0,
         note=f"{int((result.grid('how') == 1).sum())} solved directly",
     )
+
+
+#: Seconds that a map with its curves may take, by its stiffness damping.
+TARGETS = {0.003: 60.0, 0.0004: 120.0}
+#: Points of curves solved again with the full pencil.
+POINTS = 12
+
+
+@benchmark("curves")
+def maps_with_curves():
+    """The whole map, both continuity laws, with its exact curves; points of the curves against the full pencil."""
+    for beta, target in TARGETS.items():
+        case = load_case(
+            None,
+            [
+                "mesh.around=28",
+                "mesh.along=48",
+                "damping.alpha=0",
+                f"damping.beta={beta}",
+                f"map.x=pressure=500:50000:{CELLS}",
+                f"map.y=density=1:1000:{CELLS}:log",
+                "map.continuity=both",
+            ],
+        )
+        before = _processor()
+        taken, result = seconds(lambda case=case: run_map(case, workers=WORKERS))
+        work = _processor() - before
+        exact = sum(curve.exact for curve in result.curves)
+        added = sum(column.level > 0 for column in result.columns)
+        name = f"map of {CELLS} x {CELLS} cells with curves, both laws, beta {1e3 * beta:g} ms"
+        yield Row(
+            name,
+            taken,
+            unit="s",
+            target=target,
+            note=f"{exact} of {len(result.curves)} curves exact, {added} columns put in; {work:.0f} s of processors",
+        )
+        yield Row(f"largest |growth| over |eigenvalue| on its curves, {POINTS} points", _off(result), "", 1e-6)
+
+
+def _off(result) -> float:
+    """How far points of exact curves are from neutral, by the full pencil."""
+    plan, walk = result.plan, StabilityWalk(result.plan.case)
+    points = [(c.law, *p) for c in result.curves if c.exact for p in zip(c.x, c.y, c.frequency)]
+    worst = 0.0
+    for law, x, y, frequency in points[:: max(1, len(points) // POINTS)]:
+        values = walk.spectrum(plan.place(x, y, plan.laws[law])).eigenvalues
+        nearest = values[int(np.argmin(np.abs(values - 2j * np.pi * frequency)))]
+        worst = max(worst, abs(nearest.real) / abs(nearest))
+    return float(worst)
 
 
 def _processor() -> float:

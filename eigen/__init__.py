@@ -1,12 +1,16 @@
 """Spectra of large sparse quadratic pencils with a low-rank, frequency-dependent coupling."""
 
+from .agreement import Certificate
 from .certificate import CertifiedSpectrum, certified_spectrum, listed_unstable
+from .columns import Column, ColumnSolver
 from .condensation import Workspace
 from .coverage import CLEAR
 from .derivative import PencilDerivative, difference, eigenvalue_derivative
 from .factorization import SingularShiftError
+from .family import Condition, PencilFamily
 from .options import SearchOptions
 from .pencil import CoupledPencil
+from .reduction import FamilyReduction
 from .region import Oval, SearchedRegion
 from .search import leading_modes
 from .spectrum import Mode, Spectrum
@@ -18,12 +22,18 @@ from .winding import Count, unstable_count
 __all__ = [
     "CLEAR",
     "Branches",
+    "Certificate",
     "CertifiedSpectrum",
+    "Column",
+    "ColumnSolver",
+    "Condition",
     "Count",
     "CoupledPencil",
+    "FamilyReduction",
     "Mode",
     "Oval",
     "PencilDerivative",
+    "PencilFamily",
     "SearchOptions",
     "SearchedRegion",
     "SingularShiftError",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .agreement import Certificate
 from .condensation import Workspace, condensed_matrix
 from .distant import distant_pairs, joined
 from .factorization import StructureMatrices, SuperluFactorization
@@ -16,6 +17,9 @@ from .search import leading_modes
 from .spectrum import Spectrum
 from .transfer import TransferBasis
 from .winding import Count, unstable_count
+
+#: Largest accepted error of log det of the reduced basis behind a count.
+TRUSTED = 0.1
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,18 @@ class CertifiedSpectrum:
     unstable_count_independent: int
     response_error: float | None
     statement: str
+
+    @property
+    def certificate(self) -> Certificate:
+        """The same as for a cell of a map."""
+        accurate = self.response_error is None or self.response_error < TRUSTED
+        return Certificate(
+            self.unstable_count,
+            self.unstable_count_independent,
+            self.count.certain and accurate,
+            self.count.line,
+            self.count.band,
+        )
 
     @property
     def stable(self) -> bool | None:
@@ -129,7 +145,7 @@ def certified_spectrum(
     error = None
     if not small and not exact:
         error = response_error(pencil, basis, _checks(spectrum, winding, check_points))
-    trusted = winding.certain and (error is None or error < 0.1)
+    trusted = winding.certain and (error is None or error < TRUSTED)
     agrees = trusted and winding.number == listed
     return CertifiedSpectrum(
         spectrum, winding, agrees, listed, winding.number, error, _statement(spectrum, winding, listed, agrees, error)
@@ -177,7 +193,7 @@ def _statement(spectrum, winding, listed, agrees, error):
             f"The spectrum lists {listed} unstable eigenvalues{where}; the independent count "
             f"({winding.number}) is uncertain: {' '.join(winding.notes)}"
         )
-    if error is not None and error >= 0.1:
+    if error is not None and error >= TRUSTED:
         return (
             f"The spectrum lists {listed} unstable eigenvalues{where}; the reduced basis behind "
             f"the independent count ({winding.number}) is too coarse (error {error:.2g})."

@@ -54,8 +54,9 @@ def stability_map(result: MapResults) -> Figure:
     span = _frequency_span(result)
     for law, axes in enumerate(panels):
         mesh = _cells(axes, result, growth[law], _GROWTH, norm)
+        _uncertain(axes, result, law)
         lines = _curves(axes, result, law, span) or lines
-        _regions(axes, result, result.grid("unstable")[law])
+        _regions(axes, result, law)
     bar = figure.colorbar(mesh, ax=panels, pad=0.015, aspect=30, ticks=levels[::2], extend="both", location="right")
     bar.set_label("Growth rate of the leading mode, 1/s")
     if lines is not None:
@@ -74,11 +75,12 @@ def leading_frequency(result: MapResults) -> Figure:
     mesh = None
     for law, axes in enumerate(panels):
         mesh = _cells(axes, result, frequency[law], matplotlib.colormaps["cividis"], norm)
+        _uncertain(axes, result, law)
         for curve in result.curves:
             if curve.law == law:
                 axes.plot(_shown(result.plan.x, curve.x), _shown(result.plan.y, curve.y), color="white", lw=3.0)
                 axes.plot(_shown(result.plan.x, curve.x), _shown(result.plan.y, curve.y), color="#a3261b", lw=1.6)
-        _regions(axes, result, result.grid("unstable")[law])
+        _regions(axes, result, law)
     bar = figure.colorbar(mesh, ax=panels, pad=0.015, aspect=30)
     bar.set_label("Frequency of the leading mode, Hz")
     _headline(figure, result)
@@ -137,6 +139,8 @@ def _headline(figure: Figure, result: MapResults) -> None:
 def _vouched(result: MapResults) -> str:
     certified, found = result.grid("certified"), result.grid("unstable") >= 0
     text = f"{int(certified.sum())} of {int(found.sum())} cells certified by two counts"
+    if (found & ~certified.astype(bool)).any():
+        text += ", the others hatched"
     return text + (f", {len(result.checks)} solved again in full" if result.checks else "")
 
 
@@ -163,6 +167,16 @@ def _cells(axes, result: MapResults, values, colours, norm):
     for j, i in gaps:
         axes.fill_between(x[i : i + 2], y[j], y[j + 1], facecolor="#d9d9d9", hatch="////", edgecolor="#9a9a9a", lw=0)
     return mesh
+
+
+def _uncertain(axes, result: MapResults, law: int) -> None:
+    """Hatch the cells that carry no certificate: what their colour says is not vouched for."""
+    doubtful = ~result.grid("certified")[law].astype(bool) & (result.grid("unstable")[law] >= 0)
+    if not doubtful.any():
+        return
+    x, y = _edges(result.plan.x), _edges(result.plan.y)
+    hatching = axes.pcolor(x, y, np.ma.masked_where(~doubtful, doubtful), hatch="xxx", alpha=0.0)
+    hatching.set_label("uncertain")
 
 
 def _frequency_span(result: MapResults) -> tuple[float, float]:
@@ -222,10 +236,13 @@ def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:
         )
 
 
-def _regions(axes, result: MapResults, unstable: np.ndarray) -> None:
+def _regions(axes, result: MapResults, law: int) -> None:
     """Words in the middle of each sizeable region."""
+    unstable, certified = result.grid("unstable")[law], result.grid("certified")[law].astype(bool)
+    known = certified & (unstable >= 0)
     x, y = _edges(result.plan.x), _edges(result.plan.y)
-    for mask, word in ((unstable > 0, "unstable"), (unstable == 0, "stable")):
+    regions = ((known & (unstable > 0), "unstable"), (known & (unstable == 0), "stable"))
+    for mask, word in (*regions, (~certified & (unstable >= 0), "uncertain")):
         parts, count = label(mask)
         for number in range(1, count + 1):
             part = parts == number

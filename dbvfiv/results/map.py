@@ -131,8 +131,9 @@ class MapResults(Result):
             name = LAWS.get(law, f"blend {law:g}")
             lines.append(
                 (
-                    f"{name}: {unstable.shape[1]} x {unstable.shape[0]} cells, {int((unstable > 0).sum())} "
-                    f"unstable, {int(certified.sum())} of {cells} certified"
+                    f"{name}: {unstable.shape[1]} x {unstable.shape[0]} cells, "
+                    f"{int(((unstable > 0) & certified).sum())} unstable, {int(((unstable == 0) & certified).sum())} "
+                    f"stable, {int(certified.sum())} of {cells} certified"
                 )
                 + (f", {int((how == 1).sum())} solved directly" if (how == 1).any() else "")
                 + (f", {gaps} in gaps" if gaps else "")
@@ -140,7 +141,7 @@ class MapResults(Result):
             )
             for curve in self.curves:
                 if curve.law == i:
-                    kind = "exact" if curve.exact else "between columns"
+                    kind = "exact" if curve.exact else "not exact"
                     lines.append(
                         f"  onset curve, {kind}, {len(curve.x)} points: {self.plan.x.parameter} "
                         f"{min(curve.x):.6g} to {max(curve.x):.6g}, "

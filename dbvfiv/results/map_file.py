@@ -65,7 +65,7 @@ class MapFile(KeptFile, Observer):
     def item(self, result: Any) -> None:
         """Keep a finished `MapColumn`; its onsets go first, so that a row of the table vouches for them."""
         column: MapColumn = result
-        for law, along, frequency, direction in column.onsets:
+        for law, along, frequency, direction, residual in column.onsets:
             self._onsets.append(
                 {
                     "across": column.value,
@@ -73,6 +73,7 @@ class MapFile(KeptFile, Observer):
                     "along": along,
                     "frequency": frequency,
                     "direction": int(direction),
+                    "residual": residual,
                 }
             )
         row = {name: column.cells[name] for name in CELLS}
@@ -117,16 +118,17 @@ def read_columns(file: h5py.File) -> list[MapColumn]:
     """Finished columns of an open file."""
     table, onsets = Table(file["columns"], MAP), Table(file["onsets"], MAP_ONSETS)
     data = {c.name: table.read(c.name) for c in MAP}
-    found = {c.name: onsets.read(c.name) for c in MAP_ONSETS}
+    found = {c.name: onsets.read(c.name) for c in MAP_ONSETS if c.name in file["onsets"]}
+    found.setdefault("residual", np.full(onsets.rows, np.nan))  # files of an earlier layout lack it
     columns = []
     for i in range(table.rows):
         mine = np.flatnonzero(found["across"] == data["value"][i])
         # a run killed between the onsets of a column and its row has written them twice
         mine = mine[len(mine) - int(data["onset_count"][i]) :] if len(mine) else mine
         rows = (
-            np.column_stack([found[name][mine] for name in ("law", "along", "frequency", "direction")])
+            np.column_stack([found[name][mine] for name in ("law", "along", "frequency", "direction", "residual")])
             .astype(float)
-            .reshape(-1, 4)
+            .reshape(-1, 5)
         )
         cells = {name: data[name][i] for name in CELLS}
         columns.append(

@@ -33,6 +33,8 @@ class OnsetResults(Result):
         One for each onset, see `stability_tables.ONSETS`.
     values, growth_rates, frequencies : (s,), (s, 4), (s, 4) arrays
         The scan.
+    certified : (s,) bool array
+        An independent count agrees there.
     parameter : str
     """
 
@@ -45,6 +47,7 @@ class OnsetResults(Result):
         self.values = np.array([row["value"] for row in scan])
         self.growth_rates = np.array([row["growth_rates"] for row in scan]).reshape(-1, 4)
         self.frequencies = np.array([row["frequencies"] for row in scan]).reshape(-1, 4)
+        self.certified = np.array([bool(row.get("certified")) for row in scan], bool)
         self.parameter = self.case.onset.axis.parameter
 
     @classmethod
@@ -52,8 +55,10 @@ class OnsetResults(Result):
         """From a run that has just ended."""
         points = [row_of_point(p) for p in result.points]
         header = replace(header, complete=not result.interrupted)
-        rows = zip(result.values, result.growth_rates, result.frequencies)
-        scan = [{"value": float(v), "growth_rates": g, "frequencies": f} for v, g, f in rows]
+        rows = zip(result.values, result.growth_rates, result.frequencies, result.certified)
+        scan = [
+            {"value": float(v), "growth_rates": g, "frequencies": f, "certified": bool(sure)} for v, g, f, sure in rows
+        ]
         return cls(
             header, MeshData.of(model), points, scan, warnings=result.warnings, failures=result.failures, model=model
         )
@@ -75,8 +80,9 @@ class OnsetResults(Result):
         )
 
     def save(self, path: str | Path) -> Path:
-        rows = zip(self.values, self.growth_rates, self.frequencies)
-        scan = [{"value": v, "growth_rates": g, "frequencies": f, "mesh": FINE, "failure": ""} for v, g, f in rows]
+        rows = zip(self.values, self.growth_rates, self.frequencies, self.certified)
+        same = {"mesh": FINE, "failure": ""}
+        scan = [{"value": v, "growth_rates": g, "frequencies": f, "certified": sure} | same for v, g, f, sure in rows]
         with OnsetFile(path, self.header, self.mesh) as file:
             file.finish(self.warnings, self.failures, self.complete, self.points, scan)
         return Path(path)
@@ -89,6 +95,7 @@ class OnsetResults(Result):
                 "values": self.values.tolist(),
                 "growth_rate": self.growth_rates[:, 0].tolist(),
                 "frequency": self.frequencies[:, 0].tolist(),
+                "certified": self.certified.tolist(),
             },
             "failures": list(self.failures),
             "warnings": list(self.warnings),
@@ -109,7 +116,13 @@ class OnsetResults(Result):
         unit, scale = PARAMETERS[self.parameter].shown_unit, PARAMETERS[self.parameter].scale
         if not self.points:
             low, high = (self.values[[0, -1]] / scale) if len(self.values) else (math.nan, math.nan)
-            state = "unstable" if len(self.values) and self.growth_rates[0, 0] > 0 else "stable"
+            if not len(self.values) or not self.certified.all():
+                sure = int(self.certified.sum())
+                return [
+                    f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values from {low:.6g} to "
+                    f"{high:.6g} {unit} carry a certificate."
+                ]
+            state = "unstable" if self.growth_rates[0, 0] > 0 else "stable"
             return [f"No onset: the valve is {state} from {low:.6g} to {high:.6g} {unit}."]
         lines = [
             (

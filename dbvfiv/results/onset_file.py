@@ -117,13 +117,15 @@ def row_of_sample(sample: OnsetSample) -> dict[str, Any]:
         "frequencies": modes.imag / (2 * np.pi),
         "mesh": sample.mesh,
         "failure": sample.failure,
+        "certified": sample.certified,
     }
 
 
 def read_rows(group: h5py.Group, columns: tuple[Column, ...]) -> list[dict[str, Any]]:
     """Rows of a table, each a dict."""
     table = Table(group, columns)
-    data = {c.name: table.read(c.name) for c in columns}
+    # files of an earlier layout lack some
+    data = {c.name: table.read(c.name) for c in columns if c.name in group}
     return [{name: values[i] for name, values in data.items()} for i in range(table.rows)]
 
 
@@ -153,7 +155,8 @@ def known_items(path: str | Path) -> tuple[list[OnsetSample | OnsetPoint], Heade
 
 def _sample(row: Mapping[str, Any]) -> OnsetSample:
     modes = row["growth_rates"] + 2j * np.pi * row["frequencies"]
-    return OnsetSample(float(row["value"]), modes[np.isfinite(modes)], int(row["mesh"]), str(row["failure"]))
+    modes = modes[np.isfinite(modes)]
+    return OnsetSample(float(row["value"]), modes, int(row["mesh"]), str(row["failure"]), bool(row.get("certified")))
 
 
 def _point(row: Mapping[str, Any], case: Case) -> OnsetPoint:

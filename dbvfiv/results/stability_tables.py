@@ -40,6 +40,7 @@ SCAN = (
     Column("frequencies", "Hz", "Of the leading modes."),
     Column("mesh", "", "0 for the mesh of the case, 1 for the coarser one.", "i4"),
     Column("failure", "", "Why there is no state; empty if there is one.", TEXT),
+    Column("certified", "", "Whether an independent count agrees with the unstable modes there.", "?"),
 )
 MAP = (
     Column("value", "of the parameter across", "Value that the cells of this row of the table share."),
@@ -62,6 +63,7 @@ MAP_ONSETS = (
     Column("along", "of the parameter along", "Where a mode is neutral."),
     Column("frequency", "Hz", "Its frequency."),
     Column("direction", "", "+1 where the mode becomes unstable along the column, -1 where it ceases to be.", "i4"),
+    Column("residual", "", "Growth rate over the size of the eigenvalue that the full matrices leave there."),
 )
 CURVE_POINTS = (
     Column("curve", "", "Number of the curve.", "i4"),
@@ -69,8 +71,8 @@ CURVE_POINTS = (
     Column("x", "of the horizontal parameter", "Points of onset curves."),
     Column("y", "of the vertical parameter", "Points of onset curves."),
     Column("frequency", "Hz", "Of the neutral mode."),
-    Column("exact", "", "Followed by continuation.", "?"),
-    Column("mismatch", "", "Largest distance of the columns' onsets from the curve, in the unit square."),
+    Column("exact", "", "Neutral by the full matrices at every point, and known between them.", "?"),
+    Column("mismatch", "", "Largest growth rate, by the full matrices, over the size of the eigenvalue at its points."),
 )
 CHECKS = (
     Column("x", "of the horizontal parameter", "Cell solved again with the full pencil."),

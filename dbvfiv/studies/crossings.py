@@ -9,7 +9,7 @@ instability or stability are not stepped over.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -26,10 +26,14 @@ WATCHED = 4
 
 @dataclass(frozen=True)
 class Sample:
-    """Leading eigenvalues at one value, sorted by growth rate, a conjugate pair given once."""
+    """Leading eigenvalues at one value, sorted by growth rate, a conjugate pair given once.
+
+    `certified` says whether an independent count agrees with them, None where it was not asked.
+    """
 
     value: float
     eigenvalues: np.ndarray
+    certified: bool | None = None
 
     @property
     def growth(self) -> np.ndarray:
@@ -63,16 +67,26 @@ class Scan:
         Value to eigenvalues, sorted by growth rate; raises SolveError where there is no equilibrium.
     log : bool
         Intervals are halved in the logarithm.
-    told : callable, optional
-        Called with each new sample.
+    certify : callable, optional
+        From a value to whether an independent count agrees with its sample; asked at the ends of brackets. Without it
+        all samples are taken as they are.
+
+    Attributes
+    ----------
+    uncertain : list of (float, float)
+        Intervals between neighbours of the scan, one of which lacks a certificate: nothing is claimed about them.
     """
 
     def __init__(
-        self, sample: Callable[[float], np.ndarray], log: bool = False, told: Callable[[Sample], None] | None = None
+        self,
+        sample: Callable[[float], np.ndarray],
+        log: bool = False,
+        certify: Callable[[float], bool] | None = None,
     ):
-        self._sample, self.log, self._told = sample, log, told
+        self._sample, self.log, self._certify = sample, log, certify
         self.samples: dict[float, Sample] = {}
         self.failures: dict[float, str] = {}
+        self.uncertain: list[tuple[float, float]] = []
 
     def at(self, value: float) -> Sample | None:
         """The sample at a value; None where there is no equilibrium, with the sentence kept in `failures`."""
@@ -85,8 +99,6 @@ class Scan:
             except SolveError as error:
                 self.failures[value] = str(error)
                 return None
-            if self._told is not None:
-                self._told(self.samples[value])
         return self.samples[value]
 
     def middle(self, a: float, b: float) -> float:
@@ -130,15 +142,29 @@ class Scan:
                     wanted.update((self.middle(values[i - 1], values[i]), self.middle(values[i], values[i + 1])))
         return sorted(wanted)
 
+    def certified(self, value: float) -> bool:
+        """Whether the sample at a value of the scan may be claimed."""
+        sample = self.samples[value]
+        if sample.certified is None:
+            vouched = True if self._certify is None else bool(self._certify(value))
+            sample = self.samples[value] = replace(sample, certified=vouched)
+        return bool(sample.certified)
+
     def crossings(self) -> list[Crossing]:
-        """Brackets of all crossings between neighbours of the scan."""
+        """Brackets of all crossings between neighbours of the scan that both have a certificate."""
         found = []
+        self.uncertain = []
         values = sorted(self.samples)
         for a, b in zip(values[:-1], values[1:]):
             low, high = self.samples[a], self.samples[b]
-            for k in range(min(low.unstable, high.unstable), max(low.unstable, high.unstable)):
-                if k < WATCHED:
-                    found.append(Crossing(k, low, high))
+            few, many = sorted((low.unstable, high.unstable))
+            known = (low.certified is not False) and (high.certified is not False)
+            if known and few != many:
+                known = self.certified(a) and self.certified(b)
+            if not known:
+                self.uncertain.append((a, b))
+                continue
+            found += [Crossing(k, low, high) for k in range(few, min(many, WATCHED))]
         return found
 
 

@@ -6,14 +6,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from eigen.columns import DIRECT
+
 from ..case.model import Case
 from ..errors import SolveError
 from ..observer import Observer
-from .column import DIRECT
 from .map_checks import Check, check_cells
 from .map_column import CELLS, MapColumn, MapPlan
-from .map_curves import OnsetCurve, continued, linked
-from .map_pool import columns
+from .map_curves import OnsetCurve, doubts, linked
+from .map_pool import ColumnPool
+from .map_web import Web
 from .parameters import check_flow
 from .stability_walk import StabilityWalk
 
@@ -55,18 +57,23 @@ def grid(plan: MapPlan, found, name: str) -> np.ndarray:
     return table.transpose(0, 2, 1) if plan.transposed else table
 
 
+#: Rounds of columns put in for the onset curves.
+ROUNDS = 14
+#: Columns put in for them at most: as many as the map has, or this many.
+LEAST_ROOM = 40
+
+
 @dataclass
 class _Run:
     plan: MapPlan
     observer: Observer
-    workers: int
-    walk: StabilityWalk
+    pool: ColumnPool
     found: dict[tuple[float, int], MapColumn] = field(default_factory=dict)
 
     def fill(self, wanted) -> None:
         """Solve columns that are not there yet."""
         wanted = [task for task in wanted if task not in self.found]
-        for column in columns(self.plan, wanted, self.workers, self.observer.warn, self.walk):
+        for column in self.pool.columns(wanted):
             self.found[column.value, column.level] = column
             if column.failure:
                 self.observer.warn(f"No column at {self.plan.across.parameter} = {column.value:.6g}: {column.failure}")
@@ -83,6 +90,20 @@ class _Run:
                 )
                 wanted.append((self.plan.value(self.plan.across, middle), level))
         return wanted
+
+    def trace(self) -> None:
+        """Columns that the onset curves need to be known everywhere."""
+        across = self.plan.across
+        level = max(column.level for column in self.found.values())
+        room = max(LEAST_ROOM, len(across.values))
+        for _ in range(ROUNDS):
+            wanted = Web.of(self.plan, self.found.values()).wanted()[:room]
+            if not wanted:
+                return
+            room -= len(wanted)
+            level += 1
+            self.observer.progress(f"onset curves, {len(wanted)} more columns")
+            self.fill([(self.plan.value(across, place), level) for place in wanted])
 
 
 def _pattern(column: MapColumn) -> tuple:
@@ -112,27 +133,31 @@ def run_map(
     check_flow(case)
     plan = plan or MapPlan.of(case)
     observer = observer or Observer()
-    run = _Run(plan, observer, case.map.workers if workers is None else workers, StabilityWalk(case))
-    run.found = {(column.value, column.level): column for column in known}
+    known = {(column.value, column.level): column for column in known}
+    walk = StabilityWalk(case)
     observer.begin("map", len(plan.across.values))
     curves: tuple[OnsetCurve, ...] = ()
     checks: tuple[Check, ...] = ()
     warnings: list[str] = []
     interrupted = False
-    try:
-        run.fill([(value, 0) for value in plan.across.values])
-        for level in range(1, plan.refine + 1):
-            run.fill(run.between(level))
-        ordered = _ordered(run.found)
-        if all(column.failure for column in ordered):
-            raise SolveError(f"No state of the map was found: {ordered[0].failure}")
-        checks = check_cells(plan, ordered, run.walk, case.map.checks)
-        curves = linked(plan, ordered)
-        if case.map.curve:
-            curves = continued(plan, run.walk, curves, observer, warnings)
-        warnings += _doubts(plan, ordered, checks)
-    except KeyboardInterrupt:
-        interrupted = True
+    with ColumnPool(plan, case.map.workers if workers is None else workers, observer.warn, walk) as pool:
+        run = _Run(plan, observer, pool, known)
+        try:
+            run.fill([(value, 0) for value in plan.across.values])
+            for level in range(1, plan.refine + 1):
+                run.fill(run.between(level))
+            if all(column.failure for column in run.found.values()):
+                raise SolveError(f"No state of the map was found: {_ordered(run.found)[0].failure}")
+            if case.map.curve:
+                run.trace()
+            ordered = _ordered(run.found)
+            checks = check_cells(plan, ordered, walk, case.map.checks)
+            curves = linked(plan, ordered)
+            if case.map.curve:
+                warnings += doubts(plan, curves)
+            warnings += _doubts(plan, ordered, checks)
+        except KeyboardInterrupt:
+            interrupted = True
     for sentence in warnings:
         observer.warn(sentence)
     observer.end(interrupted)
@@ -147,10 +172,20 @@ def _ordered(found) -> tuple[MapColumn, ...]:
 
 def _doubts(plan: MapPlan, ordered, checks) -> list[str]:
     """Sentences about cells that are not certified or fail a check."""
-    doubtful = sum(int((~c.cells["certified"]).sum()) for c in ordered if not c.failure)
+    doubtful = sum(int((~c.cells["certified"]).sum()) for c in ordered if not c.failure and c.level == 0)
     said = []
     if doubtful:
-        said.append(f"In {doubtful} cells the spectrum and the independent count disagree or the count is uncertain.")
+        said.append(
+            f"{doubtful} cells are uncertain: spectrum and independent count disagree, or the count is not certain; "
+            "they are called neither stable nor unstable."
+        )
+    bands = [c.band for c in ordered if not c.failure and np.isfinite(c.band)]
+    if bands:
+        said.append(
+            f"Modes were searched for up to {min(bands):.4g} Hz"
+            + (f" to {max(bands):.4g} Hz, by the column" if max(bands) > min(bands) else "")
+            + "; modes.max_frequency chooses another end."
+        )
     for check in checks:
         if not check.agrees:
             said.append(

@@ -9,11 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
+from eigen import Column, Condition
+from eigen.columns import MISSING
+
 from ..case.axis import Axis
 from ..case.model import Case
 from ..errors import CaseError, SolveError
-from .column import MISSING, Column
 from .crossings import Sample, Scan, locate
+from .map_correction import OnsetCorrection
 from .parameters import Place, is_surrounding
 from .stability_walk import StabilityWalk
 
@@ -98,15 +101,18 @@ class MapColumn:
         0 for a column of the grid, more for one that was put between two of them.
     cells : dict of (laws, cells) arrays
         See `CELLS`.
-    onsets : (k, 4) array
-        Law (its number), value along the column, frequency in Hz, and +1 where a mode becomes unstable along the
-        column, -1 where it ceases to be.
+    onsets : (k, 5) array
+        Law (its number), value along the column, frequency in Hz, +1 where a mode becomes unstable along the column, -1
+        where it ceases to be, and the growth rate over the size of the eigenvalue that the full matrices leave there,
+        NaN where it was not corrected by them.
     error : float
         Largest estimated relative error of a leading eigenvalue.
     failure : str
         Why there is no column; empty if there is one.
     seconds : float
         Processor time.
+    band : float
+        Hz; modes were searched for up to it, infinite for all. Not kept in files.
     """
 
     value: float
@@ -116,6 +122,7 @@ class MapColumn:
     error: float
     failure: str = ""
     seconds: float = 0.0
+    band: float = math.inf
 
     @classmethod
     def missing(cls, plan: MapPlan, value: float, level: int, sentence: str, seconds: float = 0.0) -> MapColumn:
@@ -128,7 +135,7 @@ class MapColumn:
             "certified": np.zeros(shape, bool),
             "how": np.full(shape, MISSING),
         }
-        return cls(value, level, cells, np.zeros((0, 4)), np.nan, sentence, seconds)
+        return cls(value, level, cells, np.zeros((0, 5)), np.nan, sentence, seconds)
 
 
 def solve_column(plan: MapPlan, walk: StabilityWalk, value: float, level: int = 0) -> MapColumn:
@@ -147,51 +154,78 @@ def solve_column(plan: MapPlan, walk: StabilityWalk, value: float, level: int = 
         value,
         level,
         cells,
-        np.array(onsets, float).reshape(-1, 4),
+        np.array(onsets, float).reshape(-1, 5),
         max(column.error for column in columns),
         "",
         time.process_time() - started,
+        min(float(column.band.min()) for column in columns),
     )
 
 
-def _law(
-    plan: MapPlan, walk: StabilityWalk, value: float, law: float
-) -> tuple[Column, list[tuple[float, float, float]]]:
+def _law(plan: MapPlan, walk: StabilityWalk, value: float, law: float) -> tuple[Column, list[tuple[float, ...]]]:
     along = plan.along
     places = [plan.place(value, other, law) for other in along.values]
     if not is_surrounding(along.parameter):
         return _state_by_state(plan, walk, places)
     column = walk.column(places)
-    sample = column.eigenvalues or (
-        lambda condition: (
-            walk.spectrum(places[0].at(**dict(zip(("density", "alpha", "beta", "storage"), condition)))).eigenvalues
-        )
+    sample = column.eigenvalues or (lambda condition: walk.column([_under(places[0], condition)]).leading[0])
+    cell = column.cell or (lambda condition: walk.column([_under(places[0], condition)]))
+    scan = Scan(
+        lambda other: sample(plan.place(value, other, law).condition),
+        along.log,
+        lambda other: bool(cell(plan.place(value, other, law).condition).certified[0]),
     )
-    scan = Scan(lambda other: sample(plan.place(value, other, law).condition), along.log)
     # what the cells know need not be found again
-    scan.samples.update({float(v): Sample(float(v), row) for v, row in zip(along.values, column.leading)})
-    return column, _onsets(scan, along)
+    scan.samples.update(_known(along, column))
+    found = _onsets(scan, along)
+    if column.corrected is None:
+        return column, found
+
+    correct = OnsetCorrection(
+        column,
+        lambda other: plan.place(value, other, law).condition,
+        lambda other: walk.spectrum(plan.place(value, other, law)).eigenvalues,
+    )
+    onsets = []
+    for other, frequency, direction, _ in found:
+        other, frequency, left = correct(other, frequency)
+        onsets.append((other, frequency, direction, left))
+    return column, onsets
+
+
+def _under(place: Place, condition: Condition) -> Place:
+    """The same steady state under another condition."""
+    return place.at(**dict(zip(("density", "alpha", "beta", "storage"), condition)))
+
+
+def _known(along: Axis, column: Column) -> dict[float, Sample]:
+    rows = zip(along.values, column.leading, column.certified)
+    return {float(v): Sample(float(v), row, bool(sure)) for v, row, sure in rows}
 
 
 def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):
     """Both axes change the steady state: every cell has its own, solved directly."""
     parts = [walk.column([place]) for place in places]
-    names = ("growth_rate", "frequency", "second", "unstable", "counted", "certain", "how")
-    column = Column(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names}, error=0.0)
-    by_value = dict(zip(plan.along.values, places))
+    names = ("growth_rate", "frequency", "second", "unstable", "counted", "certain", "how", "line", "band")
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    column = Column(**joined, error=0.0, leading=[part.leading[0] for part in parts])
     parameter = plan.along.parameter
-    scan = Scan(
-        lambda other: walk.spectrum(by_value.get(other) or places[0].at(**{parameter: other})).eigenvalues,
-        plan.along.log,
-    )
+
+    def cell(other: float) -> Column:
+        return walk.column([places[0].at(**{parameter: other})])
+
+    scan = Scan(lambda other: cell(other).leading[0], plan.along.log, lambda other: bool(cell(other).certified[0]))
+    scan.samples.update(_known(plan.along, column))
     return column, _onsets(scan, plan.along)
 
 
-def _onsets(scan: Scan, along: Axis) -> list[tuple[float, float, float]]:
+def _onsets(scan: Scan, along: Axis) -> list[tuple[float, float, float, float]]:
+    """Value, frequency, direction, and what is left of the growth rate over the size of the eigenvalue."""
     found = []
     for crossing in scan.run(along.values):
         value = locate(scan, crossing, LOCATED)
-        eigenvalue = scan.at(value).eigenvalues[crossing.index]
+        eigenvalue = complex(scan.at(value).eigenvalues[crossing.index])
         direction = 1.0 if crossing.high.unstable > crossing.low.unstable else -1.0
-        found.append((value, abs(eigenvalue.imag) / (2 * np.pi), direction))
+        left = abs(eigenvalue.real) / max(abs(eigenvalue), 1.0)
+        found.append((value, abs(eigenvalue.imag) / (2 * np.pi), direction, left))
     return found

@@ -20,53 +20,78 @@ _walk: StabilityWalk | None = None
 _plan: MapPlan | None = None
 
 
-def columns(
-    plan: MapPlan,
-    wanted: Iterable[tuple[float, int]],
-    workers: int,
-    warn: Callable[[str], None],
-    walk: StabilityWalk | None = None,
-) -> Iterator[MapColumn]:
-    """Columns as they are finished, in any order.
+class ColumnPool:
+    """Processes that solve columns; a context manager, so that they start once for all rounds of a map.
 
     Parameters
     ----------
     plan : MapPlan
-    wanted : (value, level) pairs
     workers : int
-        1 solves them here, one after another.
+        1 solves everything here, one after another.
     warn : callable
         Told in a sentence when a worker was lost.
     walk : StabilityWalk, optional
         Of this process.
     """
-    wanted = list(wanted)
-    if workers <= 1 and mpi_size() == 1:
-        walk = walk or StabilityWalk(plan.case)
-        for value, level in wanted:
-            yield solve_column(plan, walk, value, level)
-        return
-    tries = dict.fromkeys(wanted, 0)
-    left = set(wanted)
-    while left:
-        pool = _pool(plan, workers)
-        lost: list[tuple[float, int]] = []
-        try:
-            for task, column in _round(pool, sorted(left), max(workers, mpi_size() - 1)):
-                if column is None:
-                    lost.append(task)
-                    continue
-                left.discard(task)
-                yield column
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-        for task in lost:
-            tries[task] += 1
-            if tries[task] >= TRIES:
-                left.discard(task)
-                yield MapColumn.missing(plan, *task, f"{TRIES} workers died over this column.")
-        if lost:
-            warn(f"A worker was lost; {len(left)} columns are given to new ones.")
+
+    def __init__(self, plan: MapPlan, workers: int, warn: Callable[[str], None], walk: StabilityWalk | None = None):
+        self.plan, self.workers, self.warn = plan, workers, warn
+        self.walk = walk
+        self._pool: Executor | None = None
+
+    def __enter__(self) -> ColumnPool:
+        return self
+
+    def __exit__(self, *_error) -> None:
+        self._close()
+
+    def _close(self) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(wait=False, cancel_futures=True)
+            self._pool = None
+
+    @property
+    def is_here(self) -> bool:
+        """Whether this process does all the work itself."""
+        return self.workers <= 1 and mpi_size() == 1
+
+    def columns(self, wanted: Iterable[tuple[float, int]]) -> Iterator[MapColumn]:
+        """Columns as they are finished, in any order.
+
+        Parameters
+        ----------
+        wanted : (value, level) pairs
+        """
+        wanted = list(wanted)
+        if self.is_here:
+            self.walk = self.walk or StabilityWalk(self.plan.case)
+            for value, level in wanted:
+                yield solve_column(self.plan, self.walk, value, level)
+            return
+        tries = dict.fromkeys(wanted, 0)
+        left = set(wanted)
+        while left:
+            self._pool = self._pool or _pool(self.plan, self.workers)
+            lost: list[tuple[float, int]] = []
+            finished = False
+            try:
+                for task, column in _round(self._pool, sorted(left), max(self.workers, mpi_size() - 1)):
+                    if column is None:
+                        lost.append(task)
+                        continue
+                    left.discard(task)
+                    yield column
+                finished = True
+            finally:
+                if lost or not finished:
+                    self._close()
+            for task in lost:
+                tries[task] += 1
+                if tries[task] >= TRIES:
+                    left.discard(task)
+                    yield MapColumn.missing(self.plan, *task, f"{TRIES} workers died over this column.")
+            if lost:
+                self.warn(f"A worker was lost; {len(left)} columns are given to new ones.")
 
 
 def _round(

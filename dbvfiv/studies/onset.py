@@ -32,6 +32,9 @@ class OnsetResult:
         All values of the scan, those of narrow tongues included.
     growth_rates, frequencies : (s, 4) arrays, 1/s, Hz
         Of the leading modes there; NaN where there are fewer.
+    certified : (s,) bool array
+        Whether an independent count of the unstable modes agrees there; nothing is claimed beside a value where it does
+        not.
     failures, warnings : tuples of str
     interrupted : bool
     """
@@ -42,20 +45,34 @@ class OnsetResult:
     values: np.ndarray
     growth_rates: np.ndarray
     frequencies: np.ndarray
+    certified: np.ndarray
     failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     interrupted: bool = False
 
     @cached_property
     def unstable_intervals(self) -> list[tuple[float, float]]:
-        """Where the state is unstable within the range scanned."""
-        marks = [self.values[0], *(p.value for p in self.points if p.edge), self.values[-1]] if len(self.values) else []
-        unstable = bool(len(self.values)) and bool(self.growth_rates[0, 0] > 0)
-        found = []
-        for a, b in zip(marks[:-1], marks[1:]):
-            if unstable:
-                found.append((float(a), float(b)))
-            unstable = not unstable
+        """Where the state is known to be unstable within the range scanned."""
+        return self._intervals(True)
+
+    @cached_property
+    def stable_intervals(self) -> list[tuple[float, float]]:
+        """Where it is known to be stable; what neither list holds is uncertain."""
+        return self._intervals(False)
+
+    def _intervals(self, unstable: bool) -> list[tuple[float, float]]:
+        edges = [p.value for p in self.points if p.edge]
+        found: list[tuple[float, float]] = []
+        for i in range(len(self.values) - 1):
+            if not (self.certified[i] and self.certified[i + 1]):
+                continue
+            marks = [self.values[i], *(e for e in edges if self.values[i] < e < self.values[i + 1]), self.values[i + 1]]
+            state = bool(self.growth_rates[i, 0] > 0)
+            for a, b in zip(marks[:-1], marks[1:]):
+                if state == unstable:
+                    joins = found and found[-1][1] == a
+                    found[-1:] = [(found[-1][0], float(b))] if joins else [*found[-1:], (float(a), float(b))]
+                state = not state
         return found
 
 
@@ -110,6 +127,7 @@ def run_onset(
                 search.point(crossing)
             except SolveError as error:
                 failures.append(str(error))
+        warnings += search.uncertainties()
         points = list(search.points.values())
         if points and options.coarse_mesh > 0:
             points = with_uncertainty(case, options, points, observer, warnings, known)
@@ -133,6 +151,7 @@ def run_onset(
         np.array([s.value for s in samples]),
         table.real,
         table.imag / (2 * np.pi),
+        np.array([s.certified for s in samples], bool),
         tuple(failures),
         tuple(warnings),
         interrupted,

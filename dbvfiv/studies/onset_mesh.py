@@ -56,7 +56,8 @@ def with_uncertainty(
     for crossing in search.scan.run(options.values):
         try:
             value = locate(search.scan, crossing, LOCATED)
-            eigenvalue = search.critical(search.place(value), crossing.index).eigenvalue
+            expected = complex(search.scan.at(value).eigenvalues[crossing.index])
+            eigenvalue = search.critical(search.place(value), expected).eigenvalue
         except SolveError:
             continue
         found.append((value, abs(eigenvalue.imag) / (2 * np.pi), crossing.high.unstable > crossing.low.unstable))

@@ -14,7 +14,6 @@ from ..case.model import Case
 from ..case.parameters import PARAMETERS
 from ..errors import SolveError
 from ..model.system import ValveSystem
-from .column import search_options
 from .onset_point import OnsetPoint
 from .parameters import Place, rebuilder
 from .stability_walk import StabilityWalk
@@ -37,7 +36,8 @@ def described(point: OnsetPoint, case: Case, walk: StabilityWalk, mode) -> Onset
 
 def system_of(case: Case, walk: StabilityWalk, place: Place) -> ValveSystem:
     """The valve as a System of `continuation` at a place."""
-    return ValveSystem(walk.built(replace(place, design={})).model, rebuilder(case), search_options(place.beta))
+    model = walk.built(replace(place, design={})).model
+    return ValveSystem(model, rebuilder(case), walk.search(place))
 
 
 def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: str | None = None):

@@ -25,12 +25,15 @@ class OnsetSample:
         `FINE` or `COARSE`.
     failure : str
         Empty if there is a state.
+    certified : bool
+        An independent count of the unstable eigenvalues agrees with them.
     """
 
     value: float
     eigenvalues: np.ndarray
     mesh: int = FINE
     failure: str = ""
+    certified: bool = False
 
 
 @dataclass(frozen=True)

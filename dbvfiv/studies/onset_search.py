@@ -7,19 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eigen import Certificate
+
 from ..case.model import Case
 from ..errors import CaseError, SolveError
 from ..observer import Observer
-from .column import floor_of
 from .crossings import WATCHED, Crossing, Scan, locate
 from .onset_normal_form import MISSING, described
 from .onset_point import FINE, OnsetPoint, OnsetSample, Side
 from .parameters import Place, is_surrounding
-from .reduction import StateFamily
 from .stability_walk import StabilityWalk
 
 #: Relative distance from an onset at which it is confirmed on both sides.
 ASIDE = 2e-3
+#: Largest relative difference of a mode on the small model and with the full matrices.
+SAME = 1e-3
+#: Values of a scan at which leading vectors are taken.
+SNAPSHOTS = 6
 
 
 @dataclass(frozen=True)
@@ -96,8 +100,8 @@ class OnsetSearch:
         self._samples = {item.value: item for item in known if isinstance(item, OnsetSample) and item.mesh == mesh}
         self._known = {item.key: item for item in known if isinstance(item, OnsetPoint)}
         self.points: dict[tuple, OnsetPoint] = {}
-        self.scan = Scan(self._eigenvalues, options.log)
-        self._fine = None
+        self.scan = Scan(self._eigenvalues, options.log, self._certified)
+        self._column = None
 
     def place(self, value: float) -> Place:
         return self.base.at(**{self.options.parameter: value})
@@ -105,42 +109,67 @@ class OnsetSearch:
     # -- samples
     # ----
 
+    def _sample(self, value: float) -> OnsetSample:
+        if value not in self._samples:
+            self._samples[value] = self._solved(value)
+            self.observer.item(self._samples[value])
+        return self._samples[value]
+
     def _eigenvalues(self, value: float) -> np.ndarray:
-        known = self._samples.get(value)
-        if known is None:
-            known = self._solved(value)
-            self.observer.item(known)
+        known = self._sample(value)
         if known.failure:
             raise SolveError(known.failure)
         return known.eigenvalues
 
+    def _certified(self, value: float) -> bool:
+        return self._sample(value).certified
+
     def _solved(self, value: float) -> OnsetSample:
         place = self.place(value)
         try:
-            found = (
-                self._reduced(place)
-                if is_surrounding(self.options.parameter)
-                else self.walk.spectrum(place).eigenvalues
-            )
+            cell = self._cell(place)
         except (SolveError, CaseError) as error:
             return OnsetSample(value, np.zeros(0, complex), self.mesh, str(error))
+        found, certificate = cell.leading[0], cell.certificate(0)
         if len(found):
-            self.observer.progress(f"{self.options.parameter} = {value:.6g}: {found[0].real:.4g} 1/s")
+            said = "" if certificate.agrees else ", uncertain"
+            self.observer.progress(f"{self.options.parameter} = {value:.6g}: {found[0].real:.4g} 1/s{said}")
         # as many as the scan looks at, so that a file holds all that matters
-        return OnsetSample(value, np.asarray(found)[:WATCHED], self.mesh)
+        return OnsetSample(value, np.asarray(found)[:WATCHED], self.mesh, certified=certificate.agrees)
 
-    def _reduced(self, place: Place) -> np.ndarray:
-        """Where the steady state stays the same a small model answers; what it says is confirmed by the full one."""
-        if self._fine is None:
-            family = StateFamily(self.walk.linear(place))
+    def _cell(self, place: Place):
+        """Leading eigenvalues and their certificate: on a small model where the steady state stays the same, with the
+        full pencil elsewhere.
+        """
+        if not is_surrounding(self.options.parameter):
+            return self.walk.column([place])
+        if self._column is None:
             ends = np.array(self.options.values)
-            taken = ends[np.unique(np.linspace(0, len(ends) - 1, 6).astype(int))]
-            conditions = [self.place(v).condition for v in taken]
-            floors = [floor_of(c[2]) for c in conditions]
-            self._fine = family.fine(conditions, 0.75 * min(floors) if np.isfinite(floors).all() else -np.inf, most=5)
-        values = self._fine.eigenvalues([place.condition])[0]
-        upper = values[(values.imag >= 0) & (values.real > floor_of(place.beta))]
-        return upper[np.argsort(-upper.real)][:8]
+            taken = ends[np.unique(np.linspace(0, len(ends) - 1, SNAPSHOTS).astype(int))]
+            self._column = self.walk.column([self.place(v) for v in taken], len(taken))
+        if self._column.cell is None:
+            return self.walk.column([place])
+        return self._column.cell(place.condition)
+
+    def uncertainties(self) -> list[str]:
+        """Sentences about what is not known: stretches of the scan without a certificate, and a band that was searched
+        instead of all frequencies.
+        """
+        name, said, joined = self.options.parameter, [], []
+        for low, high in self.scan.uncertain:
+            if joined and joined[-1][1] == low:
+                joined[-1][1] = high
+            else:
+                joined.append([low, high])
+        for low, high in joined:
+            said.append(
+                f"Between {name} = {low:.6g} and {high:.6g} spectrum and independent count do not agree everywhere, so "
+                "nothing is claimed there."
+            )
+        band = self.walk.search(self.place(self.options.values[0])).max_frequency
+        if band is not None:
+            said.append(f"Modes were searched for up to {band:.4g} Hz; modes.max_frequency chooses another end.")
+        return said
 
     # -- points
     # ----
@@ -162,7 +191,7 @@ class OnsetSearch:
         if self.options.normal_form and point.frequency > 0 and point.criticality is None and MISSING not in point.note:
             self.observer.progress(f"normal form at {point.value:.6g}")
             self.points[key] = point  # an interruption does not take away what is known
-            mode = self.critical(point.place, point.ahead) if mode is None else mode
+            mode = self.critical(point.place, 2j * np.pi * point.frequency) if mode is None else mode
             point = described(point, self.case, self.walk, mode)
             self._keep(point)
         self.points[key] = point
@@ -175,15 +204,16 @@ class OnsetSearch:
     def _located(self, crossing: Crossing):
         parameter = self.options.parameter
         value = locate(self.scan, crossing, self.options.tolerance)
+        expected = complex(self.scan.at(value).eigenvalues[crossing.index])
         if is_surrounding(parameter):
-            value = self._polished(value, crossing)
+            value = self._polished(value, crossing, expected)
         place = self.place(value)
-        mode = self.critical(place, crossing.index)
+        mode = self.critical(place, expected)
         eigenvalue = complex(mode.eigenvalue)
         gains = crossing.high.unstable > crossing.low.unstable
         width = ASIDE * abs(value) if value else ASIDE * (self.options.values[-1] - self.options.values[0])
-        below, above = (self._side(v, eigenvalue) for v in (value - width, value + width))
-        confirmed, note = _confirmed(below, above, gains)
+        (below, one), (above, two) = (self._side(v, eigenvalue) for v in (value - width, value + width))
+        confirmed, note = _confirmed(below, above, gains, one.agrees and two.agrees, max(one.line, two.line))
         edge = min(below.unstable, above.unstable) == 0
         bracket = (crossing.low.value, crossing.high.value)
         frequency = abs(eigenvalue.imag) / (2 * np.pi)
@@ -203,12 +233,12 @@ class OnsetSearch:
             note=note,
         ), mode
 
-    def _polished(self, value: float, crossing: Crossing) -> float:
+    def _polished(self, value: float, crossing: Crossing, expected: complex) -> float:
         """Secant steps with the full pencil from the root on the small model."""
         scale = max(abs(crossing.low.value), abs(crossing.high.value))
 
         def growth(v):
-            return float(self.critical(self.place(v), crossing.index).eigenvalue.real)
+            return float(self.critical(self.place(v), expected).eigenvalue.real)
 
         a, fa = value, growth(value)
         b = value + 1e-6 * scale
@@ -224,28 +254,33 @@ class OnsetSearch:
                 break
         return float(b if crossing.low.value <= b <= crossing.high.value else value)
 
-    def critical(self, place: Place, index: int):
-        """The mode of a place that is neutral, the one with `index` faster ones if that one is."""
+    def critical(self, place: Place, eigenvalue: complex):
+        """The mode of the full pencil at a place that an eigenvalue found otherwise belongs to.
+
+        Raises
+        ------
+        SolveError
+            If the full pencil has no such mode.
+        """
         spectrum = self.walk.spectrum(place)
-        near = int(np.argmin(np.abs(spectrum.eigenvalues.real)))
-        chosen = (
-            index
-            if index < len(spectrum)
-            and abs(spectrum.eigenvalues[index].real) < 2 * abs(spectrum.eigenvalues[near].real) + 1e-3
-            else near
-        )
-        return spectrum.mode(chosen)
+        apart = np.abs(spectrum.eigenvalues - eigenvalue)
+        if not len(spectrum) or apart.min() > SAME * abs(eigenvalue):
+            raise SolveError(
+                f"At {self.options.parameter} = {place.value(self.options.parameter):.6g} the full pencil has no mode "
+                f"near {abs(eigenvalue.imag) / (2 * np.pi):.4g} Hz that is neutral, so no onset is claimed there."
+            )
+        return spectrum.mode(int(np.argmin(apart)))
 
-    def _side(self, value: float, eigenvalue: complex) -> Side:
-        place = self.place(value)
-        spectrum = self.walk.spectrum(place)
-        column = self.walk.column([place])
-        nearest = int(np.argmin(np.abs(spectrum.eigenvalues - eigenvalue)))
-        crossing, leading = complex(spectrum.eigenvalues[nearest]), float(spectrum.eigenvalues[0].real)
-        return Side(value, crossing, leading, spectrum.unstable_count, int(column.counted[0]))
+    def _side(self, value: float, eigenvalue: complex) -> tuple[Side, Certificate]:
+        """What the full pencil says at a value, and what vouches for it."""
+        cell = self.walk.column([self.place(value)])
+        values, certificate = cell.leading[0], cell.certificate(0)
+        crossing = complex(values[int(np.argmin(np.abs(values - eigenvalue)))])
+        side = Side(value, crossing, float(values[0].real), certificate.unstable, certificate.counted)
+        return side, certificate
 
 
-def _confirmed(below: Side, above: Side, gains: bool) -> tuple[bool, str]:
+def _confirmed(below: Side, above: Side, gains: bool, certified: bool, line: float) -> tuple[bool, str]:
     for side in (below, above):
         if side.unstable != side.counted:
             return (
@@ -255,7 +290,11 @@ def _confirmed(below: Side, above: Side, gains: bool) -> tuple[bool, str]:
                     f"independent count finds {side.counted}."
                 ),
             )
+    if not certified:
+        return False, "the independent count beside it is uncertain."
     first, second = (below, above) if gains else (above, below)
+    if first.eigenvalue.real < 0 < second.eigenvalue.real and first.unstable == second.unstable and line > 0:
+        return False, f"the independent count looks right of {line:.4g} 1/s only, where an undamped wall ends."
     if not (first.eigenvalue.real < 0 < second.eigenvalue.real and first.unstable < second.unstable):
         return (
             False,

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
+from eigen import Condition
+
 from ..case.model import Case
 from ..case.parameters import CONDITIONS, DESIGN, PARAMETERS
 from ..errors import SolveError
@@ -47,9 +49,9 @@ class Place:
         return replace(self, **own, design={**self.design, **design})
 
     @property
-    def condition(self) -> tuple[float, float, float, float]:
+    def condition(self) -> Condition:
         """(density, alpha, beta, storage)."""
-        return self.density, self.alpha, self.beta, self.storage
+        return Condition(self.density, self.alpha, self.beta, self.storage)
 
     @property
     def conditions(self) -> Conditions:

@@ -4,18 +4,21 @@ known.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from eigen import Column, ColumnSolver, SearchOptions
+
 from ..case.model import Case
 from ..errors import SolveError
 from ..model import ValveModel
-from ..model.dynamics import LinearisedState, linearise
+from ..model.dynamics import linearise
 from ..model.equilibria import LoadPath, SteadyOptions
 from ..observer import Observer
-from .column import Column, ColumnSolver
 from .parameters import Place, rebuilder
+from .valve_family import ValveFamily
 
 #: Steps over the last one up to which a cubic is trusted ahead of it.
 REACH = 2.0
@@ -67,7 +70,7 @@ class StabilityWalk:
         self.observer = observer or Observer()
         self._rebuild = rebuilder(case)
         self._built: dict[tuple, _Built] = {}
-        self._last: tuple[tuple, LinearisedState] | None = None
+        self._last: tuple[tuple, ValveFamily] | None = None
         if model is not None:
             self._built[()] = self._new(model)
 
@@ -106,8 +109,8 @@ class StabilityWalk:
         built.known[place.pressure] = path.q
         return path.q
 
-    def linear(self, place: Place) -> LinearisedState:
-        """The linearised state, without density, damping and continuity law.
+    def family(self, place: Place) -> ValveFamily:
+        """The linearised state for any density, damping and continuity law; the last one is kept.
 
         Raises
         ------
@@ -115,8 +118,19 @@ class StabilityWalk:
         """
         key = (place.pressure, tuple(sorted(place.design.items())))
         if self._last is None or self._last[0] != key:
-            self._last = (key, linearise(self.built(place).model, self.equilibrium(place), place.pressure))
+            linear = linearise(self.built(place).model, self.equilibrium(place), place.pressure)
+            modes = self.case.modes
+            self._last = (key, ValveFamily(linear, modes.max_frequency, modes.count))
         return self._last[1]
+
+    def search(self, place: Place) -> SearchOptions:
+        """What is searched in the spectrum of a place.
+
+        Raises
+        ------
+        SolveError
+        """
+        return self.family(place).search(place.condition)
 
     def spectrum(self, place: Place, count: int = 6):
         """Leading modes of the full pencil, an `eigen.Spectrum`.
@@ -125,14 +139,32 @@ class StabilityWalk:
         ------
         SolveError
         """
-        linear = self.linear(place)
-        try:
-            return self.built(place).solver.direct(linear, place.condition, count)
-        except (ArithmeticError, ValueError) as error:
-            raise SolveError(
-                f"The modes at {place.pressure:.6g} Pa were not found: {str(error).rstrip('.')}."
-            ) from error
+        family = self.family(place)
+        with _explained(place):
+            return self.built(place).solver.direct(family, place.condition, count)
 
-    def column(self, places: list[Place]) -> Column:
-        """Cells that share a steady state."""
-        return self.built(places[0]).solver.solve(self.linear(places[0]), [p.condition for p in places])
+    def column(self, places: list[Place], snapshots: int = 3) -> Column:
+        """Cells that share a steady state.
+
+        Parameters
+        ----------
+        places : list of Place
+        snapshots : int
+            Of them, at which the vectors of the small model are made.
+
+        Raises
+        ------
+        SolveError
+        """
+        family = self.family(places[0])
+        with _explained(places[0]):
+            return self.built(places[0]).solver.solve(family, [p.condition for p in places], snapshots)
+
+
+@contextmanager
+def _explained(place: Place):
+    """Turns what numerics refuse into a sentence with the pressure."""
+    try:
+        yield
+    except (ArithmeticError, ValueError) as error:
+        raise SolveError(f"The modes at {place.pressure:.6g} Pa were not found: {str(error).rstrip('.')}.") from error

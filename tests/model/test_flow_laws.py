@@ -10,9 +10,9 @@ from dbvfiv.flow import Channel
 from dbvfiv.model import Conditions, dynamic_residual, linearise
 from dbvfiv.model.analytic import AnalyticResidual
 from dbvfiv.model.contract import EquilibriumModel, MotionForms
+from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.system import ValveSystem
-from dbvfiv.studies.steady import LoadPath, SteadyOptions
 from dbvfiv.transient.equations import ValveMotion
 from dbvfiv.transient.scheme import scheme
 from dbvfiv.transient.state import consistent_state

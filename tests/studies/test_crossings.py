@@ -53,3 +53,10 @@ def test_missing_states_are_kept_as_sentences():
     crossings = scan.run(np.linspace(1, 4, 7))
     assert list(scan.failures.values()) == ["No equilibrium."]
     assert locate(scan, crossings[0], 1e-12) == pytest.approx(3.0)
+
+
+def test_no_crossing_is_claimed_across_a_value_without_a_certificate():
+    scan = Scan(modes(lambda x: x - 1.5), certify=lambda x: x < 1.9)
+    assert scan.run([0.0, 1.0, 2.0]) == [] and scan.uncertain == [(1.0, 2.0)]
+    scan = Scan(modes(lambda x: x - 1.5), certify=lambda x: True)
+    assert len(scan.run([0.0, 1.0, 2.0])) == 1 and scan.uncertain == []

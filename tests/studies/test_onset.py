@@ -1,10 +1,12 @@
 """Onsets of the valve on a coarse mesh."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dbvfiv.errors import SolveError
-from dbvfiv.studies.onset import OnsetOptions, run_onset
+from dbvfiv.studies.onset import OnsetOptions, OnsetSearch, run_onset
 from dbvfiv.studies.parameters import Place
 
 
@@ -76,3 +78,46 @@ def test_a_place_changes_what_it_is_told(coarse_case):
     place = Place.of(coarse_case).at(density=3.0, thickness=0.9)
     assert place.condition == (3.0, 0.0, 0.003, 0.0) and place.design == {"thickness": 0.9}
     assert place.mu()["inlet"] == 6000.0 and place.mu()["thickness"] == 0.9
+
+
+def _undamped(coarse_case, **more):
+    return coarse_case.replace({"damping.alpha": 0, "damping.beta": 0, "drive.pressure": 14e3, **more})
+
+
+def test_without_damping_growth_above_80_hz_is_no_stable_valve(coarse_case):
+    options = OnsetOptions("density", (100.0, 200.0, 400.0), True, normal_form=False, coarse_mesh=0)
+    result = run_onset(_undamped(coarse_case), options)
+    growing = result.frequencies[:, 0][result.growth_rates[:, 0] > 0]
+    assert growing.max() > 80.0 and not result.stable_intervals
+    assert any("searched for up to" in sentence for sentence in result.warnings)
+
+
+def test_a_band_that_is_asked_for_is_kept(coarse_case):
+    options = OnsetOptions("density", (100.0, 200.0, 400.0), True, normal_form=False, coarse_mesh=0)
+    result = run_onset(_undamped(coarse_case, **{"modes.max_frequency": 60.0}), options)
+    assert np.nanmax(result.frequencies) <= 60.0
+
+
+def test_each_onset_over_alpha_is_listed_once_and_shown_by_its_sides(coarse_case):
+    options = OnsetOptions("alpha", tuple(np.linspace(0, 100, 6)), normal_form=False, coarse_mesh=0)
+    case = coarse_case.replace({"damping.beta": 0, "fluid.density": 4, "mesh.along": 14})
+    points = run_onset(case, options).points
+    assert len({round(p.value, 6) for p in points}) == len(points) >= 2
+    for p in points:
+        assert p.below.eigenvalue.real > 0 > p.above.eigenvalue.real and p.confirmed
+
+
+def test_nothing_is_claimed_beside_a_value_without_a_certificate(coarse_case, monkeypatch):
+    honest = OnsetSearch._solved
+
+    def doubtful(self, value):
+        sample = honest(self, value)
+        return replace(sample, certified=sample.certified and abs(value - 100.0) > 1e-6)
+
+    monkeypatch.setattr(OnsetSearch, "_solved", doubtful)
+    options = OnsetOptions("density", (1.0, 10.0, 100.0, 1000.0), True, normal_form=False, coarse_mesh=0)
+    result = run_onset(coarse_case, options)
+    assert not result.points
+    assert result.certified.tolist() == [abs(v - 100.0) > 1e-6 for v in result.values]
+    assert all(high <= 10.0 + 1e-9 for _, high in result.unstable_intervals) and not result.stable_intervals
+    assert any("nothing is claimed" in sentence for sentence in result.warnings)

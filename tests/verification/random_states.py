@@ -12,7 +12,7 @@ import numpy as np
 
 from dbvfiv.case.model import Case
 from dbvfiv.model import Conditions, LinearisedState, ValveModel, linearise
-from dbvfiv.studies.steady import LoadPath
+from dbvfiv.model.equilibria import LoadPath
 from eigen import CoupledPencil
 
 

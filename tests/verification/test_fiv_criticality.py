@@ -33,7 +33,7 @@ class Onset:
         (crossing,) = search.scan.run(options.values)
         self.point = point = search.point(crossing)
         self.form = normal_form(
-            self.case, search.walk, point.place, search.critical(point.place, point.ahead), "density"
+            self.case, search.walk, point.place, search.critical(point.place, 2j * np.pi * point.frequency), "density"
         )
         self.model = search.walk.built(point.place).model
         self.steady = self.lip(search.walk.equilibrium(point.place))

@@ -1,12 +1,12 @@
-"""How many unstable eigenvalues a reduced state has, by the argument principle, for many conditions at once.
+"""How many unstable eigenvalues a reduced family has, by the argument principle, for many conditions at once.
 
-The response h(s) = J (s^2 M + s C + K)^-1 G of the structure is condensed to the few patterns of area and pressure that
+The response h(s) = J (s^2 M + s C + K)^-1 G of the structure is condensed to the few patterns of motion and force that
 matter; then
 
     d(s) = det [ I - h A, -h B ; R, S ]
 
 is analytic right of the imaginary axis apart from unstable poles of the structure itself, and grows like s at most. Its
-phase along the imaginary axis is followed for every density, with points added where it turns fast. No eigenvalue of
+phase along the imaginary axis is followed for every condition, with points added where it turns fast. No eigenvalue of
 the coupled pencil is used except as a hint where to look.
 """
 
@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from .reduction import POWERS, Reduced
+from .reduction import POWERS, ReducedFamily
 
 #: Largest accepted step of the phase between neighbours, rad.
 LARGEST_STEP = np.pi / 3
-#: Patterns of area and pressure weaker than this are left out.
+#: Patterns of motion and force weaker than this are left out.
 PATTERNS = 1e-5
 #: Determinants evaluated at once, so that they stay in the processor's cache.
 CHUNK = 96
@@ -50,17 +50,17 @@ class PhaseCounts:
 
 
 class Response:
-    """h(s) of a reduced state at one damping, condensed to the patterns that matter.
+    """h(s) of a reduced family at one damping, condensed to the patterns that matter.
 
     Parameters
     ----------
-    reduced : Reduced
+    reduced : ReducedFamily
     alpha, beta : float
     """
 
-    def __init__(self, reduced: Reduced, alpha: float, beta: float):
+    def __init__(self, reduced: ReducedFamily, alpha: float, beta: float):
         k = reduced.size
-        damping = alpha * reduced.M + beta * reduced.Ks
+        damping = alpha * reduced.M + beta * reduced.D
         form = np.zeros((2 * k, 2 * k))
         form[:k, k:] = np.eye(k)
         form[k:] = -np.linalg.solve(reduced.M, np.hstack([reduced.K, damping]))
@@ -101,19 +101,18 @@ def _patterns(parts) -> np.ndarray:
     return vectors[:, weight > PATTERNS * weight[0]]
 
 
-def phase_counts(reduced: Reduced, conditions, hints=None, most_points: int = 400) -> PhaseCounts:
+def phase_counts(reduced: ReducedFamily, conditions, hints=None, most_points: int = 400) -> PhaseCounts:
     """Count unstable eigenvalues at several conditions.
 
     Parameters
     ----------
-    reduced : Reduced
-    conditions : sequence of (density, alpha, beta, storage)
+    reduced : ReducedFamily
+    conditions : sequence of Condition
     hints : sequence of complex arrays, optional
         For each condition, places near which the phase may turn fast.
     most_points : int
         Per condition.
     """
-    conditions = [tuple(map(float, c)) for c in conditions]
     number, certain = np.zeros(len(conditions), int), np.zeros(len(conditions), bool)
     points = 0
     for damping in dict.fromkeys(c[1:3] for c in conditions):
@@ -129,11 +128,11 @@ def phase_counts(reduced: Reduced, conditions, hints=None, most_points: int = 40
 class _Walk:
     """Phases along the imaginary axis for conditions of one damping, as sorted arrays per condition."""
 
-    def __init__(self, response: Response, reduced: Reduced, conditions):
+    def __init__(self, response: Response, reduced: ReducedFamily, conditions):
         self.response, self.conditions = response, conditions
-        self.root = np.sqrt([c[0] for c in conditions])
+        self.root = np.sqrt([c.inertia for c in conditions])
         self._known: dict[float, np.ndarray] = {}
-        self._parts = [self._condensed(reduced.fluid.parts(c[3])) for c in conditions]
+        self._parts = [self._condensed(reduced.family.parts(c.law)) for c in conditions]
         self.order = 1 if self._parts[0]["S0"].size else 0
         self.omega = [np.zeros(0) for _ in conditions]
         self.phase = [np.zeros(0) for _ in conditions]
@@ -216,7 +215,7 @@ class _Walk:
         self._add(cells, omega)
 
     def refine(self, most_points):
-        # a dense fluid that carries much added mass reaches its limit late
+        # a coupling that carries much added mass reaches its limit late
         for _ in range(5):
             late = [i for i, phase in enumerate(self.phase) if abs(self._gap(phase[-1])) > LATE]
             self._add(late, [4.0 * self.omega[i][-1] for i in late])

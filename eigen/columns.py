@@ -1,0 +1,321 @@
+"""Growth rates, and counts of unstable eigenvalues, of one state at many conditions, and what vouches for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .agreement import Certificate
+from .certificate import certified_spectrum
+from .condensation import Workspace
+from .factorization import SingularShiftError
+from .family import Condition, PencilFamily
+from .phase_count import phase_counts
+from .reduction import FamilyReduction, ReducedFamily, StaticSolver
+from .search import leading_modes
+from .transfer import TransferBasis
+from .winding import unstable_count
+
+#: Estimated relative error of an eigenvalue above which a cell is treated directly.
+TOLERANCE = 1e-6
+#: How a cell was found.
+REDUCED, DIRECT, MISSING = 0, 1, 2
+#: Share of a band up to which eigenvalues are counted, clear of those at its end.
+INSIDE = 0.999
+#: Leading eigenvalues kept of a cell.
+KEPT = 8
+#: Leading vectors taken at each condition: where damping orders the modes, and for a band.
+MOST, MOST_IN_BAND = 4, 12
+
+
+@dataclass(frozen=True)
+class Column:
+    """Cells of one state.
+
+    Attributes
+    ----------
+    growth_rate, frequency : (cells,) arrays, 1/s, Hz
+        Of the leading mode; NaN if none was found.
+    second : (cells,) array, 1/s
+        Growth rate of the next mode.
+    unstable : (cells,) int array
+        Eigenvalues right of `line` up to `band`, conjugates counted apart, by the spectrum.
+    counted : (cells,) int array
+        The same by the argument principle.
+    certain : (cells,) bool array
+        That count followed the phase everywhere.
+    error : float
+        Largest estimated relative error of leading eigenvalues among the checked cells.
+    how : (cells,) int array
+        `REDUCED` or `DIRECT`.
+    line, band : (cells,) arrays, 1/s, Hz
+        Region counted.
+    eigenvalues : callable or None
+        From any condition at the same state to its leading eigenvalues on the small model, sorted by growth rate.
+    corrected : callable or None
+        From a condition and an eigenvalue of the small model to Newton's correction of it by the full matrices.
+    cell : callable or None
+        From any further condition at the same state to a column of this one cell.
+    leading : list of arrays
+        Leading eigenvalues of the cells.
+    """
+
+    growth_rate: np.ndarray
+    frequency: np.ndarray
+    second: np.ndarray
+    unstable: np.ndarray
+    counted: np.ndarray
+    certain: np.ndarray
+    error: float
+    how: np.ndarray
+    line: np.ndarray
+    band: np.ndarray
+    eigenvalues: Callable[[Condition], np.ndarray] | None = None
+    corrected: Callable[[Condition, complex], complex] | None = None
+    cell: Callable[[Condition], Column] | None = None
+    leading: list[np.ndarray] = field(default_factory=list)
+
+    @property
+    def certified(self) -> np.ndarray:
+        """Cells for which both counts agree and the leading eigenvalue is accurate."""
+        return np.array([self.certificate(i).agrees for i in range(len(self.unstable))], bool)
+
+    def certificate(self, cell: int) -> Certificate:
+        """What vouches for a cell."""
+        accurate = self.how[cell] == DIRECT or self.error <= TOLERANCE
+        known = bool(np.isfinite(self.growth_rate[cell]))
+        return Certificate(
+            int(self.unstable[cell]),
+            int(self.counted[cell]),
+            bool(self.certain[cell] and accurate and known),
+            float(self.line[cell]),
+            float(self.band[cell]),
+        )
+
+
+class ColumnSolver:
+    """Solves families of one pattern after another."""
+
+    def __init__(self):
+        self._static, self._workspace = StaticSolver(), Workspace()
+        self._last: FamilyReduction | None = None
+
+    def reduction(self, family: PencilFamily) -> FamilyReduction:
+        """Small models of a family; the last one is kept."""
+        if self._last is None or self._last.family is not family:
+            self._last = FamilyReduction(family, self._static)
+        return self._last
+
+    def solve(self, family: PencilFamily, conditions, snapshots: int = 3) -> Column:
+        """All conditions at one state.
+
+        Parameters
+        ----------
+        family : PencilFamily
+        conditions : sequence of Condition
+        snapshots : int
+            Conditions at which leading vectors are taken into the second space; fewer than three conditions are solved
+            with the full pencil.
+
+        Raises
+        ------
+        SingularShiftError
+            If the stiffness is singular, or a full pencil has no usable shift.
+        """
+        conditions = [Condition(*c) for c in conditions]
+        reduction = self.reduction(family)
+        if len(conditions) < 3:
+            return self._directly(reduction, conditions)
+        places = _spread(conditions, snapshots)
+        banded = any(np.isfinite(family.reach(conditions[i]).band) for i in places)
+        first = reduction.wide if banded else reduction.coarse
+        fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
+        error = _error(reduction, fine, conditions, _between(places))
+        column = self._on(first, fine, conditions, error)
+
+        def eigenvalues(condition):
+            condition = Condition(*condition)
+            return family.reach(condition).leading(fine.eigenvalues([condition])[0])[:KEPT]
+
+        def corrected(condition, eigenvalue):
+            condition = Condition(*condition)
+            return complex(reduction.correction(fine.near(condition, eigenvalue), condition)[0])
+
+        def cell(condition):
+            return self._on(first, fine, [Condition(*condition)], error)
+
+        return replace(column, eigenvalues=eigenvalues, corrected=corrected, cell=cell)
+
+    def _on(self, first: ReducedFamily, fine: ReducedFamily, conditions, error: float) -> Column:
+        """Cells on a small model, counted on that of the first stage; those without a certificate directly."""
+        family = first.family
+        values = fine.eigenvalues(conditions)
+        leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
+        column = _column(leading, values, count_unstable(first, conditions, leading), error)
+        return self._repaired(column, family, conditions, np.flatnonzero(~column.certified))
+
+    def direct(self, family: PencilFamily, condition, count: int = 6):
+        """Leading modes of the full pencil, an `eigen.Spectrum`.
+
+        Raises
+        ------
+        SingularShiftError
+            If no usable shift was found.
+        """
+        condition = Condition(*condition)
+        return leading_modes(family.pencil(condition), count, family.search(condition), workspace=self._workspace)
+
+    def _directly(self, reduction: FamilyReduction, conditions) -> Column:
+        family, cells = reduction.family, len(conditions)
+        spectra = [self.direct(family, c) for c in conditions]
+        banded = any(np.isfinite(family.reach(c).band) for c in conditions)
+        first = reduction.wide if banded else reduction.coarse
+        counts = count_unstable(first, conditions, [s.eigenvalues[:1] for s in spectra])
+        column = _blank(cells, counts)
+        for i, spectrum in enumerate(spectra):
+            _enter(column, i, spectrum)
+        return self._recounted(column, family, conditions, np.flatnonzero(~column.certified))
+
+    def _repaired(self, column: Column, family, conditions, cells) -> Column:
+        for i in cells:
+            try:
+                spectrum = self.direct(family, conditions[i])
+            except (SingularShiftError, np.linalg.LinAlgError):
+                continue  # stays without a certificate
+            if len(spectrum):
+                _enter(column, i, spectrum)
+        return self._recounted(column, family, conditions, [i for i in cells if not column.certificate(i).agrees])
+
+    def _recounted(self, column: Column, family, conditions, cells) -> Column:
+        """Cells that still lack agreement, with a count of their own on a basis of structural modes.
+
+        The vectors of the spectrum join that basis: a mode that is all but neutral would otherwise stand on either side
+        of the line by the error of the basis alone.
+        """
+        for i in cells:
+            pencil, options = family.pencil(conditions[i]), family.search(conditions[i])
+            try:
+                basis = TransferBasis(pencil)
+                basis.enlarge(leading_modes(pencil, 6, options, workspace=self._workspace).q)
+                found = certified_spectrum(pencil, 6, options, workspace=self._workspace, basis=basis)
+            except (SingularShiftError, np.linalg.LinAlgError):
+                continue
+            if len(found.spectrum):
+                own = found.certificate
+                _enter(column, i, found.spectrum)
+                column.unstable[i], column.counted[i], column.certain[i] = own.unstable, own.counted, own.certain
+                column.line[i], column.band[i] = own.line, own.band
+        return column
+
+
+@dataclass(frozen=True)
+class _Counts:
+    number: np.ndarray
+    certain: np.ndarray
+    line: np.ndarray
+    band: np.ndarray
+
+
+def count_unstable(reduced: ReducedFamily, conditions, hints) -> _Counts:
+    """Count unstable eigenvalues at many conditions, each in its band.
+
+    Parameters
+    ----------
+    reduced : ReducedFamily
+    conditions : sequence of Condition
+    hints : sequence of complex arrays
+        For each condition, places near which the phase may turn fast.
+    """
+    cells = len(conditions)
+    counts = _Counts(np.zeros(cells, int), np.zeros(cells, bool), np.zeros(cells), np.full(cells, np.inf))
+    bands = np.array([reduced.family.reach(c).band for c in conditions])
+    damped = np.array([c.alpha != 0 or c.beta != 0 for c in conditions])
+    whole = np.flatnonzero(np.isinf(bands) & damped)
+    if whole.size:
+        found = phase_counts(reduced, [conditions[i] for i in whole], [hints[i][:2] for i in whole])
+        counts.number[whole], counts.certain[whole] = found.number, found.certain
+    for i in np.setdiff1d(np.arange(cells), whole):
+        band = None if np.isinf(bands[i]) else INSIDE * bands[i] / (2 * np.pi)
+        found = unstable_count(reduced.pencil(conditions[i]), scale=_scale(reduced), hints=list(hints[i]), band=band)
+        counts.number[i], counts.certain[i] = found.number, found.certain
+        counts.line[i], counts.band[i] = found.line, found.band
+    return counts
+
+
+def _scale(reduced: ReducedFamily) -> float:
+    """Lowest angular frequency of the structure, rad/s."""
+    square = np.linalg.eigvalsh(0.5 * (reduced.K + reduced.K.T))
+    return float(np.sqrt(square[square > 0].min(initial=np.inf))) if (square > 0).any() else 1.0
+
+
+def _error(reduction: FamilyReduction, fine: ReducedFamily, conditions, places) -> float:
+    """Relative change of leading eigenvalues under a correction with the full matrices, at conditions the space was
+    not made for.
+    """
+    worst = 0.0
+    for i in places:
+        pairs = fine.pairs(conditions[i], 2)
+        if pairs.values.size:
+            change = np.abs(reduction.correction(pairs, conditions[i])) / np.maximum(np.abs(pairs.values), 1.0)
+            worst = max(worst, float(change.max()))
+    return worst
+
+
+def _enter(column: Column, cell: int, spectrum) -> None:
+    """Put a direct spectrum into a cell."""
+    column.how[cell] = DIRECT
+    if not len(spectrum):
+        return
+    column.growth_rate[cell], column.frequency[cell] = spectrum.growth_rate[0], spectrum.frequency[0]
+    column.second[cell] = spectrum.growth_rate[1] if len(spectrum) > 1 else np.nan
+    inside = np.flatnonzero(spectrum.frequency <= column.band[cell])
+    column.leading[cell] = spectrum.eigenvalues[:KEPT]
+    column.unstable[cell] = spectrum.select(inside).count_right_of(column.line[cell])
+
+
+def _blank(cells: int, counts: _Counts) -> Column:
+    nothing = [np.full(cells, np.nan) for _ in range(3)]
+    return Column(
+        *nothing,
+        np.zeros(cells, int),
+        counts.number,
+        counts.certain,
+        0.0,
+        np.full(cells, DIRECT),
+        counts.line,
+        counts.band,
+        leading=[np.zeros(0, complex)] * cells,
+    )
+
+
+def _column(leading, values, counts: _Counts, error: float) -> Column:
+    inside = np.abs(values.imag) <= 2 * np.pi * counts.band[:, None]
+    first = [row[0] if len(row) else complex(np.nan, np.nan) for row in leading]
+    return Column(
+        growth_rate=np.array([value.real for value in first]),
+        frequency=np.array([value.imag / (2 * np.pi) for value in first]),
+        second=np.array([row[1].real if len(row) > 1 else np.nan for row in leading]),
+        unstable=((values.real > counts.line[:, None]) & inside).sum(axis=1),
+        counted=counts.number,
+        certain=counts.certain,
+        error=error,
+        how=np.full(len(leading), REDUCED),
+        line=counts.line,
+        band=counts.band,
+        leading=[row[:KEPT] for row in leading],
+    )
+
+
+def _spread(conditions, number: int) -> list[int]:
+    """Indices of conditions spread over the list."""
+    return sorted({int(round(x)) for x in np.linspace(0, len(conditions) - 1, min(number, len(conditions)))})
+
+
+def _between(places: list[int]) -> list[int]:
+    """The middle of the widest gap between places, the first of several."""
+    if len(places) < 2:
+        return places
+    gaps = [(b - a, -a, (a + b) // 2) for a, b in zip(places[:-1], places[1:])]
+    return [max(gaps)[2]]

@@ -1,0 +1,100 @@
+"""Families of pencils: one linearised structure under many conditions."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Hashable
+from typing import NamedTuple
+
+import numpy as np
+
+from .options import SearchOptions
+from .pencil import CoupledPencil
+
+#: Eigenvalues closer to the limit point than this share of it are not listed.
+CLEAR = 0.8
+
+
+class Condition(NamedTuple):
+    """What may differ between the pencils of a family.
+
+    Attributes
+    ----------
+    inertia : float
+        The coupling is a polynomial in sqrt(inertia) lambda, once its inner unknowns are scaled: what the density of a
+        fluid does.
+    alpha, beta : float
+        Damping C = alpha M + beta D, 1/s and s.
+    law : hashable
+        Which coupling parts.
+    """
+
+    inertia: float
+    alpha: float
+    beta: float
+    law: Hashable = 0.0
+
+
+class PencilFamily(ABC):
+    """Structure and coupling at one state; what `FamilyReduction` and `ColumnSolver` ask for.
+
+    Attributes
+    ----------
+    mass, damping, stiffness : (n, n) real sparse matrices
+        M, D and K; C = alpha M + beta D.
+    forces : (n, m) real sparse matrix G
+    slope : (m, n) real sparse matrix J
+    """
+
+    mass: object
+    damping: object
+    stiffness: object
+    forces: object
+    slope: object
+
+    @abstractmethod
+    def parts(self, law: Hashable) -> dict[str, np.ndarray]:
+        """A0 to S1 of `CoupledPencil` at inertia 1; the same object for the same law."""
+
+    @abstractmethod
+    def pencil(self, condition: Condition) -> CoupledPencil:
+        """The full pencil; its inner unknowns may be scaled differently."""
+
+    @abstractmethod
+    def search(self, condition: Condition) -> SearchOptions:
+        """What is searched in the spectrum: limit point and band."""
+
+    def coupling_at(self, s: complex, condition: Condition):
+        """A, B, R, S (s) with the inner unknowns scaled."""
+        p, z = self.parts(condition.law), s * np.sqrt(condition.inertia)
+        return (
+            p["A0"] + z * (p["A1"] + z * p["A2"]),
+            p["B0"] + z * p["B1"],
+            p["R0"] + z * (p["R1"] + z * p["R2"]),
+            p["S0"] + z * p["S1"],
+        )
+
+    def reach(self, condition: Condition) -> Reach:
+        """Where leading modes of a condition lie."""
+        options = self.search(condition)
+        floor = -np.inf if options.limit_point is None else CLEAR * options.limit_point
+        band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
+        return Reach(floor, band)
+
+
+class Reach(NamedTuple):
+    """Growth rates above `floor` (1/s) and angular frequencies up to `band` (rad/s)."""
+
+    floor: float
+    band: float
+
+    def leading(self, values: np.ndarray) -> np.ndarray:
+        """Eigenvalues of the upper half-plane in reach, sorted by growth rate.
+
+        Where none lies above the floor the largest of all is given, which then is close to the limit point.
+        """
+        upper = values[(values.imag >= 0) & (values.imag <= self.band)]
+        kept = upper[upper.real > self.floor]
+        if not kept.size and upper.size:
+            kept = upper[[int(np.argmax(upper.real))]]
+        return kept[np.argsort(-kept.real)]

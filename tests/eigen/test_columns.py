@@ -1,0 +1,116 @@
+"""Columns: one family of pencils under many conditions, against dense eigenvalues."""
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from eigen import Certificate, ColumnSolver, Condition, CoupledPencil, PencilFamily, SearchOptions, certified_spectrum
+from eigen.columns import DIRECT, REDUCED, count_unstable
+from eigen.reduction import POWERS, FamilyReduction
+
+SIZE = 60
+
+
+class Chain(PencilFamily):
+    """Masses on springs, with a coupling that feeds motion where it is dense enough, and one inner unknown."""
+
+    def __init__(self, max_frequency=None):
+        self.max_frequency = max_frequency
+        main = np.linspace(2.0, 3.0, SIZE)
+        self.mass = sp.identity(SIZE, format="csr")
+        self.stiffness = (1e4 * sp.diags([main, -np.ones(SIZE - 1), -np.ones(SIZE - 1)], [0, 1, -1])).tocsr()
+        self.damping = self.stiffness
+        patterns = np.array([np.sin((k + 1) * np.pi * np.arange(1, SIZE + 1) / (SIZE + 1)) for k in range(3)])
+        self.slope = sp.csr_matrix(patterns)
+        self.forces = sp.csr_matrix(patterns.T)
+        zero = {"A": (3, 3), "B": (3, 1), "R": (1, 3), "S": (1, 1)}
+        parts = {name: np.zeros(zero[name[0]]) for name in POWERS}
+        parts |= {"A1": 0.1 * np.diag([1.0, 0.5, 0.2]), "B0": np.full((3, 1), 0.3), "S0": np.ones((1, 1))}
+        parts |= {"R0": np.array([[0.1, 0.0, 0.2]]), "S1": 0.01 * np.ones((1, 1))}
+        self._parts = {0.0: parts, 1.0: parts | {"A2": -0.02 * np.eye(3)}}
+
+    def parts(self, law):
+        return self._parts[law]
+
+    def pencil(self, condition):
+        inertia, alpha, beta, law = condition
+        parts = {name: value * inertia ** (POWERS[name] / 2) for name, value in self.parts(law).items()}
+        damping = alpha * self.mass + beta * self.damping
+        return CoupledPencil(self.mass, damping, self.stiffness, self.forces, self.slope, **parts)
+
+    def search(self, condition):
+        band = self.max_frequency if self.max_frequency or condition.beta else 40.0
+        return SearchOptions(max_frequency=band, limit_point=-1 / condition.beta if condition.beta else None)
+
+
+def dense(family, condition):
+    values = la.eigvals(*family.pencil(condition).first_order())
+    return values[np.isfinite(values)]
+
+
+def conditions(alpha, beta, law):
+    return [Condition(inertia, alpha, beta, law) for inertia in np.geomspace(0.01, 100, 7)]
+
+
+@pytest.mark.parametrize("law", [0.0, 1.0])
+@pytest.mark.parametrize("alpha, beta", [(0.0, 2e-4), (1.0, 1e-5), (0.5, 0.0), (0.0, 0.0)])
+def test_cells_agree_with_dense_eigenvalues(alpha, beta, law):
+    family = Chain()
+    column = ColumnSolver().solve(family, conditions(alpha, beta, law))
+    assert column.certified.all()
+    for i, condition in enumerate(conditions(alpha, beta, law)):
+        values = dense(family, condition)
+        inside = values[np.abs(values.imag) <= 2 * np.pi * column.band[i]]
+        certificate = column.certificate(i)
+        assert certificate.unstable == certificate.counted == np.sum(inside.real > certificate.line)
+        leading = family.reach(condition).leading(values)[0]
+        assert column.growth_rate[i] == pytest.approx(leading.real, abs=1e-6 * abs(leading))
+    assert set(column.unstable > 0) == {True, False} or beta == 0
+
+
+def test_a_band_that_is_asked_for_ends_list_and_count():
+    condition = Condition(100.0, 0.0, 2e-4, 0.0)
+    whole, part = (ColumnSolver().solve(Chain(band), [condition] * 3) for band in (None, 20.0))
+    assert np.isinf(whole.band[0]) and part.band[0] == pytest.approx(20.0, rel=2e-3)
+    assert part.frequency[0] <= 20.0 and part.certified.all()
+
+
+def test_a_cell_and_a_mode_list_carry_one_certificate():
+    family, condition = Chain(), Condition(100.0, 0.0, 2e-4, 0.0)
+    cell = ColumnSolver().solve(family, [condition] * 3).certificate(1)
+    modes = certified_spectrum(family.pencil(condition), 6, family.search(condition)).certificate
+    assert type(cell) is type(modes) is Certificate
+    assert (cell.unstable, cell.counted, cell.stable) == (modes.unstable, modes.counted, modes.stable)
+
+
+def test_without_agreement_there_is_no_verdict():
+    assert Certificate(0, 2, True).stable is None and Certificate(0, 0, False).stable is None
+    assert Certificate(0, 0, True).stable is True and Certificate(2, 2, True).stable is False
+
+
+def test_correction_is_that_of_newton_on_the_full_pencil():
+    family, condition = Chain(), Condition(3.0, 0.0, 2e-4, 1.0)
+    reduction = FamilyReduction(family)
+    pairs = reduction.coarse.pairs(condition, 2)
+    better = pairs.values + reduction.correction(pairs, condition)
+    values = dense(family, condition)
+    for before, after in zip(pairs.values, better):
+        exact = values[np.argmin(np.abs(values - after))]
+        assert abs(after - exact) <= max(0.2 * abs(before - exact), 1e-9 * abs(exact))
+
+
+def test_further_cells_of_a_column_are_certified_too():
+    family, condition = Chain(), Condition(5.0, 0.0, 2e-4, 0.0)
+    more = ColumnSolver().solve(family, conditions(0.0, 2e-4, 0.0)).cell(condition)
+    assert more.certified.all() and more.how[0] in (REDUCED, DIRECT)
+    exact = family.reach(condition).leading(dense(family, condition))[0]
+    assert more.leading[0][0] == pytest.approx(exact, rel=1e-6)
+
+
+def test_counts_need_no_damping_at_all():
+    family = Chain()
+    reduced = FamilyReduction(family).wide
+    some = conditions(0.0, 0.0, 0.0)
+    counts = count_unstable(reduced, some, [np.zeros(0, complex)] * len(some))
+    assert (counts.line > 0).all() and counts.certain.all()
