@@ -63,6 +63,18 @@ def shaded(corners: np.ndarray, colours: np.ndarray) -> np.ndarray:
     return np.concatenate([colours[:, :3] * light[:, None], colours[:, 3:]], axis=1)
 
 
+def draw_skin(axes, corners: np.ndarray, colours: np.ndarray, zoom: float) -> None:
+    """A small view without axes of quadrilaterals (n, 4, 3) and their colours (n, 4)."""
+    colours = shaded(corners, colours)
+    axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.1))
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    for set_limits, a, b in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high):
+        set_limits(a, b)
+    axes.set_box_aspect(high - low, zoom=zoom)
+    axes.view_init(elev=26, azim=-140)
+    axes.set_axis_off()
+
+
 def frame(axes, points: np.ndarray) -> None:
     low, high = points.min(axis=0), points.max(axis=0)
     for set_limits, a, b in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,6 +12,7 @@ from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 #: Colours of things that recur.
@@ -96,6 +97,16 @@ def branch_looks(count: int) -> list[dict[str, Any]]:
     return [{"color": _NAMED[i % len(_NAMED)], "marker": _MARKERS[i % len(_MARKERS)]} for i in range(count)]
 
 
+def limits(values: Sequence[float], log: bool = False) -> tuple[float, float]:
+    """Ends of an axis that holds these values, with room about a single one."""
+    low, high = float(min(values)), float(max(values))
+    if high > low:
+        return low, high
+    return (0.5 * low, 2.0 * low) if log else (low - 0.5 * (abs(low) or 1.0), low + 0.5 * (abs(low) or 1.0))
+
+
+#: White about a text that may lie on a line.
+HALO = (withStroke(linewidth=3.0, foreground="white"),)
 _NAMED = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9", "#000000")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 #: What each parameter is called and shown in, and the factor from SI to that.
 SHOWN = {
-    "pressure": ("Inlet pressure", "kPa", 1e-3),
+    "pressure": ("Static inlet pressure", "kPa", 1e-3),
     "density": ("Fluid density", "kg/m³", 1.0),
     "alpha": ("Mass damping α", "1/s", 1.0),
     "beta": ("Stiffness damping β", "s", 1.0),

@@ -18,7 +18,7 @@ DESIGN = ("thickness", "angle", "strain")
 SYSTEM_NAMES = {"pressure": "inlet"}
 #: Labels with units.
 LABELS = {
-    "pressure": "Inlet pressure, kPa",
+    "pressure": "Static inlet pressure, kPa",
     "density": "Fluid density, kg/m³",
     "alpha": ("Mass damping α, 1/s"),
     "beta": "Stiffness damping β, s",
