@@ -115,8 +115,8 @@ def _axes(x: str, y: str):
 def _finish(figure: Figure, axes, title: str, from_zero: bool = True) -> Figure:
     axes.set_title(title, loc="left", fontweight="bold")
     axes.margins(0.06)
-    axes.set_xlim(left=0)
+    axes.set_xlim(0, 1.08 * max(0.0, axes.dataLim.x1) or None)
     if from_zero:
-        axes.set_ylim(bottom=0)
-    axes.legend(loc="best")
+        axes.set_ylim(0, 1.12 * max(0.0, axes.dataLim.y1) or None)
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.14), ncols=2)
     return figure

@@ -36,7 +36,7 @@ def layer_stress(state: State) -> Figure:
     for number, (axes, title, stress) in enumerate(zip(panels, mesh.layer_titles(), values)):
         shape = (mesh.shape[1], mesh.shape[0])
         image = axes.pcolormesh(arc * 1e3, z * 1e3, stress.reshape(shape), cmap=MAGNITUDE, vmin=0.0, rasterized=True)
-        colour_bar(figure, image, axes, "MPa", pad=0.03)
+        colour_bar(figure, image, axes, "Stress, MPa", pad=0.03)
         side = ", inside" if number == 0 else ", outside" if number == len(values) - 1 else ""
         axes.set_title(f"{number + 1}  {title}{side}", loc="left", fontsize=10)
         axes.grid(False)

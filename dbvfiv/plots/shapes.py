@@ -39,7 +39,7 @@ def lip_shapes(result: SteadyResults) -> Figure:
     axes.set_xlabel("x, mm")
     axes.set_ylabel("y, mm")
     axes.set_title("Lips at the outlet, inner faces", loc="left", fontweight="bold")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=5, title="static inlet pressure")
+    figure.legend(loc="outside lower center", ncols=5, title="static inlet pressure")
     return figure
 
 

@@ -195,7 +195,7 @@ def spectra(result: TransientResults) -> Figure:
         base = (result.verdict.get(name) or {}).get("frequency")
         if base:
             axes.axvline(base, color=ACCENT, lw=0.9, ls="--", zorder=0)
-            axes.set_title(f"period of the verdict: {in_steps(base, 1.0 / series.duration)} Hz", **_BESIDE)
+            axes.set_title(f"frequency by the verdict: {in_steps(base, 1.0 / series.duration)} Hz", **_BESIDE)
     panels[-1].set_xlim(0, min(1.15 * highest, 0.5 / np.median(np.diff(h["time"]))) or None)
     panels[-1].set_xlabel("Frequency, Hz")
     panels[0].tick_params(labelbottom=True)
@@ -244,7 +244,8 @@ def _space_time(result: TransientResults, name: str, factor: float, label: str, 
     axes.set_xlabel("Time, s")
     axes.set_ylabel("Distance from the lip z, mm")
     axes.set_title(heading, loc="left", fontweight="bold")
-    beyond = (values.min() < low, values.max() > high)
+    margin = 0.01 * (high - low)
+    beyond = (values.min() < low - margin, values.max() > high + margin)
     if any(beyond):
         axes.set_title(f"from {values.min():.3g} to {values.max():.3g} {label.split(', ')[1]}", loc="right", fontsize=9)
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
