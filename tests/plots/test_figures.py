@@ -35,7 +35,9 @@ def test_every_figure_is_there_and_labelled_with_units(figures):
     for name, figure in figures.items():
         labels = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
         assert labels, name
-        assert all(any(unit in label for unit in ("mm", "kPa", "kg/s", "m/s", "cm²", "MPa")) for label in labels), labels
+        assert all(any(unit in label for unit in ("mm", "kPa", "kg/s", "m/s", "cm²", "MPa")) for label in labels), (
+            labels
+        )
 
 
 def test_curves_hold_the_numbers(figures, coarse_run):
