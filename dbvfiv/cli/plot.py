@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -42,12 +43,15 @@ def command(
     ] = None,
     animate: Annotated[
         list[int] | None,
-        typer.Option("--animate", metavar="N", help="Also write a GIF of one cycle of mode N; may be repeated."),
+        typer.Option(
+            "--animate",
+            metavar="N",
+            help="Also write a GIF: of one cycle of mode N, or of the last N cycles of a transient; may be repeated.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Draw the figures of a result file; those of one state show the highest pressure unless --pressure is given."""
-    from ..errors import CaseError
     from ..results import load_result
 
     choices = {}
@@ -58,12 +62,28 @@ def command(
     if mode is not None:
         choices["mode"] = mode
     result = load_result(file)
+    films = [_film(result, file, folder, number) for number in animate or ()]  # misuse shows before anything is drawn
     written = result.plot(folder, format.value, only=only or (), **choices)
-    for number in animate or ():
-        if not hasattr(result, "animate"):
-            raise CaseError(f"The {result.kind} result {str(file)!r} has no modes to animate.")
-        written.append(result.animate(folder / f"mode-{number}.gif", number))
+    written += [make() for make in films]
     if as_json:
         print_json({"written": [str(path) for path in written]})
     else:
         print("\n".join(f"Wrote {path}." for path in written))
+
+
+def _film(result, file: Path, folder: Path, number: int) -> Callable[[], Path]:
+    """What writes the film that ``--animate`` asks of a result."""
+    from ..errors import CaseError
+    from ..plots.transient_motion import cycles_to_animate
+
+    if result.kind == "modes":
+        result.mode(number)
+        return lambda: result.animate(folder / f"mode-{number}.gif", number)
+    if result.kind == "transient":
+        duration = cycles_to_animate(result, number)
+        frames = min(48 * number, 240)
+        name = f"last-{number}-cycles.gif" if number > 1 else "last-cycle.gif" if result.cycle else "run.gif"
+        return lambda: result.animate(folder / name, frames=frames, duration=duration)
+    raise CaseError(
+        f"The {result.kind} result {str(file)!r} does not move; --animate takes results of modes and transient."
+    )

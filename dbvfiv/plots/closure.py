@@ -8,21 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import Normalize
+from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from ..record.whole_valve import WholeValve
-from .deformed import COLOURS, shaded
+from .deformed import COLOURS, draw_skin
+from .faces import ValveSkin, faces
 from .layers import unrolled
-from .style import MAGNITUDE, kilopascals, new_figure, some_of
+from .style import COMPUTED, MAGNITUDE, PUBLISHED, REST, colour_bar, headline, kilopascals, new_figure, some_of
 
 if TYPE_CHECKING:
     from ..results.closure import ClosureResults, PressedState
-
-#: Contact pressures above this multiple of the back pressure share a colour: they stand at single nodes beside the fold
-#: of the side edge.
-_CLIP = 4.0
 
 
 def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -35,157 +30,130 @@ def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
 
 
 def side_views(result: ClosureResults) -> Figure:
-    """Valve seen from the side at up to four back pressures, coloured by displacement, with a view in space (compare
-    Fig. 3-21 of the thesis).
+    """Valve cut open at x = 0 at up to four back pressures: the wall where it is cut, the inner face behind it coloured
+    by displacement, and a view in space (compare Fig. 3-21 of the thesis).
     """
     states = some_of(sorted(result.states, key=lambda s: s.pressure), 4)
-    valve = WholeValve.of(result.mesh)
+    skin = ValveSkin.of(result.mesh)
     rows = -(-len(states) // 2)
-    figure = new_figure(11.0, 3.2 * rows + 0.6)
+    figure = new_figure(11.0, 3.4 * rows + 0.6)
     panels = figure.subplots(rows, 2 if len(states) > 1 else 1, squeeze=False, sharex=True, sharey=True).ravel()
-    scale = Normalize(0.0, max(s.max_displacement for s in states) * 1e3)
+    scale = Normalize(0.0, max(s.max_displacement for s in states) * 1e3 or 1.0)
     for letter, axes, state in zip("abcd", panels, states):
-        _side(axes, valve, state, scale)
+        _cut(axes, skin, state, scale)
+        _inset(axes, skin, state, scale)
         axes.set_title(
-            f"({letter}) {kilopascals(state.pressure)}, largest {state.max_displacement * 1e3:.1f} mm",
-            loc="left",
-            fontsize=10,
+            f"({letter}) {kilopascals(state.pressure)}, largest {state.max_displacement * 1e3:.1f} mm", loc="left"
         )
-        _inset(figure, axes, valve, state, scale)
+        axes.set_xlabel("Distance from the lip z, mm")
+        axes.set_ylabel("y, mm")
+        axes.tick_params(labelbottom=True, labelleft=True)
     for axes in panels[len(states) :]:
         axes.set_visible(False)
-    for axes in panels[: len(states)][-2:]:
-        axes.set_xlabel("Distance from the lip z, mm")
-        axes.tick_params(labelbottom=True)
-    for axes in panels[::2]:
-        axes.set_ylabel("y, mm")
-    bar = figure.colorbar(ScalarMappable(scale, COLOURS), ax=list(panels), shrink=0.7, pad=0.02, aspect=30)
-    bar.set_label("Displacement, mm")
-    bar.outline.set_visible(False)
-    figure.suptitle(f"Back pressure, {_supports(result)}: mid-surface from the side", fontweight="bold", fontsize=11)
+    colour_bar(figure, ScalarMappable(scale, COLOURS), list(panels), "Displacement, mm", shrink=0.7, aspect=30)
+    headline(figure, f"Back pressure, {supports_of(result)}: cut at x = 0 (dashed: at rest)")
     return figure
 
 
-def _side(axes, valve: WholeValve, state: PressedState, scale: Normalize) -> None:
-    """Projection along x of the half that faces the viewer, far quadrilaterals first."""
-    points, size = _moved(valve, state)
-    corners = points[valve.quads] * 1e3
-    near = np.flatnonzero(valve.points[valve.quads][:, :, 0].mean(axis=1) >= 0)
-    order = near[np.argsort(corners[near][:, :, 0].mean(axis=1))]
-    colours = COLOURS(scale(size[valve.quads[order]].mean(axis=1)))
-    axes.add_collection(
-        PolyCollection(corners[order][:, :, [2, 1]], facecolors=colours, edgecolors="0.25", linewidths=0.15)
-    )
-    quarter = state.results.mesh
-    rest = quarter.nodes[quarter.rows[:, 0]] * 1e3
-    axes.plot(rest[:, 2], rest[:, 1], "--", color="0.5", lw=0.9)
-    axes.plot(rest[:, 2], -rest[:, 1], "--", color="0.5", lw=0.9)
+def _cut(axes, skin: ValveSkin, state: PressedState, scale: Normalize) -> None:
+    """Projection along x of the inner face of one half, far cells first, and of the wall in the plane x = 0."""
+    corners = skin.corners(state.nodal) * 1e3
+    size = skin.means(np.linalg.norm(state.nodal[:, :3], axis=1)) * 1e3
+    count = len(skin.valve.quads)
+    inner = np.arange(count, 2 * count)
+    inner = inner[corners[inner][:, :, 0].mean(axis=1) > 0]
+    order = inner[np.argsort(-corners[inner][:, :, 0].mean(axis=1))]
+    look = {"facecolors": COLOURS(scale(size[order])), "edgecolors": "0.25", "linewidths": 0.15}
+    axes.add_collection(PolyCollection(corners[order][:, :, [2, 1]], **look))
+    mesh = state.results.mesh
+    line = mesh.rows[:, 0]
+    low, high = ((face[line] * 1e3)[:, [2, 1]] for face in faces(mesh, state.nodal))
+    wall = np.concatenate([low, high[::-1]])
+    walls = PolyCollection([wall, wall * [1, -1]], facecolors="#c9b8a8", edgecolors="black", linewidths=0.7)
+    walls.set_label("wall")
+    axes.add_collection(walls)
+    for face in faces(mesh):
+        for sign in (1, -1):
+            axes.plot(face[line, 2] * 1e3, sign * face[line, 1] * 1e3, "--", color="0.5", lw=0.8)
+    top = 1.08 * float(faces(mesh)[1][:, 1].max()) * 1e3
     axes.set_aspect("equal")
-    axes.set_xlim(-10, quarter.z[-1] * 1e3 + 10)
-    axes.set_ylim(-155, 195)
+    axes.set_xlim(-10, mesh.z[-1] * 1e3 + 10)
+    axes.set_ylim(-top, 1.3 * top)
 
 
-def _inset(figure: Figure, axes, valve: WholeValve, state: PressedState, scale: Normalize) -> None:
-    points, size = _moved(valve, state)
-    corners = points[valve.quads][:, :, [2, 0, 1]]
+def _inset(axes, skin: ValveSkin, state: PressedState, scale: Normalize) -> None:
     small = axes.inset_axes([0.0, 0.56, 0.5, 0.46], projection="3d", computed_zorder=False)
-    colours = shaded(corners, COLOURS(scale(size[valve.quads].mean(axis=1))))
-    small.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.1))
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    for setter, a, b in zip((small.set_xlim, small.set_ylim, small.set_zlim), low, high):
-        setter(a, b)
-    small.set_box_aspect(high - low, zoom=1.35)
-    small.view_init(elev=26, azim=-140)
-    small.set_axis_off()
+    size = skin.means(np.linalg.norm(state.nodal[:, :3], axis=1)) * 1e3
+    draw_skin(small, skin.corners(state.nodal)[:, :, [2, 0, 1]], COLOURS(scale(size)), zoom=1.35)
     small.patch.set_alpha(0.0)
 
 
 def contact_map(result: ClosureResults) -> Figure:
-    """Contact pressure on the unrolled inner face of a quarter at up to four back pressures."""
+    """Contact pressure on the unrolled inner face of a quarter at up to four back pressures, up to its maximum."""
     states = some_of(sorted((s for s in result.states if s.contact_nodes), key=lambda s: s.pressure), 4)
     mesh = result.mesh
     arc, z = (1e3 * value for value in unrolled(mesh))
-    pressed = np.array([s.contact_pressure for s in states])[:, mesh.rows].max(axis=(0, 2)) > 0
-    last = min(len(z) - 1, int(np.flatnonzero(pressed)[-1]) + 3)
+    ratios = [state.contact_pressure[mesh.rows] / state.pressure for state in states]
+    last = min(len(z) - 1, int(np.flatnonzero((np.array(ratios) > 0).any(axis=(0, 2)))[-1]) + 3)
     figure = new_figure(3.1 * len(states) + 0.9, 4.8)
     panels = figure.subplots(1, len(states), squeeze=False, sharex=True, sharey=True).ravel()
-    scale = Normalize(0.0, _CLIP)
-    for axes, state in zip(panels, states):
-        ratio = state.contact_pressure[mesh.rows] / state.pressure
-        axes.pcolormesh(
-            arc[: last + 1],
-            z[: last + 1],
-            ratio[: last + 1],
-            shading="gouraud",
-            cmap=MAGNITUDE,
-            norm=scale,
-            rasterized=True,
-        )
+    # the few nodes beside the fold of the side edge, where it peaks, do not take all of the range
+    scale = PowerNorm(0.5, 0.0, max(float(ratio.max()) for ratio in ratios))
+    shown = slice(0, last + 1)
+    for axes, state, ratio in zip(panels, states, ratios):
+        look = {"shading": "gouraud", "cmap": MAGNITUDE, "norm": scale, "rasterized": True}
+        drawn = axes.pcolormesh(arc[shown], z[shown], ratio[shown], **look)
         touching = ratio > 0
         axes.plot(arc[touching], z[touching], ".", ms=1.6, color="white", alpha=0.7)
+        peak = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+        axes.plot(arc[peak], z[peak], "x", color=PUBLISHED, ms=7, mew=1.6)
         axes.axhline(result.case.valve.duckbill_length * 1e3, color="0.6", lw=0.8, ls=":")
         axes.set_title(
-            f"{kilopascals(state.pressure)}\n{state.contact_force:.0f} N on {state.sealed_area * 1e4:.0f} cm²",
+            f"{kilopascals(state.pressure)}\n{state.contact_force:.0f} N on {state.sealed_area * 1e4:.0f} cm²\n"
+            f"largest {ratio[peak]:.3g} times, {ratio[peak] * state.pressure / 1e3:.3g} kPa",
             loc="left",
-            fontsize=10,
+            fontsize=9,
         )
         axes.set_xlabel("Arc from the centre, mm")
         axes.grid(False)
-        axes.set_xlim(0, arc[: last + 1].max())
+        axes.set_xlim(0, arc[shown].max())
         axes.set_ylim(0, z[last].max())
+        axes.tick_params(labelleft=True)
     panels[0].set_ylabel("Distance from the lip z, mm")
-    bar = figure.colorbar(ScalarMappable(scale, MAGNITUDE), ax=list(panels), pad=0.02, aspect=28, extend="max")
-    bar.set_label("Contact pressure over back pressure")
-    bar.outline.set_visible(False)
-    figure.suptitle(f"Contact pressure, {_supports(result)} (dots: touching nodes)", fontweight="bold", fontsize=11)
+    colour_bar(figure, drawn, list(panels), "Contact pressure over back pressure")
+    headline(figure, f"Contact pressure, {supports_of(result)} (dots: touching nodes; cross: largest)")
     return figure
 
 
 def buckling_shape(result: ClosureResults) -> Figure:
     """The first buckling state and the shape it leaves it by, exaggerated."""
     first, mesh = result.buckling[0], result.mesh
-    valve = WholeValve.of(mesh)
-    mode = first.shape[:, :3] / np.abs(first.shape[:, :3]).max()
-    size = np.linalg.norm(valve.vectors(mode), axis=1)
+    shape = first.shape / np.abs(first.shape[:, :3]).max()
+    size = np.linalg.norm(shape[:, :3], axis=1)
+    skin = ValveSkin.of(mesh)
     figure = new_figure(10.0, 4.4)
     left = figure.add_subplot(1, 2, 1, projection="3d", computed_zorder=False)
-    base = valve.points + valve.vectors(first.nodal[:, :3])
-    corners = (base + 0.03 * valve.vectors(mode))[valve.quads][:, :, [2, 0, 1]]
-    colours = shaded(corners, COLOURS(size[valve.quads].mean(axis=1) / size.max()))
-    left.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.2))
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    for setter, a, b in zip((left.set_xlim, left.set_ylim, left.set_zlim), low, high):
-        setter(a, b)
-    left.set_box_aspect(high - low, zoom=1.25)
-    left.view_init(elev=26, azim=-140)
-    left.set_axis_off()
+    corners = skin.corners(first.nodal + 0.03 * shape)[:, :, [2, 0, 1]]
+    draw_skin(left, corners, COLOURS(skin.means(size) / size.max()), zoom=1.25)
     left.set_title("Buckling state plus 30 mm of its shape", loc="left", fontsize=10)
     right = figure.add_subplot(1, 2, 2)
-    row = mesh.rows[int(np.argmax(np.linalg.norm(mode[mesh.rows], axis=2).max(axis=1)))]
-    rest, moved = mesh.nodes[row], (mesh.nodes + first.nodal[:, :3])[row]
-    right.plot(*rest[:, :2].T * 1e3, "--", color="0.55", lw=1.2, label="at rest")
-    right.plot(*moved[:, :2].T * 1e3, color="#1f4e79", label="buckling state")
-    for sign in (1, -1):
-        there = moved + sign * 0.015 * mode[row]
-        right.plot(
-            *there[:, :2].T * 1e3, color="#c0392b", lw=1.1, ls=":", label="± 15 mm of the shape" if sign > 0 else None
-        )
+    row = mesh.rows[int(np.argmax(np.abs(shape[mesh.rows, :3]).max(axis=(1, 2))))]
+    for nodal, look in (
+        (None, {"color": REST, "ls": "--", "lw": 1.2, "label": "inner face at rest"}),
+        (first.nodal, {"color": COMPUTED, "label": "buckling state"}),
+        (first.nodal + 0.015 * shape, {"color": PUBLISHED, "lw": 1.1, "ls": ":", "label": "± 15 mm of the shape"}),
+        (first.nodal - 0.015 * shape, {"color": PUBLISHED, "lw": 1.1, "ls": ":"}),
+    ):
+        right.plot(*faces(mesh, nodal)[0][row, :2].T * 1e3, **look)
     right.set_aspect("equal")
     right.set_xlabel("x, mm")
     right.set_ylabel("y, mm")
-    right.set_title(f"Section at z = {rest[0, 2] * 1e3:.0f} mm, where the shape is largest", loc="left", fontsize=10)
-    right.legend(loc="lower left")
-    figure.suptitle(
-        f"Buckling at {kilopascals(first.pressure)} ({first.kind}), {_supports(result)}", fontweight="bold", fontsize=11
-    )
+    right.set_title(f"Section at z = {1e3 * mesh.nodes[row[0], 2]:.0f} mm, where the shape is largest", loc="left")
+    right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3)
+    headline(figure, f"Buckling at {kilopascals(first.pressure)} ({first.kind}), {supports_of(result)}")
     return figure
 
 
-def _moved(valve: WholeValve, state: PressedState) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (np, 3), m, and sizes of displacement (np,), mm."""
-    shift = valve.vectors(state.nodal[:, :3])
-    return valve.points + shift, np.linalg.norm(shift, axis=1) * 1e3
-
-
-def _supports(result: ClosureResults) -> str:
+def supports_of(result: ClosureResults) -> str:
+    """What holds the walls apart, as it stands in titles."""
     return "contact of the inner faces" if result.supports == "contact" else "supports of Th. 3.6"

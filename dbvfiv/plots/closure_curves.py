@@ -8,10 +8,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .style import ACCENT, COMPUTED, PUBLISHED, REST, kilopascals, new_figure, pressure_colours, some_of
+from .closure import supports_of
+from .faces import faces
+from .style import (
+    ACCENT,
+    COMPUTED,
+    HALO,
+    PUBLISHED,
+    REST,
+    headline,
+    kilopascals,
+    limits,
+    log_axis,
+    new_figure,
+    pressure_colours,
+    some_of,
+)
 
 if TYPE_CHECKING:
     from ..results.closure import ClosureResults
+
+
+#: Passage, mm2, below which a valve is shut for any purpose.
+_SHUT = 0.01
 
 
 def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -26,47 +45,49 @@ def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
 
 
 def closure_curve(result: ClosureResults) -> Figure:
-    """Sealed length, contact force, deepest displacement and lowest stiffness over the back pressure."""
-    figure = new_figure(9.0, 6.4)
+    """Sealed length, contact force, deepest displacement and lowest stiffness over the back pressure; dots are the
+    states that were asked for.
+    """
+    figure = new_figure(9.4, 6.8)
     panels = figure.subplots(2, 2, sharex=True).ravel()
-    walk = result.walk
-    p = np.array([point.pressure for point in walk]) / 1e3
-
-    def values(name):
-        return np.array([getattr(point, name) for point in walk])
-
     length, force, moved, stiffness = panels
-    length.plot(p, values("contact_front") * 1e3, color=COMPUTED, label="front of contact on the centre line")
-    length.plot(p, values("sealed_length") * 1e3, color=ACCENT, label="sealed length")
-    length.plot(p, values("lip_seal") * 1e3, color=ACCENT, ls="--", label="of it from the lip on")
-    length.axhline(result.case.valve.duckbill_length * 1e3, color=REST, lw=0.9, ls=":")
+    _over_pressure(result, length, "contact_front", 1e3, label="front of contact on the centre line")
+    _over_pressure(result, length, "sealed_length", 1e3, color=ACCENT, label="sealed length")
+    _over_pressure(result, length, "lip_seal", 1e3, color=ACCENT, ls="--", label="of it from the lip on")
+    length.axhline(result.case.valve.duckbill_length * 1e3, color=REST, lw=0.9, ls=":", label="duckbill")
+    length.set_ylim(bottom=0)
     length.set_ylabel("Length along the axis, mm")
-    length.legend()
-    force.plot(p, values("contact_force"), color=COMPUTED)
+    length.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=8, borderaxespad=0.2)
+    _over_pressure(result, force, "contact_force", 1.0)
     force.set_ylabel("Force between the walls, N")
-    moved.plot(p, values("max_displacement") * 1e3, color=COMPUTED)
+    _over_pressure(result, moved, "max_displacement", 1e3)
     moved.set_ylabel("Largest displacement, mm")
-    stiffness.plot(p, values("lowest_eigenvalue") / 1e3, color=COMPUTED)
+    _over_pressure(result, stiffness, "lowest_eigenvalue", 1e-3)
     stiffness.axhline(0.0, color=REST, lw=0.9)
     stiffness.set_ylabel("Lowest stiffness eigenvalue, 10³ 1/s²")
     for b in result.buckling[:1]:
         for axes in panels:
             axes.axvline(b.pressure / 1e3, color=PUBLISHED, lw=1.0, ls="--")
-        stiffness.annotate(
-            f"{b.kind}, {kilopascals(b.pressure)}",
-            (b.pressure / 1e3, 0),
-            (6, 8),
-            textcoords="offset points",
-            color=PUBLISHED,
-            fontsize=9,
-        )
+        look = {"textcoords": "offset points", "color": PUBLISHED, "fontsize": 9, "path_effects": HALO}
+        stiffness.annotate(f"{b.kind}, {kilopascals(b.pressure)}", (b.pressure / 1e3, 0), (6, 8), **look)
     for axes in panels:
-        for state in result.states:
-            axes.axvline(state.pressure / 1e3, color="0.85", lw=0.8, zorder=0)
-    for axes in panels[2:]:
         axes.set_xlabel("Back pressure, kPa")
-    figure.suptitle(f"Closure, {_supports(result)}", fontweight="bold", fontsize=11)
+        axes.tick_params(labelbottom=True)
+        axes.set_xlim(*limits([0.0, *(point.pressure / 1e3 for point in result.walk)]))
+    headline(figure, f"Closure, {supports_of(result)} (dots: states asked for)")
     return figure
+
+
+def _over_pressure(result: ClosureResults, axes, name: str, factor: float, **look) -> None:
+    """A column of the path over the back pressure, with dots at the states."""
+    look = {"color": COMPUTED} | look
+    p = np.array([point.pressure for point in result.walk])
+    values = factor * np.array([getattr(point, name) for point in result.walk], float)
+    axes.plot(p / 1e3, values, marker="." if len(p) == 1 else None, **look)
+    asked = np.array([state.pressure for state in result.states])
+    asked = asked[(asked >= p.min()) & (asked <= p.max())]
+    order = np.argsort(p)
+    axes.plot(asked / 1e3, np.interp(asked, p[order], values[order]), "o", color=look["color"], ms=4.5)
 
 
 def passage(result: ClosureResults) -> Figure:
@@ -75,11 +96,10 @@ def passage(result: ClosureResults) -> Figure:
     axes = figure.add_subplot()
     states = some_of(sorted(result.states, key=lambda s: s.pressure))
     z = result.mesh.z * 1e3
-    least = 1e-8  # m2; below that a passage is shut for any purpose
     for state, colour in zip(states, pressure_colours([s.pressure for s in states])):
         axes.semilogy(
             z,
-            np.maximum(4 * state.opening, least) * 1e6,
+            np.maximum(4e6 * state.opening, _SHUT),
             color=colour,
             marker=".",
             ms=3,
@@ -91,28 +111,42 @@ def passage(result: ClosureResults) -> Figure:
     axes.axvline(result.case.valve.duckbill_length * 1e3, color=REST, lw=0.8, ls=":")
     axes.set_xlabel("Distance from the lip z, mm")
     axes.set_ylabel("Passage between the inner faces, mm²")
-    axes.set_title(f"What stays open, whole valve, {_supports(result)}", loc="left", fontweight="bold")
-    axes.legend(loc="lower right", ncols=2)
+    axes.set_title(
+        f"What stays open, whole valve, {supports_of(result)} ({_SHUT:g} mm² or less drawn there)",
+        loc="left",
+        fontweight="bold",
+    )
+    log_axis(axes.yaxis, _SHUT, 4e6 * max(float(state.opening.max()) for state in states))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4)
     return figure
 
 
 def reversal(result: ClosureResults) -> Figure:
-    """From flow to back pressure: opening of the lips and position of the saddle as the drive turns round slowly."""
-    figure = new_figure(7.2, 4.6)
-    axes = figure.add_subplot()
+    """From flow to back pressure as the drive turns round slowly: the flow area of the open valve, and the narrowest
+    passage between the faces of the shut one, which are two measures and stand on two axes.
+    """
+    figure = new_figure(9.0, 4.6)
+    left, right = figure.subplots(1, 2)
     opened = sorted(result.opened, key=lambda s: -s.pressure)
-    through = np.array([s.pressure for s in opened] + [0.0]) / 1e3
-    area = np.array([s.outlet_area for s in opened] + [np.nan]) * 1e6
-    back = np.array([0.0] + [-p.pressure for p in result.walk]) / 1e3
-    left = np.array([result.reference_opening] + [p.least_opening for p in result.walk]) * 1e6
-    axes.semilogy(through, area, color=COMPUTED, label="flow area at the lip, water flowing")
-    axes.semilogy(back, np.maximum(left, 1e-2), color=ACCENT, label="narrowest passage between the faces, no flow")
-    axes.axvline(0.0, color=REST, lw=0.9)
-    axes.set_xlabel("Pressure inside less pressure outside, kPa")
-    axes.set_ylabel("Area, whole valve, mm²")
-    axes.invert_xaxis()
-    axes.set_title(f"From open to shut, quasi-static, {_supports(result)}", loc="left", fontweight="bold")
-    axes.legend()
+    left.plot([s.pressure / 1e3 for s in opened], [s.outlet_area * 1e4 for s in opened], "o-", color=COMPUTED, ms=4)
+    left.set_ylabel("Flow area at the lip, whole valve, cm²")
+    left.set_xlabel("Static inlet pressure, kPa")
+    left.set_ylim(bottom=0)
+    left.set_xlim(max([s.pressure / 1e3 for s in opened], default=1.0) * 1.03, 0)
+    left.set_title("Fluid flowing", loc="left")
+    p = np.array([0.0] + [point.pressure for point in result.walk]) / 1e3
+    area = np.array([result.reference_opening] + [point.least_opening for point in result.walk]) * 1e6
+    shut = area <= _SHUT
+    right.semilogy(p, np.where(shut, np.nan, area), "o-", color=ACCENT, ms=4)
+    right.plot(p[shut], np.full(shut.sum(), _SHUT), "v", color=ACCENT, ms=4.5, label=f"{_SHUT:g} mm² or less: shut")
+    log_axis(right.yaxis, _SHUT, max(area.max(), 10 * _SHUT))
+    right.set_ylabel("Narrowest passage between the inner faces, mm²")
+    right.set_xlabel("Back pressure, kPa")
+    right.set_xlim(left=0)
+    right.set_title("Pressed from outside, no flow", loc="left")
+    if shut.any():
+        right.legend(loc="upper right")
+    headline(figure, f"From open to shut, quasi-static, {supports_of(result)}")
     return figure
 
 
@@ -127,8 +161,8 @@ def in_time(result: ClosureResults) -> Figure:
 
     t = values("time", 1.0)
     curves = (
-        ("inlet_pressure", 1e-3, "Drive, kPa"),
-        ("lip_opening", 1e3, "Lip, mm"),
+        ("inlet_pressure", 1e-3, "Static inlet\npressure, kPa"),
+        ("lip_opening", 1e3, "Clear lip\nopening, mm"),
         ("least_opening", 1e6, "Passage, mm²"),
         ("mass_flow", 1.0, "Flow, kg/s"),
         ("contact_force", 1.0, "Contact, N"),
@@ -139,40 +173,39 @@ def in_time(result: ClosureResults) -> Figure:
         axes.axvline(closing.turn.zero, color=REST, lw=0.9, ls=":")
         if closing.closing_time is not None:
             axes.axvline(closing.turn.start + closing.closing_time, color=PUBLISHED, lw=1.0, ls="--")
-    panels[2].set_yscale("log")
+    passage_left = values("least_opening", 1e6)
+    log_axis(panels[2].yaxis, 0.1, max(float(passage_left.max()), 1.0))
     panels[2].set_ylim(bottom=0.1)
     panels[2].axhline(closing.shut_below * 1e6, color=ACCENT, lw=1.0, ls=":")
     panels[-1].set_xlabel("Time, s (dotted: the drive changes sign; dashed: shut for good)")
-    figure.suptitle("The drive turns round", fontweight="bold", fontsize=11)
+    headline(figure, "The drive turns round")
     figure.align_ylabels(panels)
     return figure
 
 
 def supports_compared(first: ClosureResults, second: ClosureResults) -> Figure:
-    """Front of contact, displacement, stiffness and centre line with two kinds of supports."""
-    figure = new_figure(9.6, 6.8)
+    """Front of contact, displacement, stiffness and inner face at x = 0 with two kinds of supports."""
+    figure = new_figure(9.6, 7.0)
     panels = figure.subplots(2, 2).ravel()
     front, moved, stiffness, line = panels
     for result, colour, dash in ((first, COMPUTED, "-"), (second, PUBLISHED, "--")):
         p = np.array([point.pressure for point in result.walk]) / 1e3
-        name = _supports(result)
+        name = supports_of(result)
         front.plot(p, [point.contact_front * 1e3 for point in result.walk], dash, color=colour, label=name)
-        moved.plot(p, [point.max_displacement * 1e3 for point in result.walk], dash, color=colour, label=name)
-        stiffness.plot(p, [point.lowest_eigenvalue / 1e3 for point in result.walk], dash, color=colour, label=name)
+        moved.plot(p, [point.max_displacement * 1e3 for point in result.walk], dash, color=colour)
+        stiffness.plot(p, [point.lowest_eigenvalue / 1e3 for point in result.walk], dash, color=colour)
         centre = result.mesh.rows[:, 0]
         for state, shade in zip(result.states, np.linspace(0.35, 1.0, len(result.states))):
-            at = (result.mesh.nodes[centre] + state.nodal[centre, :3]) * 1e3
+            at = faces(result.mesh, state.nodal)[0][centre] * 1e3
             line.plot(at[:, 2], at[:, 1], dash, color=colour, alpha=shade, lw=1.2)
-    mesh = first.mesh
-    rest = mesh.nodes[mesh.rows[:, 0]] * 1e3
-    line.plot(rest[:, 2], rest[:, 1], color=REST, lw=1.0)
-    half = 0.5e3 * np.repeat(mesh.thickness.reshape(mesh.shape[1], mesh.shape[0])[:, 0], 2)
-    line.plot(np.repeat(mesh.z, 2)[1:-1] * 1e3, half, color=ACCENT, lw=1.0, label="half the wall: inner faces meet")
-    line.set_xlim(0.15e3, 0.5e3)
-    line.set_ylim(0, 110)
+    rest = faces(first.mesh)[0][first.mesh.rows[:, 0]] * 1e3
+    line.plot(rest[:, 2], rest[:, 1], color=REST, lw=1.0, label="at rest")
+    line.axhline(0.0, color=ACCENT, lw=1.0, label="inner faces meet")
+    line.set_xlim(0.25 * rest[-1, 2], 0.9 * rest[-1, 2])
+    line.set_ylim(-5, 0.75 * rest[:, 1].max())
     line.legend(loc="upper left")
     line.set_xlabel("Distance from the lip z, mm")
-    line.set_ylabel("Mid-surface on the centre line y, mm")
+    line.set_ylabel("Inner face at x = 0, y, mm")
     for axes, label in (
         (front, "Front of contact on the centre line, mm"),
         (moved, "Largest displacement, mm"),
@@ -180,26 +213,8 @@ def supports_compared(first: ClosureResults, second: ClosureResults) -> Figure:
     ):
         axes.set_xlabel("Back pressure, kPa")
         axes.set_ylabel(label)
-    front.axvline(21.0, color=REST, lw=0.9, ls=":")
-    front.annotate(
-        "saddle touches, Th. 3.6",
-        (21.0, front.get_ylim()[1]),
-        (-4, -4),
-        textcoords="offset points",
-        ha="right",
-        va="top",
-        fontsize=8.5,
-        color="0.35",
-    )
-    front.legend(loc="center left")
+    front.axvline(21.0, color=REST, lw=0.9, ls=":", label="saddle touches, Th. 3.6")
+    figure.legend(loc="outside lower center", ncols=3)
     pressures = ", ".join(f"{s.pressure / 1e3:g}" for s in first.states)
-    figure.suptitle(
-        f"Contact of the inner faces and the supports of Th. 3.6 (centre lines at {pressures} kPa)",
-        fontweight="bold",
-        fontsize=11,
-    )
+    headline(figure, f"Contact of the inner faces and the supports of Th. 3.6 (inner faces at {pressures} kPa)")
     return figure
-
-
-def _supports(result: ClosureResults) -> str:
-    return "contact of the inner faces" if result.supports == "contact" else "supports of Th. 3.6"

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 import matplotlib
 import numpy as np
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from ..record.whole_valve import WholeValve
-from .style import kilopascals, new_figure
+from .faces import ValveSkin
+from .style import MOTION, colour_bar, headline, new_figure, static
 
 if TYPE_CHECKING:
     from ..studies.state import State
     from ..studies.steady.result import SteadyResult
 
-#: Turbo without its nearly black ends.
-COLOURS = ListedColormap(matplotlib.colormaps["turbo"](np.linspace(0.08, 0.95, 256)))
+#: Of displacements.
+COLOURS = matplotlib.colormaps[MOTION]
 _LIGHT = np.array([-0.35, -0.45, 0.82])
 
 
@@ -31,29 +31,26 @@ def draw(result: SteadyResult, pressure: float | None = None) -> Iterator[tuple[
 
 
 def deformed(state: State) -> Figure:
-    """Whole valve, true to scale, coloured by displacement (compare Fig. 7-11 of the thesis)."""
-    valve = WholeValve.of(state.results.mesh)
-    shift = valve.vectors(state.nodal[:, :3])
-    size = np.linalg.norm(shift, axis=1) * 1e3
-    points = (valve.points + shift)[:, [2, 0, 1]] * 1e3  # axis of the valve, width, opening
+    """Whole valve with the thickness of its wall, true to scale, coloured by displacement (compare Fig. 7-11 of the
+    thesis).
+    """
+    skin = ValveSkin.of(state.results.mesh)
+    size = np.linalg.norm(state.nodal[:, :3], axis=1) * 1e3
+    corners = skin.corners(state.nodal)[:, :, [2, 0, 1]] * 1e3  # axis of the valve, width, opening
     figure = new_figure(8.2, 4.9)
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
     scale = Normalize(0.0, size.max() or 1.0)
-    corners = points[valve.quads]
-    colours = shaded(corners, COLOURS(scale(size[valve.quads].mean(axis=1))))
+    colours = shaded(corners, COLOURS(scale(skin.means(size))))
     axes.add_collection3d(
         Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.3, clip_on=False)
     )
-    frame(axes, points)
-    bar = figure.colorbar(ScalarMappable(scale, COLOURS), ax=axes, shrink=0.62, pad=0.06, aspect=22)
-    bar.set_label("Displacement, mm")
-    bar.outline.set_visible(False)
+    frame(axes, corners.reshape(-1, 3))
+    colour_bar(figure, ScalarMappable(scale, COLOURS), axes, "Displacement, mm", shrink=0.62, pad=0.06, aspect=22)
     x, y, z = (1e3 * value for value in state.max_displacement_position)
-    figure.suptitle(
-        f"Deformed valve at {kilopascals(state.pressure)}: largest displacement "
-        f"{state.max_displacement * 1e3:.1f} mm at "
-        f"(x, y, z) = ({x:.0f}, ±{abs(y):.0f}, {z:.0f}) mm",
-        fontsize=10,
+    headline(
+        figure,
+        f"Deformed valve at {static(state.pressure)}: largest displacement {state.max_displacement * 1e3:.1f} mm\n"
+        f"at (x, y, z) = ({x:.0f}, ±{abs(y):.0f}, {z:.0f}) mm",
     )
     return figure
 
@@ -61,9 +58,21 @@ def deformed(state: State) -> Figure:
 def shaded(corners: np.ndarray, colours: np.ndarray) -> np.ndarray:
     """Colours (n, 4) darkened where the faces turn from the light; inner and outer side alike."""
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     light = 0.62 + 0.38 * np.abs(normal @ (_LIGHT / np.linalg.norm(_LIGHT)))
     return np.concatenate([colours[:, :3] * light[:, None], colours[:, 3:]], axis=1)
+
+
+def draw_skin(axes, corners: np.ndarray, colours: np.ndarray, zoom: float) -> None:
+    """A small view without axes of quadrilaterals (n, 4, 3) and their colours (n, 4)."""
+    colours = shaded(corners, colours)
+    axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.1))
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    for set_limits, a, b in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high):
+        set_limits(a, b)
+    axes.set_box_aspect(high - low, zoom=zoom)
+    axes.view_init(elev=26, azim=-140)
+    axes.set_axis_off()
 
 
 def frame(axes, points: np.ndarray) -> None:

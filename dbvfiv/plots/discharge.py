@@ -31,9 +31,9 @@ def ordered(result: SteadyResult) -> list[State]:
 
 
 def head_discharge(result: SteadyResult) -> Figure:
-    """Pressure drop over mass flow (compare Fig. 7-4 of the thesis)."""
+    """Static inlet pressure over mass flow (compare Fig. 7-4 of the thesis)."""
     states = ordered(result)
-    figure, axes = _axes("Mass flow, kg/s", "Pressure drop, kPa")
+    figure, axes = _axes("Mass flow, kg/s", "Static inlet pressure, kPa")
     axes.plot(
         [s.mass_flow for s in states], [s.pressure / 1e3 for s in states], "o-", color=COMPUTED, label=_name(result)
     )
@@ -65,7 +65,7 @@ def area_discharge(result: SteadyResult) -> Figure:
 def jet_velocity(result: SteadyResult) -> Figure:
     """Jet velocity over pressure (compare Fig. 7-7 of the thesis)."""
     states = ordered(result)
-    figure, axes = _axes("Pressure drop, kPa", "Velocity, m/s")
+    figure, axes = _axes("Static inlet pressure, kPa", "Velocity, m/s")
     p = np.array([s.pressure for s in states])
     axes.plot(
         p / 1e3, [s.outlet_velocity for s in states], "o-", color=COMPUTED, label=f"jet at the lip, {_name(result)}"
@@ -78,21 +78,26 @@ def jet_velocity(result: SteadyResult) -> Figure:
         ":",
         color="0.35",
         lw=1.3,
-        label=r"$\sqrt{2\,\Delta p/\rho}$",
+        label=r"$\sqrt{2\,p/\rho}$, without the velocity at the inlet",
     )
     return _finish(figure, axes, "Jet velocity")
 
 
 def deflection(result: SteadyResult) -> Figure:
-    """Lip opening and largest displacement over pressure."""
+    """Clear lip opening, between the inner faces, and largest displacement over pressure."""
     states = ordered(result)
-    figure, axes = _axes("Pressure, kPa", "Displacement, mm")
+    figure, axes = _axes("Static inlet pressure, kPa", "Opening, displacement, mm")
     p = [s.pressure / 1e3 for s in states]
     axes.plot(
-        p, [s.max_displacement * 1e3 for s in states], "s-", color=ACCENT, ms=4.5, label="largest, anywhere on the wall"
+        p,
+        [s.max_displacement * 1e3 for s in states],
+        "s-",
+        color=ACCENT,
+        ms=4.5,
+        label="largest displacement of the wall",
     )
-    axes.plot(p, [s.lip_displacement * 1e3 for s in states], "o-", color=COMPUTED, label="lip centre, in y")
-    return _finish(figure, axes, "Deflection of the wall", from_zero=all(s.lip_displacement >= 0 for s in states))
+    axes.plot(p, [s.lip_opening * 1e3 for s in states], "o-", color=COMPUTED, label="clear lip opening at its middle")
+    return _finish(figure, axes, "Opening and deflection", from_zero=all(s.lip_opening >= 0 for s in states))
 
 
 def _name(result: SteadyResult) -> str:
@@ -110,8 +115,8 @@ def _axes(x: str, y: str):
 def _finish(figure: Figure, axes, title: str, from_zero: bool = True) -> Figure:
     axes.set_title(title, loc="left", fontweight="bold")
     axes.margins(0.06)
-    axes.set_xlim(left=0)
+    axes.set_xlim(0, 1.08 * max(0.0, axes.dataLim.x1) or None)
     if from_zero:
-        axes.set_ylim(bottom=0)
-    axes.legend(loc="best")
+        axes.set_ylim(0, 1.12 * max(0.0, axes.dataLim.y1) or None)
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.14), ncols=2)
     return figure

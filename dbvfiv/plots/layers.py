@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .style import MAGNITUDE, kilopascals, new_figure
+from .style import MAGNITUDE, PUBLISHED, colour_bar, headline, kilopascals, new_figure
 
 if TYPE_CHECKING:
     from ..record.mesh import MeshData
@@ -36,29 +36,24 @@ def layer_stress(state: State) -> Figure:
     for number, (axes, title, stress) in enumerate(zip(panels, mesh.layer_titles(), values)):
         shape = (mesh.shape[1], mesh.shape[0])
         image = axes.pcolormesh(arc * 1e3, z * 1e3, stress.reshape(shape), cmap=MAGNITUDE, vmin=0.0, rasterized=True)
-        bar = figure.colorbar(image, ax=axes, pad=0.03, aspect=28)
-        bar.outline.set_visible(False)
+        colour_bar(figure, image, axes, "Stress, MPa", pad=0.03)
         side = ", inside" if number == 0 else ", outside" if number == len(values) - 1 else ""
         axes.set_title(f"{number + 1}  {title}{side}", loc="left", fontsize=10)
         axes.grid(False)
         peak = int(np.argmax(stress))
         middle = [0.25 * (f[:-1, :-1] + f[1:, :-1] + f[:-1, 1:] + f[1:, 1:]).ravel()[peak] * 1e3 for f in (arc, z)]
-        axes.plot(*middle, "+", color="#d62728", ms=9, mew=1.6)
-        axes.set_title(f"max {stress[peak]:.3g}", loc="right", fontsize=9, color="#d62728")
+        axes.plot(*middle, "+", color=PUBLISHED, ms=9, mew=1.6)
+        axes.set_title(f"max {stress[peak]:.3g}", loc="right", fontsize=9, color=PUBLISHED)
         axes.set_xlim(0, arc.max() * 1e3)
     for axes in panels[len(values) :]:
         axes.set_visible(False)
     for number, axes in enumerate(panels[: len(values)]):
-        axes.tick_params(labelbottom=number + columns >= len(values))
+        axes.tick_params(labelbottom=True, labelleft=True)
         if number % columns == 0:
             axes.set_ylabel("Distance from the lip z, mm")
         if number + columns >= len(values):
             axes.set_xlabel("Arc from the centre, mm")
-    figure.suptitle(
-        f"Von Mises stress in the layers at {kilopascals(state.pressure)}, MPa (largest in each element)",
-        fontsize=11,
-        fontweight="bold",
-    )
+    headline(figure, f"Von Mises stress in the layers at {kilopascals(state.pressure)} (largest in each element)")
     return figure
 
 

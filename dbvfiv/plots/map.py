@@ -7,33 +7,19 @@ from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
-from matplotlib.collections import LineCollection
-from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
+from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FuncFormatter, LogLocator
 from scipy.ndimage import distance_transform_edt, label
 
 from ..case.parameters import PARAMETERS
-from .style import new_figure
+from .style import HALO, MOTION, SIGNED, colour_bar, headline, limits, log_axis, new_figure, static
 
 if TYPE_CHECKING:
     from ..results.map import MapResults
 
-#: Growth below zero in blues, above in warm colours, near zero pale.
-_GROWTH = LinearSegmentedColormap.from_list(
-    "growth",
-    [
-        (0.0, "#29506d"),
-        (0.25, "#7ea3bd"),
-        (0.4999, "#e8f0f4"),
-        (0.5001, "#fdf0dc"),
-        (0.75, "#ee9b54"),
-        (1.0, "#a3261b"),
-    ],
-)
-_FREQUENCY = "viridis"
-_HALO = [withStroke(linewidth=3.2, foreground="white")]
+#: Places across a picture at which its regions are looked at.
+_FINE = 120
+_BAR = "Growth rate of the leading mode, 1/s"
 _TITLES = {0.0: "Quasi-steady continuity", 1.0: "Storage: moving walls displace fluid"}
 
 
@@ -45,46 +31,40 @@ def draw(result: MapResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
 
 
 def stability_map(result: MapResults) -> Figure:
-    """The headline: where the valve flutters."""
-    growth = result.grid("growth_rate")
+    """The headline: where the valve flutters. Cells that no independent count certifies are hatched."""
+    growth = np.where(certified_cells(result), result.grid("growth_rate"), np.nan)
     levels = growth_levels(growth)
     norm = BoundaryNorm(levels, 256)
     figure, panels = _panels(result)
-    lines, mesh = None, None
-    span = _frequency_span(result)
     for law, axes in enumerate(panels):
-        mesh = _cells(axes, result, growth[law], _GROWTH, norm)
-        _uncertain(axes, result, law)
-        lines = _curves(axes, result, law, span) or lines
-        _regions(axes, result, law)
-    bar = figure.colorbar(mesh, ax=panels, pad=0.015, aspect=30, ticks=levels[::2], extend="both", location="right")
-    bar.set_label("Growth rate of the leading mode, 1/s")
-    if lines is not None:
-        bar = figure.colorbar(lines, ax=panels, pad=0.015, aspect=30, location="right")
-        bar.set_label("Frequency along the onset curve, Hz")
+        mesh = _cells(axes, result, growth[law], matplotlib.colormaps[SIGNED], norm)
+        _curves(axes, result, law)
+        label_regions(axes, result, law)
+    bar = colour_bar(figure, mesh, panels, _BAR, pad=0.015, ticks=levels, extend="both", spacing="uniform")
+    bar.ax.set_yticklabels([f"{level:g}".replace("-", "\N{MINUS SIGN}") for level in levels])
+    bar.ax.minorticks_off()
     _headline(figure, result)
     return figure
 
 
 def leading_frequency(result: MapResults) -> Figure:
     """Frequency of the leading mode; it changes with a jump where another mode takes the lead."""
-    frequency = np.ma.masked_invalid(result.grid("frequency"))
+    frequency = np.ma.masked_invalid(np.where(certified_cells(result), result.grid("frequency"), np.nan))
     top = float(frequency.max()) if frequency.count() else 1.0
     norm = matplotlib.colors.Normalize(0.0, top)
     figure, panels = _panels(result)
-    mesh = None
     for law, axes in enumerate(panels):
-        mesh = _cells(axes, result, frequency[law], matplotlib.colormaps["cividis"], norm)
-        _uncertain(axes, result, law)
-        for curve in result.curves:
-            if curve.law == law:
-                axes.plot(_shown(result.plan.x, curve.x), _shown(result.plan.y, curve.y), color="white", lw=3.0)
-                axes.plot(_shown(result.plan.x, curve.x), _shown(result.plan.y, curve.y), color="#a3261b", lw=1.6)
-        _regions(axes, result, law)
-    bar = figure.colorbar(mesh, ax=panels, pad=0.015, aspect=30)
-    bar.set_label("Frequency of the leading mode, Hz")
+        mesh = _cells(axes, result, frequency[law], matplotlib.colormaps[MOTION], norm)
+        _curves(axes, result, law)
+        label_regions(axes, result, law)
+    colour_bar(figure, mesh, panels, "Frequency of the leading mode, Hz", pad=0.015)
     _headline(figure, result)
     return figure
+
+
+def certified_cells(result: MapResults) -> np.ndarray:
+    """(laws, rows, columns) whether two counts agree on a cell."""
+    return result.grid("certified").astype(bool) & (result.grid("unstable") >= 0)
 
 
 def growth_levels(growth: np.ndarray) -> np.ndarray:
@@ -102,9 +82,6 @@ def _panels(result: MapResults):
     panels = np.atleast_1d(figure.subplots(1, count, sharex=True, sharey=True))
     for number, (law, axes) in enumerate(zip(result.plan.laws, panels)):
         axes.grid(False)
-        for set_scale, axis in ((axes.set_xscale, result.plan.x), (axes.set_yscale, result.plan.y)):
-            if axis.log:
-                set_scale("log")
         axes.set_xlabel(PARAMETERS[result.plan.x.parameter].label)
         if number == 0:
             axes.set_ylabel(PARAMETERS[result.plan.y.parameter].label)
@@ -112,9 +89,8 @@ def _panels(result: MapResults):
             axes.set_title(_TITLES.get(law, f"Blend of the continuity laws {law:g}"), loc="left")
         for place, axis in ((axes.xaxis, result.plan.x), (axes.yaxis, result.plan.y)):
             if axis.log:
-                place.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-                decades = np.log10(axis.values[-1] / axis.values[0])
-                place.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.6 else (1.0,), numticks=12))
+                edges = _edges(axis)
+                log_axis(place, edges[0], edges[-1])
         axes.tick_params(which="both", direction="out")
         for spine in axes.spines.values():
             spine.set_visible(True)
@@ -125,13 +101,13 @@ def _headline(figure: Figure, result: MapResults) -> None:
     case = result.case
     mesh = case.mesh
     shown = {
-        "pressure": f"{case.drive.pressure / 1e3:g} kPa",
+        "pressure": static(case.drive.pressure),
         "density": f"{case.fluid.density:g} kg/m³",
         "alpha": f"α = {case.damping.alpha:g} 1/s",
     }
     shown["beta"] = f"β = {case.damping.beta:g} s"
     fixed = [text for name, text in shown.items() if name not in (result.plan.x.parameter, result.plan.y.parameter)]
-    figure.suptitle(f"Stability of {result.header.name}", x=0.01, ha="left", fontweight="bold", fontsize=12)
+    headline(figure, f"Stability of {result.header.name}")
     words = [", ".join(fixed), f"{mesh.around} × {mesh.along} elements", _vouched(result)]
     figure.supxlabel(" · ".join(w for w in words if w), x=0.01, ha="left", fontsize=8.5, color="0.35")
 
@@ -139,7 +115,7 @@ def _headline(figure: Figure, result: MapResults) -> None:
 def _vouched(result: MapResults) -> str:
     certified, found = result.grid("certified"), result.grid("unstable") >= 0
     text = f"{int(certified.sum())} of {int(found.sum())} cells certified by two counts"
-    if (found & ~certified.astype(bool)).any():
+    if not certified_cells(result).all():
         text += ", the others hatched"
     return text + (f", {len(result.checks)} solved again in full" if result.checks else "")
 
@@ -147,6 +123,8 @@ def _vouched(result: MapResults) -> str:
 def _edges(axis) -> np.ndarray:
     """Borders of the cells around the values of an axis."""
     values = _shown(axis, np.asarray(axis.values))
+    if len(values) == 1:
+        return np.array(limits(values, axis.log))
     v = np.log(values) if axis.log else values
     middle = 0.5 * (v[1:] + v[:-1])
     edges = np.concatenate([[v[0]], middle, [v[-1]]])
@@ -169,24 +147,8 @@ def _cells(axes, result: MapResults, values, colours, norm):
     return mesh
 
 
-def _uncertain(axes, result: MapResults, law: int) -> None:
-    """Hatch the cells that carry no certificate: what their colour says is not vouched for."""
-    doubtful = ~result.grid("certified")[law].astype(bool) & (result.grid("unstable")[law] >= 0)
-    if not doubtful.any():
-        return
-    x, y = _edges(result.plan.x), _edges(result.plan.y)
-    hatching = axes.pcolor(x, y, np.ma.masked_where(~doubtful, doubtful), hatch="xxx", alpha=0.0)
-    hatching.set_label("uncertain")
-
-
-def _frequency_span(result: MapResults) -> tuple[float, float]:
-    values = np.concatenate([c.frequency for c in result.curves]) if result.curves else np.array([0.0, 1.0])
-    low, high = float(values.min()), float(values.max())
-    return (low, high) if high > low else (low - 0.5, high + 0.5)
-
-
-def _curves(axes, result: MapResults, law: int, span):
-    lines = None
+def _curves(axes, result: MapResults, law: int) -> None:
+    """Onset curves in black, dashed where they are interpolated, their frequency written along them."""
     for curve in result.curves:
         if curve.law != law:
             continue
@@ -194,17 +156,10 @@ def _curves(axes, result: MapResults, law: int, span):
         if len(points) == 1:
             axes.plot(*points[0], "o", color="black", ms=4)
             continue
-        pieces = np.stack([points[:-1], points[1:]], axis=1)
-        axes.add_collection(LineCollection([points], colors="black", linewidths=4.4, capstyle="round"))
-        lines = LineCollection(
-            pieces, cmap=_FREQUENCY, norm=matplotlib.colors.Normalize(*span), linewidths=2.6, capstyle="round"
-        )
-        lines.set_array(0.5 * (curve.frequency[1:] + curve.frequency[:-1]))
-        if not curve.exact:
-            lines.set_linestyle((0, (3, 1.5)))
-        axes.add_collection(lines)
+        dashes = "-" if curve.exact else (0, (3, 1.5))
+        axes.plot(*points.T, color="white", lw=4.6, solid_capstyle="round")
+        axes.plot(*points.T, color="black", lw=2.4, ls=dashes, solid_capstyle="round")
         _ticks_along(axes, points, curve.frequency)
-    return lines
 
 
 def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:
@@ -224,45 +179,49 @@ def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:
         i = int(np.argmin(np.abs(length - share * length[-1])))
         if not (0.03 < unit[i, 0] < 0.95 and 0.04 < unit[i, 1] < 0.95):
             continue
+        step = unit[min(i + 1, len(unit) - 1)] - unit[max(i - 1, 0)]
+        rising = step[0] * step[1] > 0  # the text lies right of the curve, below where it rises
         axes.annotate(
             f"{frequency[i]:.3g} Hz",
             points[i],
-            xytext=(7, 5),
+            xytext=(8, -6) if rising else (8, 4),
             textcoords="offset points",
+            va="top" if rising else "bottom",
             fontsize=8,
             color="black",
-            path_effects=_HALO,
+            path_effects=HALO,
             clip_on=True,
         )
 
 
-def _regions(axes, result: MapResults, law: int) -> None:
-    """Words in the middle of each sizeable region."""
-    unstable, certified = result.grid("unstable")[law], result.grid("certified")[law].astype(bool)
-    known = certified & (unstable >= 0)
-    x, y = _edges(result.plan.x), _edges(result.plan.y)
-    regions = ((known & (unstable > 0), "unstable"), (known & (unstable == 0), "stable"))
-    for mask, word in (*regions, (~certified & (unstable >= 0), "uncertain")):
-        parts, count = label(mask)
-        for number in range(1, count + 1):
-            part = parts == number
-            if part.sum() < 0.03 * part.size:
-                continue
-            depth = distance_transform_edt(np.pad(part, 1))[1:-1, 1:-1]
+def label_regions(axes, result: MapResults, law: int) -> None:
+    """Words, on a ground of their own, in the middle of the largest stable and unstable regions."""
+    unstable = result.grid("unstable")[law]
+    sure = certified_cells(result)[law]
+    cells = [_drawn_cells(axis) for axis in (result.plan.x, result.plan.y)]
+    for mask, word in ((sure & (unstable > 0), "unstable"), (sure & (unstable == 0), "stable")):
+        parts, count = label(mask[np.ix_(cells[1], cells[0])])
+        sizes = np.bincount(parts.ravel(), minlength=count + 1)[1:]
+        for number in np.flatnonzero((sizes >= 0.05 * parts.size) | (sizes == sizes.max(initial=-1))) + 1:
+            # deep inside, and nearer to a longish word's shape than a square would be
+            depth = distance_transform_edt(np.pad(parts == number, 1), sampling=(2.0, 1.0))[1:-1, 1:-1]
             j, i = np.unravel_index(int(np.argmax(depth)), depth.shape)
-            if depth[j, i] < 1.5:
-                continue
-            middle = [
-                np.sqrt(e[k] * e[k + 1]) if axis.log else 0.5 * (e[k] + e[k + 1])
-                for e, k, axis in ((x, i, result.plan.x), (y, j, result.plan.y))
-            ]
-            axes.annotate(
+            axes.text(
+                (i + 0.5) / _FINE,
+                (j + 0.5) / _FINE,
                 word,
-                middle,
+                transform=axes.transAxes,
                 ha="center",
                 va="center",
-                fontsize=12.5,
+                fontsize=10.5,
                 fontweight="bold",
-                color="0.12",
-                path_effects=_HALO,
+                bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": "0.3", "lw": 0.6},
             )
+
+
+def _drawn_cells(axis) -> np.ndarray:
+    """Cell under each of `_FINE` places across the picture."""
+    edges = _edges(axis)
+    edges = np.log(edges) if axis.log else edges
+    places = edges[0] + (edges[-1] - edges[0]) * (np.arange(_FINE) + 0.5) / _FINE
+    return np.clip(np.searchsorted(edges, places) - 1, 0, len(edges) - 2)

@@ -11,7 +11,7 @@ from matplotlib.animation import PillowWriter
 from ..errors import CaseError
 from .modes_plane import conditions, mode_title
 from .modes_shapes import ModeSurface
-from .style import new_figure, style
+from .style import headline, new_figure, style
 
 if TYPE_CHECKING:
     from ..studies.modes.mode import ModeShape
@@ -37,7 +37,7 @@ def animate_mode(result: ModesResult, mode: ModeShape, path: str | Path, frames:
         axes = figure.add_subplot(projection="3d", computed_zorder=False)
         surface = ModeSurface(result, mode)
         collection = surface.draw(axes, 0.0)
-        figure.suptitle(f"{mode_title(mode)} ({conditions(result)})", fontsize=10)
+        headline(figure, f"{mode_title(mode)} ({conditions(result)})")
         figure.set_layout_engine("none")  # the picture must not move
         axes.set_position([0.0, 0.05, 0.98, 0.9])
         writer = PillowWriter(fps=_PICTURES_A_SECOND)

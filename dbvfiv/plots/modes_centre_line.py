@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from .faces import drawn_amplitude, faces
 from .modes_plane import conditions, mode_title
 from .shapes import mark_pieces
-from .style import COMPUTED, REST, new_figure
+from .style import COMPUTED, REST, new_figure, phase_looks
+from .waves import wave_content
 
 if TYPE_CHECKING:
     from ..studies.modes.mode import ModeShape
@@ -30,46 +31,61 @@ def draw(result: ModesResult, mode: int | None = None) -> Iterator[tuple[str, Ca
 
 
 def centre_line(result: ModesResult, mode: ModeShape) -> Figure:
-    """Line x = 0 over one cycle (compare Fig. 7-16 of Wang 2014): its place, its swing in y, and how the motion lags
-    along it.
+    """Inner face at x = 0 over one cycle (compare Fig. 7-16 of Wang 2014): its place, the swing in y, how the motion
+    lags along it, and how much of it travels.
     """
-    mesh, state = result.mesh, result.state
-    line = mesh.rows[:, 0]
-    rest, steady = mesh.nodes[line] * 1e3, state.nodal[line, :3] * 1e3
-    amplitude = mode.drawn_amplitude(state)
+    line, z = result.mesh.rows[:, 0], result.mesh.z * 1e3
     figure = new_figure(7.4, 8.0)
     place, swing, lag = figure.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": [1.25, 1.1, 0.8]})
-    z = rest[:, 2]
-    phases = np.arange(_PHASES) / _PHASES
-    colours = matplotlib.colormaps["hsv"](phases * 0.92) * [0.82, 0.82, 0.82, 1.0]
-    motion = mode.shape[line, :3]
-    for share, colour in zip(phases, colours):
-        moved = (motion * np.exp(2j * np.pi * share)).real
-        at = rest + steady + 1e3 * amplitude * moved
-        place.plot(at[:, 2], at[:, 1], color=colour, lw=1.2)
-        swing.plot(z, 1e3 * amplitude * moved[:, 1], color=colour, lw=1.2, label=f"{share:.1f}")
-    place.plot(z, rest[:, 1], color=REST, ls="--", lw=1.2, label="at rest")
-    place.plot((rest + steady)[:, 2], (rest + steady)[:, 1], color="black", lw=2.0, label="steady state")
-    envelope = 1e3 * amplitude * np.abs(motion[:, 1])
-    swing.fill_between(z, -envelope, envelope, color="0.5", alpha=0.13, lw=0)
-    lag.plot(z, _lag(motion[:, 1]), "o-", color=COMPUTED, ms=3)
+    amplitude = drawn_amplitude(result.state, mode)
+    _draw_cycle(place, swing, result, mode, amplitude)
+    motion = mode.shape[line, 1]
+    lag.plot(z, _lag(motion), "o-", color=COMPUTED, ms=3)
     mark_pieces(result, place, swing, lag)
     place.set_ylabel("y, mm")
     swing.set_ylabel("Swing in y, mm")
     lag.set_ylabel("Phase in y, degrees")
     lag.set_xlabel("Distance from the lip z, mm")
-    lag.set_xlim(min(0.0, float(np.min((rest + steady)[:, 2])) - 2), z.max())
-    place.set_ylim(bottom=0)
+    lag.set_xlim(min(0.0, float(place.dataLim.x0) - 2), z.max())
     place.set_title(f"{mode_title(mode)} ({conditions(result)})", loc="left", fontweight="bold")
     swing.set_title(
         f"drawn for a largest displacement of {1e3 * amplitude:.3g} mm; a linear mode has no amplitude of its own",
         loc="left",
         fontsize=9,
     )
-    lag.set_title("falling towards the lip: a wave that travels downstream", loc="left", fontsize=9)
+    lag.set_title(_wave(mode, motion, result.mesh.z), loc="left", fontsize=9)
     place.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
     swing.legend(loc="upper left", bbox_to_anchor=(1.01, 1.05), title="share of\nthe cycle")
+    for axes in (place, swing):
+        axes.tick_params(labelbottom=True)
     return figure
+
+
+def _draw_cycle(place, swing, result: ModesResult, mode: ModeShape, amplitude: float) -> None:
+    """Inner face and swing of the line x = 0 at some phases, about the steady state."""
+    mesh, steady = result.mesh, result.state.nodal
+    line, z = mesh.rows[:, 0], mesh.z * 1e3
+    phases = np.arange(_PHASES) / _PHASES
+    for share, look in zip(phases, phase_looks(_PHASES)):
+        shape = mode.at_phase(2 * np.pi * share)
+        at = 1e3 * faces(mesh, steady + amplitude * shape)[0][line]
+        place.plot(at[:, 2], at[:, 1], lw=1.2, **look)
+        swing.plot(z, 1e3 * amplitude * shape[line, 1], lw=1.2, label=f"{share:.1f}", **look)
+    for nodal, look in (
+        (None, {"color": REST, "ls": "--", "lw": 1.2, "label": "inner face\nat rest"}),
+        (steady, {"color": "black", "lw": 2.0, "label": "steady state"}),
+    ):
+        at = 1e3 * faces(mesh, nodal)[0][line]
+        place.plot(at[:, 2], at[:, 1], **look)
+    place.axhline(0.0, color=REST, lw=0.8)
+    envelope = 1e3 * amplitude * np.abs(mode.shape[line, 1])
+    swing.fill_between(z, -envelope, envelope, color="0.5", alpha=0.13, lw=0)
+
+
+def _wave(mode: ModeShape, motion: np.ndarray, z: np.ndarray) -> str:
+    if mode.frequency == 0:
+        return "no oscillation, so that no wave travels"
+    return wave_content(motion, z).words()
 
 
 def _lag(swing: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .style import COMPUTED, PUBLISHED, kilopascals, new_figure
+from .style import COMPUTED, PUBLISHED, new_figure, static
 
 if TYPE_CHECKING:
     from ..studies.modes.result import ModesResult
@@ -77,7 +77,7 @@ def eigenvalues(result: ModesResult) -> Figure:
 
 def conditions(result: ModesResult) -> str:
     """Pressure and fluid as they stand in titles."""
-    where = "at rest" if result.state.pressure == 0 else f"at {kilopascals(result.state.pressure)}"
+    where = "at rest" if result.state.pressure == 0 else f"at {static(result.state.pressure)}"
     fluid = "in vacuo" if in_vacuo(result) else f"{result.case.fluid.density:g} kg/m³"
     return f"{where}, {fluid}"
 

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FuncFormatter, LogLocator
 
 from ..case.parameters import PARAMETERS
-from .style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure
+from .style import ACCENT, COMPUTED, HALO, PUBLISHED, REST, limits, log_axis, new_figure, static
 
 if TYPE_CHECKING:
     from ..results.onset import OnsetResults
@@ -31,87 +29,67 @@ def onset(result: OnsetResults) -> Figure:
     axis = result.case.onset.axis
     scale = PARAMETERS[axis.parameter].scale
     values = result.values / scale
-    figure = new_figure(7.2, 5.6)
+    figure = new_figure(7.2, 5.8)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    ranges = unstable_ranges(result)
-    for axes in (top, bottom):
-        if axis.log:
-            axes.set_xscale("log")
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-            decades = np.log10(values[-1] / values[0]) if len(values) > 1 else 1.0
-            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.6 else (1.0,), numticks=12))
-        for a, b in ranges:
-            axes.axvspan(
-                a / scale,
-                b / scale,
-                color=_UNSTABLE,
-                lw=0,
-                zorder=0,
-                label="unstable" if axes is top and a == ranges[0][0] else None,
-            )
-    growth, frequency = result.growth_rates, result.frequencies
-    low = _floor(growth)
-    for k in range(1, growth.shape[1]):
-        top.plot(
-            values,
-            np.where(growth[:, k] > low, growth[:, k], np.nan),
-            ".",
-            color=REST,
-            ms=3.5,
-            label="further modes" if k == 1 else None,
-        )
-        bottom.plot(values, np.where(growth[:, k] > low, frequency[:, k], np.nan), ".", color=REST, ms=3.5)
-    top.plot(values, growth[:, 0], "-", color=COMPUTED, label="leading mode")
-    changes = np.flatnonzero(_jumps(frequency[:, 0]))
-    bottom.plot(np.insert(values, changes, np.nan), np.insert(frequency[:, 0], changes, np.nan), "-", color=COMPUTED)
-    top.axhline(0.0, color="0.25", lw=1.0)
+    _shade(result, scale, top, bottom)
+    low = _draw_scan(result, values, top, bottom)
     for row in result.points:
-        x = row["value"] / scale
-        hollow = row["criticality"] == "sub"
-        style = {
-            "marker": "o",
-            "ms": 7,
-            "color": PUBLISHED,
-            "mfc": "white" if hollow else PUBLISHED,
-            "ls": "none",
-            "zorder": 5,
-        }
-        top.plot(x, 0.0, **style)
-        bottom.plot(x, row["frequency"], **style)
-        if math.isfinite(row["uncertainty"]):
-            top.plot(
-                [x - row["uncertainty"] / scale, x + row["uncertainty"] / scale],
-                [0, 0],
-                color=ACCENT,
-                lw=3.5,
-                alpha=0.75,
-                zorder=4,
-                solid_capstyle="butt",
-            )
-        kind = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], "")
-        words = f"{x:.4g}{_unit(axis.parameter)}\n{row['frequency']:.3g} Hz" + (f"\n{kind}" if kind else "")
-        # on the side of the mark that the curve leaves free
-        place = {"xytext": (9, -8), "va": "top"} if row["gains"] else {"xytext": (9, 8), "va": "bottom"}
-        top.annotate(
-            words,
-            (x, 0.0),
-            textcoords="offset points",
-            fontsize=8.5,
-            color=PUBLISHED,
-            path_effects=[withStroke(linewidth=3, foreground="white")],
-            **place,
-        )
+        _mark(row, scale, axis.parameter, top, bottom)
     # room for the words at the marks
-    top.set_ylim(low, max(1.1 * np.nanmax(growth), -0.3 * low))
+    top.set_ylim(low, max(1.1 * np.nanmax(result.growth_rates), -0.3 * low))
     top.set_ylabel("Growth rate, 1/s")
     bottom.set_ylabel("Frequency, Hz")
     bottom.set_ylim(bottom=0)
     bottom.set_xlabel(PARAMETERS[axis.parameter].label)
     top.set_title(_title(result), loc="left", fontweight="bold")
-    top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2)
-    if len(values) > 1:
-        bottom.set_xlim(values[0], values[-1])
+    figure.legend(loc="outside lower center", ncols=3)
+    for axes in (top, bottom):
+        if axis.log:
+            log_axis(axes.xaxis, *limits(values, True))
+        axes.set_xlim(*limits(values, axis.log))
+        axes.tick_params(labelbottom=True)
     return figure
+
+
+def _shade(result: OnsetResults, scale: float, *panels) -> None:
+    for number, (a, b) in enumerate(unstable_ranges(result)):
+        for axes in panels:
+            label = "unstable" if axes is panels[0] and not number else None
+            axes.axvspan(a / scale, b / scale, color=_UNSTABLE, lw=0, zorder=0, label=label)
+
+
+def _draw_scan(result: OnsetResults, values: np.ndarray, top, bottom) -> float:
+    """Curves of the scan; the growth rate down to which they are shown."""
+    growth, frequency = result.growth_rates, result.frequencies
+    low = _floor(growth)
+    for k in range(1, growth.shape[1]):
+        shown = growth[:, k] > low
+        label = "further modes" if k == 1 else None
+        top.plot(values, np.where(shown, growth[:, k], np.nan), "s", color=REST, ms=3.5, label=label)
+        bottom.plot(values, np.where(shown, frequency[:, k], np.nan), "s", color=REST, ms=3.5)
+    top.plot(values, growth[:, 0], ".-", color=COMPUTED, label="leading mode")
+    changes = np.flatnonzero(_jumps(frequency[:, 0]))
+    bottom.plot(np.insert(values, changes, np.nan), np.insert(frequency[:, 0], changes, np.nan), ".-", color=COMPUTED)
+    top.axhline(0.0, color="0.25", lw=1.0)
+    return low
+
+
+def _mark(row: dict, scale: float, parameter: str, top, bottom) -> None:
+    """An onset with its uncertainty and its numbers: full where it is supercritical, hollow where it is subcritical."""
+    x = row["value"] / scale
+    inside = "white" if row["criticality"] == "sub" else PUBLISHED
+    look = {"marker": "o", "ms": 7, "color": PUBLISHED, "mfc": inside, "ls": "none", "zorder": 5}
+    top.plot(x, 0.0, **look)
+    bottom.plot(x, row["frequency"], **look)
+    if math.isfinite(row["uncertainty"]):
+        reach = row["uncertainty"] / scale
+        top.plot([x - reach, x + reach], [0, 0], color=ACCENT, lw=3.5, alpha=0.75, zorder=4, solid_capstyle="butt")
+    kind = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], "")
+    words = f"{x:.4g}{_unit(parameter)}\n{row['frequency']:.3g} Hz" + (f"\n{kind}" if kind else "")
+    # on the side of the mark that the curve leaves free
+    place = {"xytext": (9, -8), "va": "top"} if row["gains"] else {"xytext": (9, 8), "va": "bottom"}
+    look = {"textcoords": "offset points", "fontsize": 8.5, "color": PUBLISHED, "path_effects": HALO}
+    top.annotate(words, (x, 0.0), **look, **place)
 
 
 def unstable_ranges(result: OnsetResults) -> list[tuple[float, float]]:
@@ -147,7 +125,7 @@ def _jumps(frequency: np.ndarray) -> np.ndarray:
 def _title(result: OnsetResults) -> str:
     case, parameter = result.case, result.parameter
     shown = {
-        "pressure": f"{case.drive.pressure / 1e3:g} kPa",
+        "pressure": static(case.drive.pressure),
         "density": f"{case.fluid.density:g} kg/m³",
         "storage": case.fluid.continuity,
     }

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _QUARTERS = 4
 _PANELS = (
-    ("Pressure, kPa", lambda state: state.station_pressure / 1e3),
+    ("Static pressure, kPa", lambda state: state.station_pressure / 1e3),
     ("Velocity, m/s", lambda state: state.station_velocity),
     ("Flow area, cm²", lambda state: _QUARTERS * state.station_area * 1e4),
 )
@@ -40,8 +40,9 @@ def passage(result: SteadyResult) -> Figure:
         axes.set_ylabel(label)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.set_xlim(0, z[-1])
+        axes.tick_params(labelbottom=True)
     mark_pieces(result, *panels)
     panels[0].set_title("Along the passage (lip left, inlet right)", loc="left", fontweight="bold")
     panels[-1].set_xlabel("Distance from the lip z, mm")
-    panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="inlet pressure")
+    panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="static inlet\npressure")
     return figure

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .discharge import ordered
+from .faces import faces
 from .style import REST, kilopascals, new_figure, pressure_colours, some_of
 
 if TYPE_CHECKING:
@@ -22,42 +23,50 @@ def draw(result: SteadyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
 
 
 def lip_shapes(result: SteadyResult) -> Figure:
-    """Mid-surface of the lip at several pressures, all four quarters (compare Fig. 7-10 of the thesis)."""
-    figure = new_figure(7.2, 4.4)
+    """Inner faces of the lips at several pressures, all four quarters, and the outer face at the highest (compare Fig.
+    7-10 of the thesis, which shows the mid-surface).
+    """
+    figure = new_figure(7.2, 4.6)
     axes = figure.add_subplot()
     lip = result.mesh.rows[0]
-    rest = result.mesh.nodes[lip, :2]
-    axes.plot(*_closed(rest).T * 1e3, color=REST, lw=1.2, ls="--", label="at rest")
+    axes.plot(*_closed(faces(result.mesh)[0][lip, :2]).T * 1e3, color=REST, lw=1.2, ls="--", label="at rest")
     states = some_of(ordered(result))
     for state, colour in zip(states, pressure_colours([s.pressure for s in states])):
-        axes.plot(*_closed(rest + state.nodal[lip, :2]).T * 1e3, color=colour, label=kilopascals(state.pressure))
+        inner, outer = faces(result.mesh, state.nodal)
+        axes.plot(*_closed(inner[lip, :2]).T * 1e3, color=colour, label=kilopascals(state.pressure))
+    axes.plot(*_closed(outer[lip, :2]).T * 1e3, color=colour, lw=0.9, label="its outer face")
     axes.set_aspect("equal")
     axes.set_xlabel("x, mm")
     axes.set_ylabel("y, mm")
-    axes.set_title("Lip at the outlet, mid-surface", loc="left", fontweight="bold")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=5)
+    axes.set_title("Lips at the outlet, inner faces", loc="left", fontweight="bold")
+    figure.legend(loc="outside lower center", ncols=5, title="static inlet pressure")
     return figure
 
 
 def centre_line(result: SteadyResult) -> Figure:
-    """Deformed lines of the two symmetry planes: y over z at x = 0 and x over z at y = 0."""
+    """Inner and outer face in the two symmetry planes: y over z at x = 0 and x over z at y = 0."""
     figure = new_figure(7.2, 6.2)
     upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1, 1]})
     states = some_of(ordered(result))
     colours = pressure_colours([s.pressure for s in states])
+    moved = [faces(result.mesh, state.nodal) for state in states]
+    rest = faces(result.mesh)
     for axes, line, across in ((upper, result.mesh.rows[:, 0], 1), (lower, result.mesh.rows[:, -1], 0)):
-        rest = result.mesh.nodes[line]
-        axes.plot(rest[:, 2] * 1e3, rest[:, across] * 1e3, color=REST, lw=1.2, ls="--", label="at rest")
-        for state, colour in zip(states, colours):
-            moved = rest + state.nodal[line, :3]
-            axes.plot(moved[:, 2] * 1e3, moved[:, across] * 1e3, color=colour, label=kilopascals(state.pressure))
+        for face, width in ((0, 1.6), (1, 0.8)):
+            look = {"color": REST, "lw": 0.75 * width, "ls": "--", "label": None if face else "at rest"}
+            axes.plot(rest[face][line, 2] * 1e3, rest[face][line, across] * 1e3, **look)
+            for state, both, colour in zip(states, moved, colours):
+                place = both[face][line] * 1e3
+                label = None if face else kilopascals(state.pressure)
+                axes.plot(place[:, 2], place[:, across], color=colour, lw=width, label=label)
+        axes.tick_params(labelbottom=True)
     mark_pieces(result, upper, lower)
     upper.set_ylabel("y, mm")
     lower.set_ylabel("x, mm")
     lower.set_xlabel("Distance from the lip z, mm")
-    upper.set_title("Centre line, x = 0", loc="left", fontweight="bold")
+    upper.set_title("Inner (thick) and outer face at x = 0", loc="left", fontweight="bold")
     lower.set_title("Side edge, y = 0", loc="left", fontweight="bold")
-    upper.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    upper.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title="static inlet\npressure")
     return figure
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..case.parameters import PARAMETERS
 from .modes_plane import DANGER, UNSTABLE
-from .style import kilopascals, new_figure
+from .style import HALO, branch_looks, limits, log_axis, new_figure, static
 
 if TYPE_CHECKING:
     from ..studies.sweep.result import SweepResult
@@ -24,7 +23,7 @@ _STABLE_GROUND = "#1f4e790d"
 
 def draw(result: SweepResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a sweep, each with its name."""
-    if len(result.values) > 1 and result.branches:
+    if len(result.values) and result.branches:
         yield "sweep", lambda: curves(result)
 
 
@@ -32,13 +31,14 @@ def curves(result: SweepResult) -> Figure:
     """Growth rate, frequency and damping ratio of each branch; crossings of zero growth marked, spans with unstable
     modes shaded.
     """
-    shown = PARAMETERS[result.parameter]
+    row = PARAMETERS[result.parameter]
+    name, unit, factor = row.words, row.shown_unit, 1.0 / row.scale
     figure = new_figure(7.6, 8.6)
     growth, frequency, ratio = panels = figure.subplots(
         3, 1, sharex=True, gridspec_kw={"height_ratios": [1.25, 1.0, 0.9]}
     )
-    x = result.values / shown.scale
-    for branch, colour in zip(result.branches, branch_colours(result)):
+    x = result.values * factor
+    for branch, look in zip(result.branches, branch_looks(len(result.branches))):
         size = np.hypot(branch.growth_rate, branch.angular_frequency)
         second = (branch.angular_frequency < 0).any()  # of a pair that two real modes became: both are seen
         series = (branch.growth_rate, branch.frequency, -100 * branch.growth_rate / np.where(size > 0, size, 1.0))
@@ -46,24 +46,25 @@ def curves(result: SweepResult) -> Figure:
             axes.plot(
                 x,
                 values,
-                color=colour,
+                color=look["color"],
                 lw=1.7,
                 ls="--" if second else "-",
-                marker="o" if len(x) <= 60 else None,
-                ms=2.8,
+                marker=look["marker"],
+                markevery=max(1, len(x) // 30),
+                ms=3.6,
                 label=f"{branch.id}",
             )
             doubtful = branch.confidence < DOUBTFUL
-            axes.plot(x[doubtful], values[doubtful], "x", color=colour, ms=7, mew=1.6)
+            axes.plot(x[doubtful], values[doubtful], "x", color="black", ms=8, mew=1.6)
     for crossing in result.crossings():
-        at = crossing.value / shown.scale
+        at = factor * crossing.value
         growth.plot(at, 0.0, "D", color=UNSTABLE, ms=6, zorder=4)
         # beside the point where there is room
         side = -1 if _share(at, x, result.axis.log) > 0.7 else 1
         text = (
-            f"{at:.4g} {shown.shown_unit}, {crossing.frequency:.3g} Hz"
+            f"≈ {at:.3g} {unit}, {crossing.frequency:.2g} Hz"
             if crossing.frequency > 0
-            else f"{at:.4g} {shown.shown_unit}, no oscillation"
+            else f"≈ {at:.3g} {unit}, no oscillation"
         )
         growth.annotate(
             text,
@@ -72,39 +73,36 @@ def curves(result: SweepResult) -> Figure:
             textcoords="offset points",
             fontsize=9,
             color=UNSTABLE,
+            path_effects=HALO,
             ha="left" if side > 0 else "right",
         )
     for axes in panels:
         _shade(axes, result, x)
         if result.axis.log:
-            axes.set_xscale("log")
-        axes.set_xlim(x[0], x[-1])
+            log_axis(axes.xaxis, x[0], x[-1])
+        axes.set_xlim(*limits(x, result.axis.log))
+        axes.tick_params(labelbottom=True)
     growth.axhline(0.0, color="0.25", lw=1.1)
     ratio.axhline(0.0, color="0.25", lw=1.1)
     frequency.set_ylim(bottom=min(0.0, frequency.get_ylim()[0]))
     growth.set_ylabel("Growth rate, 1/s")
     frequency.set_ylabel("Frequency, Hz")
     ratio.set_ylabel("Damping ratio, %")
-    ratio.set_xlabel(shown.label)
+    ratio.set_xlabel(f"{name}, {unit}")
     growth.set_title(
-        f"Modes over {shown.words[0].lower()}{shown.words[1:]}, {surroundings_of(result)}",
-        loc="left",
-        fontweight="bold",
+        f"Modes over {name[0].lower()}{name[1:]}, {surroundings_of(result)}", loc="left", fontweight="bold"
     )
     handles, labels = growth.get_legend_handles_labels()
     if any(np.nanmin(b.confidence, initial=1.0) < DOUBTFUL for b in result.branches):
-        handles.append(Line2D([], [], ls="", marker="x", color="0.3", ms=7, mew=1.6))
+        handles.append(Line2D([], [], ls="", marker="x", color="black", ms=8, mew=1.6))
         labels.append("doubtful match")
     growth.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.02), title="mode")
     word = "certified against full solves" if result.certified else "not certified"
-    figure.supxlabel(f"Red ground: at least one unstable mode. The sweep is {word}.", x=0.01, ha="left", fontsize=9)
+    words = f"Red ground: at least one unstable mode. The sweep is {word}."
+    if result.crossings():
+        words += "\nDiamonds: interpolated between the values computed; `dbvfiv onset` finds them exactly."
+    figure.supxlabel(words, x=0.01, ha="left", fontsize=9)
     return figure
-
-
-def branch_colours(result: SweepResult) -> list:
-    """A colour for each branch, the same in all figures."""
-    wheel = list(matplotlib.colormaps["tab10"].colors) + list(matplotlib.colormaps["Dark2"].colors)
-    return [wheel[i % len(wheel)] for i in range(len(result.branches))]
 
 
 def surroundings_of(result: SweepResult) -> str:
@@ -112,11 +110,13 @@ def surroundings_of(result: SweepResult) -> str:
     case = result.case
     parts = []
     if result.parameter != "pressure":
-        parts.append(kilopascals(result.points[0]["pressure"]))
+        parts.append(static(result.points[0]["pressure"]))
     if result.parameter != "density" and case.drive.kind == "flow":
         parts.append(f"{case.fluid.density:g} kg/m³")
     parts += [
-        PARAMETERS[name].text(getattr(case.damping, name)) for name in ("alpha", "beta") if name != result.parameter
+        f"{symbol} = {getattr(case.damping, key):g} {unit}"
+        for key, symbol, unit in (("alpha", "α", "1/s"), ("beta", "β", "s"))
+        if key != result.parameter
     ]
     return ", ".join(parts)
 
@@ -128,10 +128,12 @@ def _share(at: float, x: np.ndarray, log: bool) -> float:
 
 def _shade(axes, result: SweepResult, x: np.ndarray) -> None:
     """Ground red where a mode is unstable, its edges at the crossings."""
-    scale = PARAMETERS[result.parameter].scale
+    factor = 1.0 / PARAMETERS[result.parameter].scale
     edges = sorted(
-        {float(x[0]), float(x[-1]), *(c.value / scale for c in result.crossings() if x[0] < c.value / scale < x[-1])}
+        {float(x[0]), float(x[-1]), *(factor * c.value for c in result.crossings() if x[0] < factor * c.value < x[-1])}
     )
+    if len(edges) == 1:  # a single value
+        edges = list(limits(x, result.axis.log))
     for low, high in zip(edges[:-1], edges[1:]):
         inside = result.unstable_count[(x >= low) & (x <= high)]
         unstable = bool(inside.size) and (inside > 0).mean() > 0.5

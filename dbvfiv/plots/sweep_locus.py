@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from ..case.parameters import PARAMETERS
 from .modes_plane import DANGER, UNSTABLE
-from .style import MAGNITUDE, new_figure
+from .style import HALO, MAGNITUDE, colour_bar, limits, log_axis, new_figure
 from .sweep_curves import surroundings_of
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def draw(result: SweepResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a sweep, each with its name."""
-    if len(result.values) > 1 and result.branches:
+    if len(result.values) and result.branches:
         yield "root-locus", lambda: root_locus(result)
 
 
@@ -31,12 +31,14 @@ def root_locus(result: SweepResult) -> Figure:
     """Growth rate and frequency of each branch, coloured by the parameter; a ring where it begins, crossings of the
     axis marked.
     """
-    shown = PARAMETERS[result.parameter]
+    row = PARAMETERS[result.parameter]
+    name, unit, factor = row.words, row.shown_unit, 1.0 / row.scale
     figure = new_figure(7.6, 5.4)
     axes = figure.add_subplot()
-    x = result.values / shown.scale
+    x = result.values * factor
     colours = matplotlib.colors.ListedColormap(matplotlib.colormaps[MAGNITUDE](np.linspace(0.0, 0.9, 256)))
-    scale = LogNorm(x[0], x[-1]) if result.axis.log else Normalize(x[0], x[-1])
+    ends_of_x = limits(x, result.axis.log)
+    scale = LogNorm(*ends_of_x) if result.axis.log else Normalize(*ends_of_x)
     ends: dict[tuple[float, ...], list[int]] = {}
     for branch in result.branches:
         points = np.column_stack([branch.growth_rate, branch.frequency])
@@ -57,12 +59,13 @@ def root_locus(result: SweepResult) -> Figure:
     for crossing in result.crossings():
         axes.plot(0.0, crossing.frequency, "D", color=UNSTABLE, ms=6, zorder=5)
         axes.annotate(
-            f"{crossing.value / shown.scale:.4g} {shown.shown_unit}",
+            f"≈ {factor * crossing.value:.3g} {unit}",
             (0.0, crossing.frequency),
             (9, 6),
             textcoords="offset points",
             fontsize=9,
             color=UNSTABLE,
+            path_effects=HALO,
         )
     axes.margins(0.06)
     axes.autoscale_view()
@@ -73,11 +76,14 @@ def root_locus(result: SweepResult) -> Figure:
     axes.set_xlim(low, high)
     axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
     axes.text(0.995, 0.015, "unstable", transform=axes.transAxes, ha="right", va="bottom", color=UNSTABLE, fontsize=9)
-    bar = figure.colorbar(ScalarMappable(scale, colours), ax=axes, pad=0.02, aspect=28)
-    bar.set_label(shown.label)
-    bar.outline.set_visible(False)
+    bar = colour_bar(figure, ScalarMappable(scale, colours), axes, f"{name}, {unit}")
+    if result.axis.log:
+        log_axis(bar.ax.yaxis, x[0], x[-1])
     axes.set_xlabel("Growth rate, 1/s")
     axes.set_ylabel("Frequency, Hz")
     axes.set_title(f"Root locus, {surroundings_of(result)}", loc="left", fontweight="bold")
-    figure.supxlabel("Rings: where a branch begins; numbers: where it ends.", x=0.01, ha="left", fontsize=9)
+    words = "Rings: where a branch begins; numbers: where it ends."
+    if result.crossings():
+        words += " Diamonds: interpolated between the values computed."
+    figure.supxlabel(words, x=0.01, ha="left", fontsize=9)
     return figure

@@ -7,18 +7,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..verdict import Series, spectrum
-from .style import ACCENT, COMPUTED, REST, kilopascals, new_figure
+from ..verdict import Series, in_steps, spectrum
+from .style import ACCENT, COMPUTED, MAGNITUDE, REST, colour_bar, headline, new_figure, phase_looks, static
 
 if TYPE_CHECKING:
     from ..transient.result import TransientResults
-
-#: Colours of the times of a cycle.
-_CYCLE = "plasma"
 
 
 def draw(result: TransientResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -37,7 +33,7 @@ def draw(result: TransientResults) -> Iterator[tuple[str, Callable[[], Figure]]]
 def title(result: TransientResults) -> str:
     case = result.case
     fluid = f", {case.fluid.density:g} kg/m³, {case.fluid.continuity}" if case.drive.kind == "flow" else ""
-    return f"{result.header.name}: {kilopascals(float(result.history['inlet_pressure'][-1]))}{fluid}"
+    return f"{result.header.name}: {static(float(result.history['inlet_pressure'][-1]))}{fluid}"
 
 
 def history(result: TransientResults) -> Figure:
@@ -51,51 +47,74 @@ def history(result: TransientResults) -> Figure:
     if flow:
         panels[0].plot(t, h["mass_flow"], color=COMPUTED, lw=1.3, label="out at the lip")
         if case.fluid.continuity == "storage":
-            panels[0].plot(t, h["inlet_mass_flow"], color=ACCENT, lw=1.0, label="in at the flange")
-            panels[0].legend(loc="best")
+            panels[0].plot(t, h["inlet_mass_flow"], color=ACCENT, lw=1.0, ls="--", label="in at the flange")
+            panels[0].legend(loc="upper left", bbox_to_anchor=(0.0, -0.02), ncols=2)
         panels[0].set_ylabel("Mass flow, kg/s")
-        panels[2].plot(t, 1e4 * h["smallest_area"], color=ACCENT, lw=1.3, label="smallest of all rows")
+        panels[2].plot(t, 1e4 * h["smallest_area"], color=ACCENT, lw=1.3, ls="--", label="smallest of all rows")
         panels[2].plot(t, 1e4 * h["outlet_area"], color=COMPUTED, lw=1.0, label="at the lip")
         panels[2].set_ylabel("Flow area, cm²")
         # beside the axes' title line: an oscillation leaves no empty place within
         panels[2].legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=2, borderaxespad=0.0)
     lip.plot(t, 1e3 * h["lip_opening"], color=COMPUTED, lw=1.3)
-    lip.set_ylabel("Lip opening, mm")
+    lip.set_ylabel("Clear lip opening, mm")
     panels[-1].set_xlabel("Time, s")
     panels[-1].set_xlim(t[0], t[-1])
     panels[0].set_title(title(result), loc="left", fontweight="bold")
     verdict = result.verdict
-    panels[0].set_title(f"{verdict['verdict']}{'' if verdict['decided'] else ' ?'}", loc="right", fontsize=10)
+    sure = "" if verdict["decided"] else " (not certain)"
+    panels[0].set_title(f"{verdict['verdict']}{sure}", loc="right", fontsize=10)
+    for axes in panels:
+        axes.tick_params(labelbottom=True)
     return figure
 
 
 def energies(result: TransientResults) -> Figure:
-    """Energies of the wall, and what work and damping leave unexplained."""
+    """Energies of the wall, what has gone in and out, and, on an axis of its own, what these leave unexplained."""
     h = result.history
-    figure = new_figure(8.0, 5.4)
-    upper, lower = figure.subplots(2, 1, sharex=True)
+    figure = new_figure(8.0, 7.2)
+    upper, lower, rest = figure.subplots(3, 1, sharex=True, height_ratios=(3, 3, 2))
     t = h["time"]
-    for name, label, colour in (
-        ("kinetic_energy", "kinetic", ACCENT),
-        ("strain_energy", "strain", COMPUTED),
-        ("stop_energy", "lip stops", "0.55"),
-    ):
-        if np.any(h[name]):
-            upper.plot(t, h[name], color=colour, lw=1.2, label=label)
-    for name, label, colour in (
-        ("pressure_work", "work of the pressure", COMPUTED),
-        ("dissipation", "lost to damping", ACCENT),
-        ("balance", "balance", "0.35"),
-    ):
-        lower.plot(t, h[name], color=colour, lw=1.2, label=label)
+    for axes, curves in ((upper, _STORED), (lower, _EXCHANGED)):
+        for name, label, look in curves:
+            if np.any(h[name]):
+                axes.plot(t, h[name], lw=1.2, label=label, **look)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    turned_over = float(np.abs(np.diff(h["pressure_work"])).sum())
+    scale, unit = _readable(h["balance"])
+    rest.plot(t, scale * h["balance"], color="0.25", lw=1.2)
+    rest.axhline(0.0, color=REST, lw=0.8)
+    worst = float(np.abs(h["balance"]).max())
+    share = f", {100 * worst / turned_over:.2g} % of the work turned over" if turned_over > 0 else ""
+    rest.set_title(f"unexplained: at most {scale * worst:.3g} {unit}{share}", loc="left", fontsize=9)
     upper.set_ylabel("Energy, J")
     lower.set_ylabel("Since the start, J")
-    lower.set_xlabel("Time, s")
-    lower.set_xlim(t[0], t[-1])
-    upper.legend(loc="best")
-    lower.legend(loc="best")
+    rest.set_ylabel(f"Imbalance, {unit}")
+    rest.set_xlabel("Time, s")
+    rest.set_xlim(t[0], t[-1])
+    for axes in (upper, lower):
+        axes.tick_params(labelbottom=True)
     upper.set_title(f"Energies of the wall, {title(result)}", loc="left", fontweight="bold")
     return figure
+
+
+_STORED = (
+    ("kinetic_energy", "kinetic", {"color": ACCENT}),
+    ("strain_energy", "strain", {"color": COMPUTED}),
+    ("stop_energy", "lip stops", {"color": "0.45", "ls": ":"}),
+)
+_EXCHANGED = (
+    ("pressure_work", "work of the\npressure", {"color": COMPUTED}),
+    ("dissipation", "lost to\ndamping", {"color": ACCENT}),
+)
+
+
+def _readable(energy: np.ndarray) -> tuple[float, str]:
+    """Factor and unit in which an energy, J, has few digits before the point."""
+    size = float(np.abs(energy).max())
+    for factor, unit in ((1.0, "J"), (1e3, "mJ"), (1e6, "µJ")):
+        if size * factor >= 1.0:
+            return factor, unit
+    return 1e9, "nJ"
 
 
 def _cycle_rows(result: TransientResults) -> np.ndarray:
@@ -114,11 +133,9 @@ def centre_line(result: TransientResults, count: int = 6) -> Figure:
     figure = new_figure(7.2, 4.4)
     axes = figure.add_subplot()
     z = 1e3 * result.mesh.z
-    colours = matplotlib.colormaps[_CYCLE](np.linspace(0.0, 0.85, len(chosen)))
-    for row, colour in zip(chosen, colours):
-        axes.plot(
-            z, 1e3 * h["centre_line"][row], color=colour, label=f"{1e3 * (h['time'][row] - h['time'][rows[0]]):.1f} ms"
-        )
+    for row, look in zip(chosen, phase_looks(len(chosen))):
+        after = 1e3 * (h["time"][row] - h["time"][rows[0]])
+        axes.plot(z, 1e3 * h["centre_line"][row], label=f"{after:.1f} ms", **look)
     axes.fill_between(
         z, 1e3 * h["centre_line"][rows].min(axis=0), 1e3 * h["centre_line"][rows].max(axis=0), color="0.9", zorder=0
     )
@@ -132,65 +149,71 @@ def centre_line(result: TransientResults, count: int = 6) -> Figure:
     )
     axes.set_title(f"Centre line over {period}", loc="left", fontweight="bold")
     axes.set_xlim(0, z[-1])
-    axes.legend(loc="best", title="after")
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="after")
     return figure
 
 
 def phase_portrait(result: TransientResults) -> Figure:
-    """Velocity of the lip over its displacement; the last cycles stand out."""
+    """Velocity of the lip over its opening; the last cycles stand out."""
     h = result.history
     figure = new_figure(6.0, 4.6)
     axes = figure.add_subplot()
-    x, v = 1e3 * h["lip_displacement"], h["lip_velocity"]
-    axes.plot(x, v, color="0.75", lw=0.7, label="whole run")
+    x, v = 1e3 * h["lip_opening"], h["lip_velocity"]
+    axes.plot(x, v, color="0.6", lw=0.7, label="whole run")
     rows = _cycle_rows(result)
     rows = np.concatenate(
         [[max(rows[0] - 1, 0)], rows]
     )  # a cycle is no whole number of steps: one more closes the loop
     axes.plot(x[rows], v[rows], color=COMPUTED, lw=1.8, label="last cycle" if result.cycle else "last fifth of the run")
     axes.plot(x[0], v[0], "o", color=ACCENT, label="start")
-    axes.set_xlabel("Displacement of a lip, mm")
-    axes.set_ylabel("Its velocity, m/s")
+    axes.set_xlabel("Clear lip opening, mm")
+    axes.set_ylabel("Velocity of one lip, m/s")
     axes.set_title("Phase portrait of the lip", loc="left", fontweight="bold")
-    axes.legend(loc="best")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     return figure
 
 
 def spectra(result: TransientResults) -> Figure:
-    """Amplitude spectra of mass flow and lip opening over the second half of the run."""
+    """Amplitude spectra of mass flow and lip opening over the second half of the run, with their resolution."""
     h = result.history
-    figure = new_figure(7.2, 4.8)
+    figure = new_figure(7.2, 5.2)
     flow = result.case.drive.kind == "flow"
     panels = figure.subplots(2 if flow else 1, 1, sharex=True, squeeze=False)[:, 0]
     half = len(h["time"]) // 2
-    signals = ([("mass_flow", 1.0, "Mass flow, kg/s")] if flow else []) + [("lip_opening", 1e3, "Lip opening, mm")]
-    highest = 0.0
+    signals = ([("mass_flow", 1.0, "Mass flow, kg/s")] if flow else []) + [
+        ("lip_opening", 1e3, "Clear lip opening, mm")
+    ]
+    heading, highest = "Spectrum of the second half (Hann window)", 0.0
     for axes, (name, factor, label) in zip(panels, signals):
-        if len(h["time"]) - half < 16:
-            continue
-        frequency, amplitude = spectrum(Series.of(h["time"][half:], factor * h[name][half:]))
-        amplitude = np.maximum(amplitude, 1e-12 * max(amplitude.max(), 1e-30))
-        axes.semilogy(frequency, amplitude, color=COMPUTED, lw=1.1)
-        axes.set_ylim(bottom=1e-6 * max(amplitude.max(), 1e-9))
         axes.set_ylabel(label)
-        above = np.flatnonzero(amplitude > 1e-4 * amplitude.max())
-        highest = max(highest, frequency[above[-1]] if len(above) else 0.0)
+        if len(h["time"]) - half < 16:
+            heading = "The second half of the run is too short for a spectrum"
+            continue
+        series = Series.of(h["time"][half:], factor * h[name][half:])
+        heading = f"Spectrum of the second half (Hann window, resolution {1.0 / series.duration:.2g} Hz)"
+        highest = max(highest, _spectrum(axes, series))
         base = (result.verdict.get(name) or {}).get("frequency")
         if base:
             axes.axvline(base, color=ACCENT, lw=0.9, ls="--", zorder=0)
-            axes.annotate(
-                f"{base:.2f} Hz",
-                (base, 1.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(4, -12),
-                textcoords="offset points",
-                color=ACCENT,
-                fontsize=9,
-            )
+            axes.set_title(f"frequency by the verdict: {in_steps(base, 1.0 / series.duration)} Hz", **_BESIDE)
     panels[-1].set_xlim(0, min(1.15 * highest, 0.5 / np.median(np.diff(h["time"]))) or None)
     panels[-1].set_xlabel("Frequency, Hz")
-    panels[0].set_title("Spectrum of the second half (Hann window)", loc="left", fontweight="bold")
+    panels[0].tick_params(labelbottom=True)
+    headline(figure, heading)
     return figure
+
+
+_BESIDE = {"loc": "right", "fontsize": 9, "color": ACCENT}
+
+
+def _spectrum(axes, series: Series) -> float:
+    """Draw a spectrum with a dot at each line that it resolves; the frequency up to which there is something, Hz."""
+    frequency, amplitude = spectrum(series)
+    amplitude = np.maximum(amplitude, 1e-12 * max(amplitude.max(), 1e-30))
+    axes.semilogy(frequency, amplitude, ".-" if len(frequency) < 200 else "-", color=COMPUTED, lw=1.1, ms=4)
+    axes.set_ylim(bottom=1e-6 * max(amplitude.max(), 1e-9))
+    above = np.flatnonzero(amplitude > 1e-4 * amplitude.max())
+    return float(frequency[above[-1]]) if len(above) else 0.0
 
 
 def wave(result: TransientResults) -> Figure:
@@ -200,7 +223,7 @@ def wave(result: TransientResults) -> Figure:
 
 def pressures(result: TransientResults) -> Figure:
     """Pressure in space and time."""
-    return _space_time(result, "station_pressure", 1e-3, "Pressure, kPa", "Pressure along the valve")
+    return _space_time(result, "station_pressure", 1e-3, "Static pressure, kPa", "Pressure along the valve")
 
 
 def _space_time(result: TransientResults, name: str, factor: float, label: str, heading: str) -> Figure:
@@ -212,23 +235,19 @@ def _space_time(result: TransientResults, name: str, factor: float, label: str, 
     values = factor * h[name][rows].T
     figure = new_figure(7.6, 4.2)
     axes = figure.add_subplot()
-    # single spikes must not take the whole range
+    # single spikes must not take the whole range; what lies beyond is said
     low, high = np.percentile(values, [0.5, 99.5])
-    drawn = axes.pcolormesh(
-        t[rows],
-        1e3 * result.mesh.z,
-        values,
-        cmap="viridis",
-        shading="nearest",
-        rasterized=True,
-        vmin=low,
-        vmax=high if high > low else low + 1.0,
-    )
+    low, high = (low, high) if high > low else (low - 0.5, low + 0.5)
+    look = {"vmin": low, "vmax": high, "cmap": MAGNITUDE, "shading": "nearest", "rasterized": True}
+    drawn = axes.pcolormesh(t[rows], 1e3 * result.mesh.z, values, **look)
     axes.grid(False)
     axes.set_xlabel("Time, s")
     axes.set_ylabel("Distance from the lip z, mm")
     axes.set_title(heading, loc="left", fontweight="bold")
-    bar = figure.colorbar(drawn, ax=axes, aspect=25)
-    bar.set_label(label)
-    bar.outline.set_visible(False)
+    margin = 0.01 * (high - low)
+    beyond = (values.min() < low - margin, values.max() > high + margin)
+    if any(beyond):
+        axes.set_title(f"from {values.min():.3g} to {values.max():.3g} {label.split(', ')[1]}", loc="right", fontsize=9)
+    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
+    colour_bar(figure, drawn, axes, label, aspect=25, extend=extend)
     return figure

@@ -67,7 +67,7 @@ def compare(results: Sequence[TransientResults]) -> Figure:
             panels[1, column].plot(time, 1e3 * h["lip_opening"][rows], **look)
             look["lw"] = 1.5
     panels[0, 0].set_ylabel("Mass flow, kg/s")
-    panels[1, 0].set_ylabel("Lip opening, mm")
+    panels[1, 0].set_ylabel("Clear lip opening, mm")
     panels[1, 0].set_xlabel("Time, s")
     panels[1, 0].set_xlim(
         left=min(r.history["time"][0] for r in results), right=max(r.history["time"][-1] for r in results)

@@ -19,16 +19,23 @@ def signal(name: str, time: np.ndarray, values: np.ndarray, verdict: Verdict) ->
     upper, lower = figure.subplots(2, 1)
     upper.plot(time, values, color=COMPUTED, lw=1.0)
     upper.axhline(verdict.mean, color=ACCENT, lw=0.9, ls="--")
+    for edge in verdict.judged:
+        if time[0] < edge < time[-1]:  # only a part of the record is judged
+            upper.axvline(edge, color=ACCENT, lw=0.9, ls=":")
     upper.set(xlabel="Time, s", ylabel=name, xlim=(time[0], time[-1]))
     upper.set_title(name, loc="left", fontweight="bold")
-    upper.set_title(f"{verdict.name}{'' if verdict.decided else ' ?'}", loc="right", fontsize=10)
+    upper.set_title(f"{verdict.name}{'' if verdict.decided else ' (not certain)'}", loc="right", fontsize=10)
+    label = "Amplitude"
     if len(values) >= 4:
-        frequency, amplitude = spectrum(Series.of(time, values))
+        within = (time >= verdict.judged[0]) & (time <= verdict.judged[1])
+        series = Series.of(time[within], values[within])
+        frequency, amplitude = spectrum(series)
+        label = f"Amplitude (resolution {1.0 / series.duration:.2g} Hz)"
         lower.semilogy(frequency, np.maximum(amplitude, 1e-9 * max(amplitude.max(), 1e-300)), color=COMPUTED, lw=1.0)
         lower.set_xlim(0, frequency[-1])
     if verdict.period > 0:
         lower.axvline(verdict.frequency, color=ACCENT, lw=0.9, ls="--")
-    lower.set(xlabel="Frequency, Hz", ylabel="Amplitude")
+    lower.set(xlabel="Frequency, Hz", ylabel=label)
     numbers = [
         ("mean", verdict.mean),
         ("rms", verdict.rms),

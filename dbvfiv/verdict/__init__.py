@@ -2,8 +2,9 @@
 valves.
 """
 
-from .judge import JudgeOptions, judge
-from .series import Series, spectrum
+from .judge import judge
+from .options import JudgeOptions
+from .series import Series, in_steps, spectrum
 from .verdict import NAMES, Verdict
 
-__all__ = ["NAMES", "JudgeOptions", "Series", "Verdict", "judge", "spectrum"]
+__all__ = ["NAMES", "JudgeOptions", "Series", "Verdict", "in_steps", "judge", "spectrum"]

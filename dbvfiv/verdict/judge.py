@@ -4,46 +4,21 @@ mislead.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from .cycles import Cycles, extremes, harmonics
+from .level import within_noise, without_cycles
+from .options import JudgeOptions
 from .period import find_period, refine
-from .series import Series, undersampled
+from .sampling import longest_part
+from .series import Series, check_samples, swings, undersampled
 from .trend import comes_and_goes, remaining, settled, trend_of
 from .verdict import Verdict
 
-
-@dataclass(frozen=True)
-class JudgeOptions:
-    """Options of a verdict.
-
-    Attributes
-    ----------
-    steady : float
-        Largest change, over the last fifth and still to come, of a steady signal relative to its size.
-    residual : float
-        Largest residual of a steady state, where a residual is known.
-    cycles : int
-        Cycles that a limit cycle must have kept.
-    periodic : float
-        Largest periodicity error of a limit cycle without noise.
-    noisy : float
-        Largest periodicity error of a limit cycle with noise on it.
-    drift : float
-        Largest relative change of the amplitude over the cycles looked at, and still to come.
-    band : float
-        Relative band within which amplitudes count as equal.
-    """
-
-    steady: float = 1e-4
-    residual: float = 1e-3
-    cycles: int = 10
-    periodic: float = 0.02
-    noisy: float = 0.4
-    drift: float = 2e-3
-    band: float = 0.02
+#: Samples without which nothing is said.
+_FEWEST = 16
 
 
 def judge(
@@ -59,7 +34,8 @@ def judge(
     Parameters
     ----------
     time, values : (k,) arrays
-        Samples at increasing times; uneven ones are interpolated.
+        Samples at increasing times; uneven ones are interpolated. Of a record with gaps the longest part between
+        them is judged, and a note says so.
     options : JudgeOptions
     residual : float, optional
         How far from equilibrium the system is at the end, relative; a signal that stands still while its system does
@@ -83,14 +59,25 @@ def judge(
     >>> verdict.name, round(verdict.frequency, 6), round(verdict.amplitude, 6)
     ('limit cycle', 1.0, 1.0)
     """
-    series = Series.of(time, values)
-    whole = {"smallest": float(np.min(values)), "largest": float(np.max(values))}
-    if len(series.values) < 16:
-        end = series.values[-1]
-        return Verdict(
-            "undecided", False, "There are fewer than 16 samples.", mean=float(end), amplitude=0.0, rms=0.0, **whole
-        )
-    return replace(_judge(series, options, residual, closed_below), **whole)
+    time, values = check_samples(time, values)
+    part, notes = longest_part(time)
+    facts = {
+        "smallest": float(values.min()),
+        "largest": float(values.max()),
+        "judged": (float(time[part][0]), float(time[part][-1])),
+        "notes": notes,
+    }
+    time, values = time[part], values[part]
+    if len(values) < _FEWEST:
+        end = float(values[-1])
+        return Verdict("undecided", False, _too_few(notes), mean=end, amplitude=0.0, rms=0.0, **facts)
+    found = _judge(Series.of(time, values), options, residual, closed_below)
+    return replace(found, **facts)
+
+
+def _too_few(notes: tuple[str, ...]) -> str:
+    between = " between two gaps" if notes else ""
+    return f"There are fewer than {_FEWEST} samples{between}."
 
 
 def _judge(series: Series, options: JudgeOptions, residual: float | None, closed_below: float | None) -> Verdict:
@@ -112,13 +99,11 @@ def _judge(series: Series, options: JudgeOptions, residual: float | None, closed
             )
             return Verdict("undecided", False, words, **at_end)
         found = _oscillation(series, options, size)
-        if found is not None:
+        if found is not None and (found.decided and found.name != "irregular"):
             return found
-    return _without_cycles(series, options, size, residual, at_end)
-
-
-# -- signals with cycles
-# ----
+        found = found or without_cycles(series, options, size, residual, at_end)
+        return within_noise(series, options, residual, at_end) or found
+    return without_cycles(series, options, size, residual, at_end)
 
 
 def _oscillation(series: Series, options: JudgeOptions, size: float) -> Verdict | None:
@@ -179,11 +164,11 @@ def _name(
         doubled = abs(np.log(cycles.spread[-1] / cycles.spread[max(0, count - options.cycles)])) > 0.3
         return Verdict(direction, count >= options.cycles or (count >= 5 and doubled), words + ".", **facts)
     enough = (1.5 if error > options.noisy else 4.0) * options.cycles  # swings without a return
-    if count < options.cycles and error > options.periodic and _swings(series) >= enough:
+    if count < options.cycles and error > options.periodic and swings(series) >= enough:
         return Verdict(
             "irregular",
             True,
-            f"After {_swings(series)} swings it still repeats within {100 * error:.2g} % only.",
+            f"After {swings(series)} swings it still repeats within {100 * error:.2g} % only.",
             **facts,
         )
     if count < options.cycles:
@@ -280,12 +265,6 @@ def _slackens(spread: np.ndarray) -> bool:
     return bool(abs(last.slope) + 2.0 * last.error < 0.9 * abs(first.slope))
 
 
-def _swings(series: Series) -> int:
-    """How often the signal passed its mean upwards."""
-    above = series.values > series.values.mean()
-    return int(np.count_nonzero(above[1:] & ~above[:-1]))
-
-
 def _noise_on_cycle(cycles: Cycles, options: JudgeOptions) -> bool:
     """Whether cycles differ by something without memory, within a cycle and from one to the next."""
     kept = cycles.last(4 * options.cycles)
@@ -305,60 +284,3 @@ def _noise_on_cycle(cycles: Cycles, options: JudgeOptions) -> bool:
 def _factor(error: np.ndarray) -> float:
     """Factor from one error to the next; not a number where the errors are rounding."""
     return float(np.exp(trend_of(error).slope)) if len(error) >= 3 and error.min() > 1e-12 else np.nan
-
-
-# -- signals without
-# ----
-
-
-def _without_cycles(
-    series: Series, options: JudgeOptions, size: float, residual: float | None, at_end: dict
-) -> Verdict:
-    tail = series.last(0.2 * series.duration).values
-    thirds = [part.mean() for part in np.array_split(tail, 3)]
-    first, second = thirds[1] - thirds[0], thirds[2] - thirds[1]
-    to_come = abs(second) / (1.0 - min(abs(second / first), 0.99)) if first and abs(second) > 1e-13 * size else 0.0
-    if 2.0 * at_end["amplitude"] <= options.steady * size and to_come <= options.steady * size:
-        if residual is not None and not residual <= options.residual:
-            return Verdict(
-                "undecided",
-                False,
-                (
-                    f"The signal stands still but its system does not (residual "
-                    f"{residual:.2g}): it may be sampled at its own period."
-                ),
-                **at_end,
-            )
-        return Verdict(
-            "steady", True, f"It changes by less than {options.steady:g} of its size, and little is to come.", **at_end
-        )
-    ranges = np.array([np.ptp(part) for part in np.array_split(series.values, 8)])
-    levels = np.array([part.mean() for part in np.array_split(series.values, 8)])
-    late = ranges[-4:]
-    falling, rising = np.all(np.diff(late) < 0), np.all(np.diff(late) > 0)
-    if falling and late[-1] < 0.6 * late[0]:
-        return Verdict(
-            "decaying", bool(late[-1] < 0.1 * ranges.max()), "Its changes become smaller and smaller.", **at_end
-        )
-    if rising and late[-1] > 1.5 * late[0] and ranges[-1] == ranges.max():
-        return Verdict(
-            "growing", bool(late[-1] > 10 * max(late[0], 1e-300)), "Its changes become larger and larger.", **at_end
-        )
-    steps = np.diff(levels[-5:])
-    if np.all(steps > 0) or np.all(steps < 0):
-        if np.ptp(levels[-5:]) > 2.0 * np.median([_scatter(part) for part in np.array_split(series.values, 8)[-4:]]):
-            shrinking = abs(steps[-1]) < 0.5 * abs(steps[0])
-            return Verdict(
-                "decaying" if shrinking else "growing",
-                False,
-                "It drifts one way" + (", slower and slower." if shrinking else "."),
-                **at_end,
-            )
-    if _swings(series) < options.cycles:
-        return Verdict("undecided", False, "It moves, and too few swings have been seen to tell how.", **at_end)
-    return Verdict("irregular", True, "It moves without a period.", **at_end)
-
-
-def _scatter(part: np.ndarray) -> float:
-    t = np.arange(len(part))
-    return float(np.ptp(part - np.polyval(np.polyfit(t, part, 1), t)))

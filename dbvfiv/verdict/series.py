@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,20 +33,8 @@ class Series:
         ValueError
             If lengths differ, times do not increase, or numbers are not finite.
         """
-        time, values = np.asarray(time, float), np.asarray(values, float)
-        if time.ndim != 1 or time.shape != values.shape:
-            raise ValueError(
-                f"The series has {time.size} times and {values.size} values; both must be lists of the same length."
-            )
-        if time.size < 2:
-            raise ValueError("A series needs at least two samples.")
-        if not (np.isfinite(time).all() and np.isfinite(values).all()):
-            where = int(np.flatnonzero(~(np.isfinite(time) & np.isfinite(values)))[0])
-            raise ValueError(f"Sample {where + 1} of the series is not a finite number.")
+        time, values = check_samples(time, values)
         gaps = np.diff(time)
-        if gaps.min() <= 0:
-            where = int(np.argmin(gaps > 0))
-            raise ValueError(f"The times of the series do not increase at sample {where + 2}.")
         step = float(np.median(gaps))
         if np.ptp(gaps) <= 1e-6 * step or time.size < 4:
             return cls(float(time[0]), float((time[-1] - time[0]) / (time.size - 1)), values)
@@ -79,6 +68,31 @@ class Series:
         return make_interp_spline(self.times(), self.values, k=max(degree, 1))
 
 
+def check_samples(time, values) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values as arrays (k,), k at least 2.
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, times do not increase, or numbers are not finite.
+    """
+    time, values = np.asarray(time, float), np.asarray(values, float)
+    if time.ndim != 1 or time.shape != values.shape:
+        raise ValueError(
+            f"The series has {time.size} times and {values.size} values; both must be lists of the same length."
+        )
+    if time.size < 2:
+        raise ValueError("A series needs at least two samples.")
+    if not (np.isfinite(time).all() and np.isfinite(values).all()):
+        where = int(np.flatnonzero(~(np.isfinite(time) & np.isfinite(values)))[0])
+        raise ValueError(f"Sample {where + 1} of the series is not a finite number.")
+    gaps = np.diff(time)
+    if gaps.min() <= 0:
+        where = int(np.argmin(gaps > 0))
+        raise ValueError(f"The times of the series do not increase at sample {where + 2}.")
+    return time, values
+
+
 def spectrum(series: Series) -> tuple[np.ndarray, np.ndarray]:
     """One-sided amplitude spectrum about the mean with a Hann window: a sine of amplitude a shows a peak of about a.
 
@@ -93,6 +107,18 @@ def spectrum(series: Series) -> tuple[np.ndarray, np.ndarray]:
     return np.fft.rfftfreq(len(values), series.step), amplitude
 
 
+def in_steps(value: float, step: float) -> str:
+    """A value with no more digits than its resolution carries.
+
+    Examples
+    --------
+    >>> in_steps(35.714, 20.0), in_steps(35.714, 0.25)
+    ('36', '35.7')
+    """
+    decimals = max(0, -math.floor(math.log10(step))) if step > 0 else 6
+    return f"{value:.{min(decimals, 12)}f}"
+
+
 def undersampled(series: Series) -> float:
     """Frequency, Hz, of a line that holds most of the signal's power and is sampled fewer than four times a cycle; zero
     without one.
@@ -103,3 +129,9 @@ def undersampled(series: Series) -> float:
     if 4.0 * frequency[at] * series.step <= 1.0:
         return 0.0
     return float(frequency[at]) if power[max(at - 3, 0) : at + 4].sum() > 0.5 * power.sum() else 0.0
+
+
+def swings(series: Series) -> int:
+    """How often the signal passed its mean upwards."""
+    above = series.values > series.values.mean()
+    return int(np.count_nonzero(above[1:] & ~above[:-1]))

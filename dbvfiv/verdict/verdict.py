@@ -44,6 +44,13 @@ class Verdict:
         Root mean square about the mean, of the same part of the series.
     smallest, largest : float
         Extremes of the whole series.
+    noise : float
+        Root mean square of noise without memory about a constant level, where the end of the series is that; not a
+        number otherwise.
+    judged : tuple of float, s
+        Beginning and end of the part that the verdict is about: the whole series, or its longest part between gaps.
+    notes : tuple of str
+        Sentences on the samples: gaps, uneven steps.
     """
 
     name: str
@@ -60,6 +67,9 @@ class Verdict:
     rms: float = np.nan
     smallest: float = np.nan
     largest: float = np.nan
+    noise: float = np.nan
+    judged: tuple[float, float] = (np.nan, np.nan)
+    notes: tuple[str, ...] = ()
 
     @property
     def frequency(self) -> float:
@@ -79,6 +89,7 @@ class Verdict:
             "rms": self.rms,
             "smallest": self.smallest,
             "largest": self.largest,
+            "noise": self.noise,
         }
         return {
             "verdict": self.name,
@@ -86,5 +97,7 @@ class Verdict:
             "reason": self.reason,
             **{name: float(value) if np.isfinite(value) else None for name, value in numbers.items()},
             "cycles_observed": self.cycles,
+            "judged": [float(t) if np.isfinite(t) else None for t in self.judged],
+            "notes": list(self.notes),
             "harmonics": [{"amplitude": float(a), "phase": float(p)} for a, p in self.harmonics],
         }

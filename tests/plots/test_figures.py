@@ -1,12 +1,15 @@
 """Figures: they exist, show the numbers of the result, and carry units."""
 
+import matplotlib
 import numpy as np
 import pytest
 
 import dbvfiv
 from dbvfiv.case import Case
 from dbvfiv.errors import CaseError
-from dbvfiv.plots import figures_of, published
+from dbvfiv.plots import figures_of, published, style
+from dbvfiv.plots.deformed import COLOURS
+from dbvfiv.plots.faces import faces
 from dbvfiv.plots.layers import unrolled
 
 NAMES = {
@@ -32,7 +35,9 @@ def test_every_figure_is_there_and_labelled_with_units(figures):
     for name, figure in figures.items():
         labels = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
         assert labels, name
-        assert all(any(unit in label for unit in ("mm", "kPa", "kg/s", "m/s", "cm²")) for label in labels), labels
+        assert all(any(unit in label for unit in ("mm", "kPa", "kg/s", "m/s", "cm²", "MPa")) for label in labels), (
+            labels
+        )
 
 
 def test_curves_hold_the_numbers(figures, coarse_run):
@@ -43,14 +48,62 @@ def test_curves_hold_the_numbers(figures, coarse_run):
     assert np.allclose(jet.get_ydata(), [s.outlet_velocity for s in coarse_run.states])
 
 
-def test_lips_are_closed_symmetric_curves(figures, coarse_run):
+def test_lips_are_closed_symmetric_curves_of_the_inner_face(figures, coarse_run):
     rest, *moved = figures["lip-shapes"].axes[0].lines
     for line in (rest, *moved):
         x, y = line.get_data()
         assert x[0] == pytest.approx(x[-1]) and y[0] == pytest.approx(y[-1])
         assert x.max() == pytest.approx(-x.min()) and y.max() == pytest.approx(-y.min())
-    opening = max(moved[-1].get_ydata()) - max(rest.get_ydata())
-    assert opening == pytest.approx(coarse_run.states[-1].lip_displacement * 1e3)
+    assert np.ptp(rest.get_ydata()) < 1.0  # mm: a closed lip shows no slot
+    mesh, state = coarse_run.mesh, coarse_run.states[-1]
+    *_, last, outer = moved
+    assert last.get_ydata().max() == pytest.approx(1e3 * faces(mesh, state.nodal)[0][mesh.rows[0], 1].max())
+    assert outer.get_ydata().max() - last.get_ydata().max() == pytest.approx(12, abs=0.5)  # the wall
+    upper = figures["centre-line"].axes[0]
+    assert upper.lines[0].get_ydata()[0] < 0.5 and "Inner" in upper.get_title("left")
+
+
+def test_pressures_are_said_to_be_static_and_openings_to_be_clear(figures):
+    assert figures["head-discharge"].axes[0].get_ylabel() == "Static inlet pressure, kPa"
+    assert figures["passage"].axes[0].get_ylabel() == "Static pressure, kPa"
+    assert "static" in figures["deformed"].get_suptitle()
+    labels = [text.get_text() for text in figures["deflection"].axes[0].get_legend().get_texts()]
+    assert "clear lip opening at its middle" in labels
+
+
+def test_colours_are_perceptual_and_styles_one(figures):
+    """Lightness of colour maps of magnitudes rises evenly, as it must in grey print."""
+    for name in (style.MAGNITUDE, style.MOTION):
+        grey = matplotlib.colormaps[name](np.linspace(0, 1, 64))[:, :3] @ [0.2126, 0.7152, 0.0722]
+        assert (np.diff(grey) > 0).all(), name
+    assert COLOURS.name == style.MOTION
+    bold = [f.axes[0].title.get_fontweight() for f in figures.values() if not f.get_suptitle()]
+    titles = [f.axes[0].get_title("left") for f in figures.values() if not f.get_suptitle()]
+    assert all(titles) and bold
+    for figure in figures.values():
+        if figure.get_suptitle():
+            assert figure._suptitle.get_ha() == "left" and figure._suptitle.get_fontweight() == "bold"
+
+
+def test_every_panel_has_numbers_at_its_ticks(figures):
+    for name in ("passage", "layer-stress", "centre-line"):
+        figure = figures[name]
+        figure.canvas.draw()
+        for axes in figure.axes:
+            if axes.get_visible() and axes.get_label() != "<colorbar>":
+                for axis in (axes.xaxis, axes.yaxis):
+                    assert any(label.get_text() for label in axis.get_ticklabels() if label.get_visible()), name
+
+
+def test_short_logarithmic_axes_have_numbers():
+    figure = style.new_figure()
+    axes = figure.add_subplot()
+    axes.plot([5.2, 8.7], [1, 2])
+    axes.set_xlim(5.2, 8.7)
+    style.log_axis(axes.xaxis, 5.2, 8.7)
+    figure.canvas.draw()
+    inside = [t.get_text() for t in axes.get_xticklabels() if 5.2 <= t.get_position()[0] <= 8.7 and t.get_text()]
+    assert len(inside) >= 2 and axes.get_xscale() == "log"
 
 
 def test_one_panel_for_each_layer(figures, coarse_run):
@@ -77,6 +130,11 @@ def test_published_points_only_on_the_reference_valve(figures, coarse_run):
 def test_a_single_state_and_a_chosen_pressure(tmp_path, coarse_run):
     alone = figures_of(coarse_run.only(coarse_run.states[0]))
     assert set(alone) == NAMES
+    for name in ("head-discharge", "area-discharge", "deflection"):
+        axes = alone[name].axes[0]
+        (x,), (y,) = axes.lines[0].get_data()
+        assert axes.lines[0].get_marker() not in (None, "None", ""), name
+        assert axes.get_xlim()[0] <= x < 0.97 * axes.get_xlim()[1] and axes.get_ylim()[0] <= y < axes.get_ylim()[1]
     chosen = figures_of(coarse_run, only=["deformed"], pressure=17e3)
     assert "18 kPa" in chosen["deformed"].get_suptitle()
 

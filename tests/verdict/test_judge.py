@@ -105,7 +105,6 @@ IRREGULAR = {
     "bursts of uneven strength": bursts(np.full(40, 0.5), 1 + 0.3 * noise(5, 40)),
     "chaotic swings": mapped(3.9),
     "outbursts between quiet cycles": np.sin(W * T) * (1 + 0.6 * ((T % 3.7) > 3.3)),
-    "decayed into noise": 3 + np.exp(-T) * np.sin(W * T) + 0.01 * noise(),
     "amplitude doubled near the end": np.sin(W * T) * (1 + (T > 9)),
 }
 UNDECIDED = {

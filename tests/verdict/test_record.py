@@ -1,0 +1,263 @@
+"""Records as instruments write them: units, decimal commas, gaps, missing values, noise; and files that are none."""
+
+import json
+
+import numpy as np
+import pytest
+
+from dbvfiv.verdict import judge
+from dbvfiv.verdict.table import read_table
+
+T = np.linspace(0.0, 10.0, 2001)
+SINE = 2 + np.sin(2 * np.pi * 3.0 * T)
+
+
+def text_of(rows, header="", separator=",", decimal="."):
+    lines = [separator.join(f"{value:.9g}".replace(".", decimal) for value in row) for row in rows]
+    return "\n".join([*([header] if header else []), *lines]) + "\n"
+
+
+def record(tmp_path, text, encoding="utf-8"):
+    file = tmp_path / "record.csv"
+    file.write_bytes(text.encode(encoding))
+    return file
+
+
+def judged(command_line, file, *options):
+    outcome = command_line("verdict", file, "--json", *options)
+    assert outcome.status == 0, outcome.err
+    return json.loads(outcome.out)["signals"]
+
+
+HEADERS = {
+    "time [ms],p": 1e-3,
+    "t (us),p": 1e-6,
+    '"Time, ms",p': 1e-3,
+    "Zeit in ms,Druck": 1e-3,
+    "t/ms,p/kPa": 1e-3,
+    "t_ms,p": 1e-3,
+    "Time [µs],p": 1e-6,
+    "time (min),p": 60.0,
+    "time [s],p": 1.0,
+    "run time,p": 1.0,
+    "ms,kPa": 1e-3,
+    "time,p\n[ms],[kPa]": 1e-3,
+    "time,p\nms,kPa": 1e-3,
+    "# time [ms], p": 1e-3,
+    "Logger 7,\nRate,200 Hz\ntime [ms],p": 1e-3,
+}
+
+
+@pytest.mark.parametrize("header", HEADERS)
+def test_units_of_time_in_the_header(command_line, tmp_path, header):
+    factor = HEADERS[header]
+    file = record(tmp_path, text_of(np.column_stack([T / factor, SINE]), header))
+    (found,) = judged(command_line, file)
+    assert found["verdict"] == "limit cycle" and found["frequency"] == pytest.approx(3.0, rel=1e-5)
+
+
+def test_a_unit_may_be_given(command_line, tmp_path):
+    file = record(tmp_path, text_of(np.column_stack([1e3 * T, SINE]), "time,p"))
+    assert judged(command_line, file, "--time-unit", "ms")[0]["frequency"] == pytest.approx(3.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("header", ["time [fortnights],p", "time,p\n[steps],[kPa]", "t/T,p"])
+def test_units_that_are_none_of_time_are_refused(command_line, tmp_path, one_sentence, header):
+    outcome = command_line("verdict", record(tmp_path, text_of(np.column_stack([T, SINE]), header)))
+    assert outcome.status == 2 and "no unit of time" in outcome.err and one_sentence(outcome.err), outcome.err
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " "])
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "latin-1", "utf-16"])
+def test_decimal_commas_and_encodings(command_line, tmp_path, separator, encoding):
+    header = separator.join(["Zeit", "Öffnung"])
+    text = text_of(np.column_stack([T, SINE]), header, separator, ",").replace("\n", "\r\n")
+    (found,) = judged(command_line, record(tmp_path, text, encoding))
+    assert found["name"] == "Öffnung" and found["frequency"] == pytest.approx(3.0, rel=1e-5)
+    assert found["mean"] == pytest.approx(2.0, rel=1e-3)
+
+
+def test_blank_lines_and_separators_at_the_end(command_line, tmp_path):
+    lines = text_of(np.column_stack([T, SINE]), "t,p").splitlines()
+    text = "\n\n".join(line + "," for line in lines[:50]) + "\n,,\n" + "\n".join(lines[50:])
+    assert judged(command_line, record(tmp_path, text))[0]["frequency"] == pytest.approx(3.0, rel=1e-5)
+
+
+BAD = {"NaN": "nan", "": "nothing", "overload": "overload", "1e400": "1e400"}
+
+
+@pytest.mark.parametrize("cell", BAD)
+def test_rows_without_a_number_are_named_or_skipped(command_line, tmp_path, one_sentence, cell):
+    lines = text_of(np.column_stack([T, SINE]), "t,p").splitlines()
+    for row in (1500, 1800, 1801):
+        lines[row] = f"{lines[row].split(',')[0]},{cell}"
+    file = record(tmp_path, "\n".join(lines))
+    outcome = command_line("verdict", file)
+    assert outcome.status == 2 and one_sentence(outcome.err), outcome.err
+    assert "line 1501" in outcome.err and BAD[cell] in outcome.err.lower() and "2 more rows" in outcome.err
+    assert "--skip-bad" in outcome.err
+    (found,) = judged(command_line, file, "--skip-bad")
+    assert found["skipped_rows"] == 3 and found["verdict"] == "limit cycle"
+    assert found["frequency"] == pytest.approx(3.0, rel=1e-4)
+    assert "3 of 2001 rows" in command_line("verdict", file, "--skip-bad").out
+
+
+def test_missing_values_of_other_columns_do_not_matter(command_line, tmp_path):
+    lines = [f"{t:.6g},{x:.6g},{'' if i % 7 else 1}" for i, (t, x) in enumerate(zip(T, SINE))]
+    file = record(tmp_path, "t,p,rare\n" + "\n".join(lines))
+    assert judged(command_line, file, "-c", "p")[0]["skipped_rows"] == 0
+
+
+@pytest.mark.parametrize("text, words", [("t,p\n0,1\n", "a single sample"), ("t,p\n", "no numbers")])
+def test_one_row_and_none(command_line, tmp_path, one_sentence, text, words):
+    outcome = command_line("verdict", record(tmp_path, text))
+    assert outcome.status == 2 and words in outcome.err and one_sentence(outcome.err), outcome.err
+
+
+def test_names_with_commas_and_columns_by_number(tmp_path):
+    table = read_table(record(tmp_path, '"time, s","lip, mm"\n0,1\n1,2\n'))
+    assert table.names == ("time, s", "lip, mm") and table.index("2") == 1 and table.index("lip") == 1
+    with pytest.raises(ValueError, match="no column '3'"):
+        table.index("3")
+
+
+def test_a_gap_is_named_and_the_longest_part_judged():
+    keep = (T < 2.0) | (T > 3.13)
+    verdict = judge(T[keep], SINE[keep])
+    assert verdict.name == "limit cycle", verdict.reason
+    assert verdict.frequency == pytest.approx(3.0, rel=1e-5)
+    assert verdict.judged == (pytest.approx(3.135), 10.0)
+    (note,) = verdict.notes
+    assert "a gap from 1.995 to 3.135 s" in note and "3.135 to 10 s" in note
+
+
+def test_a_gap_in_the_middle_of_many_leaves_too_few(command_line):
+    keep = np.arange(len(T)) % 40 < 12
+    verdict = judge(T[keep], SINE[keep])
+    assert verdict.name == "undecided" and "between two gaps" in verdict.reason and "50 gaps" in verdict.notes[0]
+
+
+def test_uneven_samples_are_said_to_be_interpolated():
+    t = np.sort(np.random.default_rng(5).uniform(0, 10, 3000))
+    verdict = judge(t, 2 + np.sin(6 * np.pi * t))
+    assert verdict.name == "limit cycle" and "uneven" in verdict.notes[0]
+    assert judge(np.round(T, 4), SINE).notes == ()
+
+
+NOISE = np.random.default_rng(7).standard_normal(len(T))
+COLOURED = np.convolve(NOISE, [0.25, 0.5, 0.25], "same")
+
+
+@pytest.mark.parametrize("noise", [NOISE, COLOURED, np.round(2 * NOISE) / 2, NOISE[: len(T)] ** 3 / 4])
+@pytest.mark.parametrize("strength", [1e-3, 0.01])
+def test_a_constant_under_noise_is_steady_and_the_noise_is_named(noise, strength):
+    verdict = judge(T, 5 + 5 * strength * noise)
+    assert (verdict.name, verdict.decided) == ("steady", True), verdict.reason
+    assert "within noise" in verdict.reason
+    assert verdict.noise == pytest.approx(5 * strength * noise[-401:].std(), rel=0.01)
+    assert verdict.mean == pytest.approx(5, rel=4 * strength / 10)
+
+
+def test_an_oscillation_that_died_into_noise_is_steady():
+    t = np.linspace(0.0, 10.0, 10001)
+    noise = np.random.default_rng(1).standard_normal(len(t))
+    verdict = judge(t, 3 + np.exp(-t) * np.sin(6 * np.pi * t) + 0.01 * noise)
+    assert verdict.name == "steady" and verdict.noise == pytest.approx(0.01, rel=0.1)
+
+
+def test_much_noise_is_irregular_and_says_so():
+    verdict = judge(T, 5 + NOISE)
+    assert verdict.name == "irregular" and "too much to call it steady" in verdict.reason
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        5 + 0.02 * np.sin(2 * np.pi * 3 * T) + 0.01 * NOISE,
+        5 + 0.01 * np.sin(2 * np.pi * 40 * T) * np.sin(2 * np.pi * 0.37 * T) + 0.004 * NOISE,
+        5 + 0.01 * np.cumsum(NOISE) / 20,
+        5 + 0.01 * NOISE + 0.01 * T,
+    ],
+    ids=["line", "beats", "walk", "ramp"],
+)
+def test_motion_under_noise_is_not_steady(values):
+    assert judge(T, values).name != "steady"
+
+
+def test_a_system_that_moves_is_not_steady_within_noise():
+    assert judge(T, 5 + 0.01 * NOISE, residual=0.5).name != "steady"
+
+
+# -- files as chance and editors spoil them
+
+
+def spoiled(rng) -> bytes:
+    """A record with a few random injuries."""
+    count = int(rng.integers(0, 120))
+    columns = int(rng.integers(1, 4))
+    t = np.cumsum(rng.uniform(0.5, 1.5, count) if rng.random() < 0.3 else np.full(count, 1.0)) * 10.0 ** rng.integers(
+        -6, 6
+    )
+    data = [t] + [rng.normal(size=count) * 10.0 ** rng.integers(-9, 9) + rng.normal() for _ in range(columns - 1)]
+    separator = rng.choice([",", ";", "\t", " ", ", ", "  "])
+    decimal = rng.choice([".", ","]) if separator.strip() != "," else "."
+    header = rng.choice(["", "time,p,q", "time [ms];p;q", "# a b", "t/s x\ns Pa", "Zeit\tDruck", "é,ü", '"a', "[s]"])
+    text = text_of(np.column_stack(data), str(header), str(separator), str(decimal))
+    encoding = rng.choice(["utf-8", "latin-1", "utf-8-sig", "utf-16"])
+    raw = bytearray(text.encode(str(encoding), "replace"))
+    words = [
+        b"nan",
+        b"inf",
+        b"-",
+        b",,",
+        b";;",
+        b"1e308",
+        b"1e99",
+        b"\n\n",
+        b"#",
+        b'"',
+        b"\xb5",
+        b"\0",
+        b"\r",
+        b"text",
+        b"1_0",
+        b" ",
+    ]
+    for _ in range(int(rng.integers(0, 6))):
+        at = int(rng.integers(0, len(raw) + 1))
+        kind = rng.random()
+        if kind < 0.6:
+            raw[at:at] = words[int(rng.integers(len(words)))]
+        elif kind < 0.8:
+            del raw[at : at + int(rng.integers(1, 20))]
+        else:
+            raw[at:at] = rng.integers(0, 256, 3, dtype=np.uint8).tobytes()
+    return bytes(raw)
+
+
+def survive(command_line, tmp_path, one_sentence, seeds):
+    outcomes = {0: 0, 2: 0}
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        file = tmp_path / "fuzz.csv"
+        file.write_bytes(spoiled(rng))
+        options = [o for o in ("--skip-bad", "--json") if rng.random() < 0.5]
+        options += ["--rate", "10"] if rng.random() < 0.3 else []
+        outcome = command_line("verdict", file, *options)
+        assert outcome.status in (0, 2), (seed, outcome)
+        if outcome.status:
+            assert one_sentence(outcome.err), (seed, outcome.err)
+        elif "--json" in options:
+            json.loads(outcome.out, parse_constant=lambda name: pytest.fail(f"{name} in the JSON of {seed}"))
+        assert "Traceback" not in outcome.err and "Warning" not in outcome.err, (seed, outcome.err)
+        outcomes[outcome.status] += 1
+    assert min(outcomes.values()) > 0.1 * len(seeds), outcomes
+
+
+def test_spoiled_files_give_a_verdict_or_a_sentence(command_line, tmp_path, one_sentence):
+    survive(command_line, tmp_path, one_sentence, range(200))
+
+
+@pytest.mark.slow
+def test_many_spoiled_files(command_line, tmp_path, one_sentence):
+    survive(command_line, tmp_path, one_sentence, range(200, 2000))
