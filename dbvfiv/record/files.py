@@ -6,13 +6,17 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from time import sleep
 from typing import Self
 
 import h5py
 
 from ..errors import CaseError
 from .layout import LAYOUT
+from .lock import is_being_written
 
+#: A file that is being written is tried this often, s apart.
+_TRIES, _PAUSE = 40, 0.02
 #: What broken or foreign HDF5 files make h5py and the readers raise.
 _BROKEN = (OSError, KeyError, RuntimeError, ValueError, TypeError, IndexError, AttributeError, MemoryError)
 
@@ -98,12 +102,20 @@ def kind_of(path: str | Path) -> str:
 
 def _opened(path: Path) -> h5py.File:
     """A file for reading; one in single-writer mode also while it is written, or after its writer was killed."""
-    try:
-        return h5py.File(path, "r", locking=False)
-    except OSError as error:
-        if "SWMR" not in str(error) and "already open for write" not in str(error):
+    for _ in range(_TRIES):
+        try:
+            return h5py.File(path, "r", locking=False)
+        except PermissionError:
             raise
-        return h5py.File(path, "r", locking=False, libver="latest", swmr=True)
+        except OSError as error:
+            plain = error
+        try:
+            return h5py.File(path, "r", locking=False, libver="latest", swmr=True)
+        except OSError:
+            if not is_being_written(path):
+                raise plain from None
+        sleep(_PAUSE)  # caught between two writes of the same instant
+    raise plain
 
 
 def create(path: str | Path, single_writer: bool = False) -> h5py.File:

@@ -68,3 +68,18 @@ class WriterLock:
         finally:
             os.close(self._descriptor)
             self._descriptor = -1
+
+
+def is_being_written(path: Path) -> bool:
+    """Whether a process holds the right to write a file."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False

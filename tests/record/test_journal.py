@@ -1,0 +1,178 @@
+"""Journals: whole rows only, readable at any moment, one writer, room on the disk."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dbvfiv.case.model import Case
+from dbvfiv.errors import CaseError
+from dbvfiv.record.header import Header
+from dbvfiv.record.journal import DiskFull, Journal
+from dbvfiv.record.layout import TEXT, Column
+from dbvfiv.record.record import GrowingRecord, StoredRecord
+from dbvfiv.record.table import TableSpec
+
+ROOT = Path(__file__).parent.parent.parent
+TABLE = TableSpec(
+    "states",
+    (Column("x", "m", "A number"), Column("shape", "m", "A field"), Column("why", "", "A text", TEXT)),
+    {"shape": (2000,)},
+)
+
+
+def tables(_mesh=None):
+    return (TABLE,)
+
+
+def header():
+    return Header.of("steady", Case())
+
+
+def row(i):
+    return {"x": float(i), "shape": np.full(2000, float(i)), "why": f"because of {i}"}
+
+
+WRITER = """
+import sys
+sys.path.insert(0, {root!r})
+from tests.record.test_journal import *
+with GrowingRecord(header(), None, tables(), {path!r}) as record:
+    print("open", flush=True)
+    for i in range({count}):
+        record.append("states", row(i))
+        record.note("thing", number=i, values=np.arange(3.0))
+    record.conclude(True)
+"""
+
+
+def start_writer(path, count=100_000):
+    code = WRITER.format(root=str(ROOT), path=str(path), count=count)
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    writer = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    )
+    assert writer.stdout.readline() == "open\n", writer.stderr.read()
+    return writer
+
+
+def check_whole(path):
+    found = StoredRecord(path, tables)
+    count = found.rows("states")
+    assert np.array_equal(found.column("states", "x"), np.arange(count))
+    assert np.all(found.column("states", "shape") == np.arange(count)[:, None])
+    assert [note["number"] for note in found.notes("thing")] == list(range(len(found.notes("thing"))))
+    assert count - len(found.notes("thing")) in (0, 1) or not found.complete
+    return count
+
+
+def test_rows_and_notes_come_back(tmp_path):
+    with GrowingRecord(header(), None, tables(), tmp_path / "a.h5") as record:
+        for i in range(3):
+            record.append("states", row(i))
+        record.note("thing", number=0, complex=1 + 2j, text="ü", missing=float("nan"))
+        record.warn("Look out.")
+        record.fail("It did not work.")
+        record.conclude(True)
+    again = StoredRecord(tmp_path / "a.h5", tables)
+    for mine in (record, again):
+        assert mine.rows("states") == 3 and mine.value("states", "why", 1) == "because of 1"
+        assert mine.notes("thing")[0]["complex"] == [1, 2] and mine.notes("thing")[0]["text"] == "ü"
+        assert np.isnan(mine.notes("thing")[0]["missing"])
+        assert mine.warnings == ("Look out.",) and mine.failures == ("It did not work.",) and mine.complete
+        assert np.array_equal(mine.column("states", "shape"), np.outer(range(3), np.ones(2000)))
+
+
+def test_going_on_keeps_rows_and_says_anew_what_failed(tmp_path):
+    path = tmp_path / "a.h5"
+    with GrowingRecord(header(), None, tables(), path) as record:
+        record.append("states", row(0))
+        record.fail("It did not work.")
+        record.conclude(False)
+    with GrowingRecord(header(), None, tables(), path, known=StoredRecord(path, tables)) as record:
+        assert record.rows("states") == 1 and not record.failures
+        record.append("states", row(1))
+        record.conclude(True)
+    again = StoredRecord(path, tables)
+    assert again.complete and not again.failures and list(again.column("states", "x")) == [0, 1]
+
+
+def test_killed_writers_leave_whole_rows(tmp_path):
+    random = np.random.default_rng(1)
+    for number in range(6):
+        path = tmp_path / f"{number}.h5"
+        writer = start_writer(path)
+        time.sleep(random.uniform(0.0, 0.4))
+        writer.send_signal(signal.SIGKILL)
+        writer.communicate()
+        check_whole(path)
+        with GrowingRecord(header(), None, tables(), path, known=StoredRecord(path, tables)) as record:  # goes on
+            record.append("states", row(record.rows("states")))
+        check_whole(path)
+        assert not list(tmp_path.glob(".*"))
+
+
+def test_a_running_file_can_be_read_at_any_moment(tmp_path):
+    path = tmp_path / "a.h5"
+    writer = start_writer(path)
+    try:
+        counts = [check_whole(path) for _ in range(60)]
+    finally:
+        writer.kill()
+        writer.communicate()
+    assert counts == sorted(counts) and counts[-1] > counts[0]
+
+
+def test_a_second_writer_is_told_before_anything_is_touched(tmp_path, one_sentence):
+    path = tmp_path / "a.h5"
+    writer = start_writer(path)
+    try:
+        with pytest.raises(CaseError) as caught:
+            Journal(path, header(), None, tables())
+        assert one_sentence(str(caught.value)) and "another process" in str(caught.value)
+        assert check_whole(path) >= 0
+        time.sleep(0.1)
+        assert check_whole(path) > 0  # the first goes on
+    finally:
+        writer.kill()
+        writer.communicate()
+    Journal(path, header(), None, tables()).close()  # whoever held it is gone
+
+
+def test_two_writers_in_one_process(tmp_path):
+    with Journal(tmp_path / "a.h5", header(), None, tables()), pytest.raises(CaseError):
+        Journal(tmp_path / "a.h5", header(), None, tables())
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
+def test_a_full_disk_keeps_what_was_found(tmp_path, one_sentence):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", disk], capture_output=True).returncode:
+        pytest.skip("this machine lets nobody mount")
+    try:
+        record = GrowingRecord(header(), None, tables(), disk / "a.h5")
+        with pytest.raises(DiskFull) as caught:
+            for i in range(1000):
+                record.append("states", row(i))
+        record.close()
+        assert one_sentence(str(caught.value))
+        assert check_whole(disk / "a.h5") == i > 10
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def test_a_folder_that_cannot_be_written(tmp_path, one_sentence):
+    if os.geteuid() == 0:
+        folder = Path("/proc")
+    else:
+        folder = tmp_path / "locked"
+        folder.mkdir(mode=0o500)
+    with pytest.raises(CaseError) as caught:
+        Journal(folder / "a.h5", header(), None, tables())
+    assert one_sentence(str(caught.value))
