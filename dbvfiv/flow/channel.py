@@ -145,7 +145,7 @@ class Channel(FlowLaw):
             _, inertia = jax.jvp(momentum, (area, rate, inner), (rate, acceleration, inner_rate))
         head = self.heads(area, rate, inner, parameters)
         p = parameters["inlet"] - parameters["density"] * (head + inertia)
-        return p.at[0].set(0.0), p[:1]
+        return jnp.concatenate([jnp.zeros(1), p[1:]]), p[:1]
 
     def _blend(self, parameters):
         return parameters["storage"] if self.unsteady else 0.0
