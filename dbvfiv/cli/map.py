@@ -36,8 +36,9 @@ def command(
     """Growth rate of the leading mode over two parameters, with the exact onset curves.
 
     Every cell carries two counts of its unstable modes, by eigenvalues and by the argument principle; some cells are
-    solved again with the full matrices (map.checks). Columns are put in where onsets appear or vanish (map.refine), and
-    the onset curves are followed by continuation (map.curve).
+    solved again with the full matrices (map.checks); cells whose counts disagree are uncertain and hatched. Columns are put
+    in where onsets appear or vanish (map.refine), and until the onset curves, every point of which is neutral by the full
+    matrices, are known between them too (map.curve).
 
     With -o every finished column is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash. Under mpiexec with
     mpi4py the columns are shared among its processes.
