@@ -133,9 +133,9 @@ def maps_with_curves():
             taken,
             unit="s",
             target=target,
-            note=f"{exact} of {len(result.curves)} curves exact, {added} columns put in; {work:.0f} s of processors",
+            note=f"{exact} of {len(result.curves)} curves exact, {added} columns put in, {work:.0f} s of processor",
         )
-        yield Row(f"largest |growth| over |eigenvalue| on its curves, {POINTS} points", _off(result), "", 1e-6)
+        yield Row("the same, largest |growth| over |eigenvalue| on its curves", _off(result), "", 1e-6)
 
 
 def _off(result) -> float:

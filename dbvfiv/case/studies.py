@@ -120,7 +120,7 @@ class StabilityMap(Section):
     )
     y: StabilityRange = key("density=1:1000:64:log", "Vertical range, likewise.")
     continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
-    curve: StrictBool = key(True, "Follow the onset curves exactly, by continuation of Hopf points.")
+    curve: StrictBool = key(True, "Put in columns until the onset curves are known everywhere.")
     refine: StrictInt = key(
         2, "How often columns are put in between neighbours with different numbers of onsets.", ge=0, le=6
     )

@@ -36,9 +36,10 @@ def command(
 ) -> None:
     """Growth rate of the leading mode over two parameters, with the exact onset curves.
 
-    Every cell carries two counts of its unstable modes, by eigenvalues and by the argument principle; some cells are
-    solved again with the full matrices (map.checks). Columns are put in where onsets appear or vanish (map.refine), and
-    the onset curves are followed by continuation (map.curve).
+    Every cell carries two counts of its unstable modes, by eigenvalues and by the argument principle; where they
+    disagree it is uncertain, and hatched. Some cells are solved again with the full matrices (map.checks). Columns are
+    put in where onsets appear or vanish (map.refine), and until the onset curves are known between them too; every
+    point of a curve is neutral by the full matrices (map.curve).
 
     With -o every finished column is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash. Under mpiexec with
     mpi4py the columns are shared among its processes.

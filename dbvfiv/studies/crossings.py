@@ -64,7 +64,8 @@ class Scan:
     Parameters
     ----------
     sample : callable
-        Value to eigenvalues, sorted by growth rate; raises SolveError where there is no equilibrium.
+        Value to eigenvalues, sorted by growth rate, or to a whole `Sample`; raises SolveError where there is no
+        equilibrium.
     log : bool
         Intervals are halved in the logarithm.
     certify : callable, optional
@@ -79,7 +80,7 @@ class Scan:
 
     def __init__(
         self,
-        sample: Callable[[float], np.ndarray],
+        sample: Callable[[float], np.ndarray | Sample],
         log: bool = False,
         certify: Callable[[float], bool] | None = None,
     ):
@@ -95,7 +96,8 @@ class Scan:
             return None
         if value not in self.samples:
             try:
-                self.samples[value] = Sample(value, np.asarray(self._sample(value)))
+                found = self._sample(value)
+                self.samples[value] = found if isinstance(found, Sample) else Sample(value, np.asarray(found))
             except SolveError as error:
                 self.failures[value] = str(error)
                 return None

@@ -19,6 +19,8 @@ NEUTRAL = 1e-8
 CORRECTIONS = 5
 #: Step along the column for the slope of the growth rate, relative.
 STEP = 1e-4
+#: Largest step along the column, relative.
+REACH = 0.05
 #: Largest relative difference of one mode on the small model and with the full matrices.
 SAME = 1e-2
 
@@ -58,6 +60,8 @@ class OnsetCorrection:
             near, left = found, abs(found.real) / max(abs(found), 1.0)
             if left <= NEUTRAL:
                 break
+            if abs(found.real) > REACH * abs(slope) * (abs(value) or 1.0):
+                return None  # a growth rate that hardly changes along the column leads astray
             value -= found.real / slope
         return (value, abs(near.imag) / (2 * np.pi), left) if left <= ACCURATE else None
 

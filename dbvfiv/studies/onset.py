@@ -151,7 +151,7 @@ def run_onset(
         np.array([s.value for s in samples]),
         table.real,
         table.imag / (2 * np.pi),
-        np.array([s.certified for s in samples], bool),
+        np.array([bool(s.certified) for s in samples], bool),
         tuple(failures),
         tuple(warnings),
         interrupted,

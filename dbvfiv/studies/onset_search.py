@@ -12,7 +12,7 @@ from eigen import Certificate
 from ..case.model import Case
 from ..errors import CaseError, SolveError
 from ..observer import Observer
-from .crossings import WATCHED, Crossing, Scan, locate
+from .crossings import WATCHED, Crossing, Sample, Scan, locate
 from .onset_normal_form import MISSING, described
 from .onset_point import FINE, OnsetPoint, OnsetSample, Side
 from .parameters import Place, is_surrounding
@@ -100,7 +100,7 @@ class OnsetSearch:
         self._samples = {item.value: item for item in known if isinstance(item, OnsetSample) and item.mesh == mesh}
         self._known = {item.key: item for item in known if isinstance(item, OnsetPoint)}
         self.points: dict[tuple, OnsetPoint] = {}
-        self.scan = Scan(self._eigenvalues, options.log, self._certified)
+        self.scan = Scan(self._scanned, options.log)
         self._column = None
 
     def place(self, value: float) -> Place:
@@ -115,14 +115,11 @@ class OnsetSearch:
             self.observer.item(self._samples[value])
         return self._samples[value]
 
-    def _eigenvalues(self, value: float) -> np.ndarray:
+    def _scanned(self, value: float) -> Sample:
         known = self._sample(value)
         if known.failure:
             raise SolveError(known.failure)
-        return known.eigenvalues
-
-    def _certified(self, value: float) -> bool:
-        return self._sample(value).certified
+        return Sample(value, known.eigenvalues, known.certified)
 
     def _solved(self, value: float) -> OnsetSample:
         place = self.place(value)
