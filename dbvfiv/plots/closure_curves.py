@@ -8,22 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from .axes import HALO, headline, limits, log_axis
 from .closure import supports_of
 from .faces import faces
-from .style import (
-    ACCENT,
-    COMPUTED,
-    HALO,
-    PUBLISHED,
-    REST,
-    headline,
-    kilopascals,
-    limits,
-    log_axis,
-    new_figure,
-    pressure_colours,
-    some_of,
-)
+from .style import ACCENT, COMPUTED, PUBLISHED, REST, kilopascals, new_figure, pressure_colours, some_of
 
 if TYPE_CHECKING:
     from ..results.closure import ClosureResults
@@ -203,7 +191,6 @@ def supports_compared(first: ClosureResults, second: ClosureResults) -> Figure:
     line.axhline(0.0, color=ACCENT, lw=1.0, label="inner faces meet")
     line.set_xlim(0.25 * rest[-1, 2], 0.9 * rest[-1, 2])
     line.set_ylim(-5, 0.75 * rest[:, 1].max())
-    line.legend(loc="upper left")
     line.set_xlabel("Distance from the lip z, mm")
     line.set_ylabel("Inner face at x = 0, y, mm")
     for axes, label in (

@@ -4,20 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..record.fields import motion
 from ..record.mesh import MeshData
 from ..record.whole_valve import WholeValve
-
-if TYPE_CHECKING:
-    from ..studies.modes.mode import ModeShape
-    from ..studies.state import State
-
-#: Share of the clear height that a drawn mode may take, and share of the amplitude it is drawn with in any case.
-_OPEN, _SEEN = 0.85, 0.2
 
 
 def nodal_thickness(mesh: MeshData) -> np.ndarray:
@@ -65,18 +57,6 @@ def offset_line(z: np.ndarray, y: np.ndarray, half: np.ndarray) -> tuple[np.ndar
     along = np.stack([np.gradient(z), np.gradient(y)])
     along /= np.linalg.norm(along, axis=0)
     return z - half * along[1], y + half * along[0]
-
-
-def drawn_amplitude(state: State, mode: ModeShape) -> float:
-    """Largest displacement, m, at which a mode shows well and the inner faces of the lips do not cross."""
-    mesh = state.results.mesh
-    line = mesh.rows[:, 0]
-    height = faces(mesh, state.nodal)[0][line, 1]
-    swing = np.abs(mode.shape[line, 1])
-    chosen = (swing > 1e-3) & (height > 0)
-    wanted = mode.drawn_amplitude(state)
-    room = float(np.min(_OPEN * height[chosen] / swing[chosen])) if chosen.any() else wanted
-    return min(wanted, max(room, _SEEN * wanted))
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .style import MAGNITUDE, PUBLISHED, colour_bar, headline, kilopascals, new_figure
+from .axes import colour_bar, headline
+from .style import MAGNITUDE, PUBLISHED, kilopascals, new_figure
+from .views import unrolled
 
 if TYPE_CHECKING:
-    from ..record.mesh import MeshData
     from ..studies.state import State
     from ..studies.steady.result import SteadyResult
 
@@ -55,11 +56,3 @@ def layer_stress(state: State) -> Figure:
             axes.set_xlabel("Arc from the centre, mm")
     headline(figure, f"Von Mises stress in the layers at {kilopascals(state.pressure)} (largest in each element)")
     return figure
-
-
-def unrolled(mesh: MeshData) -> tuple[np.ndarray, np.ndarray]:
-    """Arc length from x = 0 and axial position of the nodes, both (rows, columns) in m, at rest."""
-    points = mesh.nodes[mesh.rows]
-    steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
-    arc = np.concatenate([np.zeros((len(points), 1)), np.cumsum(steps, axis=1)], axis=1)
-    return arc, points[:, :, 2]

@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.animation import PillowWriter
 
 from ..errors import CaseError
+from .axes import headline
 from .modes_plane import conditions, mode_title
 from .modes_shapes import ModeSurface
-from .style import headline, new_figure, style
+from .style import new_figure, style
 
 if TYPE_CHECKING:
     from ..studies.modes.mode import ModeShape

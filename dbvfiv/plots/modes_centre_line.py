@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .faces import drawn_amplitude, faces
+from .faces import faces
 from .modes_plane import conditions, mode_title
-from .shapes import mark_pieces
+from .modes_shapes import drawn_amplitude
 from .style import COMPUTED, REST, new_figure, phase_looks
+from .views import mark_pieces
 from .waves import wave_content
 
 if TYPE_CHECKING:

@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .style import COMPUTED, PUBLISHED, new_figure, static
+from .style import DANGER, STABLE, UNSTABLE, new_figure, static
 
 if TYPE_CHECKING:
     from ..studies.modes.result import ModesResult
 
-STABLE, UNSTABLE = COMPUTED, PUBLISHED
-#: Ground of the unstable half-plane.
-DANGER = "#c0392b14"
 _RATIOS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7)
 
 

@@ -11,16 +11,20 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from .deformed import COLOURS, frame, shaded
-from .faces import ValveSkin, drawn_amplitude
-from .modes_plane import UNSTABLE, conditions, mode_title
-from .style import colour_bar, headline, new_figure
+from .axes import colour_bar, headline
+from .faces import ValveSkin, faces
+from .modes_plane import conditions, mode_title
+from .style import UNSTABLE, new_figure
+from .views import COLOURS, frame, shaded
 
 if TYPE_CHECKING:
     from ..studies.modes.mode import ModeShape
     from ..studies.modes.result import ModesResult
+    from ..studies.state import State
 
 _PANELS = 6
+#: Share of the clear height that a drawn mode may take, and share of the amplitude it is drawn with in any case.
+_OPEN, _SEEN = 0.85, 0.2
 
 
 def draw(result: ModesResult, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -51,7 +55,7 @@ def mode_shapes(result: ModesResult, modes) -> Figure:
         panels.append(axes)
     shrink = 0.62 if rows == 1 else 0.4
     label = "Amplitude, relative to the largest"
-    colour_bar(figure, ScalarMappable(scale, COLOURS), panels, label, shrink=shrink, pad=0.03)
+    colour_bar(figure, ScalarMappable(scale, COLOURS), panels, label, shrink=shrink, pad=0.08)
     length = 1e3 * np.ptp(result.mesh.z)
     headline(figure, f"Mode shapes {conditions(result)}, lips at the front; the valve is {length:.0f} mm long")
     return figure
@@ -99,3 +103,15 @@ class ModeSurface:
         surface.set_verts(corners)
         surface.set_facecolors(colours)
         surface.set_edgecolors(colours)
+
+
+def drawn_amplitude(state: State, mode: ModeShape) -> float:
+    """Largest displacement, m, at which a mode shows well and the inner faces of the lips do not cross."""
+    mesh = state.results.mesh
+    line = mesh.rows[:, 0]
+    height = faces(mesh, state.nodal)[0][line, 1]
+    swing = np.abs(mode.shape[line, 1])
+    chosen = (swing > 1e-3) & (height > 0)
+    wanted = mode.drawn_amplitude(state)
+    room = float(np.min(_OPEN * height[chosen] / swing[chosen])) if chosen.any() else wanted
+    return min(wanted, max(room, _SEEN * wanted))

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .modes_plane import STABLE, UNSTABLE, conditions
-from .style import COMPUTED, log_axis, new_figure
+from .axes import log_axis
+from .modes_plane import conditions
+from .style import COMPUTED, STABLE, UNSTABLE, new_figure
 
 if TYPE_CHECKING:
     from ..studies.modes.result import ModesResult

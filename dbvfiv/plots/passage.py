@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from .discharge import ordered
-from .shapes import mark_pieces
 from .style import kilopascals, new_figure, pressure_colours, some_of
+from .views import mark_pieces
 
 if TYPE_CHECKING:
     from ..studies.steady.result import SteadyResult

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from .discharge import ordered
 from .faces import faces
 from .style import REST, kilopascals, new_figure, pressure_colours, some_of
+from .views import mark_pieces
 
 if TYPE_CHECKING:
     from ..studies.steady.result import SteadyResult
@@ -68,16 +69,6 @@ def centre_line(result: SteadyResult) -> Figure:
     lower.set_title("Side edge, y = 0", loc="left", fontweight="bold")
     upper.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title="static inlet\npressure")
     return figure
-
-
-def mark_pieces(result: SteadyResult, *panels) -> None:
-    """Thin lines where duckbill, saddle and flange meet."""
-    valve = result.case.valve
-    if valve.key_points is not None:
-        return
-    for axes in panels:
-        for z in (valve.duckbill_length, valve.duckbill_length + valve.saddle_length):
-            axes.axvline(z * 1e3, color="0.6", lw=0.8, ls=":")
 
 
 def _closed(quarter: np.ndarray) -> np.ndarray:

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 #: Colours of things that recur.
 COMPUTED, PUBLISHED, REST, ACCENT = "#1f4e79", "#c0392b", "#8c8c8c", "#d98200"
+#: Of what is stable and unstable, and the ground of the unstable half-plane.
+STABLE, UNSTABLE, DANGER = COMPUTED, PUBLISHED, "#c0392b14"
 #: Colour maps of magnitudes, of motion and of what has a sign: even steps to the eye, readable in grey (but for the
 #: sign) and by the colour-blind.
 MAGNITUDE, MOTION, SIGNED = "viridis", "cividis", "RdBu_r"
-#: Decades of a logarithmic axis below which 2 and 5 of each decade are written too.
-_SHORT, _SHORTEST = 2.6, 0.7
 
 _SETTINGS: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -61,29 +57,6 @@ def new_figure(width: float = 6.4, height: float = 4.2) -> Figure:
     return figure
 
 
-def headline(figure: Figure, text: str) -> None:
-    """The title of a figure of several panels, at the left as those of single panels are."""
-    figure.suptitle(text, x=0.01, ha="left")
-
-
-def log_axis(axis: Axis, low: float, high: float) -> None:
-    """Make an axis from `low` to `high` logarithmic, with numbers at its ticks however short it is."""
-    getattr(axis.axes, f"set_{axis.axis_name}scale")("log")
-    decades = np.log10(high / low) if 0 < low < high else 1.0
-    digits = np.arange(1.0, 10.0) if decades < _SHORTEST else (1.0, 2.0, 5.0) if decades < _SHORT else (1.0,)
-    axis.set_major_locator(LogLocator(subs=digits, numticks=12))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
-
-
-def colour_bar(figure: Figure, drawn: Any, axes: Any, label: str, **options: Any) -> Colorbar:
-    """A colour bar with its label, without a frame."""
-    bar = figure.colorbar(drawn, ax=axes, **{"pad": 0.02, "aspect": 28} | options)
-    bar.set_label(label)
-    bar.outline.set_visible(False)
-    return bar
-
-
 def phase_looks(count: int) -> list[dict[str, Any]]:
     """Colours and dashes of `count` instants of a cycle: dark to light, the second half dashed."""
     shades = matplotlib.colormaps[MAGNITUDE](np.linspace(0.0, 0.85, count))
@@ -97,16 +70,6 @@ def branch_looks(count: int) -> list[dict[str, Any]]:
     return [{"color": _NAMED[i % len(_NAMED)], "marker": _MARKERS[i % len(_MARKERS)]} for i in range(count)]
 
 
-def limits(values: Sequence[float], log: bool = False) -> tuple[float, float]:
-    """Ends of an axis that holds these values, with room about a single one."""
-    low, high = float(min(values)), float(max(values))
-    if high > low:
-        return low, high
-    return (0.5 * low, 2.0 * low) if log else (low - 0.5 * (abs(low) or 1.0), low + 0.5 * (abs(low) or 1.0))
-
-
-#: White about a text that may lie on a line.
-HALO = (withStroke(linewidth=3.0, foreground="white"),)
 _NAMED = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9", "#000000")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..case.parameters import PARAMETERS
-from .modes_plane import DANGER, UNSTABLE
-from .style import HALO, branch_looks, limits, log_axis, new_figure, static
+from .axes import HALO, limits, log_axis
+from .style import DANGER, UNSTABLE, branch_looks, new_figure, static
 
 if TYPE_CHECKING:
-    from ..studies.sweep.result import SweepResult
+    from ..studies.sweep.result import Branch, Crossing, SweepResult
 
 #: Confidence below which a match is drawn as doubtful.
 DOUBTFUL = 0.5
@@ -34,64 +34,27 @@ def curves(result: SweepResult) -> Figure:
     row = PARAMETERS[result.parameter]
     name, unit, factor = row.words, row.shown_unit, 1.0 / row.scale
     figure = new_figure(7.6, 8.6)
-    growth, frequency, ratio = panels = figure.subplots(
-        3, 1, sharex=True, gridspec_kw={"height_ratios": [1.25, 1.0, 0.9]}
-    )
+    ratios = {"height_ratios": [1.25, 1.0, 0.9]}
+    growth, frequency, ratio = panels = figure.subplots(3, 1, sharex=True, gridspec_kw=ratios)
     x = result.values * factor
     for branch, look in zip(result.branches, branch_looks(len(result.branches))):
-        size = np.hypot(branch.growth_rate, branch.angular_frequency)
-        second = (branch.angular_frequency < 0).any()  # of a pair that two real modes became: both are seen
-        series = (branch.growth_rate, branch.frequency, -100 * branch.growth_rate / np.where(size > 0, size, 1.0))
-        for axes, values in zip(panels, series):
-            axes.plot(
-                x,
-                values,
-                color=look["color"],
-                lw=1.7,
-                ls="--" if second else "-",
-                marker=look["marker"],
-                markevery=max(1, len(x) // 30),
-                ms=3.6,
-                label=f"{branch.id}",
-            )
-            doubtful = branch.confidence < DOUBTFUL
-            axes.plot(x[doubtful], values[doubtful], "x", color="black", ms=8, mew=1.6)
+        _draw_branch(panels, x, branch, look)
     for crossing in result.crossings():
-        at = factor * crossing.value
-        growth.plot(at, 0.0, "D", color=UNSTABLE, ms=6, zorder=4)
-        # beside the point where there is room
-        side = -1 if _share(at, x, result.axis.log) > 0.7 else 1
-        text = (
-            f"≈ {at:.3g} {unit}, {crossing.frequency:.2g} Hz"
-            if crossing.frequency > 0
-            else f"≈ {at:.3g} {unit}, no oscillation"
-        )
-        growth.annotate(
-            text,
-            (at, 0.0),
-            (7 * side, 7),
-            textcoords="offset points",
-            fontsize=9,
-            color=UNSTABLE,
-            path_effects=HALO,
-            ha="left" if side > 0 else "right",
-        )
+        _mark_crossing(growth, crossing, result, x)
     for axes in panels:
         _shade(axes, result, x)
         if result.axis.log:
             log_axis(axes.xaxis, x[0], x[-1])
         axes.set_xlim(*limits(x, result.axis.log))
         axes.tick_params(labelbottom=True)
+    for axes, label in ((growth, "Growth rate, 1/s"), (frequency, "Frequency, Hz"), (ratio, "Damping ratio, %")):
+        axes.set_ylabel(label)
     growth.axhline(0.0, color="0.25", lw=1.1)
     ratio.axhline(0.0, color="0.25", lw=1.1)
     frequency.set_ylim(bottom=min(0.0, frequency.get_ylim()[0]))
-    growth.set_ylabel("Growth rate, 1/s")
-    frequency.set_ylabel("Frequency, Hz")
-    ratio.set_ylabel("Damping ratio, %")
     ratio.set_xlabel(f"{name}, {unit}")
-    growth.set_title(
-        f"Modes over {name[0].lower()}{name[1:]}, {surroundings_of(result)}", loc="left", fontweight="bold"
-    )
+    over = f"{name[0].lower()}{name[1:]}"
+    growth.set_title(f"Modes over {over}, {surroundings_of(result)}", loc="left", fontweight="bold")
     handles, labels = growth.get_legend_handles_labels()
     if any(np.nanmin(b.confidence, initial=1.0) < DOUBTFUL for b in result.branches):
         handles.append(Line2D([], [], ls="", marker="x", color="black", ms=8, mew=1.6))
@@ -103,6 +66,30 @@ def curves(result: SweepResult) -> Figure:
         words += "\nDiamonds: interpolated between the values computed; `dbvfiv onset` finds them exactly."
     figure.supxlabel(words, x=0.01, ha="left", fontsize=9)
     return figure
+
+
+def _draw_branch(panels, x: np.ndarray, branch: Branch, look: dict) -> None:
+    """A branch in the three panels, doubtful matches crossed."""
+    size = np.hypot(branch.growth_rate, branch.angular_frequency)
+    second = (branch.angular_frequency < 0).any()  # of a pair that two real modes became: both are seen
+    series = (branch.growth_rate, branch.frequency, -100 * branch.growth_rate / np.where(size > 0, size, 1.0))
+    doubtful = branch.confidence < DOUBTFUL
+    look = look | {"lw": 1.7, "ls": "--" if second else "-", "ms": 3.6, "markevery": max(1, len(x) // 30)}
+    for axes, values in zip(panels, series):
+        axes.plot(x, values, label=f"{branch.id}", **look)
+        axes.plot(x[doubtful], values[doubtful], "x", color="black", ms=8, mew=1.6)
+
+
+def _mark_crossing(axes, crossing: Crossing, result: SweepResult, x: np.ndarray) -> None:
+    """A crossing of zero growth and its numbers, beside it where there is room."""
+    _, unit, factor = SHOWN[result.parameter]
+    at = factor * crossing.value
+    axes.plot(at, 0.0, "D", color=UNSTABLE, ms=6, zorder=4)
+    side = -1 if _share(at, x, result.axis.log) > 0.7 else 1
+    swing = f"{crossing.frequency:.2g} Hz" if crossing.frequency > 0 else "no oscillation"
+    look = {"textcoords": "offset points", "fontsize": 9, "color": UNSTABLE, "path_effects": HALO}
+    look["ha"] = "left" if side > 0 else "right"
+    axes.annotate(f"≈ {at:.3g} {unit}, {swing}", (at, 0.0), (7 * side, 7), **look)
 
 
 def surroundings_of(result: SweepResult) -> str:

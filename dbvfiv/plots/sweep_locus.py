@@ -13,8 +13,8 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from ..case.parameters import PARAMETERS
-from .modes_plane import DANGER, UNSTABLE
-from .style import HALO, MAGNITUDE, colour_bar, limits, log_axis, new_figure
+from .axes import HALO, colour_bar, limits, log_axis
+from .style import DANGER, MAGNITUDE, UNSTABLE, new_figure
 from .sweep_curves import surroundings_of
 
 if TYPE_CHECKING:
@@ -56,17 +56,7 @@ def root_locus(result: SweepResult) -> Figure:
         ends.setdefault(tuple(points[last].round(6)), []).append(branch.id)
     for place, ids in ends.items():
         axes.annotate(", ".join(map(str, ids)), place, (6, 4), textcoords="offset points", fontsize=9.5, color="0.15")
-    for crossing in result.crossings():
-        axes.plot(0.0, crossing.frequency, "D", color=UNSTABLE, ms=6, zorder=5)
-        axes.annotate(
-            f"≈ {factor * crossing.value:.3g} {unit}",
-            (0.0, crossing.frequency),
-            (9, 6),
-            textcoords="offset points",
-            fontsize=9,
-            color=UNSTABLE,
-            path_effects=HALO,
-        )
+    _mark_crossings(axes, result)
     axes.margins(0.06)
     axes.autoscale_view()
     low, high = axes.get_xlim()
@@ -87,3 +77,11 @@ def root_locus(result: SweepResult) -> Figure:
         words += " Diamonds: interpolated between the values computed."
     figure.supxlabel(words, x=0.01, ha="left", fontsize=9)
     return figure
+
+
+def _mark_crossings(axes, result: SweepResult) -> None:
+    _, unit, factor = SHOWN[result.parameter]
+    look = {"textcoords": "offset points", "fontsize": 9, "color": UNSTABLE, "path_effects": HALO}
+    for crossing in result.crossings():
+        axes.plot(0.0, crossing.frequency, "D", color=UNSTABLE, ms=6, zorder=5)
+        axes.annotate(f"≈ {factor * crossing.value:.3g} {unit}", (0.0, crossing.frequency), (9, 6), **look)

@@ -11,7 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..verdict import Series, in_steps, spectrum
-from .style import ACCENT, COMPUTED, MAGNITUDE, REST, colour_bar, headline, new_figure, phase_looks, static
+from .axes import colour_bar, headline
+from .style import ACCENT, COMPUTED, MAGNITUDE, REST, new_figure, phase_looks, static
 
 if TYPE_CHECKING:
     from ..transient.result import TransientResults

@@ -152,17 +152,7 @@ def _name(
     ):
         direction = ""  # growth as slow as that does not make cycles so different
     if direction in ("growing", "decaying"):
-        words = f"The amplitude changes by {100 * facts['amplitude_trend']:+.2g} % a cycle"
-        if comes_and_goes(cycles.spread, 2.5 * options.band):
-            return Verdict(
-                "irregular", count >= 2 * options.cycles, words + " after having come and gone before.", **facts
-            )
-        if _slackens(recent.spread):
-            return Verdict(
-                direction, False, words + ", less and less: it may be on its way to another amplitude.", **facts
-            )
-        doubled = abs(np.log(cycles.spread[-1] / cycles.spread[max(0, count - options.cycles)])) > 0.3
-        return Verdict(direction, count >= options.cycles or (count >= 5 and doubled), words + ".", **facts)
+        return _growth(cycles, recent, facts, direction, options)
     enough = (1.5 if error > options.noisy else 4.0) * options.cycles  # swings without a return
     if count < options.cycles and error > options.periodic and swings(series) >= enough:
         return Verdict(
@@ -204,6 +194,18 @@ def _name(
         ", the difference being noise." if noisy else "."
     )
     return Verdict("limit cycle", True, words, **facts)
+
+
+def _growth(cycles: Cycles, recent: Cycles, facts: dict, direction: str, options: JudgeOptions) -> Verdict:
+    """Verdict on cycles whose amplitude grows or decays."""
+    count = len(cycles)
+    words = f"The amplitude changes by {100 * facts['amplitude_trend']:+.2g} % a cycle"
+    if comes_and_goes(cycles.spread, 2.5 * options.band):
+        return Verdict("irregular", count >= 2 * options.cycles, words + " after having come and gone before.", **facts)
+    if _slackens(recent.spread):
+        return Verdict(direction, False, words + ", less and less: it may be on its way to another amplitude.", **facts)
+    doubled = abs(np.log(cycles.spread[-1] / cycles.spread[max(0, count - options.cycles)])) > 0.3
+    return Verdict(direction, count >= options.cycles or (count >= 5 and doubled), words + ".", **facts)
 
 
 def _period(series: Series) -> tuple[float, float]:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from dbvfiv.plots.faces import ValveSkin, drawn_amplitude, faces, nodal_thickness, offset_line
+from dbvfiv.plots.faces import ValveSkin, faces, nodal_thickness, offset_line
+from dbvfiv.plots.modes_shapes import drawn_amplitude
 from dbvfiv.plots.waves import wave_content
 
 

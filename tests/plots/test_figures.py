@@ -8,9 +8,9 @@ import dbvfiv
 from dbvfiv.case import Case
 from dbvfiv.errors import CaseError
 from dbvfiv.plots import figures_of, published, style
-from dbvfiv.plots.deformed import COLOURS
+from dbvfiv.plots.axes import log_axis
 from dbvfiv.plots.faces import faces
-from dbvfiv.plots.layers import unrolled
+from dbvfiv.plots.views import COLOURS, unrolled
 
 NAMES = {
     "head-discharge",
@@ -100,7 +100,7 @@ def test_short_logarithmic_axes_have_numbers():
     axes = figure.add_subplot()
     axes.plot([5.2, 8.7], [1, 2])
     axes.set_xlim(5.2, 8.7)
-    style.log_axis(axes.xaxis, 5.2, 8.7)
+    log_axis(axes.xaxis, 5.2, 8.7)
     figure.canvas.draw()
     inside = [t.get_text() for t in axes.get_xticklabels() if 5.2 <= t.get_position()[0] <= 8.7 and t.get_text()]
     assert len(inside) >= 2 and axes.get_xscale() == "log"

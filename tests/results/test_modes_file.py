@@ -10,7 +10,8 @@ from PIL import Image
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.plots import figures_of
-from dbvfiv.plots.faces import drawn_amplitude, faces
+from dbvfiv.plots.faces import faces
+from dbvfiv.plots.modes_shapes import drawn_amplitude
 
 FLUTTER = {"density": 10, "alpha": 0}
 
