@@ -64,7 +64,7 @@ def modes_at_any_state():
     structure = linear.pencil(REFERENCE, fluid=False)
 
     def solve(conditions, storage):
-        search = select_search(SearchOptions(), conditions, lambda n: lowest_frequencies(structure, n), 10)
+        search = select_search(SearchOptions(), conditions, lambda n: lowest_frequencies(structure, n, workspace), 10)
         pencil = linear.pencil(conditions, storage=storage)
         return leading_modes(pencil, 10, search.options, workspace=workspace)
 
