@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dbvfiv.model import Conditions, linearise
+from dbvfiv.model import Conditions, linearise, select_search
 from dbvfiv.model.equilibria import find_equilibria
-from eigen import SearchOptions, Workspace, leading_modes, sweep
+from eigen import SearchOptions, Workspace, leading_modes, lowest_frequencies, sweep
 
 from .registry import Row, benchmark, medians, seconds
 from .statics import model_of, refactorisation
@@ -47,6 +47,42 @@ def modes():
             target=30.0,
             note=f"{1e3 * times[name]:.0f} ms, {len(found)} found, residual {found.residual.max():.0e}",
         )
+
+
+#: From the reference damping down to none, in water and in a light fluid, under both continuity laws.
+BETAS = (3e-3, 3e-4, 3e-5, 0.0)
+DENSITIES = (1000.0, 10.0)
+LAWS = {"storage": 1.0, "quasi-steady": 0.0}
+
+
+@benchmark("modes-any-state")
+def modes_at_any_state():
+    """Ten leading coupled pairs at one state under light and heavy damping and fluid, linearisation left out."""
+    model = model_of(28, 48)
+    q = find_equilibria(model, [6e3]).states[0].q
+    linear, factor, workspace = linearise(model, q, 6e3), refactorisation(model, q), Workspace()
+    structure = linear.pencil(REFERENCE, fluid=False)
+
+    def solve(conditions, storage):
+        search = select_search(SearchOptions(), conditions, lambda n: lowest_frequencies(structure, n, workspace), 10)
+        pencil = linear.pencil(conditions, storage=storage)
+        return leading_modes(pencil, 10, search.options, workspace=workspace)
+
+    for density in DENSITIES:
+        for law, storage in LAWS.items():
+            for beta in BETAS:
+                conditions = Conditions(density, 0.0, beta)
+                times = medians({"lu": factor.refactor, "search": lambda: solve(conditions, storage)}, 3)
+                found = solve(conditions, storage)
+                yield Row(
+                    f"leading modes, {density:g} kg/m3, {law}, beta {1e3 * beta:g} ms, over one LU refactorisation",
+                    times["search"] / times["lu"],
+                    target=30.0,
+                    note=(
+                        f"{len(found)} found, {found.status}, {found.applications} applications, "
+                        f"residual {found.residual.max():.0e}"
+                    ),
+                )
 
 
 @benchmark("density-sweep")

@@ -40,7 +40,7 @@ class Workspace:
         """M, C, K of the pencil on the common pattern."""
         if self._loaded is pencil:
             return self._structure
-        if self._structure is not None and self._structure.fits(pencil):
+        if self._structure is not None and (self._structure.fits(pencil) or self._structure.covers(pencil)):
             self._structure.load(pencil)
         else:
             self._structure = StructureMatrices(pencil)

@@ -52,8 +52,20 @@ class StructureMatrices:
             _same_pattern(p, *old) for p, old in zip((pencil.M, pencil.C, pencil.K), self._sources)
         )
 
+    def covers(self, pencil: CoupledPencil) -> bool:
+        """Whether all entries of a pencil lie on the common pattern, though its parts may have fewer."""
+        if pencil.M.shape != self.shape:
+            return False
+        keys = _keys(self.indptr, self.indices, self.shape[1])
+        for part in (pencil.M, pencil.C, pencil.K):
+            wanted = _keys(part.indptr, part.indices, self.shape[1])
+            place = np.searchsorted(keys, wanted)
+            if not (place < keys.size).all() or not np.array_equal(keys[place], wanted):
+                return False
+        return True
+
     def load(self, pencil: CoupledPencil) -> None:
-        """Take the numbers of a pencil with the same pattern."""
+        """Take the numbers of a pencil whose entries lie on the common pattern."""
         parts = (pencil.M, pencil.C, pencil.K)
         if not self.fits(pencil):
             keys = _keys(self.indptr, self.indices, self.shape[1])

@@ -170,8 +170,7 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
     """Sort, cut to the number asked for, and say what is certified."""
     region = SearchedRegion(tuple(found.ovals.values()), found.everything)
     _, band = leading_band(found, max(count, options.least), options)
-    order = np.lexsort((found.values.imag, -found.values.real))
-    order = order[found.values.imag[order] <= band * (1 + 1e-12)]
+    order = _by_growth(found.values, np.flatnonzero(found.values.imag <= band * (1 + 1e-12)))
     if options.limit_point is not None:
         order = order[found.values.real[order] > CLEAR * options.limit_point]
     order = order[:count]
@@ -227,6 +226,13 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
     if not options.left:
         return spectrum
     return _with_left(pencil, spectrum, found.left_q[:, order], found.left_u[:, order])
+
+
+def _by_growth(values, chosen):
+    """Largest growth rate first; of those that differ by rounding only, as without damping, the lowest frequency."""
+    values = values[chosen]
+    unit = 1e-9 * np.abs(values).max(initial=0.0) or 1.0
+    return chosen[np.lexsort((-values.real, values.imag, -np.round(values.real / unit)))]
 
 
 def _with_left(pencil, spectrum, left_q, left_u) -> Spectrum:

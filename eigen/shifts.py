@@ -26,7 +26,8 @@ def plan_shifts(pencil, count, options, workspace):
 def first_shift(pencil, aim, options, workspace) -> float:
     """A positive real shift of the size of the frequencies sought."""
     if options.max_frequency is not None:
-        return 1.5 * 2 * np.pi * options.max_frequency
+        # close to the band its eigenvalues lie well apart; next to a limit point the disc has to stay flat
+        return (0.75 if options.limit_point is None else 1.5) * 2 * np.pi * options.max_frequency
     stiffness, inertia = np.abs(pencil.K.diagonal()), np.abs(pencil.M.diagonal())
     typical = np.sqrt(np.median(stiffness + 1e-300) / np.median(inertia + 1e-300))
     probe = 1e-3 * typical if np.isfinite(typical) and typical > 0 else 1.0
@@ -63,7 +64,7 @@ def next_shift(pencil, found, aim, options, workspace) -> complex:
         return 3.0 * max(abs(s) for s in found.shifts)
     if options.max_frequency is not None and len(found.shifts) == 1:
         natural = first_shift(pencil, aim, replace(options, max_frequency=None), workspace)
-        if natural < 0.5 * found.shifts[0].real:
+        if natural < 0.75 * 2 * np.pi * options.max_frequency:
             return natural
     if options.max_frequency is not None:
         band = 2 * np.pi * options.max_frequency

@@ -9,6 +9,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
+from .condensation import Workspace
 from .factorization import MumpsFactorization, SingularShiftError, StructureMatrices
 from .pencil import FLUID_PARTS, CoupledPencil
 
@@ -146,13 +147,15 @@ class TransferBasis:
         return self.V @ vectors
 
 
-def lowest_frequencies(pencil: CoupledPencil, count: int) -> np.ndarray:
+def lowest_frequencies(pencil: CoupledPencil, count: int, workspace: Workspace | None = None) -> np.ndarray:
     """Lowest frequencies of the undamped symmetric structure in vacuo, (K + K^T)/2 and M.
 
     Parameters
     ----------
     pencil : CoupledPencil
     count : int
+    workspace : Workspace, optional
+        Keeps the symbolic factorisation between pencils of one pattern.
 
     Returns
     -------
@@ -165,32 +168,31 @@ def lowest_frequencies(pencil: CoupledPencil, count: int) -> np.ndarray:
     >>> np.round(lowest_frequencies(pencil, 2), 6)
     array([1., 2.])
     """
-    return _frequencies(_lowest_modes(pencil, count)[0])
+    return _frequencies(_lowest_modes(pencil, count, workspace)[0])
 
 
 def _frequencies(squares):
     return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
 
 
-def _lowest_modes(pencil, count):
+def _lowest_modes(pencil, count, workspace=None):
     """Squares of the lowest angular frequencies of the symmetric structure, ascending, and its modes."""
     symmetric = ((pencil.K + pencil.K.T) * 0.5).tocsr()
     count = min(count, pencil.n)
     if count >= pencil.n - 1 or pencil.n < 60:
         values, vectors = la.eigh(symmetric.toarray(), pencil.M.toarray())
         return values[:count], vectors[:, :count]
-    return _lowest_by_inverse(symmetric, pencil.M, count)
+    return _lowest_by_inverse(symmetric, pencil.M, count, workspace or Workspace())
 
 
-def _lowest_by_inverse(stiffness, mass, count):
+def _lowest_by_inverse(stiffness, mass, count, workspace):
     """Lowest modes of a large symmetric pencil by shift and invert a little below zero."""
     unit = np.median(stiffness.diagonal()) / np.median(mass.diagonal())
-    structure = StructureMatrices(CoupledPencil(M=mass, C=sp.csr_matrix(mass.shape), K=stiffness))
-    factor = MumpsFactorization(structure)
+    structure = CoupledPencil(M=mass, C=sp.csr_matrix(mass.shape), K=stiffness)
     shift = 1e-8 * unit
     for _ in range(6):
         try:
-            factor.refactor(structure.values(np.sqrt(shift)))
+            factor = workspace.factored(structure, float(np.sqrt(shift)))
             break
         except SingularShiftError:
             shift *= 3.7

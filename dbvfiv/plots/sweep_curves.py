@@ -82,7 +82,8 @@ def _draw_branch(panels, x: np.ndarray, branch: Branch, look: dict) -> None:
 
 def _mark_crossing(axes, crossing: Crossing, result: SweepResult, x: np.ndarray) -> None:
     """A crossing of zero growth and its numbers, beside it where there is room."""
-    _, unit, factor = SHOWN[result.parameter]
+    row = PARAMETERS[result.parameter]
+    unit, factor = row.shown_unit, 1.0 / row.scale
     at = factor * crossing.value
     axes.plot(at, 0.0, "D", color=UNSTABLE, ms=6, zorder=4)
     side = -1 if _share(at, x, result.axis.log) > 0.7 else 1

@@ -80,7 +80,8 @@ def root_locus(result: SweepResult) -> Figure:
 
 
 def _mark_crossings(axes, result: SweepResult) -> None:
-    _, unit, factor = SHOWN[result.parameter]
+    row = PARAMETERS[result.parameter]
+    unit, factor = row.shown_unit, 1.0 / row.scale
     look = {"textcoords": "offset points", "fontsize": 9, "color": UNSTABLE, "path_effects": HALO}
     for crossing in result.crossings():
         axes.plot(0.0, crossing.frequency, "D", color=UNSTABLE, ms=6, zorder=5)

@@ -174,7 +174,7 @@ class FluidFamily:
     def _lowest(self, count: int) -> np.ndarray:
         """Structural frequencies of the one state."""
         if len(self._frequencies) < count:
-            self._frequencies = lowest_frequencies(self._full(self.axis.values[0]), count)
+            self._frequencies = lowest_frequencies(self._full(self.axis.values[0]), count, self.workspace)
         return self._frequencies[:count]
 
     def _full(self, value: float) -> CoupledPencil:
@@ -246,8 +246,9 @@ class PressureFamily:
             self.known[value] = self.path.go_to(value)
         pencil = linearise(self.model, self.known[value].q, value).pencil(self.conditions)
         if value not in self._bands:
+            search, workspace = self.options.search, self.workspace
             self._bands[value] = select_search(
-                self.options.search, self.conditions, lambda n: lowest_frequencies(pencil, n), self.options.count
+                search, self.conditions, lambda n: lowest_frequencies(pencil, n, workspace), self.options.count
             )
         self._searches[pencil] = self._bands[value]
         return pencil
