@@ -14,7 +14,7 @@ from .map_column import CELLS, MapColumn, MapPlan
 from .map_curves import OnsetCurve, continued, linked
 from .map_pool import columns
 from .observer import Observer
-from .parameters import check_flow
+from .parameters import check_scan
 from .stability_walk import StabilityWalk
 
 
@@ -106,11 +106,13 @@ def run_map(
 
     Raises
     ------
+    CaseError
+        If the case has nothing that a parameter could change.
     SolveError
         If the case has no flow, or no column was found at all.
     """
-    check_flow(case)
     plan = plan or MapPlan.of(case)
+    check_scan(case, plan.x.parameter, plan.y.parameter)
     observer = observer or Observer()
     run = _Run(plan, observer, case.map.workers if workers is None else workers, StabilityWalk(case))
     run.found = {(column.value, column.level): column for column in known}

@@ -192,3 +192,11 @@ def test_pressures_of_steady(tmp_path, text, overrides, expected):
     changed = case.replace(changes).replace({"fluid.density": 10})
     assert changed.steady_pressures() == (expected or Case().steady.pressures)
     assert Case().steady_pressures() == Case().steady.pressures
+
+
+def test_the_true_metric_by_its_word_or_as_truth(tmp_path):
+    """`--set shell.metric=true` was refused because TOML reads a truth value there."""
+    assert load_case(None, ["shell.metric=true"]).shell.metric == "true"
+    assert load_case(None, ['shell.metric="true"']).shell.metric == "true"
+    with pytest.raises(CaseError, match='shell.metric is given as false; it must be "first-order" or "true"'):
+        load_case(None, ["shell.metric=false"])

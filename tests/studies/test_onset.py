@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from dbvfiv.errors import SolveError
+from dbvfiv.case import Case
+from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.studies.map import run_map
 from dbvfiv.studies.onset import OnsetOptions, run_onset
 from dbvfiv.studies.parameters import Place
 
@@ -76,3 +78,22 @@ def test_a_place_changes_what_it_is_told(coarse_case):
     place = Place.of(coarse_case).at(density=3.0, thickness=0.9)
     assert place.condition == (3.0, 0.0, 0.003, 0.0) and place.design == {"thickness": 0.9}
     assert place.mu()["inlet"] == 6000.0 and place.mu()["thickness"] == 0.9
+
+
+@pytest.mark.parametrize(
+    "parameter, words", [("strain", "no layer is one of the built-in rubbers"), ("angle", "ply|angle")]
+)
+def test_what_a_case_does_not_have_is_no_parameter(one_sentence, parameter, words):
+    """Before, every state of such a scan was the same."""
+    own = {"kind": "neo-hookean", "shear_modulus": "1 MPa", "density": 1200}
+    case = Case().replace({"materials.own": own, "layers": [{"material": "own", "thickness": 0.01}]})
+    for ask in (
+        lambda: run_onset(case.replace({"onset.over": parameter})),
+        lambda: run_map(case.replace({"map.x": USUAL[parameter], "map.y": "density=1:10:2"})),
+    ):
+        with pytest.raises(CaseError, match=words) as caught:
+            ask()
+        assert one_sentence(str(caught.value))
+
+
+USUAL = {"strain": "strain=0.1:0.6:3", "angle": "angle=20:80:3"}
