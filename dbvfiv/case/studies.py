@@ -18,6 +18,7 @@ from pydantic import (
 
 from .axis import Axis, parse_axis
 from .drive_table import read_drive_table
+from .existing_file import existing_file
 from .parameters import PARAMETERS, listed
 from .quantity import Frequency, Length, Number, Pressure, Rate, Time
 from .section import BrokenRule, Section, key
@@ -214,13 +215,7 @@ class Transient(Section):
     @field_validator("start_file", mode="after")
     @classmethod
     def _find_start(cls, path: Path | None, info: ValidationInfo) -> Path | None:
-        context = info.context or {}
-        if path is None or not context.get("check_files", True):
-            return path
-        path = Path(context.get("folder", ".")) / path
-        if not path.is_file():
-            raise ValueError("which does not exist")
-        return path.resolve()
+        return path if path is None else existing_file(path, info)
 
     @model_validator(mode="after")
     def _fits_together(self) -> Transient:
