@@ -82,7 +82,7 @@ def time_steps():
         size = os.path.getsize(path)
     force, solve = np.median(unit.force), np.median(unit.solve)
     steps = run.progress.steps
-    lip = 1e3 * run.history["lip_opening"]
+    lip = 1e3 * run.history["lip_displacement"]
     yield Row(
         "one step over one force evaluation and one solve with existing factors",
         spent / steps / (force + solve),

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictStr, ValidationInfo, field_validator, model_validator
 
+from .existing_file import existing_file
 from .quantity import Angle, Density, Length, Modulus, Number, Percent
 from .section import BrokenRule, Section, key
 
@@ -113,17 +114,7 @@ class Fit(Section):
     @field_validator("path", mode="after")
     @classmethod
     def _find(cls, path: Path, info: ValidationInfo) -> Path:
-        context = info.context or {}
-        if not context.get("check_files", True):
-            return path
-        path = Path(context.get("folder", ".")) / path
-        try:
-            found = path.is_file()
-        except (OSError, ValueError):
-            found = False
-        if not found:
-            raise ValueError("which does not exist" if not str(path).endswith("/") else "which is not a file")
-        return path.resolve()
+        return existing_file(path, info)
 
 
 class ShippedRubber(Section):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import StrictBool
+from pydantic import StrictBool, field_validator
 
 from .parameters import PARAMETERS
 from .quantity import Density, Number, Pressure, Rate, Stiffness, Time
@@ -16,11 +16,17 @@ class Shell(Section):
 
     metric: Literal["first-order", "true"] = key(
         "first-order",
-        "Through-thickness metric: Budiansky-Sanders first order, or the true one (refused where "
-        "half the wall exceeds the radius of the mid-surface).",
+        'Through-thickness metric, one of two words: "first-order" of Budiansky and Sanders, or "true", the exact one '
+        "(refused where half the wall exceeds the radius of the mid-surface).",
     )
     shear_correction_plies: Number = key(5 / 6, "Transverse-shear factor of fibre plies.", gt=0, le=1.5)
     shear_correction_rubber: Number = key(1.0, "Transverse-shear factor of all other layers.", gt=0, le=1.5)
+
+    @field_validator("metric", mode="before")
+    @classmethod
+    def _name_the_true_one(cls, given: Any) -> Any:
+        """The word "true" is easily written without quotes."""
+        return "true" if given is True else given
 
 
 class Damping(Section):

@@ -18,6 +18,7 @@ from pydantic import (
 
 from .axis import Axis, parse_axis
 from .drive_table import read_drive_table
+from .existing_file import existing_file
 from .parameters import PARAMETERS, listed
 from .quantity import Frequency, Length, Number, Pressure, Rate, Time
 from .section import BrokenRule, Section, key
@@ -45,7 +46,9 @@ class Steady(Section):
     """Equilibria over a list of pressures."""
 
     pressures: tuple[LoadPressure, ...] = key(
-        (2e3, 6e3, 12e3, 18e3, 24e3, 29e3, 36e3, 50e3), "Pressures of the head-discharge curve.", min_length=1
+        (2e3, 6e3, 12e3, 18e3, 24e3, 29e3, 36e3, 50e3),
+        "Static inlet pressures of the head-discharge curve.",
+        min_length=1,
     )
     tolerance: Number = key(1e-8, "Residual, relative to the load, at which Newton stops.", gt=0, le=1e-2)
     max_iterations: StrictInt = key(30, "Newton iterations of one load step.", ge=1, le=10000)
@@ -212,13 +215,7 @@ class Transient(Section):
     @field_validator("start_file", mode="after")
     @classmethod
     def _find_start(cls, path: Path | None, info: ValidationInfo) -> Path | None:
-        context = info.context or {}
-        if path is None or not context.get("check_files", True):
-            return path
-        path = Path(context.get("folder", ".")) / path
-        if not path.is_file():
-            raise ValueError("which does not exist")
-        return path.resolve()
+        return path if path is None else existing_file(path, info)
 
     @model_validator(mode="after")
     def _fits_together(self) -> Transient:
@@ -245,7 +242,9 @@ class Transient(Section):
 class Closure(Section):
     """Back pressure on the outside, no flow."""
 
-    pressures: tuple[LoadPressure, ...] = key((7e3, 14e3, 21e3, 28e3), "Back pressures.", min_length=1)
+    pressures: tuple[LoadPressure, ...] = key(
+        (7e3, 14e3, 21e3, 28e3), "Static back pressures, outside over inside.", min_length=1
+    )
     supports: Literal["contact", "held-lips"] = key(
         "contact",
         "Inner faces touching the closing plane, or the simplification of Th. 3.6: duckbill held shut, "
@@ -255,7 +254,7 @@ class Closure(Section):
     start: Literal["rest", "open"] = key(
         "rest", "From the valve at rest, or from the steady flow at open_pressure turned back."
     )
-    open_pressure: LoadPressure = key(10e3, "Inlet pressure of the open start.")
+    open_pressure: LoadPressure = key(10e3, "Static inlet pressure of the open start.")
     max_step: LoadPressure = key(1e3, "Largest load step; the stiffness is watched for buckling at each.")
     contact_depth: Length = key(
         3e-6,

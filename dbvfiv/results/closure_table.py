@@ -72,7 +72,7 @@ BUCKLING = (
     Column("shape", "", "Buckling shape, displacements and rotations of each node"),
 )
 OPENED = (
-    Column("pressure", "Pa", "Inlet pressure"),
+    Column("pressure", "Pa", "Static inlet pressure"),
     Column("lip_opening", "m", "Full clear opening between the inner faces of both lips at x = z = 0"),
     Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
     Column("outlet_area", "m^2", "Flow area at the lip, whole valve"),

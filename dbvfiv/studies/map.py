@@ -16,7 +16,7 @@ from .map_column import CELLS, MapColumn, MapPlan
 from .map_curves import OnsetCurve, doubts, linked
 from .map_pool import ColumnPool
 from .map_web import Web
-from .parameters import check_flow
+from .parameters import check_scan
 from .stability_walk import StabilityWalk
 
 
@@ -127,11 +127,13 @@ def run_map(
 
     Raises
     ------
+    CaseError
+        If the case has nothing that a parameter could change.
     SolveError
         If the case has no flow, or no column was found at all.
     """
-    check_flow(case)
     plan = plan or MapPlan.of(case)
+    check_scan(case, plan.x.parameter, plan.y.parameter)
     observer = observer or Observer()
     known = {(column.value, column.level): column for column in known}
     walk = StabilityWalk(case)

@@ -14,7 +14,7 @@ from ..observer import Observer
 from .onset_mesh import with_uncertainty
 from .onset_point import OnsetPoint, OnsetSample
 from .onset_search import OnsetOptions, OnsetSearch
-from .parameters import check_flow
+from .parameters import check_scan
 from .stability_walk import StabilityWalk
 
 
@@ -100,11 +100,13 @@ def run_onset(
 
     Raises
     ------
+    CaseError
+        If the case has nothing that the parameter could change.
     SolveError
         If the case has no flow, or no state of the scan was found.
     """
-    check_flow(case)
     options = options or OnsetOptions.of(case)
+    check_scan(case, options.parameter)
     observer = observer or Observer()
     known = list(known)
     observer.begin("onset", None)

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 
 from eigen import Condition
 
+from ..case.materials import RUBBERS
 from ..case.model import Case
 from ..case.parameters import CONDITIONS, DESIGN, PARAMETERS
-from ..errors import SolveError
+from ..errors import CaseError, SolveError
 from ..model import ValveModel
 from ..model.dynamics import Conditions
 
@@ -83,6 +84,28 @@ def check_flow(case: Case) -> None:
             "Without flow nothing couples the fluid to the wall, so there is no onset to look for; "
             "drive.kind must be 'flow'."
         )
+
+
+def check_scan(case: Case, *names: str) -> None:
+    """Refuse to ask over a parameter that this case does not have, or without flow.
+
+    Raises
+    ------
+    CaseError
+        For strain levels without a rubber that has them, and angles without a ply that has one.
+    SolveError
+        Without flow.
+    """
+    check_flow(case)
+    used = {layer.material for layer in case.layers}
+    shipped = [name for name in RUBBERS if name not in case.materials.named]
+    if "strain" in names and not used & set(shipped):
+        raise CaseError(
+            "There is no strain level to change, because no layer is one of the built-in rubbers "
+            f"{', '.join(RUBBERS)}; the layers are of {', '.join(sorted(used))}."
+        )
+    if "angle" in names and not any(layer.angle for layer in case.layers):
+        raise CaseError("There is no fibre angle to change, because every layer lies at 0 degrees.")
 
 
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:

@@ -94,12 +94,21 @@ def assess(
     chosen = time >= since
     known = residual if np.isfinite(residual) else None
     signals = ("mass_flow", "lip_displacement", "lip_opening")
+    if np.count_nonzero(chosen) < 2:
+        found = [_unjudged(float(history[name][-1])) for name in signals]
+        return RunVerdict(*found, residual, history.rows - 1, float(time[-1]))
     found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in signals]
     closed = judge(time[chosen], history["smallest_area"][chosen], options, closed_below=CLOSED * gap)
     if closed.name == "closed":
         reason = "The smallest flow area stays at that of the lip gap at rest."
         found = [Verdict(**{**vars(v), "name": "closed", "decided": True, "reason": reason}) for v in found]
     return RunVerdict(*found, residual, history.rows - 1, float(time[-1]))
+
+
+def _unjudged(value: float) -> Verdict:
+    """Verdict on a run without a step."""
+    reason = "No step was found, so there is nothing to judge."
+    return Verdict("undecided", False, reason, mean=value, amplitude=0.0, rms=0.0, smallest=value, largest=value)
 
 
 def beyond_model(history: History) -> str | None:

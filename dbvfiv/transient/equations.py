@@ -10,6 +10,7 @@ tangent without an evaluation of it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -223,6 +224,11 @@ class ValveMotion:
         out = nodal.copy()
         out[:, :3] += self.model.shell.mesh.nodes
         return out
+
+    @cached_property
+    def rounding(self) -> float:
+        """What rounding of the positions makes of a displacement that is nothing, m."""
+        return float(np.finfo(float).eps * np.abs(self.model.mesh.nodes).max())
 
     def length(self, dq: np.ndarray) -> float:
         """Largest displacement in a change (n,) of the unknowns, m; rotations count by the path of the wall's face."""

@@ -143,7 +143,7 @@ class TransientResults(Result):
             failures=read_texts(file, "messages/failures"),
             path=path,
         )
-        if rows > 1 and verdict.get("steps") != rows - 1:
+        if verdict.get("steps") != rows - 1:
             result.verdict = result._reassessed().summary()
         return result
 

@@ -396,7 +396,7 @@ class _Trial:
         motion = self.motion
         moved = self.h**2 * self.scheme.beta * motion.length(self.a_mid)
         floor = max(options.floor, 1e3 * np.finfo(float).eps)
-        return options.tolerance * moved + floor * motion.length(self.q) + np.finfo(float).tiny
+        return options.tolerance * moved + floor * motion.length(self.q) + motion.rounding
 
     def state(self) -> MotionState:
         old, load = self.old, self.load

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dbvfiv.case import Case, CaseError, load_case, parse_axis
+from dbvfiv.case import Case, CaseError, load_case, make_case, parse_axis
 from dbvfiv.case.describe import walk
 from dbvfiv.case.reference import explain, page
 from dbvfiv.case.write import case_toml
@@ -192,3 +192,19 @@ def test_pressures_of_steady(tmp_path, text, overrides, expected):
     changed = case.replace(changes).replace({"fluid.density": 10})
     assert changed.steady_pressures() == (expected or Case().steady.pressures)
     assert Case().steady_pressures() == Case().steady.pressures
+
+
+def test_the_true_metric_by_its_word_or_as_truth(tmp_path):
+    """`--set shell.metric=true` was refused because TOML reads a truth value there."""
+    assert load_case(None, ["shell.metric=true"]).shell.metric == "true"
+    assert load_case(None, ['shell.metric="true"']).shell.metric == "true"
+    with pytest.raises(CaseError, match='shell.metric is given as false; it must be "first-order" or "true"'):
+        load_case(None, ["shell.metric=false"])
+
+
+@pytest.mark.parametrize("name", ["a" * 5000, "nowhere.h5", "bad\x00name"])
+def test_a_start_file_that_cannot_be(name, one_sentence):
+    """A name longer than the system allows ended in a traceback."""
+    with pytest.raises(CaseError, match="transient.start_file is given as .* which does not exist") as caught:
+        make_case({"transient": {"start": "state", "start_file": name}})
+    assert one_sentence(str(caught.value))

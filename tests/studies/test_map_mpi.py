@@ -23,7 +23,7 @@ MESH = {"mesh.around": 8, "mesh.along": 16, "damping.alpha": 0.0, "damping.beta"
 
 @pytest.mark.slow
 def test_two_mpi_processes_find_the_same_map(coarse_case, tmp_path):
-    pytest.importorskip("mpi4py.futures", reason="mpi4py is an extra (pip install dbvfiv[mpi]) and not installed")
+    pytest.importorskip("mpi4py.futures", reason="mpi4py is not installed (pip install mpi4py)")
     if shutil.which("mpiexec") is None:
         pytest.skip("There is no mpiexec on this machine.")
     path = tmp_path / "map.h5"

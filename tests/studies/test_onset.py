@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbvfiv.errors import SolveError
+from dbvfiv.case import Case
+from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.studies.map import run_map
 from dbvfiv.studies.onset import OnsetOptions, OnsetSearch, run_onset
 from dbvfiv.studies.parameters import Place
 
@@ -122,3 +124,22 @@ def test_nothing_is_claimed_beside_a_value_without_a_certificate(coarse_case, mo
     assert result.certified.tolist() == [abs(v - 100.0) > 1e-6 for v in result.values]
     assert all(high <= 10.0 + 1e-9 for _, high in result.unstable_intervals) and not result.stable_intervals
     assert any("nothing is claimed" in sentence for sentence in result.warnings)
+
+
+@pytest.mark.parametrize(
+    "parameter, words", [("strain", "no layer is one of the built-in rubbers"), ("angle", "ply|angle")]
+)
+def test_what_a_case_does_not_have_is_no_parameter(one_sentence, parameter, words):
+    """Before, every state of such a scan was the same."""
+    own = {"kind": "neo-hookean", "shear_modulus": "1 MPa", "density": 1200}
+    case = Case().replace({"materials.own": own, "layers": [{"material": "own", "thickness": 0.01}]})
+    for ask in (
+        lambda: run_onset(case.replace({"onset.over": parameter})),
+        lambda: run_map(case.replace({"map.x": USUAL[parameter], "map.y": "density=1:10:2"})),
+    ):
+        with pytest.raises(CaseError, match=words) as caught:
+            ask()
+        assert one_sentence(str(caught.value))
+
+
+USUAL = {"strain": "strain=0.1:0.6:3", "angle": "angle=20:80:3"}

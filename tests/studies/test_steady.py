@@ -54,7 +54,7 @@ def test_flow_is_that_of_bernoulli_at_the_outlet(model):
 
 
 def test_lip_opening_is_the_distance_between_the_faces(model):
-    """47.7 mm at 18 kPa where the displacement of one lip, 23.8 mm, was called the opening before.
+    """About 48 mm at 18 kPa where the displacement of one lip, 24 mm, was called the opening before.
 
     At rest 2 (6.19 - 6) mm are left between the faces; a state adds twice the displacement and what the turn of the
     director gives back of the half wall.

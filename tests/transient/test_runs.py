@@ -393,3 +393,21 @@ def test_pressures_below_vacuum_are_told():
     pressure[50:60, 2] = -2.5e6
     sentence = beyond_model(history)
     assert "from 0.5051 s" in sentence and "10 %" in sentence and "-2500 kPa" in sentence
+
+
+def test_a_valve_without_pressure_rests(valve, tmp_path):
+    """Before, no step was found, since nothing moved that a correction could be measured against, and what read the
+    file failed.
+    """
+    model = valve({"drive.pressure": 0, "transient.duration": 0.02})
+    kept = transient(model, "idle", tmp_path / "run.h5")
+    assert not kept.failures and kept.verdict["verdict"] != "growing"
+    assert np.abs(kept.history["lip_displacement"]).max() < 1e-12
+    assert load_result(tmp_path / "run.h5").lines()
+
+
+def test_a_run_without_a_step_can_be_read(valve, tmp_path):
+    hard = {"drive.pressure": 1e7, "transient.step": 0.5, "transient.duration": 1.0, "transient.smallest_step": 1.0}
+    kept = transient(valve(hard), "stuck", tmp_path / "run.h5")
+    assert kept.failures and kept.verdict["verdict"] == "undecided" and "No step" in kept.verdict["reason"]
+    assert load_result(tmp_path / "run.h5").lines() == kept.lines()

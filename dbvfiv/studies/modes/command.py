@@ -22,7 +22,7 @@ def command(
             "--pressure",
             "-p",
             metavar="P",
-            help="Inlet pressure in place of drive.pressure; 0 with --in-vacuo is the valve at rest.",
+            help="Static inlet pressure in place of drive.pressure; 0 with --in-vacuo is the valve at rest.",
         ),
     ] = None,
     density: Annotated[

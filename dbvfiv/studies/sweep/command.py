@@ -22,7 +22,8 @@ def command(
         ),
     ] = None,
     pressure: Annotated[
-        str | None, typer.Option("--pressure", "-p", metavar="P", help="Inlet pressure in place of drive.pressure.")
+        str | None,
+        typer.Option("--pressure", "-p", metavar="P", help="Static inlet pressure in place of drive.pressure."),
     ] = None,
     density: Annotated[
         str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
