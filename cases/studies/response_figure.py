@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dbvfiv.plots.style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure, style
+from dbvfiv.drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure, style
 
 MARKS = {"down": ("v", COMPUTED), "up": ("^", ACCENT)}
 

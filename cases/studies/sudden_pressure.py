@@ -20,7 +20,7 @@ import numpy as np
 from kept import kept_run
 
 import dbvfiv
-from dbvfiv.plots.style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure, style
+from dbvfiv.drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure, style
 
 PRESSURES = (2, 6, 12, 18, 24, 29, 36, 50)  # kPa
 MARK, CLOSE = 0.5, 1e-4  # s; relative distance to the steady flow

@@ -114,8 +114,8 @@ def _figures(results, folder: Path) -> list[Path]:
         if result.states:
             written += result.plot(folder if not number else folder / result.supports)
     if len(results) > 1 and all(result.states for result in results):
+        from ..drawing.style import style
         from ..plots.closure_curves import supports_compared
-        from ..plots.style import style
 
         path = folder / "supports-compared.png"
         with style():

@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from ..errors import CaseError
-from ..plots.style import style
+from .style import style
 
 FORMATS = ("png", "svg")
 

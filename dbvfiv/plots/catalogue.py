@@ -20,10 +20,7 @@ if TYPE_CHECKING:
     from ..record.result import Result
 
 FAMILIES: dict[str, tuple[str, ...]] = {
-    "steady": ("discharge", "shapes", "passage", "deformed", "layers"),
-    "closure": ("closure", "closure_curves", "layers"),
-    "modes": ("modes_plane", "modes_shapes", "modes_centre_line", "modes_winding"),
-    "sweep": ("sweep_curves", "sweep_locus"),
+    "closure": ("closure", "closure_curves"),
     "onset": ("onset",),
     "map": ("map",),
     "transient": ("transient",),
@@ -46,7 +43,7 @@ def figures_of(result: Result, only: Sequence[str] = (), **choices: Any) -> dict
     CaseError
         For a name that the result has no figure of, or a result without anything to draw.
     """
-    from .style import style
+    from ..drawing.style import style
 
     drawers = dict(_drawers(result, choices))
     if not drawers:
@@ -66,7 +63,7 @@ def save_figures(result: Result, folder: str | Path = ".", format: str = "png", 
     CaseError
         As `figures_of` does, and when the folder cannot be written.
     """
-    from .style import style
+    from ..drawing.style import style
 
     if format not in FORMATS:
         raise CaseError(f"Figures are written as {' or '.join(FORMATS)}, not as {format!r}.")

@@ -11,10 +11,10 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
 
-from .axes import colour_bar, headline
-from .faces import ValveSkin, faces
-from .style import COMPUTED, MAGNITUDE, PUBLISHED, REST, kilopascals, new_figure, some_of
-from .views import COLOURS, draw_skin, unrolled
+from ..drawing.axes import colour_bar, headline
+from ..drawing.faces import ValveSkin, faces
+from ..drawing.style import COMPUTED, MAGNITUDE, PUBLISHED, REST, kilopascals, new_figure, some_of
+from ..drawing.views import COLOURS, draw_skin, unrolled
 
 if TYPE_CHECKING:
     from ..results.closure import ClosureResults, PressedState

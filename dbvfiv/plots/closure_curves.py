@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .axes import HALO, headline, limits, log_axis
+from ..drawing.axes import HALO, headline, limits, log_axis
+from ..drawing.faces import faces
+from ..drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, kilopascals, new_figure, pressure_colours, some_of
 from .closure import supports_of
-from .faces import faces
-from .style import ACCENT, COMPUTED, PUBLISHED, REST, kilopascals, new_figure, pressure_colours, some_of
 
 if TYPE_CHECKING:
     from ..results.closure import ClosureResults

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from scipy.ndimage import distance_transform_edt, label
 
 from ..case.parameters import PARAMETERS
-from .axes import HALO, colour_bar, headline, limits, log_axis
-from .style import MOTION, SIGNED, new_figure, static
+from ..drawing.axes import HALO, colour_bar, headline, limits, log_axis
+from ..drawing.style import MOTION, SIGNED, new_figure, static
 
 if TYPE_CHECKING:
     from ..results.map import MapResults

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..case.parameters import PARAMETERS
-from .axes import HALO, limits, log_axis
-from .style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure, static
+from ..drawing.axes import HALO, limits, log_axis
+from ..drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure, static
 
 if TYPE_CHECKING:
     from ..results.onset import OnsetResults

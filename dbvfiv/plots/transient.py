@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..drawing.axes import colour_bar, headline
+from ..drawing.style import ACCENT, COMPUTED, MAGNITUDE, REST, new_figure, phase_looks, static
 from ..verdict import Series, in_steps, spectrum
-from .axes import colour_bar, headline
-from .style import ACCENT, COMPUTED, MAGNITUDE, REST, new_figure, phase_looks, static
 
 if TYPE_CHECKING:
     from ..transient.result import TransientResults

@@ -10,8 +10,8 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..drawing.style import new_figure, style
 from ..errors import CaseError
-from .style import new_figure, style
 
 if TYPE_CHECKING:
     from ..transient.result import TransientResults

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
 
+from ..drawing.faces import nodal_thickness, offset_line
+from ..drawing.style import ACCENT, COMPUTED, REST, new_figure, style
 from ..errors import CaseError
-from .faces import nodal_thickness, offset_line
-from .style import ACCENT, COMPUTED, REST, new_figure, style
 
 if TYPE_CHECKING:
     from ..transient.result import TransientResults

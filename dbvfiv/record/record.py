@@ -246,6 +246,10 @@ class StoredRecord(Record):
             self.mesh = read_mesh(file) if "mesh" in file else None
             self.tables = {table.name: table for table in tables(self.mesh)}
             self._log = read_log(file)
+            for table in self.tables.values():
+                missing = [c.name for c in table.columns if c.name not in file["tables"][table.name]]
+                if missing:
+                    raise KeyError(f"{table.name}/{missing[0]}")
             self._count = {name: read_rows(file["tables"][name]) for name in self.tables}
             self.header = replace(read_header(file), complete=self.complete)
 

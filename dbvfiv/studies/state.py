@@ -98,15 +98,15 @@ class State(SteadyState):
 
     def plot(self, folder: str | Path = ".", format: str = "png") -> list[Path]:
         """Write the figures of this state alone."""
-        return gather_states([self]).plot(folder, format)
+        return gather_states(self.results, [self]).plot(folder, format)
 
     def save(self, path: str | Path) -> Path:
         """Write a result file with this state alone."""
-        return gather_states([self]).save(path)
+        return gather_states(self.results, [self]).save(path)
 
     def export(self, path: str | Path, quarter: bool = False, deformed: bool = False) -> Path:
         """Write this state for ParaView."""
-        return gather_states([self]).export(path, quarter, deformed)
+        return gather_states(self.results, [self]).export(path, quarter, deformed)
 
 
 def states_of(result: StudyResult, table: str) -> tuple[State, ...]:
@@ -115,9 +115,8 @@ def states_of(result: StudyResult, table: str) -> tuple[State, ...]:
     return tuple(State(**vars(state), results=result, table=table, index=i) for i, state in found)
 
 
-def gather_states(states: Sequence[State]) -> Any:
-    """A steady result with some states of a result, at least one."""
-    origin = states[0].results
+def gather_states(origin: StudyResult, states: Sequence[State]) -> Any:
+    """A steady result with some states of a result of any kind."""
     study = find_study("steady")
     (table,) = study.tables(origin.mesh)
     record = GrowingRecord(replace(origin.header, kind="steady"), origin.mesh, (table,))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from dbvfiv.plots.faces import ValveSkin, faces, nodal_thickness, offset_line
-from dbvfiv.plots.modes_shapes import drawn_amplitude
-from dbvfiv.plots.waves import wave_content
+from dbvfiv.drawing.faces import ValveSkin, faces, nodal_thickness, offset_line
+from dbvfiv.drawing.waves import wave_content
+from dbvfiv.studies.modes.shapes import drawn_amplitude
 
 
 def test_the_faces_lie_a_wall_apart_and_a_closed_lip_shows_no_slot(coarse_run):

@@ -6,11 +6,12 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case import Case
+from dbvfiv.drawing import style
+from dbvfiv.drawing.axes import log_axis
+from dbvfiv.drawing.faces import faces
+from dbvfiv.drawing.views import COLOURS, unrolled
 from dbvfiv.errors import CaseError
-from dbvfiv.plots import figures_of, published, style
-from dbvfiv.plots.axes import log_axis
-from dbvfiv.plots.faces import faces
-from dbvfiv.plots.views import COLOURS, unrolled
+from dbvfiv.studies.steady import published
 
 NAMES = {
     "head-discharge",
@@ -27,7 +28,7 @@ NAMES = {
 
 @pytest.fixture(scope="module")
 def figures(coarse_run):
-    return figures_of(coarse_run)
+    return coarse_run.figures()
 
 
 def test_every_figure_is_there_and_labelled_with_units(figures):
@@ -128,20 +129,20 @@ def test_published_points_only_on_the_reference_valve(figures, coarse_run):
 
 
 def test_a_single_state_and_a_chosen_pressure(tmp_path, coarse_run):
-    alone = figures_of(coarse_run.only(coarse_run.states[0]))
+    alone = coarse_run.only(coarse_run.states[0]).figures()
     assert set(alone) == NAMES
     for name in ("head-discharge", "area-discharge", "deflection"):
         axes = alone[name].axes[0]
         (x,), (y,) = axes.lines[0].get_data()
         assert axes.lines[0].get_marker() not in (None, "None", ""), name
         assert axes.get_xlim()[0] <= x < 0.97 * axes.get_xlim()[1] and axes.get_ylim()[0] <= y < axes.get_ylim()[1]
-    chosen = figures_of(coarse_run, only=["deformed"], pressure=17e3)
+    chosen = coarse_run.figures(only=["deformed"], pressure=17e3)
     assert "18 kPa" in chosen["deformed"].get_suptitle()
 
 
 def test_no_flow_no_curves_of_the_flow(coarse_valve):
     shut = coarse_valve.replace({"drive.kind": "uniform"}).steady(pressure=[500.0])
-    assert set(figures_of(shut)) == NAMES - {"head-discharge", "area-discharge", "jet-velocity", "passage"}
+    assert set(shut.figures()) == NAMES - {"head-discharge", "area-discharge", "jet-velocity", "passage"}
 
 
 @pytest.mark.parametrize("format, head", [("png", b"\x89PNG"), ("svg", b"<?xml")])

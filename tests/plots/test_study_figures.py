@@ -10,7 +10,6 @@ from PIL import Image
 import dbvfiv
 from dbvfiv.case import Case
 from dbvfiv.errors import CaseError
-from dbvfiv.plots import figures_of
 from dbvfiv.plots import map as map_figures
 from dbvfiv.plots import onset as onset_figures
 from dbvfiv.studies.map_column import MapPlan
@@ -41,7 +40,7 @@ def sweep(coarse_run):
 
 def test_captions_of_modes_follow_their_shapes(modes):
     """A share of the motion that travels, measured; not the same sentence under each."""
-    drawn = figures_of(modes, only=[f"centre-line-{n}" for n in (1, 2, 3)])
+    drawn = modes.figures(only=[f"centre-line-{n}" for n in (1, 2, 3)])
     captions = [drawn[f"centre-line-{n}"].axes[2].get_title("left") for n in (1, 2, 3)]
     assert len(set(captions)) == 3
     for mode, caption in zip(modes.modes, captions):
@@ -57,7 +56,7 @@ def test_captions_of_modes_follow_their_shapes(modes):
 
 
 def test_numbers_of_modes_stand_above_the_winding_and_not_on_it(modes):
-    figure = figures_of(modes, only=["winding"])["winding"]
+    figure = modes.figures(only=["winding"])["winding"]
     (axes,) = figure.axes
     figure.canvas.draw()
     frame = axes.get_window_extent()
@@ -70,14 +69,14 @@ def test_numbers_of_modes_stand_above_the_winding_and_not_on_it(modes):
 
 def test_crossings_of_sweeps_are_called_interpolated(sweep):
     for name in ("sweep", "root-locus"):
-        found = texts(figures_of(sweep, only=[name])[name])
+        found = texts(sweep.figures(only=[name])[name])
         assert any("interpolated" in text for text in found), name
         marks = [text for text in found if "kg/m³" in text and text.startswith("≈")]
         assert len(marks) == len(sweep.crossings()) > 0
 
 
 def test_branches_are_told_apart_without_colour(sweep):
-    axes = figures_of(sweep, only=["sweep"])["sweep"].axes[0]
+    axes = sweep.figures(only=["sweep"])["sweep"].axes[0]
     markers = [line.get_marker() for line in axes.lines if line.get_label().isdigit()]
     assert len(markers) == len(sweep.branches) and len(set(markers)) == len(markers)
 
@@ -179,7 +178,7 @@ def closure():
 
 
 def test_the_contact_map_reaches_to_its_maximum_and_says_it(closure):
-    figure = figures_of(closure, only=["contact-map"])["contact-map"]
+    figure = closure.figures(only=["contact-map"])["contact-map"]
     mesh = figure.axes[0].collections[0]
     largest = [s.contact_pressure.max() / s.pressure for s in closure.states if s.contact_nodes]
     assert mesh.norm.vmax == pytest.approx(max(largest))
@@ -188,7 +187,7 @@ def test_the_contact_map_reaches_to_its_maximum_and_says_it(closure):
 
 
 def test_the_closure_curve_has_no_lines_but_its_own(closure):
-    figure = figures_of(closure, only=["closure-curve"])["closure-curve"]
+    figure = closure.figures(only=["closure-curve"])["closure-curve"]
     buckled = len(closure.buckling[:1])
     for axes in figure.axes:
         upright = [line for line in axes.lines if len(set(line.get_xdata())) == 1 and len(line.get_xdata()) == 2]
@@ -198,13 +197,13 @@ def test_the_closure_curve_has_no_lines_but_its_own(closure):
 
 
 def test_two_measures_of_opening_stand_on_two_axes(closure):
-    left, right = figures_of(closure, only=["reversal"])["reversal"].axes
+    left, right = closure.figures(only=["reversal"])["reversal"].axes
     assert "Flow area" in left.get_ylabel() and "passage between the inner faces" in right.get_ylabel()
     assert np.nanmin(right.lines[0].get_ydata()) > 0
 
 
 def test_side_views_show_the_faces(closure):
-    figure = figures_of(closure, only=["side-views"])["side-views"]
+    figure = closure.figures(only=["side-views"])["side-views"]
     axes = figure.axes[0]
     wall = next(c for c in axes.collections if c.get_label() == "wall")
     upper, lower = (path.vertices for path in wall.get_paths())
@@ -224,7 +223,7 @@ def run(tmp_path_factory):
 
 
 def test_the_imbalance_has_an_axis_of_its_own(run):
-    figure = figures_of(run, only=["energies"])["energies"]
+    figure = run.figures(only=["energies"])["energies"]
     *_, rest = figure.axes
     assert rest.get_ylabel().startswith("Imbalance, ")
     factor = {"J": 1.0, "mJ": 1e3, "µJ": 1e6, "nJ": 1e9}[rest.get_ylabel().split(", ")[1]]
@@ -238,14 +237,14 @@ def test_spectra_say_their_resolution_and_print_no_more_digits(run, monkeypatch)
     half = len(run.history["time"]) // 2
     fine = 1.0 / Series.of(run.history["time"][half:], run.history["mass_flow"][half:]).duration
     monkeypatch.setitem(run.verdict["lip_opening"], "frequency", 54.98)
-    figure = figures_of(run, only=["spectrum"])["spectrum"]
+    figure = run.figures(only=["spectrum"])["spectrum"]
     assert f"resolution {fine:.2g} Hz" in figure.get_suptitle()
     assert figure.axes[1].get_title("right").endswith(f" {in_steps(54.98, fine)} Hz") and fine > 1
     assert in_steps(54.98, 50.0) == "55" and in_steps(54.98, 0.3) == "55.0" and in_steps(54.983, 0.02) == "54.98"
 
 
 def test_figures_of_runs_say_clear_opening_and_static_pressure(run):
-    drawn = figures_of(run, only=["history", "phase-portrait", "station-pressures"])
+    drawn = run.figures(only=["history", "phase-portrait", "station-pressures"])
     assert "Clear lip opening, mm" in texts(drawn["history"])
     assert "Velocity of one lip, m/s" in texts(drawn["phase-portrait"])
     assert "Static pressure, kPa" in texts(drawn["station-pressures"])

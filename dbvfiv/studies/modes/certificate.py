@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...record.layout import Column
 from .run import FoundModes
 
 _ATTRIBUTES = (
@@ -24,6 +25,11 @@ _ATTRIBUTES = (
     "complete_above",
     "band",
     "rejected",
+)
+#: The independent count as a curve.
+CURVE = (
+    Column("frequency", "Hz", "Points on the line at which the determinant was evaluated"),
+    Column("phase", "rad", "Continuous phase of the determinant against that of a stable structure"),
 )
 
 
@@ -105,14 +111,15 @@ class Certificate:
         )
 
     def note(self) -> dict[str, Any]:
-        """All of it as a note of a record."""
-        return dict(vars(self))
+        """All but the curve, as a note of a record."""
+        curve = [column.name for column in CURVE]
+        return {name: value for name, value in vars(self).items() if name not in curve}
 
     @classmethod
-    def read(cls, note: dict[str, Any]) -> Certificate:
-        """From a note of a record."""
-        values = {name: note[name] for name in cls.__dataclass_fields__}
-        return cls(**values | {name: np.array(values[name], float) for name in ("frequency", "phase")})
+    def read(cls, note: dict[str, Any], frequency: np.ndarray, phase: np.ndarray) -> Certificate:
+        """From a note of a record and the curve."""
+        names = cls.__dataclass_fields__.keys() - {"frequency", "phase"}
+        return cls(**{name: note[name] for name in names}, frequency=frequency, phase=phase)
 
     @property
     def verdict(self) -> str:

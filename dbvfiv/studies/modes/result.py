@@ -10,8 +10,6 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from ...errors import CaseError
-from ...plots import modes_centre_line, modes_plane, modes_shapes, modes_winding
-from ...plots.modes_animation import animate_mode
 from ...record.mesh import MeshData
 from ...record.states import state_table
 from ...record.table import TableSpec
@@ -20,22 +18,24 @@ from ...record.whole_valve import WholeValve
 from ..result import StudyResult
 from ..session import describe_surroundings
 from ..state import State, states_of
-from .certificate import Certificate
+from . import centre_line, plane, shapes, winding
+from .animation import animate_mode
+from .certificate import CURVE, Certificate
 from .mode import MODE, ModeShape
 from .steps import cycle_steps, mode_steps
 
-STATE, MODES = "state", "modes"
+STATE, MODES, COUNT = "state", "modes", "count"
 HEAD = (
     "  mode   growth rate    frequency   damping ratio   residual",
     "                 1/s           Hz",
 )
 
 
-def tables_of(mesh: MeshData) -> tuple[TableSpec, TableSpec]:
-    """Tables of a result on a mesh: the state and its modes."""
+def tables_of(mesh: MeshData) -> tuple[TableSpec, TableSpec, TableSpec]:
+    """Tables of a result on a mesh: the state, its modes, and the curve of the independent count."""
     stations = len(mesh.z)
-    shapes = {"shape": (len(mesh.nodes), 5), "area": (stations,), "pressure": (stations,)}
-    return state_table(STATE, mesh), TableSpec(MODES, MODE, shapes, chunk=8)
+    row_shapes = {"shape": (len(mesh.nodes), 5), "area": (stations,), "pressure": (stations,)}
+    return state_table(STATE, mesh), TableSpec(MODES, MODE, row_shapes, chunk=8), TableSpec(COUNT, CURVE)
 
 
 class ModesResult(StudyResult):
@@ -61,12 +61,14 @@ class ModesResult(StudyResult):
 
     @cached_property
     def modes(self) -> tuple[ModeShape, ...]:
-        (_, table) = tables_of(self.mesh)
+        (_, table, _) = tables_of(self.mesh)
         return tuple(ModeShape(number=i + 1, **row) for i, row in enumerate(self.record.table_rows(table)))
 
     @cached_property
     def certificate(self) -> Certificate:
-        return Certificate.read(self.record.notes("certificate")[-1])
+        return Certificate.read(
+            self.record.notes("certificate")[-1], *(self.record.column(COUNT, c.name) for c in CURVE)
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -120,10 +122,10 @@ class ModesResult(StudyResult):
 
     def drawers(self, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
         """Eigenvalues, shapes, centre lines and the independent count; of one mode alone if it is named."""
-        yield from modes_plane.draw(self)
-        yield from modes_shapes.draw(self, mode)
-        yield from modes_centre_line.draw(self, mode)
-        yield from modes_winding.draw(self)
+        yield from plane.draw(self)
+        yield from shapes.draw(self, mode)
+        yield from centre_line.draw(self, mode)
+        yield from winding.draw(self)
 
     def animate(self, path: str | Path, mode: int = 1, frames: int = 24) -> Path:
         """Write a GIF of one cycle of a mode."""

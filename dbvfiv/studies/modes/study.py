@@ -6,9 +6,9 @@ from ...record.record import GrowingRecord
 from ...record.states import state_row
 from ..session import Session
 from ..study import Study
-from .certificate import Certificate
+from .certificate import CURVE, Certificate
 from .mode import rows_of
-from .result import MODES, STATE, ModesResult, tables_of
+from .result import COUNT, MODES, STATE, ModesResult, tables_of
 from .run import ModesOptions, run_modes
 
 
@@ -25,7 +25,10 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.append(MODES, row)
     for sentence in found.notes:
         record.note("remark", text=sentence)
-    record.note("certificate", **Certificate.of(found).note())
+    certificate = Certificate.of(found)
+    if not record.rows(COUNT):
+        record.extend(COUNT, {column.name: getattr(certificate, column.name) for column in CURVE})
+    record.note("certificate", **certificate.note())
 
 
 STUDY = Study("modes", tables_of, run, ModesResult)

@@ -9,7 +9,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from ...plots import deformed, discharge, layers, passage, shapes
+from ...drawing import deformed, layers
 from ...record.fields import layer_field_names, motion
 from ...record.layout import Column
 from ...record.mesh import MeshData
@@ -18,7 +18,8 @@ from ...record.table import TableSpec, printed_head, printed_row
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
 from ..result import StudyResult
-from ..state import State, states_of
+from ..state import State, gather_states, states_of
+from . import discharge, passage, shapes
 
 #: Where the walk over the pressures goes on from.
 PATH = (
@@ -46,6 +47,10 @@ class SteadyResult(StudyResult):
     @cached_property
     def states(self) -> tuple[State, ...]:
         return states_of(self, STATES)
+
+    def only(self, *states: State) -> SteadyResult:
+        """A result with some of its states."""
+        return gather_states(self, states)
 
     def nearest(self, pressure: float) -> State:
         """State at the pressure closest to a given one, Pa."""

@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 
 from ...case.axis import Axis
 from ...case.parameters import PARAMETERS
-from ...plots import sweep_curves, sweep_locus
 from ...record.layout import Column
 from ...record.mesh import MeshData
 from ...record.states import SUMMARY
 from ...record.table import TableSpec
 from ..result import StudyResult
 from ..session import describe_surroundings
+from . import curves, locus
 from .printed import crossing_line, head, rows_of_sweep
 
 POINTS, BRANCHES, CHECKS, STATES = "points", "branches", "checks", "states"
@@ -239,8 +239,8 @@ class SweepResult(StudyResult):
 
     def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
         if self.branches:
-            yield from sweep_curves.draw(self)
-            yield from sweep_locus.draw(self)
+            yield from curves.draw(self)
+            yield from locus.draw(self)
 
     def lines(self) -> list[str]:
         crossings = [crossing_line(self, crossing) for crossing in self.crossings()]

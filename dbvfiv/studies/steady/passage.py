@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
+from ...drawing.style import kilopascals, new_figure, pressure_colours, some_of
+from ...drawing.views import mark_pieces
 from .discharge import ordered
-from .style import kilopascals, new_figure, pressure_colours, some_of
-from .views import mark_pieces
 
 if TYPE_CHECKING:
-    from ..studies.steady.result import SteadyResult
+    from ...studies.steady.result import SteadyResult
 
 _QUARTERS = 4
 _PANELS = (

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .axes import log_axis
-from .modes_plane import conditions
-from .style import COMPUTED, STABLE, UNSTABLE, new_figure
+from ...drawing.axes import log_axis
+from ...drawing.style import COMPUTED, STABLE, UNSTABLE, new_figure
+from .plane import conditions
 
 if TYPE_CHECKING:
-    from ..studies.modes.result import ModesResult
+    from ...studies.modes.result import ModesResult
 
 
 def draw(result: ModesResult) -> Iterator[tuple[str, Callable[[], Figure]]]:

@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..case.parameters import PARAMETERS
-from .axes import HALO, limits, log_axis
-from .style import DANGER, UNSTABLE, branch_looks, new_figure, static
+from ...case.parameters import PARAMETERS
+from ...drawing.axes import HALO, limits, log_axis
+from ...drawing.style import DANGER, UNSTABLE, branch_looks, new_figure, static
 
 if TYPE_CHECKING:
-    from ..studies.sweep.result import Branch, Crossing, SweepResult
+    from ...studies.sweep.result import Branch, Crossing, SweepResult
 
 #: Confidence below which a match is drawn as doubtful.
 DOUBTFUL = 0.5

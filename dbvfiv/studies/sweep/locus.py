@@ -12,13 +12,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from ..case.parameters import PARAMETERS
-from .axes import HALO, colour_bar, limits, log_axis
-from .style import DANGER, MAGNITUDE, UNSTABLE, new_figure
-from .sweep_curves import surroundings_of
+from ...case.parameters import PARAMETERS
+from ...drawing.axes import HALO, colour_bar, limits, log_axis
+from ...drawing.style import DANGER, MAGNITUDE, UNSTABLE, new_figure
+from .curves import surroundings_of
 
 if TYPE_CHECKING:
-    from ..studies.sweep.result import SweepResult
+    from ...studies.sweep.result import SweepResult
 
 
 def draw(result: SweepResult) -> Iterator[tuple[str, Callable[[], Figure]]]:

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .faces import faces
-from .modes_plane import conditions, mode_title
-from .modes_shapes import drawn_amplitude
-from .style import COMPUTED, REST, new_figure, phase_looks
-from .views import mark_pieces
-from .waves import wave_content
+from ...drawing.faces import faces
+from ...drawing.style import COMPUTED, REST, new_figure, phase_looks
+from ...drawing.views import mark_pieces
+from ...drawing.waves import wave_content
+from .plane import conditions, mode_title
+from .shapes import drawn_amplitude
 
 if TYPE_CHECKING:
-    from ..studies.modes.mode import ModeShape
-    from ..studies.modes.result import ModesResult
+    from ...studies.modes.mode import ModeShape
+    from ...studies.modes.result import ModesResult
 
 _PHASES, _DRAWN = 10, 3
 #: Part of the largest swing below which a phase means nothing.

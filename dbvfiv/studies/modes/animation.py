@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.animation import PillowWriter
 
-from ..errors import CaseError
-from .axes import headline
-from .modes_plane import conditions, mode_title
-from .modes_shapes import ModeSurface
-from .style import new_figure, style
+from ...drawing.axes import headline
+from ...drawing.style import new_figure, style
+from ...errors import CaseError
+from .plane import conditions, mode_title
+from .shapes import ModeSurface
 
 if TYPE_CHECKING:
-    from ..studies.modes.mode import ModeShape
-    from ..studies.modes.result import ModesResult
+    from ...studies.modes.mode import ModeShape
+    from ...studies.modes.result import ModesResult
 
 _PICTURES_A_SECOND, _DOTS = 15, 90
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...drawing.faces import faces
+from ...drawing.style import REST, kilopascals, new_figure, pressure_colours, some_of
+from ...drawing.views import mark_pieces
 from .discharge import ordered
-from .faces import faces
-from .style import REST, kilopascals, new_figure, pressure_colours, some_of
-from .views import mark_pieces
 
 if TYPE_CHECKING:
-    from ..studies.steady.result import SteadyResult
+    from ...studies.steady.result import SteadyResult
 
 
 def draw(result: SteadyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, new_figure
 from . import published
-from .style import ACCENT, COMPUTED, PUBLISHED, new_figure
 
 if TYPE_CHECKING:
-    from ..studies.state import State
-    from ..studies.steady.result import SteadyResult
+    from ...studies.state import State
+    from ...studies.steady.result import SteadyResult
 
 
 def draw(result: SteadyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:

@@ -8,10 +8,9 @@ import pytest
 from PIL import Image
 
 import dbvfiv
+from dbvfiv.drawing.faces import faces
 from dbvfiv.errors import CaseError
-from dbvfiv.plots import figures_of
-from dbvfiv.plots.faces import faces
-from dbvfiv.plots.modes_shapes import drawn_amplitude
+from dbvfiv.studies.modes.shapes import drawn_amplitude
 
 FLUTTER = {"density": 10, "alpha": 0}
 
@@ -54,8 +53,13 @@ def test_the_case_of_the_file_gives_the_modes_again(stored):
 
 def test_numbers_carry_units(stored):
     with h5py.File(stored.path) as file:
-        assert file["modes/growth_rate"].attrs["units"] == "1/s" and file["modes/shape"].attrs["description"]
-        assert file["state/pressure"].attrs["units"] == "Pa" and file["certificate/frequency"].attrs["units"] == "Hz"
+        assert (
+            file["tables/modes/growth_rate"].attrs["units"] == "1/s" and file["tables/modes/shape"].attrs["description"]
+        )
+        assert (
+            file["tables/state/pressure"].attrs["units"] == "Pa"
+            and file["tables/count/frequency"].attrs["units"] == "Hz"
+        )
 
 
 def test_state_and_valve_say_the_same(coarse_valve, modes):
@@ -157,20 +161,20 @@ def test_a_missing_branch_is_null(sweep):
 
 
 def test_figures(stored, stored_sweep):
-    assert set(figures_of(stored, only=["eigenvalues", "winding", "centre-line-1"])) == {
+    assert set(stored.figures(only=["eigenvalues", "winding", "centre-line-1"])) == {
         "eigenvalues",
         "winding",
         "centre-line-1",
     }
-    assert set(figures_of(stored, mode=2, only=["mode-shape-2", "centre-line-2"])) == {"mode-shape-2", "centre-line-2"}
-    assert set(figures_of(stored_sweep)) == {"sweep", "root-locus"}
+    assert set(stored.figures(mode=2, only=["mode-shape-2", "centre-line-2"])) == {"mode-shape-2", "centre-line-2"}
+    assert set(stored_sweep.figures()) == {"sweep", "root-locus"}
     with pytest.raises(CaseError):
-        figures_of(stored, mode=17)
+        stored.figures(mode=17)
 
 
 def test_centre_line_shows_the_cycle(stored):
     """Ten phases about the steady state, each of them the inner face of the equilibrium plus the swing of the mode."""
-    figure = figures_of(stored, only=["centre-line-1"])["centre-line-1"]
+    figure = stored.figures(only=["centre-line-1"])["centre-line-1"]
     lines = figure.axes[0].get_lines()
     state, mode = stored.state, stored.modes[0]
     row = stored.mesh.rows[:, 0]
@@ -196,7 +200,7 @@ def test_a_damaged_file_is_told(stored, tmp_path, one_sentence):
     path = tmp_path / "broken.h5"
     path.write_bytes(stored.path.read_bytes())
     with h5py.File(path, "a") as file:
-        del file["modes/shape"]
+        del file["tables/modes/shape"]
     with pytest.raises(CaseError) as caught:
         dbvfiv.load_result(path)
     assert one_sentence(str(caught.value))

@@ -11,16 +11,16 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from .axes import colour_bar, headline
-from .faces import ValveSkin, faces
-from .modes_plane import conditions, mode_title
-from .style import UNSTABLE, new_figure
-from .views import COLOURS, frame, shaded
+from ...drawing.axes import colour_bar, headline
+from ...drawing.faces import ValveSkin, faces
+from ...drawing.style import UNSTABLE, new_figure
+from ...drawing.views import COLOURS, frame, shaded
+from .plane import conditions, mode_title
 
 if TYPE_CHECKING:
-    from ..studies.modes.mode import ModeShape
-    from ..studies.modes.result import ModesResult
-    from ..studies.state import State
+    from ...studies.modes.mode import ModeShape
+    from ...studies.modes.result import ModesResult
+    from ...studies.state import State
 
 _PANELS = 6
 #: Share of the clear height that a drawn mode may take, and share of the amplitude it is drawn with in any case.

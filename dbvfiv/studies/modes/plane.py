@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .style import DANGER, STABLE, UNSTABLE, new_figure, static
+from ...drawing.style import DANGER, STABLE, UNSTABLE, new_figure, static
 
 if TYPE_CHECKING:
-    from ..studies.modes.result import ModesResult
+    from ...studies.modes.result import ModesResult
 
 _RATIOS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7)
 
