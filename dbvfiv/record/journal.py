@@ -50,6 +50,8 @@ class Journal:
     header : Header
     mesh : MeshData, optional
     tables : iterable of TableSpec
+    fill : callable, optional
+        Called as fill(journal) before the file takes the name, so that rows of an earlier attempt are never out of it.
 
     Raises
     ------
@@ -58,7 +60,7 @@ class Journal:
     DiskFull
     """
 
-    def __init__(self, path: str | Path, header: Header, mesh: MeshData | None, tables: Iterable[TableSpec]):
+    def __init__(self, path: str | Path, header: Header, mesh: MeshData | None, tables: Iterable[TableSpec], fill=None):
         self.path = Path(path)
         self._tables = {table.name: table for table in tables}
         refuse_foreign(self.path)
@@ -77,6 +79,9 @@ class Journal:
                     table.create(file.require_group("tables"))
                 log = file.create_dataset("log", (0,), "u1", maxshape=(None,), chunks=(4096,))
                 log.attrs["description"] = "JSON documents, each closed by a line feed"
+            if fill is not None:
+                with h5py.File(new, "r+", libver="latest", locking=False) as self._file:
+                    fill(self)
             self._lock.move(new)
             self._file = h5py.File(self.path, "r+", libver="latest", locking=False)
             self._file.swmr_mode = True
