@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 FAMILIES: dict[str, tuple[str, ...]] = {
     "steady": ("discharge", "shapes", "passage", "deformed", "layers"),
-    "closure": ("closure", "closure_curves", "layers"),
     "modes": ("modes_plane", "modes_shapes", "modes_centre_line", "modes_winding"),
     "sweep": ("sweep_curves", "sweep_locus"),
     "onset": ("onset",),

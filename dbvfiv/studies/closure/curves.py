@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .closure import supports_of
-from .faces import faces
-from .style import (
+from ...plots.faces import faces
+from ...plots.style import (
     ACCENT,
     COMPUTED,
     HALO,
@@ -24,16 +23,17 @@ from .style import (
     pressure_colours,
     some_of,
 )
+from .figures import supports_of
 
 if TYPE_CHECKING:
-    from ..results.closure import ClosureResults
+    from .result import ClosureResult
 
 
 #: Passage, mm2, below which a valve is shut for any purpose.
 _SHUT = 0.01
 
 
-def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ClosureResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a closure result, each with its name."""
     if result.walk:
         yield "closure-curve", lambda: closure_curve(result)
@@ -44,7 +44,7 @@ def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
         yield "reversal-in-time", lambda: in_time(result)
 
 
-def closure_curve(result: ClosureResults) -> Figure:
+def closure_curve(result: ClosureResult) -> Figure:
     """Sealed length, contact force, deepest displacement and lowest stiffness over the back pressure; dots are the
     states that were asked for.
     """
@@ -78,7 +78,7 @@ def closure_curve(result: ClosureResults) -> Figure:
     return figure
 
 
-def _over_pressure(result: ClosureResults, axes, name: str, factor: float, **look) -> None:
+def _over_pressure(result: ClosureResult, axes, name: str, factor: float, **look) -> None:
     """A column of the path over the back pressure, with dots at the states."""
     look = {"color": COMPUTED} | look
     p = np.array([point.pressure for point in result.walk])
@@ -90,7 +90,7 @@ def _over_pressure(result: ClosureResults, axes, name: str, factor: float, **loo
     axes.plot(asked / 1e3, np.interp(asked, p[order], values[order]), "o", color=look["color"], ms=4.5)
 
 
-def passage(result: ClosureResults) -> Figure:
+def passage(result: ClosureResult) -> Figure:
     """Passage left between the inner faces along the axis."""
     figure = new_figure(7.2, 4.4)
     axes = figure.add_subplot()
@@ -121,7 +121,7 @@ def passage(result: ClosureResults) -> Figure:
     return figure
 
 
-def reversal(result: ClosureResults) -> Figure:
+def reversal(result: ClosureResult) -> Figure:
     """From flow to back pressure as the drive turns round slowly: the flow area of the open valve, and the narrowest
     passage between the faces of the shut one, which are two measures and stand on two axes.
     """
@@ -150,7 +150,7 @@ def reversal(result: ClosureResults) -> Figure:
     return figure
 
 
-def in_time(result: ClosureResults) -> Figure:
+def in_time(result: ClosureResult) -> Figure:
     """Drive, lip, narrowest passage, flow and contact force while the drive turns round."""
     closing = result.closing
     figure = new_figure(8.4, 8.0)
@@ -183,7 +183,7 @@ def in_time(result: ClosureResults) -> Figure:
     return figure
 
 
-def supports_compared(first: ClosureResults, second: ClosureResults) -> Figure:
+def supports_compared(first: ClosureResult, second: ClosureResult) -> Figure:
     """Front of contact, displacement, stiffness and inner face at x = 0 with two kinds of supports."""
     figure = new_figure(9.6, 7.0)
     panels = figure.subplots(2, 2).ravel()

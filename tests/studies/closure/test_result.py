@@ -10,8 +10,8 @@ import pytest
 
 import dbvfiv
 from dbvfiv.api import load
-from dbvfiv.plots.closure_curves import supports_compared
 from dbvfiv.results import load_result
+from dbvfiv.studies.closure.curves import supports_compared
 
 COARSE = {
     "mesh.around": 6,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -15,7 +16,7 @@ from dbvfiv.api import load
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.results import load_result
-from dbvfiv.results.closure_run import resume_closure
+from dbvfiv.resuming import resume
 
 COARSE = {
     "mesh.around": 6,
@@ -49,11 +50,11 @@ def whole():
 def agree(result, whole):
     assert result.complete and [s.pressure for s in result.states] == PRESSURES
     for a, b in zip(result.states, whole.states):
-        assert a.nodal == pytest.approx(b.nodal, abs=1e-12)
-        assert a.energy_balance == pytest.approx(b.energy_balance, rel=1e-6)
+        assert np.array_equal(a.nodal, b.nodal)
+        assert a.energy_balance == b.energy_balance
         assert (a.load_steps, a.iterations, a.multiplier_updates) == (b.load_steps, b.iterations, b.multiplier_updates)
-    assert [p.pressure for p in result.walk] == [p.pressure for p in whole.walk]
-    assert result.summary()["opened"] == whole.summary()["opened"]
+    assert [vars(p) for p in result.walk] == [vars(p) for p in whole.walk]
+    assert json.dumps(result.summary()) == json.dumps(whole.summary())
     assert result.warnings == whole.warnings and not result.failures
 
 
@@ -64,22 +65,16 @@ def test_an_interrupted_run_goes_on_as_if_it_had_not_been(whole, tmp_path):
     assert len(load_result(path).walk) > len(
         [p for p in whole.walk if p.pressure <= PRESSURES[0]]
     )  # a part of the way to the next state too
-    agree(resume_closure(path), whole)
-    with pytest.raises(CaseError, match="nothing is left to do"):
-        resume_closure(path)
+    agree(resume(path), whole)
+    with pytest.raises(CaseError, match="nothing to resume"):
+        resume(path)
 
 
 def test_a_run_interrupted_before_its_first_state_begins_anew(whole, tmp_path):
     path = tmp_path / "run.h5"
     load(None, COARSE).closure(PRESSURES, output=path, observer=StopAfter(0))
     assert not load_result(path).states
-    agree(resume_closure(path), whole)
-
-
-def test_other_results_are_refused(tmp_path):
-    path = load(None, COARSE).steady([2e3]).save(tmp_path / "steady.h5")
-    with pytest.raises(CaseError, match="no back-pressure run"):
-        resume_closure(path)
+    agree(resume(path), whole)
 
 
 @pytest.mark.slow
@@ -106,4 +101,4 @@ def test_a_killed_run_has_lost_no_finished_state(whole, tmp_path):
     kept = load_result(path)
     assert not kept.complete and len(kept.states) >= 1
     assert np.array_equal(kept.states[0].nodal, whole.states[0].nodal)
-    agree(resume_closure(path), whole)
+    agree(resume(path), whole)

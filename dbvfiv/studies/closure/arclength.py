@@ -10,10 +10,10 @@ from continuation import ContinuationOptions, MatrixLinearisation, SystemBase, c
 from continuation import NewtonOptions as ContinuationNewton
 from continuation.branch import Branch
 
-from ..contact import PressedShell
-from ..contact.second import contact_second
-from ..observer import Observer
-from .closure_stability import stiffness_spectrum
+from ...contact import PressedShell
+from ...contact.second import contact_second
+from ...observer import Observer
+from .stiffness import stiffness_spectrum
 
 PARAMETER = "pressure"
 
@@ -22,7 +22,7 @@ class PressedSystem(SystemBase):
     """M u' = -r(u; P): motion so slow that only resistance counts, with the mass matrix for the resistance.
 
     Its equilibria are those of the shell, and the eigenvalues of its linearisation are the stiffness eigenvalues of
-    `closure_stability` with the sign turned, so that a positive one means an unstable equilibrium. The contact
+    `stiffness` with the sign turned, so that a positive one means an unstable equilibrium. The contact
     multipliers stay as they are.
 
     Parameters
