@@ -17,7 +17,8 @@ from ...plots.layers import unrolled
 from ...plots.style import COMPUTED, MAGNITUDE, PUBLISHED, REST, colour_bar, headline, kilopascals, new_figure, some_of
 
 if TYPE_CHECKING:
-    from .result import ClosureResult, PressedState
+    from .pressed_state import PressedState
+    from .result import ClosureResult
 
 
 def draw(result: ClosureResult) -> Iterator[tuple[str, Callable[[], Figure]]]:

@@ -36,6 +36,7 @@ def turn_back(case: Case, record: GrowingRecord) -> None:
     for pressure in np.geomspace(case.closure.open_pressure, case.closure.open_pressure / 50, OPEN_STATES).tolist():
         if pressure in known:
             continue
+        record.progress(f"steady state at {pressure:.6g} Pa")
         try:
             record.append(OPENED, state_row(model, path.go_to(pressure)) | way_on(path))
         except SolveError as error:

@@ -21,6 +21,7 @@ from .buckling import Buckling, BucklingWatch
 from .energy import EnergyLedger
 from .model import ClosureModel
 from .opening import FACES, opening
+from .path_point import PathPoint, PathRestart
 from .state import QUARTERS, ClosureState, contact_front, describe_closure, face_overlap
 from .stiffness import stiffness_spectrum
 
@@ -73,68 +74,6 @@ class ClosureOptions:
             arclength=closure.arclength,
             balance_tolerance=closure.balance_tolerance,
         )
-
-
-@dataclass(frozen=True)
-class PathPoint:
-    """One equilibrium on the way; areas and forces of the whole valve.
-
-    Attributes
-    ----------
-    pressure : float, Pa
-    max_displacement : float, m
-    contact_force : float, N
-    least_opening : float, m2
-    sealed_length, lip_seal : float, m
-    contact_front, overlap : float, m
-    lowest_eigenvalue : float, 1/s2
-        NaN on stretches followed by arclength.
-    arclength : bool
-        Found by arclength.
-    """
-
-    pressure: float
-    max_displacement: float
-    contact_force: float
-    least_opening: float
-    sealed_length: float
-    lip_seal: float
-    contact_front: float
-    overlap: float
-    lowest_eigenvalue: float
-    arclength: bool = False
-
-
-@dataclass(frozen=True)
-class PathRestart:
-    """What a walk needs to go on from a state that it reached, as if it had never stopped.
-
-    Attributes
-    ----------
-    pressure : float, Pa
-    q, slope : (n,) arrays
-        Unknowns and their derivative by the pressure.
-    multiplier : (k,) array, Pa
-    step : float, Pa
-        Load step to try next.
-    beyond_limit : bool
-    eigenvalue : float, 1/s2
-        Lowest stiffness eigenvalue there.
-    energy : tuple of float
-        See `EnergyLedger.totals`.
-    buckling : tuple of Buckling
-        Found so far.
-    """
-
-    pressure: float
-    q: np.ndarray
-    slope: np.ndarray
-    multiplier: np.ndarray
-    step: float
-    beyond_limit: bool
-    eigenvalue: float
-    energy: tuple[float, ...]
-    buckling: tuple[Buckling, ...] = ()
 
 
 @dataclass

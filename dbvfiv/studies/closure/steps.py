@@ -11,7 +11,7 @@ from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
 
 if TYPE_CHECKING:
-    from .result import PressedState
+    from .pressed_state import PressedState
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from .buckling import Buckling
 from .columns import BUCKLED, BUCKLING, FIELDS, MOST_EIGENVALUES, PATH, POINT, STATES, SUMMARY, valid_rows, void_rows
 from .model import ClosureModel
 from .opening import opening
-from .path import ClosureOptions, ClosurePath, PathRestart
+from .path import ClosureOptions, ClosurePath
+from .path_point import PathPoint, PathRestart
 from .remarks import FoundPlace, overlap_warnings, start_warnings
 from .state import QUARTERS, ClosureState
 
@@ -165,7 +166,7 @@ class ClosureWalk:
         }
 
     @staticmethod
-    def _point_row(point) -> dict[str, Any]:
+    def _point_row(point: PathPoint) -> dict[str, Any]:
         return {c.name: getattr(point, c.name) for c in POINT}
 
     def _buckling_row(self, found: Buckling) -> dict[str, Any]:

@@ -77,6 +77,73 @@ def test_a_run_interrupted_before_its_first_state_begins_anew(whole, tmp_path):
     agree(resume(path), whole)
 
 
+class StopAt(Observer):
+    """Interrupts at the `count`-th piece of progress that begins with a text, once `after` states were found."""
+
+    def __init__(self, text: str, count: int, after: int = 0):
+        self.text, self.count, self.after = text, count, after
+
+    def item(self, result):
+        self.after -= not isinstance(result, str)
+
+    def progress(self, text):
+        if self.after <= 0 and text.startswith(self.text):
+            self.count -= 1
+            if self.count == 0:
+                raise KeyboardInterrupt
+
+
+def test_a_flow_that_is_turned_back_goes_on_from_its_last_state(whole, tmp_path):
+    path = tmp_path / "run.h5"
+    load(None, COARSE).closure(PRESSURES, output=path, observer=StopAt("steady state at", 4))
+    assert len(load_result(path).opened) == 3
+    agree(resume(path), whole)
+
+
+def test_a_file_may_be_taken_up_twice(whole, tmp_path):
+    path = tmp_path / "run.h5"
+    load(None, COARSE).closure(PRESSURES, output=path, observer=StopAt("equilibrium at 1050 Pa", 1))
+    assert not load_result(path).states and load_result(path).walk
+    again = resume(path, observer=StopAfter(2))
+    assert not again.complete and len(again.states) == 2
+    agree(resume(path), whole)
+
+
+def test_supports_to_compare_with_and_the_turn_in_time_are_taken_up_too(tmp_path):
+    path = tmp_path / "run.h5"
+    changes = COARSE | {
+        "closure.start": "rest",
+        "closure.max_step": "5 kPa",
+        "closure.reversal_time": "0.02 s",
+        "closure.reversal_hold": 0.0,
+    }
+
+    def ask(**further):
+        return load(None, changes).closure([4e3, 14e3], in_time=True, compare=True, **further)
+
+    complete = ask()
+    first = ask(output=path, observer=StopAt("0.00", 3))
+    assert len(first.states) == 2 and 0 < len(first.closing.samples) < len(complete.closing.samples)
+    assert first.compared is None
+    second = resume(path, observer=StopAt("equilibrium", 1, after=1))
+    assert second.closing.samples == complete.closing.samples
+    assert not second.complete and len(second.compared.states) == 1
+    last = resume(path)
+    assert last.complete and json.dumps(last.summary()) == json.dumps(complete.summary())
+
+
+@pytest.mark.slow
+def test_a_walk_that_is_stopped_beyond_a_limit_meets_it_again(tmp_path):
+    path = tmp_path / "run.h5"
+    thin = {"mesh.around": 8, "mesh.along": 14, "valve.thickness_factor": 0.4, "closure.max_step": "0.5 kPa"}
+    complete = load(None, thin).closure([3e3, 8e3])
+    first = load(None, thin).closure([3e3, 8e3], output=path, observer=StopAt("arclength point", 4))
+    assert not first.complete and len(first.states) == 1
+    last = resume(path)
+    assert json.dumps(last.summary()) == json.dumps(complete.summary())
+    assert last.before_limit is not None and np.array_equal(last.before_limit.nodal, complete.before_limit.nodal)
+
+
 @pytest.mark.slow
 def test_a_killed_run_has_lost_no_finished_state(whole, tmp_path):
     path = tmp_path / "run.h5"
