@@ -246,8 +246,10 @@ class Closure(Section):
     """Back pressure on the outside, no flow."""
 
     pressures: tuple[LoadPressure, ...] = key((7e3, 14e3, 21e3, 28e3), "Back pressures.", min_length=1)
-    rated_pressure: LoadPressure | None = key(
-        None, "Back pressure that the safety factor refers to; the largest of pressures without it."
+    rated_pressure: Pressure | None = key(
+        None,
+        "Back pressure that the safety factor refers to; the largest of pressures without it.",
+        **PARAMETERS["pressure"].limits,
     )
     supports: Literal["contact", "held-lips"] = key(
         "contact",
