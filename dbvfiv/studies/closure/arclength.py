@@ -151,6 +151,8 @@ def arclength_path(
         observer.progress(f"arclength point {len(branch)} at {point.z[-1]:.6g} Pa")
 
     branch = continue_branch(system, q, {PARAMETER: pressure}, PARAMETER, options, observers=tell)
+    if branch.reason == "interrupted":  # no end of the path: whoever goes on follows it anew
+        raise KeyboardInterrupt
     limits = []
     for special in branch.of_kind("fold"):
         at = float(special.mu[PARAMETER])
