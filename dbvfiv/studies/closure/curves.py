@@ -207,7 +207,7 @@ def supports_compared(first: ClosureResult, second: ClosureResult) -> Figure:
     line.set_xlabel("Distance from the lip z, mm")
     line.set_ylabel("Inner face at x = 0, y, mm")
     for axes, label in (
-        (front, "Front of contact on the centre line, mm"),
+        (front, "Contact front at x = 0, mm"),
         (moved, "Largest displacement, mm"),
         (stiffness, "Lowest stiffness eigenvalue, 10³ 1/s²"),
     ):

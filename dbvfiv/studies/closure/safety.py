@@ -37,7 +37,9 @@ class SafetyFactor:
         that cross the last at which they had not.
     rated_pressure : float, Pa
     followed_to : float, Pa
-        Largest back pressure of an equilibrium before the limit.
+        Largest back pressure of an equilibrium before arclength takes over.
+    seal_assumed : bool
+        The supports hold the lips shut, so that a loss of seal cannot be seen.
     """
 
     factor: float
@@ -46,6 +48,7 @@ class SafetyFactor:
     limit_pressure: float | None
     rated_pressure: float
     followed_to: float
+    seal_assumed: bool = False
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
@@ -56,9 +59,10 @@ class SafetyFactor:
         """For people."""
         rated = f"over the rated {self.rated_pressure / 1e3:.6g} kPa"
         if self.at_least:
+            seal = "its seal is an assumption of the supports," if self.seal_assumed else "does not lose its seal,"
             return (
                 f"Safety factor at least {self.factor:.3g}: up to {self.followed_to / 1e3:.6g} kPa, {rated}, it does "
-                "not buckle within the symmetry of the model, does not lose its seal, and its faces do not cross; "
+                f"not buckle within the symmetry of the model, {seal} and its faces do not cross; "
                 "higher pressures tell more, with closure.rated_pressure for the rated one."
             )
         if self.limit == SEAL and not self.limit_pressure:
@@ -78,16 +82,18 @@ def find_safety(result: ClosureResult) -> SafetyFactor | None:
     rated = closure.rated_pressure or max(closure.pressures)
     followed = rising[-1].pressure
     limits = [(b.pressure, BUCKLING) for b in result.buckling[:1]]
-    limits += [(at, SEAL) for at in _last_before(rising, _lost_seal(rising))]
-    if result.supports == HELD_LIPS:
+    held = result.supports == HELD_LIPS
+    if not held:
+        limits += [(at, SEAL) for at in _last_before(rising, _lost_seal(rising))]
+    else:
         crossed = np.array([point.overlap > CROSSED * closure.penetration for point in rising])
         limits += [(at, CROSSING) for at in _last_before(rising, crossed)]
     if result.walk_failure is not None:
         limits.append((followed, END))
     if not limits:
-        return SafetyFactor(followed / rated, True, None, None, rated, followed)
+        return SafetyFactor(followed / rated, True, None, None, rated, followed, held)
     pressure, limit = min(limits, key=lambda found: found[0])
-    return SafetyFactor(pressure / rated, False, limit, pressure, rated, followed)
+    return SafetyFactor(pressure / rated, False, limit, pressure, rated, followed, held)
 
 
 def _rising(result: ClosureResult) -> list[Any]:

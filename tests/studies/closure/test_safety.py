@@ -53,6 +53,13 @@ def test_faces_cross_only_where_supports_do_not_look_at_them():
     assert find_safety(result([7e3, 14e3, 28e3], [0.2] * 3, overlap)).at_least
 
 
+def test_a_seal_that_supports_give_is_not_found_but_assumed():
+    held = find_safety(result([7e3, 14e3], [0.2, 0.2], supports="held-lips"))
+    assert held.at_least and held.seal_assumed and "assumption" in held.sentence
+    free = find_safety(result([7e3, 14e3], [0.2, 0.2]))
+    assert not free.seal_assumed and "does not lose its seal" in free.sentence
+
+
 def test_where_equilibria_end_is_a_limit():
     found = find_safety(result([1e3, 1.8e3], [0.1, 0.1], failure="No equilibrium was found.", rated_pressure=3e3))
     assert (found.limit, found.factor) == ("end of the path", pytest.approx(0.6))
