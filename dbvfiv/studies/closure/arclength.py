@@ -16,6 +16,8 @@ from ...observer import Observer
 from .stiffness import stiffness_spectrum
 
 PARAMETER = "pressure"
+#: First and largest step, in wall thicknesses of mean displacement, and most points.
+STEP, LARGEST_STEP, MOST_POINTS = 0.05, 0.25, 400
 
 
 class PressedSystem(SystemBase):
@@ -118,14 +120,9 @@ def arclength_path(
     pressure: float,
     target: float,
     tolerance: float = 1e-8,
-    max_points: int = 400,
     observer: Observer | None = None,
-    step: float = 0.05,
-    max_step: float = 0.25,
 ) -> ArclengthPath:
     """Follow equilibria from a state by pseudo-arclength until the pressure is `target`, or falls to zero.
-
-    `step` and `max_step` are lengths in wall thicknesses of mean displacement.
 
     Raises
     ------
@@ -135,10 +132,10 @@ def arclength_path(
     observer = Observer() if observer is None else observer
     system = PressedSystem(pressed, max(target, pressure))
     options = ContinuationOptions(
-        step=step,
+        step=STEP,
         min_step=1e-6,
-        max_step=max_step,
-        max_points=max_points,
+        max_step=LARGEST_STEP,
+        max_points=MOST_POINTS,
         limits={PARAMETER: (0.0, target)},
         parameter_scales={PARAMETER: max(target, pressure)},
         branch_points=False,
