@@ -12,6 +12,7 @@ from .case.model import Case
 from .case.parameters import PARAMETERS
 from .errors import CaseError, SolveError
 from .model import ValveModel
+from .studies.closure.result import ClosureResult
 from .studies.modes.result import ModesResult
 from .studies.session import Session, named_changes
 from .studies.state import State
@@ -20,7 +21,6 @@ from .studies.sweep.result import SweepResult
 
 if TYPE_CHECKING:
     from .observer import Observer
-    from .results.closure import ClosureResults
     from .results.map import MapResults
     from .results.onset import OnsetResults
     from .transient.result import TransientResults
@@ -102,7 +102,7 @@ class Valve:
             If one pressure was asked for and not reached. Of several, `failures` of the result names those that were
             not.
         """
-        single = isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0
+        single = _is_single(pressure)
         asked = self.case.steady_pressures() if pressure is None else [pressure] if single else pressure
         pressures = read_pressures(asked, "drive.pressure" if pressure is None else "pressure", self.case.fluid.density)
         self.model  # shared by what is asked of this valve
@@ -177,20 +177,23 @@ class Valve:
 
     def closure(
         self,
-        pressure: Iterable[float | str] | None = None,
+        pressure: float | str | Iterable[float | str] | None = None,
         *,
         in_time: bool = False,
+        compare: bool = False,
         output: str | Path | None = None,
         observer: Observer | None = None,
-    ) -> ClosureResults:
+    ) -> ClosureResult:
         """Equilibria under back pressure: whether, where and how firmly the valve shuts.
 
         Parameters
         ----------
-        pressure : several of numbers (Pa) or texts with a unit, optional
+        pressure : number (Pa), text with a unit, or several of them, optional
             Those of the case by default.
         in_time : bool
-            Also turn the drive from flow to back pressure in time; see `dbvfiv.studies.closing`.
+            Also turn the drive from flow to back pressure in time; see `dbvfiv.studies.closure.closing`.
+        compare : bool
+            Do the same with the other kind of supports; see `ClosureResult.compared`.
         output : path, optional
             Result file, written state by state.
         observer : Observer, optional
@@ -204,14 +207,12 @@ class Valve:
         --------
         >>> result = dbvfiv.load().closure(["7 kPa", "28 kPa"])          # doctest: +SKIP
         >>> result.states[-1].closed, result.critical_pressure           # doctest: +SKIP
+        >>> result.safety.factor, result.safety.limit                    # doctest: +SKIP
         """
-        from .results.closure_run import start_closure
-
-        asked = self.case.closure.pressures if pressure is None else pressure
+        asked = self.case.closure.pressures if pressure is None else [pressure] if _is_single(pressure) else pressure
         pressures = read_pressures(asked, "pressure", self.case.fluid.density)
-        return start_closure(
-            self.case.replace({"closure.pressures": list(pressures)}), self.name, in_time, output, observer
-        )
+        session = self._ask({"closure.pressures": list(pressures)}, {})
+        return session.perform("closure", output, observer, in_time=in_time, compare=compare)
 
     def onset(
         self, over: str | None = None, *, output: str | Path | None = None, observer: Observer | None = None
@@ -341,6 +342,11 @@ def read_pressures(given: Iterable[Any], name: str, density: float | None = None
 _ALLOWED = (
     f"it must be a pressure greater than 0 kPa and at most {_PRESSURE.high / 1e3:g} kPa, such as '36 kPa' or 36e3 (Pa)"
 )
+
+
+def _is_single(pressure: Any) -> bool:
+    """Whether it is one pressure and not several."""
+    return isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0
 
 
 def _number(value: Any) -> Any:

@@ -45,7 +45,7 @@ def resume(
         from .studies.session import resume_result
 
         return resume_result(path, observer)
-    if kind not in ("transient", "map", "onset", "closure"):
+    if kind not in ("transient", "map", "onset"):
         raise CaseError(
             f"{str(path)!r} holds a result of kind {kind!r}; what can be resumed are transient, map, onset "
             f"and closure runs."
@@ -60,10 +60,6 @@ def resume(
         from .stability import resume_onset
 
         return resume_onset(path, observer)
-    if kind == "closure":
-        from .results.closure_run import resume_closure
-
-        return resume_closure(path, observer)
     from .transient.api import resume as resume_transient
 
     return resume_transient(path, duration, observer)

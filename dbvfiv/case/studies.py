@@ -245,6 +245,11 @@ class Closure(Section):
     pressures: tuple[LoadPressure, ...] = key(
         (7e3, 14e3, 21e3, 28e3), "Static back pressures, outside over inside.", min_length=1
     )
+    rated_pressure: Pressure | None = key(
+        None,
+        "Back pressure that the safety factor refers to; the largest of pressures without it.",
+        **PARAMETERS["pressure"].limits,
+    )
     supports: Literal["contact", "held-lips"] = key(
         "contact",
         "Inner faces touching the closing plane, or the simplification of Th. 3.6: duckbill held shut, "

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from ..record.result import Result
 
 FAMILIES: dict[str, tuple[str, ...]] = {
-    "closure": ("closure", "closure_curves"),
     "onset": ("onset",),
     "map": ("map",),
     "transient": ("transient",),

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from ..record.result import Result
 
 READERS: dict[str, str] = {
-    "closure": "dbvfiv.results.closure:ClosureResults",
     "onset": "dbvfiv.results.onset:OnsetResults",
     "map": "dbvfiv.results.map:MapResults",
     "transient": "dbvfiv.transient.result:TransientResults",

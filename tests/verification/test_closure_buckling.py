@@ -11,9 +11,9 @@ from dbvfiv.errors import SolveError
 from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.shell import Shell, ShellMesh
-from dbvfiv.studies.closure_arclength import PressedSystem, arclength_path
-from dbvfiv.studies.closure_buckling import BucklingWatch
-from dbvfiv.studies.closure_stability import stiffness_spectrum
+from dbvfiv.studies.closure.arclength import PressedSystem, arclength_path
+from dbvfiv.studies.closure.buckling import BucklingWatch
+from dbvfiv.studies.closure.stiffness import stiffness_spectrum
 from tests.shell.structures import grid, isotropic_section
 
 E, NU, RADIUS, WALL, WIDTH = 5e6, 0.3, 0.1, 1e-3, 0.02

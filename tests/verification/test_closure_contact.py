@@ -14,8 +14,8 @@ from dbvfiv.model.linear import DirectFactor
 from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.shell import Shell, ShellMesh
-from dbvfiv.studies.closure_balance import force_balance
-from dbvfiv.studies.closure_energy import EnergyLedger
+from dbvfiv.studies.closure.balance import force_balance
+from dbvfiv.studies.closure.energy import EnergyLedger
 from tests.shell.structures import grid, isotropic_section
 
 E, WIDTH = 5e6, 0.02

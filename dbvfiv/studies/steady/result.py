@@ -11,27 +11,22 @@ from matplotlib.figure import Figure
 
 from ...drawing import deformed, layers
 from ...record.fields import layer_field_names, motion
-from ...record.layout import Column
 from ...record.mesh import MeshData
 from ...record.states import SUMMARY, state_table
 from ...record.table import TableSpec, printed_head, printed_row
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
+from ..load_path import WAY_ON, way_on_shapes
 from ..result import StudyResult
 from ..state import State, gather_states, states_of
 from . import discharge, passage, shapes
 
-#: Where the walk over the pressures goes on from.
-PATH = (
-    Column("path/slope", "m/Pa, rad/Pa", "Derivative of the free unknowns by the pressure"),
-    Column("path/step", "Pa", "Load step that is tried next"),
-)
 STATES = "states"
 
 
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     """Tables of a steady result on a mesh."""
-    return (state_table(STATES, mesh, PATH, {"path/slope": (int(mesh.free.sum()),)}),)
+    return (state_table(STATES, mesh, WAY_ON, way_on_shapes(mesh)),)
 
 
 class SteadyResult(StudyResult):

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
-
-import numpy as np
 
 from ...case.model import Case
 from ...errors import SolveError
@@ -14,6 +11,7 @@ from ...model.state import SteadyState
 from ...record.record import GrowingRecord
 from ...record.states import SUMMARY, read_states, state_row
 from ...record.table import printed_head, printed_row
+from ..load_path import go_on, way_on
 from ..session import Session
 from ..study import Study
 from .result import STATES, SteadyResult, tables_of
@@ -29,11 +27,7 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
     states = read_states(record, STATES)
     known = {state.pressure for state in states}
     if states:
-        last = len(states) - 1
-        path.q, path.pressure = states[last].q, states[last].pressure
-        slope = record.value(STATES, "path/slope", last)
-        path.slope = slope if np.isfinite(slope).all() else None
-        path.step = float(record.value(STATES, "path/step", last))
+        go_on(path, record, STATES, len(states) - 1, states[-1])
     record.begin("steady", len(pressures))
     for sentence in model_warnings(model):
         record.warn(sentence)
@@ -46,17 +40,12 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
             except SolveError as error:
                 record.fail(str(error))
                 continue
-            record.append(STATES, state_row(model, state) | _way_on(path))
+            record.append(STATES, state_row(model, state) | way_on(path))
             states.append(state)
             record.item(state)
     finally:
         for sentence in state_warnings(model, states):
             record.warn(sentence)
-
-
-def _way_on(path: LoadPath) -> dict[str, Any]:
-    slope = np.full(path.model.size, np.nan) if path.slope is None else path.slope
-    return {"path/slope": slope, "path/step": path.step}
 
 
 def print_live(_case: Case) -> Callable[[SteadyState], str]:

@@ -12,12 +12,13 @@ import pytest
 from dbvfiv.case.model import Case
 from dbvfiv.errors import SolveError
 from dbvfiv.observer import Observer
-from dbvfiv.studies import closure_path
-from dbvfiv.studies.closure import run_closure
-from dbvfiv.studies.closure_energy import EnergyLedger
-from dbvfiv.studies.closure_model import closure_model
-from dbvfiv.studies.closure_opening import Opening, opening
-from dbvfiv.studies.closure_path import ClosureOptions, ClosurePath
+from dbvfiv.studies.closure import path as closure_path
+from dbvfiv.studies.closure.energy import EnergyLedger
+from dbvfiv.studies.closure.model import closure_model
+from dbvfiv.studies.closure.opening import Opening, opening
+from dbvfiv.studies.closure.path import ClosureOptions, ClosurePath
+from dbvfiv.studies.closure.remarks import start_warnings
+from dbvfiv.studies.session import Session
 
 COARSE = {"mesh.around": 8, "mesh.along": 14, "closure.max_step": "4 kPa", "closure.pressures": ["7 kPa", "28 kPa"]}
 
@@ -27,16 +28,28 @@ def case() -> Case:
     return Case().replace(COARSE)
 
 
+def closure(case, pressures=None, observer=None):
+    if pressures is not None:
+        case = case.replace({"closure.pressures": pressures})
+    return Session(case).perform("closure", observer=observer)
+
+
+def reach(case, pressure, model=None, **options):
+    """State at one back pressure, with the penalty for the largest pressure of the case."""
+    path = ClosurePath(model or closure_model(case), replace(ClosureOptions.of(case), **options))
+    return path.go_to(pressure)
+
+
 @pytest.fixture(scope="module")
 def pressed(case):
     """Result with contact of the inner faces."""
-    return run_closure(case)
+    return closure(case)
 
 
 @pytest.fixture(scope="module")
 def held(case):
     """Result with the supports of Th. 3.6."""
-    return run_closure(case.replace({"closure.supports": "held-lips"}))
+    return closure(case.replace({"closure.supports": "held-lips"}))
 
 
 def test_states_are_equilibria_without_penetration(pressed):
@@ -76,8 +89,7 @@ def test_the_valve_shuts_more_firmly_under_more_pressure(pressed):
 def test_the_thesis_supports_hold_the_lips_and_say_so(held):
     for state in held.states:
         assert state.closed and state.sealed_length >= 0.21
-        nodal = held.model.pressed.nodal(state.q)
-        assert np.abs(nodal[held.model.mesh.rows[held.model.held], 1]).max() == 0.0
+        assert np.abs(state.nodal[held.model.mesh.rows[held.model.held], 1]).max() == 0.0
     assert held.states[-1].overlap > 1e-4
     assert any("held shut by its supports" in text for text in held.warnings)
     assert any("overlap" in text for text in held.warnings)
@@ -95,24 +107,30 @@ def test_nodes_that_start_beyond_the_plane_are_counted_and_told(pressed):
     assert any(f"beyond the closing plane at {len(model.nodes_beyond)} nodes" in text for text in pressed.warnings)
 
 
+def test_nothing_is_said_of_faces_that_do_not_start_beyond_the_plane(case):
+    """A wall of half the thickness clears the plane everywhere."""
+    thin = closure_model(case.replace({"valve.thickness_factor": 0.5}))
+    assert len(thin.nodes_beyond) == 0
+    assert list(start_warnings(thin)) == []
+
+
 def test_the_answer_does_not_depend_on_the_penalty(case, pressed):
     """Three times softer: the multipliers bring the same forces, but for the wider rounding of the law's kink."""
-    other = run_closure(case, [7e3], model=closure_model(case, contact_depth=1e-5))
-    state, reference = other.states[0], pressed.states[0]
+    state, reference = reach(case, 7e3, closure_model(case, contact_depth=1e-5)), pressed.states[0]
     assert state.multiplier_updates > 0
     assert state.contact_force == pytest.approx(reference.contact_force, rel=1e-3)
     assert state.max_displacement == pytest.approx(reference.max_displacement, rel=1e-3)
 
 
 def test_the_answer_does_not_depend_on_the_steps(case, pressed):
-    one = run_closure(case, [28e3], replace(ClosureOptions.of(case), max_step=1.5e3))
-    assert one.states[0].contact_force == pytest.approx(pressed.states[-1].contact_force, rel=1e-4)
-    assert one.states[0].max_displacement == pytest.approx(pressed.states[-1].max_displacement, rel=1e-4)
+    one = reach(case, 28e3, max_step=1.5e3)
+    assert one.contact_force == pytest.approx(pressed.states[-1].contact_force, rel=1e-4)
+    assert one.max_displacement == pytest.approx(pressed.states[-1].max_displacement, rel=1e-4)
 
 
 def test_stiffness_is_followed_at_every_step(pressed):
-    assert len(pressed.path) > 5
-    lowest = [point.eigenvalues[0] for point in pressed.path]
+    assert len(pressed.walk) > 5
+    lowest = [point.lowest_eigenvalue for point in pressed.walk]
     assert min(lowest) > 0 and pressed.critical_pressure is None
     assert min(lowest) < 0.8 * lowest[0]
     state = pressed.states[-1]
@@ -121,22 +139,25 @@ def test_stiffness_is_followed_at_every_step(pressed):
 
 
 def test_an_open_start_turns_a_flow_back(case):
-    result = run_closure(case.replace({"closure.start": "open"}), [2e3])
+    result = closure(case.replace({"closure.start": "open"}), [2e3])
     flows = [state.mass_flow for state in result.opened]
     assert flows == sorted(flows, reverse=True) and flows[-1] < 0.1 * flows[0]
     assert result.opened[0].pressure == 10e3
-    assert result.states[0].max_displacement == pytest.approx(
-        run_closure(case, [2e3]).states[0].max_displacement, rel=1e-8
-    )
+    assert result.states[0].max_displacement == pytest.approx(closure(case, [2e3]).states[0].max_displacement, rel=1e-8)
 
 
 @pytest.mark.slow
 def test_a_pressure_that_is_not_reached_ends_the_list(case):
     """Without arclength a thin wall ends at its limit point, and says where."""
     thin = case.replace({"valve.thickness_factor": 0.25, "closure.arclength": False, "closure.max_step": "0.5 kPa"})
-    result = run_closure(thin, [200.0, 28e3, 29e3], replace(ClosureOptions.of(thin), min_step=1e-3))
+    result = closure(thin, [200.0, 28e3, 29e3])
     assert len(result.failures) == 1 and "No equilibrium was found between" in result.failures[0]
     assert [state.pressure for state in result.states] == [200.0]
+    assert "1 of 3 back pressures were reached" in result.shortfall()
+    last = result.before_limit
+    assert last.pressure == result.walk[-1].pressure > 200.0 and last.converged
+    assert any(line.endswith("last before the limit") for line in result.lines())
+    assert result.safety.limit == "end of the path" and result.safety.limit_pressure == last.pressure
 
 
 def test_an_interrupt_keeps_what_was_found(case):
@@ -144,8 +165,9 @@ def test_an_interrupt_keeps_what_was_found(case):
         def item(self, result):
             raise KeyboardInterrupt
 
-    result = run_closure(case, [1e3, 2e3], observer=Stop())
-    assert result.interrupted and not result.failures
+    result = closure(case, [1e3, 2e3], observer=Stop())
+    assert not result.complete and not result.failures
+    assert [state.pressure for state in result.states] == [1e3]
 
 
 def test_a_penetration_out_of_reach_is_an_error(case, monkeypatch):
@@ -181,12 +203,12 @@ def test_energy_balances_to_1e_8_on_request_from_the_first_touch_on(case):
     are.
     """
     case = case.replace({"mesh.around": 6, "mesh.along": 10})
-    rough = run_closure(case, [7e3]).states[0]
-    fine = run_closure(case.replace({"closure.balance_tolerance": 1e-8}), [7e3]).states[0]
+    rough = reach(case, 7e3)
+    fine = reach(case, 7e3, balance_tolerance=1e-8)
     assert fine.multiplier_updates > 0
     assert fine.energy_balance < 1e-8 < 1e-5 < rough.energy_balance < 1e-2
     # for the balance alone: the state is the same
-    assert fine.load_steps == rough.load_steps and np.array_equal(fine.q, rough.q)
+    assert fine.load_steps == rough.load_steps and np.array_equal(fine.nodal, rough.nodal)
 
 
 @pytest.mark.parametrize("share", [1.0, 1.01])

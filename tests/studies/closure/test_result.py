@@ -10,8 +10,9 @@ import pytest
 
 import dbvfiv
 from dbvfiv.api import load
-from dbvfiv.plots.closure_curves import supports_compared
 from dbvfiv.results import load_result
+from dbvfiv.studies.closure.curves import supports_compared
+from dbvfiv.studies.session import Session
 
 COARSE = {
     "mesh.around": 6,
@@ -75,6 +76,33 @@ def test_figures(run, tmp_path):
     assert {"side-views", "contact-map", "closure-curve", "passage", "reversal", "layer-stress"} == names
     figure = supports_compared(result, result)
     assert len(figure.axes) == 4
+
+
+@pytest.mark.parametrize(
+    "given", ["2 kPa", 2000, 2e3, np.float64(2e3), np.array(2e3), np.array([2e3]), ["2 kPa"], (2e3,)]
+)
+def test_python_interface_takes_one_pressure_or_several(given, monkeypatch):
+    asked = []
+    monkeypatch.setattr(Session, "perform", lambda session, *_, **__: asked.append(session.case.closure.pressures))
+    load(None, COARSE).closure(given)
+    assert asked == [(2e3,)]
+
+
+def test_one_pressure_gives_a_result():
+    valve = load(None, COARSE | {"closure.start": "rest"})
+    single, listed = valve.closure("2 kPa"), valve.closure([2e3])
+    assert [state.pressure for state in single.states] == [2e3]
+    assert np.array_equal(single.states[0].nodal, listed.states[0].nodal)
+
+
+def test_the_states_of_the_flow_can_be_asked(run):
+    result, path = run
+    opened = load_result(path).opened
+    assert len(opened) == 10 and opened[0].pressure == pytest.approx(10e3)
+    assert np.array_equal(opened[0].layers.von_mises, result.opened[0].layers.von_mises)
+    assert {"pressure", "lip_opening", "lip_displacement", "outlet_area", "mass_flow"} <= set(
+        result.summary()["opened"][0]
+    )
 
 
 def test_python_interface_refuses_what_is_no_pressure():

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contact import PressedShell
-from ..shell import Shell
+from ...contact import PressedShell
+from ...shell import Shell
 
 
 @dataclass(frozen=True)

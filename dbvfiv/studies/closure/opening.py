@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contact import PlaneContact, nodal_thickness
-from ..geometry import ValveMesh
-from ..shell import Shell
-from .closure_model import ClosureModel
+from ...contact import PlaneContact, nodal_thickness
+from ...geometry import ValveMesh
+from ...shell import Shell
+from .model import ClosureModel
 
 #: The quarter model meets the closing plane once; the whole valve's walls meet each other over two such quarters.
 FACES = 2

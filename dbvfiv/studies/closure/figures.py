@@ -11,16 +11,17 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
 
-from ..drawing.axes import colour_bar, headline
-from ..drawing.faces import ValveSkin, faces
-from ..drawing.style import COMPUTED, MAGNITUDE, PUBLISHED, REST, kilopascals, new_figure, some_of
-from ..drawing.views import COLOURS, draw_skin, unrolled
+from ...drawing.axes import colour_bar, headline
+from ...drawing.faces import ValveSkin, faces
+from ...drawing.style import COMPUTED, MAGNITUDE, PUBLISHED, REST, kilopascals, new_figure, some_of
+from ...drawing.views import COLOURS, draw_skin, unrolled
 
 if TYPE_CHECKING:
-    from ..results.closure import ClosureResults, PressedState
+    from .pressed_state import PressedState
+    from .result import ClosureResult
 
 
-def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ClosureResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a closure result, each with its name."""
     yield "side-views", lambda: side_views(result)
     if any(state.contact_nodes for state in result.states):
@@ -29,7 +30,7 @@ def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
         yield "buckling-shape", lambda: buckling_shape(result)
 
 
-def side_views(result: ClosureResults) -> Figure:
+def side_views(result: ClosureResult) -> Figure:
     """Valve cut open at x = 0 at up to four back pressures: the wall where it is cut, the inner face behind it coloured
     by displacement, and a view in space (compare Fig. 3-21 of the thesis).
     """
@@ -88,7 +89,7 @@ def _inset(axes, skin: ValveSkin, state: PressedState, scale: Normalize) -> None
     small.patch.set_alpha(0.0)
 
 
-def contact_map(result: ClosureResults) -> Figure:
+def contact_map(result: ClosureResult) -> Figure:
     """Contact pressure on the unrolled inner face of a quarter at up to four back pressures, up to its maximum."""
     states = some_of(sorted((s for s in result.states if s.contact_nodes), key=lambda s: s.pressure), 4)
     mesh = result.mesh
@@ -125,7 +126,7 @@ def contact_map(result: ClosureResults) -> Figure:
     return figure
 
 
-def buckling_shape(result: ClosureResults) -> Figure:
+def buckling_shape(result: ClosureResult) -> Figure:
     """The first buckling state and the shape it leaves it by, exaggerated."""
     first, mesh = result.buckling[0], result.mesh
     shape = first.shape / np.abs(first.shape[:, :3]).max()
@@ -154,6 +155,6 @@ def buckling_shape(result: ClosureResults) -> Figure:
     return figure
 
 
-def supports_of(result: ClosureResults) -> str:
+def supports_of(result: ClosureResult) -> str:
     """What holds the walls apart, as it stands in titles."""
     return "contact of the inner faces" if result.supports == "contact" else "supports of Th. 3.6"

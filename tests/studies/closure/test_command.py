@@ -6,6 +6,8 @@ import json
 
 import pytest
 
+from dbvfiv.results import load_result
+
 COARSE = ("--set", "mesh.around=6", "--set", "mesh.along=10", "--set", "closure.max_step=5 kPa")
 
 
@@ -26,8 +28,12 @@ def test_both_supports_with_file_and_figures(command_line, tmp_path):
     )
     assert done.status == 0, done.err
     assert "Supports: contact" in done.out and "Supports: held-lips" in done.out
-    assert (tmp_path / "run.h5").exists() and (tmp_path / "run-held-lips.h5").exists()
-    assert (tmp_path / "figures" / "supports-compared.png").exists()
+    kept = load_result(tmp_path / "run.h5")
+    assert kept.supports == "contact" and kept.compared.supports == "held-lips"
+    assert [state.pressure for state in kept.compared.states] == [5e3]
+    assert "Supports: held-lips" in kept.lines()
+    drawn = {path.stem for path in (tmp_path / "figures").iterdir()}
+    assert {"side-views", "side-views-held-lips", "supports-compared"} <= drawn
 
 
 @pytest.mark.slow

@@ -6,11 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..case.model import Case
-from ..contact import ContactLaw, PlaneContact, nodal_thickness, tributary_area
-from ..model import ValveModel
-from ..transient.equations import ValveMotion
-from .closure_model import ROUNDING
+from ...case.model import Case
+from ...contact import ContactLaw, PlaneContact, nodal_thickness, tributary_area
+from ...model import ValveModel
+from ...transient.equations import ValveMotion
+from .model import ROUNDING
 
 
 class ContactValve(ValveModel):

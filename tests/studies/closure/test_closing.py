@@ -9,8 +9,8 @@ from dbvfiv.case.model import Case
 from dbvfiv.flow import Channel
 from dbvfiv.flow.reversed import ReversibleFluid
 from dbvfiv.flow.stepping import MovingFluid
-from dbvfiv.studies.closing import ClosingResult, ClosingSample, Turn, run_closing
-from dbvfiv.studies.closing_motion import ContactValve
+from dbvfiv.studies.closure.closing import ClosingResult, ClosingSample, Turn, closing_valve, run_closing
+from dbvfiv.studies.closure.closing_motion import ContactValve
 
 COARSE = {"mesh.around": 6, "mesh.along": 10, "closure.pressures": ["10 kPa"]}
 
@@ -128,7 +128,7 @@ def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
         COARSE
         | {"mesh.around": 8, "mesh.along": 14, "closure.reversal_time": "0.2 s", "closure.reversal_hold": "0.2 s"}
     )
-    result = run_closing(case)
+    result = run_closing(closing_valve(case))
     told = result.summary()
     assert not result.failure and told["stays_shut"]
     assert result.samples[0].inlet_pressure == 10e3 and result.samples[-1].inlet_pressure == -10e3

@@ -10,19 +10,21 @@ from continuation import ContinuationOptions, MatrixLinearisation, SystemBase, c
 from continuation import NewtonOptions as ContinuationNewton
 from continuation.branch import Branch
 
-from ..contact import PressedShell
-from ..contact.second import contact_second
-from ..observer import Observer
-from .closure_stability import stiffness_spectrum
+from ...contact import PressedShell
+from ...contact.second import contact_second
+from ...observer import Observer
+from .stiffness import stiffness_spectrum
 
 PARAMETER = "pressure"
+#: First and largest step, in wall thicknesses of mean displacement, and most points.
+STEP, LARGEST_STEP, MOST_POINTS = 0.05, 0.25, 400
 
 
 class PressedSystem(SystemBase):
     """M u' = -r(u; P): motion so slow that only resistance counts, with the mass matrix for the resistance.
 
     Its equilibria are those of the shell, and the eigenvalues of its linearisation are the stiffness eigenvalues of
-    `closure_stability` with the sign turned, so that a positive one means an unstable equilibrium. The contact
+    `stiffness` with the sign turned, so that a positive one means an unstable equilibrium. The contact
     multipliers stay as they are.
 
     Parameters
@@ -118,14 +120,9 @@ def arclength_path(
     pressure: float,
     target: float,
     tolerance: float = 1e-8,
-    max_points: int = 400,
     observer: Observer | None = None,
-    step: float = 0.05,
-    max_step: float = 0.25,
 ) -> ArclengthPath:
     """Follow equilibria from a state by pseudo-arclength until the pressure is `target`, or falls to zero.
-
-    `step` and `max_step` are lengths in wall thicknesses of mean displacement.
 
     Raises
     ------
@@ -135,10 +132,10 @@ def arclength_path(
     observer = Observer() if observer is None else observer
     system = PressedSystem(pressed, max(target, pressure))
     options = ContinuationOptions(
-        step=step,
+        step=STEP,
         min_step=1e-6,
-        max_step=max_step,
-        max_points=max_points,
+        max_step=LARGEST_STEP,
+        max_points=MOST_POINTS,
         limits={PARAMETER: (0.0, target)},
         parameter_scales={PARAMETER: max(target, pressure)},
         branch_points=False,
@@ -151,6 +148,8 @@ def arclength_path(
         observer.progress(f"arclength point {len(branch)} at {point.z[-1]:.6g} Pa")
 
     branch = continue_branch(system, q, {PARAMETER: pressure}, PARAMETER, options, observers=tell)
+    if branch.reason == "interrupted":  # no end of the path: whoever goes on follows it anew
+        raise KeyboardInterrupt
     limits = []
     for special in branch.of_kind("fold"):
         at = float(special.mu[PARAMETER])

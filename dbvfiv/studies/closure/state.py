@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.lip import LipCentre
-from ..shell.recovery import layer_fields
-from .closure_balance import force_balance
-from .closure_model import ClosureModel
-from .closure_opening import FACES, Opening, opening
-from .closure_stability import StiffnessSpectrum
+from ...model.lip import LipCentre
+from ...shell.recovery import layer_fields
+from .balance import force_balance
+from .model import ClosureModel
+from .opening import FACES, Opening, opening
+from .stiffness import StiffnessSpectrum
 
 QUARTERS = 4
 
@@ -24,7 +24,6 @@ class ClosureState:
     ----------
     pressure : float, Pa
         Outside.
-    q : (n,) array
     closed : bool
         Some section is shut: less than `closure.shut_fraction` of the lip's opening at rest is left.
     sealed_length : float, m
@@ -33,7 +32,6 @@ class ClosureState:
         The part of it that begins at the lip.
     joint_seal : float, m
         The rest, at the joint of duckbill and saddle and on the saddle.
-    sealed_intervals : tuple of (start, stop), m
     sealed_area : float, m2
         Area over which the inner faces press on each other.
     contact_force : float, N
@@ -71,23 +69,25 @@ class ClosureState:
     beyond_limit : bool
         The state lies beyond a limit point, so a valve loaded by rising pressure jumps before it gets here.
     force_balance, energy_balance : float
-        Relative errors, see `closure_balance`.
+        Relative errors, see `balance`.
     converged, iterations, load_steps, multiplier_updates, residual, rounding, reason
         How it was found.
+    nodal : (nn, 5) array, m and rad
+        Displacements and rotations of all nodes.
     opening : (rows,) array, m2
         Passage of a quarter at each row.
     contact_pressure, gap : (nn,) arrays, Pa, m
     stiffness_eigenvalues : (k,) array, 1/s2
         Real parts, ascending.
+    before_limit : bool
+        Not asked for: the last state before a limit.
     """
 
     pressure: float
-    q: np.ndarray
     closed: bool
     sealed_length: float
     lip_seal: float
     joint_seal: float
-    sealed_intervals: tuple[tuple[float, float], ...]
     sealed_area: float
     contact_force: float
     largest_contact_pressure: float
@@ -119,20 +119,12 @@ class ClosureState:
     residual: float
     rounding: float
     reason: str
+    nodal: np.ndarray
     opening: np.ndarray
     contact_pressure: np.ndarray
     gap: np.ndarray
     stiffness_eigenvalues: np.ndarray
-
-    def summary(self) -> dict:
-        """Plain SI numbers for JSON."""
-        fields = ("q", "opening", "contact_pressure", "gap")
-        found = {name: value for name, value in vars(self).items() if name not in fields}
-        return found | {
-            "sealed_intervals": [list(pair) for pair in self.sealed_intervals],
-            "max_displacement_position": list(self.max_displacement_position),
-            "stiffness_eigenvalues": [float(value) for value in self.stiffness_eigenvalues],
-        }
+    before_limit: bool = False
 
 
 def describe_closure(
@@ -141,7 +133,7 @@ def describe_closure(
     """State of a model from its unknowns; `known` holds how it was found, the energy balance and whether it lies beyond
     a limit point.
     """
-    pressed, face = model.pressed, model.face
+    pressed = model.pressed
     nodal = pressed.nodal(q)
     state, passage = pressed.contact_state(q), opening(model, q)
     fraction = model.case.closure.shut_fraction
@@ -149,12 +141,8 @@ def describe_closure(
     length, lip = passage.shut_length(fraction), passage.lip_seal(fraction)
     pressures = np.zeros(len(nodal))
     pressures[pressed.contact.nodes] = state.pressure
-    faces = face.gap(nodal, pressed.shell.directors(nodal)[0])
     gap = np.zeros(len(nodal))
     gap[model.mesh.rows] = passage.gap
-    movable = np.zeros(len(nodal), bool)
-    movable[face.nodes] = True
-    movable[model.mesh.rows[model.held].ravel()] = False
     layers = layer_fields(pressed.shell, q)
     strain = np.maximum(layers.stretch[:, :, 1] - 1, 1 - layers.stretch[:, :, 0]).max(axis=0)
     stress = layers.von_mises.max(axis=0)
@@ -163,19 +151,17 @@ def describe_closure(
     centre = LipCentre(model.mesh, pressed.shell)
     return ClosureState(
         pressure=float(pressure),
-        q=np.asarray(q),
         closed=bool(intervals),
         sealed_length=length,
         lip_seal=lip,
         joint_seal=length - lip,
-        sealed_intervals=tuple(intervals),
         sealed_area=float(FACES * pressed.contact.area[state.touching].sum()),
         contact_force=FACES * state.total,
         largest_contact_pressure=float(state.pressure.max(initial=0.0)),
         contact_nodes=int(np.count_nonzero(state.touching)),
         contact_front=contact_front(passage, model),
         penetration=state.penetration,
-        overlap=float(max(0.0, -faces[movable[face.nodes]].min(initial=0.0))),
+        overlap=face_overlap(model, nodal),
         least_opening=float(QUARTERS * passage.area.min()),
         least_opening_position=float(passage.z[passage.narrowest]),
         lip_opening=centre.opening(q),
@@ -191,12 +177,22 @@ def describe_closure(
         asymmetry=spectrum.asymmetry,
         stable=bool(spectrum.lowest > 0),
         force_balance=force_balance(pressed, q, pressure).error,
+        nodal=nodal,
         opening=passage.area,
         contact_pressure=pressures,
         gap=gap,
         stiffness_eigenvalues=spectrum.values.real,
         **known,
     )
+
+
+def face_overlap(model: ClosureModel, nodal: np.ndarray) -> float:
+    """Deepest overlap of the inner faces, m, for nodal unknowns (nn, 5); rows held shut by supports are left out."""
+    face = model.face
+    gap = face.gap(nodal, model.shell.directors(nodal)[0])
+    movable = np.ones(len(nodal), bool)
+    movable[model.mesh.rows[model.held].ravel()] = False
+    return float(max(0.0, -gap[movable[face.nodes]].min(initial=0.0)))
 
 
 def contact_front(passage: Opening, model: ClosureModel) -> float:

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..drawing.axes import HALO, headline, limits, log_axis
-from ..drawing.faces import faces
-from ..drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, kilopascals, new_figure, pressure_colours, some_of
-from .closure import supports_of
+from ...drawing.axes import HALO, headline, limits, log_axis
+from ...drawing.faces import faces
+from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, kilopascals, new_figure, pressure_colours, some_of
+from .figures import supports_of
 
 if TYPE_CHECKING:
-    from ..results.closure import ClosureResults
+    from .result import ClosureResult
 
 
 #: Passage, mm2, below which a valve is shut for any purpose.
 _SHUT = 0.01
 
 
-def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: ClosureResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a closure result, each with its name."""
     if result.walk:
         yield "closure-curve", lambda: closure_curve(result)
@@ -32,7 +32,7 @@ def draw(result: ClosureResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
         yield "reversal-in-time", lambda: in_time(result)
 
 
-def closure_curve(result: ClosureResults) -> Figure:
+def closure_curve(result: ClosureResult) -> Figure:
     """Sealed length, contact force, deepest displacement and lowest stiffness over the back pressure; dots are the
     states that were asked for.
     """
@@ -66,7 +66,7 @@ def closure_curve(result: ClosureResults) -> Figure:
     return figure
 
 
-def _over_pressure(result: ClosureResults, axes, name: str, factor: float, **look) -> None:
+def _over_pressure(result: ClosureResult, axes, name: str, factor: float, **look) -> None:
     """A column of the path over the back pressure, with dots at the states."""
     look = {"color": COMPUTED} | look
     p = np.array([point.pressure for point in result.walk])
@@ -78,7 +78,7 @@ def _over_pressure(result: ClosureResults, axes, name: str, factor: float, **loo
     axes.plot(asked / 1e3, np.interp(asked, p[order], values[order]), "o", color=look["color"], ms=4.5)
 
 
-def passage(result: ClosureResults) -> Figure:
+def passage(result: ClosureResult) -> Figure:
     """Passage left between the inner faces along the axis."""
     figure = new_figure(7.2, 4.4)
     axes = figure.add_subplot()
@@ -109,7 +109,7 @@ def passage(result: ClosureResults) -> Figure:
     return figure
 
 
-def reversal(result: ClosureResults) -> Figure:
+def reversal(result: ClosureResult) -> Figure:
     """From flow to back pressure as the drive turns round slowly: the flow area of the open valve, and the narrowest
     passage between the faces of the shut one, which are two measures and stand on two axes.
     """
@@ -138,7 +138,7 @@ def reversal(result: ClosureResults) -> Figure:
     return figure
 
 
-def in_time(result: ClosureResults) -> Figure:
+def in_time(result: ClosureResult) -> Figure:
     """Drive, lip, narrowest passage, flow and contact force while the drive turns round."""
     closing = result.closing
     figure = new_figure(8.4, 8.0)
@@ -171,7 +171,7 @@ def in_time(result: ClosureResults) -> Figure:
     return figure
 
 
-def supports_compared(first: ClosureResults, second: ClosureResults) -> Figure:
+def supports_compared(first: ClosureResult, second: ClosureResult) -> Figure:
     """Front of contact, displacement, stiffness and inner face at x = 0 with two kinds of supports."""
     figure = new_figure(9.6, 7.0)
     panels = figure.subplots(2, 2).ravel()
@@ -194,7 +194,7 @@ def supports_compared(first: ClosureResults, second: ClosureResults) -> Figure:
     line.set_xlabel("Distance from the lip z, mm")
     line.set_ylabel("Inner face at x = 0, y, mm")
     for axes, label in (
-        (front, "Front of contact on the centre line, mm"),
+        (front, "Contact front at x = 0, mm"),
         (moved, "Largest displacement, mm"),
         (stiffness, "Lowest stiffness eigenvalue, 10³ 1/s²"),
     ):

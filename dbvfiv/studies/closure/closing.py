@@ -4,22 +4,24 @@ that of the fluid.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ..case.model import Case
-from ..errors import SolveError
-from ..model.lip import LipCentre
-from ..observer import Observer
-from ..transient.control import ControlOptions, FixedSteps
-from ..transient.scheme import scheme
-from ..transient.start import steady_positions
-from ..transient.state import consistent_state
-from ..transient.stepper import StepFailure, StepOptions, Stepper
+from ...case.model import Case
+from ...errors import SolveError
+from ...model.lip import LipCentre
+from ...observer import Observer
+from ...transient.control import ControlOptions, FixedSteps
+from ...transient.scheme import scheme
+from ...transient.start import steady_positions
+from ...transient.state import consistent_state
+from ...transient.stepper import StepFailure, StepOptions, Stepper
 from .closing_motion import ClosingMotion, ContactValve
-from .closure_opening import FACES, measure
-from .closure_state import QUARTERS
+from .opening import FACES, measure
+from .state import QUARTERS
 
 #: Rest before the drive turns, over the time it takes to turn.
 LEAD = 0.1
@@ -40,6 +42,12 @@ class Turn:
     pressure: float
     start: float
     duration: float
+
+    @classmethod
+    def of(cls, case: Case) -> Turn:
+        """The turn that a case asks for."""
+        closure = case.closure
+        return cls(closure.open_pressure, LEAD * closure.reversal_time, closure.reversal_time)
 
     def __call__(self, time: float) -> float:
         return self.pressure * float(np.interp(time, (self.start, self.start + self.duration), (1.0, -1.0)))
@@ -99,7 +107,6 @@ class ClosingResult:
         Steps that had to be halved.
     failure : str
         Why the run ended early; empty if it did not.
-    interrupted : bool
     """
 
     samples: tuple[ClosingSample, ...]
@@ -107,7 +114,6 @@ class ClosingResult:
     shut_below: float
     halvings: int = 0
     failure: str = ""
-    interrupted: bool = False
 
     @property
     def first_shut(self) -> float | None:
@@ -149,8 +155,30 @@ class ClosingResult:
         }
 
 
-def run_closing(case: Case, observer: Observer | None = None) -> ClosingResult:
-    """Turn the drive of a case from `closure.open_pressure` to as much back pressure and follow the valve.
+def closing_valve(case: Case) -> ContactValve:
+    """The valve that follows the turn of its drive."""
+    changes = {"drive.kind": "flow", "drive.side": "inside", "fluid.continuity": case.closure.reversal_continuity}
+    return ContactValve(case.replace(changes | {"fluid.unsteady": True}))
+
+
+def shut_below(model: ContactValve) -> float:
+    """Passage of the whole valve, m2, that counts as shut."""
+    rest = measure(model.mesh, model.shell, model.contact, np.zeros((len(model.mesh.nodes), 5)))
+    return QUARTERS * model.case.closure.shut_fraction * rest.reference
+
+
+def run_closing(
+    model: ContactValve, observer: Observer | None = None, keep: Callable[[ClosingSample], None] | None = None
+) -> ClosingResult:
+    """Turn the drive from `closure.open_pressure` to as much back pressure and follow the valve.
+
+    Parameters
+    ----------
+    model : ContactValve
+        See `closing_valve`.
+    observer : Observer, optional
+    keep : callable, optional
+        Is given every sample as soon as it is found.
 
     Raises
     ------
@@ -158,49 +186,41 @@ def run_closing(case: Case, observer: Observer | None = None) -> ClosingResult:
         If the open state was not found. A step that fails ends the run and is told in the result.
     """
     observer = Observer() if observer is None else observer
-    closure = case.closure
-    model = ContactValve(
-        case.replace(
-            {
-                "drive.kind": "flow",
-                "drive.side": "inside",
-                "fluid.continuity": closure.reversal_continuity,
-                "fluid.unsteady": True,
-            }
-        )
-    )
-    motion = ClosingMotion(model)
-    turn = Turn(closure.open_pressure, LEAD * closure.reversal_time, closure.reversal_time)
-    end = turn.start + turn.duration + closure.reversal_hold
-    rest = measure(model.mesh, model.shell, model.contact, np.zeros((len(model.mesh.nodes), 5)))
-    limit = QUARTERS * closure.shut_fraction * rest.reference
+    motion, turn = ClosingMotion(model), Turn.of(model.case)
+    end = turn.start + turn.duration + model.case.closure.reversal_hold
+    samples: list[ClosingSample] = []
+    failure = ""
+
+    def look(state, load) -> None:
+        samples.append(_sample(model, motion, state, load))
+        if keep is not None:
+            keep(samples[-1])
+
     observer.progress(f"open state at {turn.pressure:.6g} Pa")
-    q = steady_positions(model, turn.pressure)
-    area = model.rows.areas(model.nodal(q))
-    speed = model.flow.inlet_velocity(area, turn.pressure, motion.conditions.density)
-    state = consistent_state(motion, 0.0, q, np.zeros(model.size), speed, turn.pressure)
-    stepper = Stepper(
-        motion,
-        scheme("generalised-alpha", max(DAMPING, case.transient.numerical_damping)),
-        turn,
-        StepOptions(backward=True),
-    )
-    control = FixedSteps(stepper, ControlOptions(case.transient.step))
-    still = motion._instant(state.speed, state.psi_rate, turn.pressure)
-    load = motion.load(state.q, state.v, state.q, state.v, still, state.speed)
-    samples, failure, interrupted = [_sample(model, motion, state, load)], "", False
+    control, state, load = _set_out(model, motion, turn)
+    look(state, load)
     try:
         while state.time < end - 1e-9:
             result = control.advance(state, end)
             state = result.state
-            samples.append(_sample(model, motion, state, result.load))
+            look(state, result.load)
             observer.progress(f"{state.time:.4f} s of {end:.4g} s")
     except StepFailure as error:
         failure = f"No step was possible beyond {state.time:.6g} s: {error}"
-        observer.warn(failure)
-    except KeyboardInterrupt:
-        interrupted = True
-    return ClosingResult(tuple(samples), turn, limit, control.halvings, failure, interrupted)
+    return ClosingResult(tuple(samples), turn, shut_below(model), control.halvings, failure)
+
+
+def _set_out(model: ContactValve, motion: ClosingMotion, turn: Turn) -> tuple[FixedSteps, Any, Any]:
+    """The steps to take, the open state that they begin with, and its load."""
+    transient = model.case.transient
+    q = steady_positions(model, turn.pressure)
+    area = model.rows.areas(model.nodal(q))
+    speed = model.flow.inlet_velocity(area, turn.pressure, motion.conditions.density)
+    state = consistent_state(motion, 0.0, q, np.zeros(model.size), speed, turn.pressure)
+    rule = scheme("generalised-alpha", max(DAMPING, transient.numerical_damping))
+    control = FixedSteps(Stepper(motion, rule, turn, StepOptions(backward=True)), ControlOptions(transient.step))
+    still = motion._instant(state.speed, state.psi_rate, turn.pressure)
+    return control, state, motion.load(state.q, state.v, state.q, state.v, still, state.speed)
 
 
 def _sample(model: ContactValve, motion: ClosingMotion, state, load) -> ClosingSample:

@@ -4,22 +4,26 @@ points.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from continuation import NotConverged
 
-from ..errors import SolveError
-from ..model.load_steps import LoadStepOptions, LoadSteps
-from ..model.newton import NewtonOptions
-from ..observer import Observer
-from .closure_arclength import arclength_path
-from .closure_buckling import Buckling, BucklingWatch
-from .closure_energy import EnergyLedger
-from .closure_model import ClosureModel
-from .closure_opening import FACES, opening
-from .closure_state import QUARTERS, ClosureState, contact_front, describe_closure
+from ...errors import SolveError
+from ...model.load_steps import LoadStepOptions, LoadSteps
+from ...model.newton import NewtonOptions
+from ...observer import Observer
+from .arclength import arclength_path
+from .buckling import Buckling, BucklingWatch
+from .energy import EnergyLedger
+from .model import ClosureModel
+from .opening import FACES, opening
+from .path_point import PathPoint, PathRestart
+from .state import QUARTERS, ClosureState, contact_front, describe_closure, face_overlap
+from .stiffness import stiffness_spectrum
 
 #: Farthest that an equilibrium may lie from its prediction, over the mean wall thickness.
 LARGEST_JUMP = 0.15
@@ -72,74 +76,29 @@ class ClosureOptions:
         )
 
 
-@dataclass(frozen=True)
-class PathPoint:
-    """One equilibrium on the way; areas and forces of the whole valve.
-
-    Attributes
-    ----------
-    pressure : float, Pa
-    max_displacement : float, m
-    contact_force : float, N
-    least_opening : float, m2
-    sealed_length, lip_seal : float, m
-    contact_front : float, m
-    eigenvalues : (k,) array, 1/s2
-        Real parts, ascending; empty on stretches followed by arclength.
-    arclength : bool
-        Found by arclength.
-    """
-
-    pressure: float
-    max_displacement: float
-    contact_force: float
-    least_opening: float
-    sealed_length: float
-    lip_seal: float
-    contact_front: float
-    eigenvalues: np.ndarray
-    arclength: bool = False
-
-
-@dataclass(frozen=True)
-class PathRestart:
-    """What a walk needs to go on from a state that it reached, as if it had never stopped.
-
-    Attributes
-    ----------
-    pressure : float, Pa
-    q, slope : (n,) arrays
-        Unknowns and their derivative by the pressure.
-    multiplier : (k,) array, Pa
-    step : float, Pa
-        Load step to try next.
-    beyond_limit : bool
-    eigenvalue : float, 1/s2
-        Lowest stiffness eigenvalue there.
-    energy : tuple of float
-        See `EnergyLedger.totals`.
-    buckling : tuple of Buckling
-        Found so far.
-    """
-
-    pressure: float
-    q: np.ndarray
-    slope: np.ndarray
-    multiplier: np.ndarray
-    step: float
-    beyond_limit: bool
-    eigenvalue: float
-    energy: tuple[float, ...]
-    buckling: tuple[Buckling, ...] = ()
-
-
 @dataclass
 class ClosurePath:
-    """Walks a model from one back pressure to the next."""
+    """Walks a model from one back pressure to the next.
+
+    Parameters
+    ----------
+    model : ClosureModel
+    options : ClosureOptions
+    observer : Observer
+    followed : callable, optional
+        Called as followed(path) whenever there is more on the path.
+
+    Attributes
+    ----------
+    points : list of PathPoint
+    before_limit : ClosureState or None
+        Last state before the first limit that this walk met: a buckling state, or the end of what was found.
+    """
 
     model: ClosureModel
     options: ClosureOptions = ClosureOptions()
     observer: Observer = field(default_factory=Observer)
+    followed: Callable[[ClosurePath], None] | None = None
 
     def __post_init__(self):
         options, pressed = self.options, self.model.pressed
@@ -147,8 +106,9 @@ class ClosurePath:
         steps = LoadStepOptions(options.newton, options.min_step, options.first_step, options.max_step, jump)
         self.steps = LoadSteps(pressed, steps, observer=self.observer, accepted=self._accepted)
         self.points: list[PathPoint] = []
+        self.before_limit: ClosureState | None = None
         self.watch = BucklingWatch(pressed, steps, options.eigenvalues)
-        self.beyond_limit = False
+        self.beyond_limit = self._met = False
         self.energy = EnergyLedger(pressed, options.balance_tolerance)
         self.energy.begin(self.steps.q, 0.0)
 
@@ -179,6 +139,7 @@ class ClosurePath:
         self.model.pressed.multiplier = at.multiplier
         self.beyond_limit = at.beyond_limit
         self.watch.resume(at.pressure, at.q, at.eigenvalue, at.buckling)
+        self._met = bool(at.buckling)
         self.energy.begin(at.q, at.pressure, at.slope)
         self.energy.totals = at.energy
 
@@ -195,6 +156,7 @@ class ClosurePath:
             last, iterations, count = way.result, way.iterations, way.steps
         except SolveError as error:
             if not self.options.arclength:
+                self._meet_limit(self.steps.pressure, self.steps.q)
                 raise
             self._past_limit(target, error)
             last = self.steps.settle()
@@ -212,6 +174,7 @@ class ClosurePath:
             iterations, updates = iterations + last.iterations, updates + 1
         self.energy.settle()
         spectrum = self.watch.see(target, self.steps.q)
+        self._tell()
         return describe_closure(
             self.model,
             self.steps.q,
@@ -233,25 +196,36 @@ class ClosurePath:
 
     def _accepted(self, pressure: float, q: np.ndarray) -> None:
         self.energy.add(q, pressure, self.steps.slope)
-        self.points.append(self._point(pressure, q, self.watch.see(pressure, q).values.real))
+        self.points.append(self._point(pressure, q, float(self.watch.see(pressure, q).values.real[0])))
+        self._tell()
+
+    def _tell(self) -> None:
+        if self.watch.before is not None:
+            self._meet_limit(*self.watch.before)
+        if self.followed is not None:
+            self.followed(self)
 
     def _past_limit(self, target: float, error: SolveError) -> None:
         """Arclength from the last equilibrium to the target pressure."""
-        start = self.steps.pressure
+        start, q = self.steps.pressure, self.steps.q
         self.observer.progress(f"arclength from {start:.6g} Pa")
         try:
             path = arclength_path(
-                self.model.pressed, self.steps.q, start, target, self.options.newton.tolerance, observer=self.observer
+                self.model.pressed, q, start, target, self.options.newton.tolerance, observer=self.observer
             )
         except NotConverged as reason:
+            self._meet_limit(start, q)
             raise SolveError(f"{error} Arclength did not get under way either: {reason}") from reason
         for point in path.branch.points[1:]:
-            self.points.append(self._point(float(point.z[-1]), point.z[:-1], np.empty(0), arclength=True))
+            self.points.append(self._point(float(point.z[-1]), point.z[:-1], np.nan, arclength=True))
             self.energy.add(point.z[:-1], float(point.z[-1]), refine=False)
+        if path.limits or not path.reached:
+            self._meet_limit(start, q)
         for limit in path.limits:
             self.buckling.append(Buckling("limit point", limit.pressure, limit.q, limit.shape, limit.eigenvalue))
         self.beyond_limit = self.beyond_limit or bool(path.limits)
         self.watch.forget()
+        self._tell()
         self.steps.q, self.steps.pressure, self.steps.slope = path.q, path.pressure, None
         if not path.reached:
             raise SolveError(
@@ -259,17 +233,61 @@ class ClosurePath:
                 f"({path.branch.reason})."
             )
 
-    def _point(self, pressure: float, q: np.ndarray, eigenvalues: np.ndarray, arclength: bool = False) -> PathPoint:
+    def _meet_limit(self, pressure: float, q: np.ndarray) -> None:
+        """Describe the last equilibrium before the first limit."""
+        if self._met or pressure <= 0:
+            return
+        self._met = True
+        try:
+            self.before_limit = self._describe_before_limit(pressure, q)
+        except SolveError as error:
+            self.observer.warn(f"The last state before a limit, at {pressure:.6g} Pa, was not described: {error}")
+
+    def _describe_before_limit(self, pressure: float, q: np.ndarray) -> ClosureState:
+        """With the penetration asked for, on a model of its own: the walk is left as it is."""
+        model = replace(self.model, pressed=copy(self.model.pressed))
+        steps, updates = LoadSteps(model.pressed, self.steps.options, pressure, q), 0
+        last = steps.settle()
+        found = model.pressed.multiplier, steps.q
+        try:
+            while (
+                model.pressed.contact_state(steps.q).penetration > self.options.penetration and updates < MOST_UPDATES
+            ):
+                model.pressed.renew_multipliers(steps.q)
+                last, updates = steps.settle(), updates + 1
+        except SolveError:  # the limit lies nearer than what renewed multipliers change
+            model.pressed.multiplier, steps.q = found
+            last, updates = steps.settle(), 0
+        spectrum = stiffness_spectrum(model.pressed, steps.q, pressure, self.options.eigenvalues)
+        return describe_closure(
+            model,
+            steps.q,
+            pressure,
+            spectrum,
+            beyond_limit=False,
+            energy_balance=self.energy.error,
+            converged=True,
+            iterations=last.iterations,
+            load_steps=0,
+            multiplier_updates=updates,
+            residual=last.residual,
+            rounding=last.rounding,
+            reason=last.reason,
+            before_limit=True,
+        )
+
+    def _point(self, pressure: float, q: np.ndarray, lowest: float, arclength: bool = False) -> PathPoint:
         model = self.model
-        passage, contact = opening(model, q), model.pressed.contact_state(q)
+        passage, contact, nodal = opening(model, q), model.pressed.contact_state(q), model.pressed.nodal(q)
         return PathPoint(
             pressure=float(pressure),
-            max_displacement=float(np.linalg.norm(model.pressed.nodal(q)[:, :3], axis=1).max()),
+            max_displacement=float(np.linalg.norm(nodal[:, :3], axis=1).max()),
             contact_force=FACES * contact.total,
             least_opening=float(QUARTERS * passage.area.min()),
             sealed_length=passage.shut_length(model.case.closure.shut_fraction),
             lip_seal=passage.lip_seal(model.case.closure.shut_fraction),
             contact_front=contact_front(passage, model),
-            eigenvalues=eigenvalues,
+            overlap=face_overlap(model, nodal),
+            lowest_eigenvalue=lowest,
             arclength=arclength,
         )

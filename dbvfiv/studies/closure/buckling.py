@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..contact import PressedShell
-from ..model.load_steps import LoadStepOptions, LoadSteps
-from .closure_stability import StiffnessSpectrum, stiffness_spectrum
+from ...contact import PressedShell
+from ...model.load_steps import LoadStepOptions, LoadSteps
+from .stiffness import StiffnessSpectrum, stiffness_spectrum
 
 #: The eigenvalue at a located buckling state over that at the stable end of its bracket.
 TOLERANCE = 1e-7
@@ -49,12 +49,15 @@ class BucklingWatch:
     Attributes
     ----------
     found : list of Buckling
+    before : (pressure, unknowns) or None
+        Last equilibrium, of those seen, before the first that was found by this watch.
     """
 
     pressed: PressedShell
     steps: LoadStepOptions
     eigenvalues: int = 4
     found: list[Buckling] = field(default_factory=list)
+    before: tuple[float, np.ndarray] | None = None
     _stable: tuple[float, np.ndarray, float] | None = field(default=None, repr=False)
 
     def see(self, pressure: float, q: np.ndarray) -> StiffnessSpectrum:
@@ -63,6 +66,8 @@ class BucklingWatch:
         if spectrum.lowest > 0:
             self._stable = (pressure, q, spectrum.lowest)
         elif self._stable is not None:
+            if not self.found:
+                self.before = self._stable[:2]
             self.found.append(self._locate(*self._stable, pressure, spectrum.lowest))
             self._stable = None
         return spectrum

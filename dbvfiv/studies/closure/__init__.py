@@ -1,0 +1,1 @@
+"""Back pressure: whether, where and how firmly the valve shuts, and how far its wall is from buckling."""

@@ -1,0 +1,83 @@
+"""How the valve is followed under back pressure, and kept: states, then the turn of the drive in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ...case.model import Case
+from ...errors import SolveError
+from ...record.record import GrowingRecord
+from ...record.table import printed_head, printed_row
+from ..session import Session
+from ..study import Study
+from .closing import closing_valve, run_closing, shut_below
+from .columns import COMPARED, REVERSAL, SUMMARY, tables_of, void_rows
+from .model import CONTACT, HELD_LIPS, closure_model
+from .opened import turn_back
+from .result import ClosureResult
+from .state import ClosureState
+from .walk import ClosureWalk
+
+
+def run(session: Session, record: GrowingRecord, in_time: bool = False, compare: bool = False) -> None:
+    """Equilibria at `closure.pressures` of the case; with `in_time` the turn of its drive, with `compare` the same
+    equilibria with the other supports.
+    """
+    if record.notes("asked"):
+        asked = record.notes("asked")[0]
+        in_time, compare = asked["in_time"], asked["compare"]
+    else:
+        record.note("asked", in_time=in_time, compare=compare)
+    case, pressures = session.case, session.case.closure.pressures
+    record.begin("closure", len(pressures) * (2 if compare else 1))
+    if compare:
+        record.item(f"Supports: {case.closure.supports}")
+    if case.closure.start == "open":
+        turn_back(case, record)
+    ClosureWalk(closure_model(case), record).go(pressures)
+    if in_time:
+        _turn_in_time(case, record)
+    if compare:
+        other = other_supports(case)
+        record.item(f"Supports: {other}")
+        ClosureWalk(closure_model(case, other), record, COMPARED).go(pressures)
+
+
+def other_supports(case: Case) -> str:
+    """Those to compare with."""
+    return HELD_LIPS if case.closure.supports == CONTACT else CONTACT
+
+
+def _turn_in_time(case: Case, record: GrowingRecord) -> None:
+    """Follow the turn of the drive; one that was cut short begins anew."""
+    if not record.notes("turned"):
+        void_rows(record, REVERSAL, 0)
+        model = closing_valve(case)
+        record.note("turning", shut_below=shut_below(model))
+        try:
+            found = run_closing(model, record, lambda sample: record.append(REVERSAL, vars(sample)))
+        except SolveError as error:
+            record.note("turned", halvings=0, failure=str(error))
+        else:
+            record.note("turned", halvings=found.halvings, failure=found.failure)
+    failure = record.notes("turned")[-1]["failure"]
+    if failure:
+        record.fail(f"The turn of the drive in time was not followed to its end: {failure}")
+
+
+def print_live(_case: Case) -> Callable[[ClosureState | str], str]:
+    """Lines of the table as states are found; a text is a title of those that follow."""
+    head = [*printed_head(SUMMARY)]
+
+    def write(item: ClosureState | str) -> str:
+        if isinstance(item, str):
+            head[:] = printed_head(SUMMARY)
+            return item
+        lines = [*head, printed_row(SUMMARY, item)]
+        head.clear()
+        return "\n".join(lines)
+
+    return write
+
+
+STUDY = Study("closure", tables_of, run, ClosureResult, live=print_live)

@@ -1,0 +1,37 @@
+"""Where a walk of load steps over steady states goes on from, as the rows of its states keep it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..model.load_steps import LoadSteps
+from ..model.state import SteadyState
+from ..record.layout import Column
+from ..record.mesh import MeshData
+from ..record.record import Record
+
+WAY_ON = (
+    Column("path/slope", "m/Pa, rad/Pa", "Derivative of the free unknowns by the pressure"),
+    Column("path/step", "Pa", "Load step that is tried next"),
+)
+
+
+def way_on_shapes(mesh: MeshData) -> dict[str, tuple[int, ...]]:
+    """Shapes of those columns that are not scalars."""
+    return {"path/slope": (int(mesh.free.sum()),)}
+
+
+def way_on(path: LoadSteps) -> dict[str, Any]:
+    """Those columns of the state that a walk has just reached."""
+    slope = np.full(path.model.size, np.nan) if path.slope is None else path.slope
+    return {"path/slope": slope, "path/step": path.step}
+
+
+def go_on(path: LoadSteps, record: Record, table: str, row: int, state: SteadyState) -> None:
+    """Stand where another walk stood when it had reached the state in a row of a table."""
+    path.q, path.pressure = state.q, state.pressure
+    slope = record.value(table, "path/slope", row)
+    path.slope = slope if np.isfinite(slope).all() else None
+    path.step = float(record.value(table, "path/step", row))

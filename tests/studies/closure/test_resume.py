@@ -1,0 +1,171 @@
+"""A closure run that is stopped or killed goes on where it stood."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from dbvfiv.api import load
+from dbvfiv.errors import CaseError
+from dbvfiv.observer import Observer
+from dbvfiv.results import load_result
+from dbvfiv.resuming import resume
+
+COARSE = {
+    "mesh.around": 6,
+    "mesh.along": 10,
+    "closure.max_step": "3 kPa",
+    "closure.start": "open",
+    "closure.eigenvalues": 2,
+}
+PRESSURES = [4e3, 1.2e4, 2e4]
+
+
+class StopAfter(Observer):
+    """Interrupts as a user does: during the way to the state after `count` others."""
+
+    def __init__(self, count: int):
+        self.count = count
+
+    def item(self, result):
+        self.count -= 1
+
+    def progress(self, text):
+        if self.count == 0 and text.startswith("equilibrium"):
+            raise KeyboardInterrupt
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return load(None, COARSE).closure(PRESSURES)
+
+
+def agree(result, whole):
+    assert result.complete and [s.pressure for s in result.states] == PRESSURES
+    for a, b in zip(result.states, whole.states):
+        assert np.array_equal(a.nodal, b.nodal)
+        assert a.energy_balance == b.energy_balance
+        assert (a.load_steps, a.iterations, a.multiplier_updates) == (b.load_steps, b.iterations, b.multiplier_updates)
+    assert [vars(p) for p in result.walk] == [vars(p) for p in whole.walk]
+    assert json.dumps(result.summary()) == json.dumps(whole.summary())
+    assert result.warnings == whole.warnings and not result.failures
+
+
+def test_an_interrupted_run_goes_on_as_if_it_had_not_been(whole, tmp_path):
+    path = tmp_path / "run.h5"
+    first = load(None, COARSE).closure(PRESSURES, output=path, observer=StopAfter(1))
+    assert not first.complete and len(load_result(path).states) == 1
+    assert len(load_result(path).walk) > len(
+        [p for p in whole.walk if p.pressure <= PRESSURES[0]]
+    )  # a part of the way to the next state too
+    agree(resume(path), whole)
+    with pytest.raises(CaseError, match="nothing to resume"):
+        resume(path)
+
+
+def test_a_run_interrupted_before_its_first_state_begins_anew(whole, tmp_path):
+    path = tmp_path / "run.h5"
+    load(None, COARSE).closure(PRESSURES, output=path, observer=StopAfter(0))
+    assert not load_result(path).states
+    agree(resume(path), whole)
+
+
+class StopAt(Observer):
+    """Interrupts at the `count`-th piece of progress that begins with a text, once `after` states were found."""
+
+    def __init__(self, text: str, count: int, after: int = 0):
+        self.text, self.count, self.after = text, count, after
+
+    def item(self, result):
+        self.after -= not isinstance(result, str)
+
+    def progress(self, text):
+        if self.after <= 0 and text.startswith(self.text):
+            self.count -= 1
+            if self.count == 0:
+                raise KeyboardInterrupt
+
+
+def test_a_flow_that_is_turned_back_goes_on_from_its_last_state(whole, tmp_path):
+    path = tmp_path / "run.h5"
+    load(None, COARSE).closure(PRESSURES, output=path, observer=StopAt("steady state at", 4))
+    assert len(load_result(path).opened) == 3
+    agree(resume(path), whole)
+
+
+def test_a_file_may_be_taken_up_twice(whole, tmp_path):
+    path = tmp_path / "run.h5"
+    load(None, COARSE).closure(PRESSURES, output=path, observer=StopAt("equilibrium at 1050 Pa", 1))
+    assert not load_result(path).states and load_result(path).walk
+    again = resume(path, observer=StopAfter(2))
+    assert not again.complete and len(again.states) == 2
+    agree(resume(path), whole)
+
+
+def test_supports_to_compare_with_and_the_turn_in_time_are_taken_up_too(tmp_path):
+    path = tmp_path / "run.h5"
+    changes = COARSE | {
+        "closure.start": "rest",
+        "closure.max_step": "5 kPa",
+        "closure.reversal_time": "0.02 s",
+        "closure.reversal_hold": 0.0,
+    }
+
+    def ask(**further):
+        return load(None, changes).closure([4e3, 14e3], in_time=True, compare=True, **further)
+
+    complete = ask()
+    first = ask(output=path, observer=StopAt("0.00", 3))
+    assert len(first.states) == 2 and 0 < len(first.closing.samples) < len(complete.closing.samples)
+    assert first.compared is None
+    second = resume(path, observer=StopAt("equilibrium", 1, after=1))
+    assert second.closing.samples == complete.closing.samples
+    assert not second.complete and len(second.compared.states) == 1
+    last = resume(path)
+    assert last.complete and json.dumps(last.summary()) == json.dumps(complete.summary())
+
+
+@pytest.mark.slow
+def test_a_walk_that_is_stopped_beyond_a_limit_meets_it_again(tmp_path):
+    path = tmp_path / "run.h5"
+    thin = {"mesh.around": 8, "mesh.along": 14, "valve.thickness_factor": 0.4, "closure.max_step": "0.5 kPa"}
+    complete = load(None, thin).closure([3e3, 8e3])
+    first = load(None, thin).closure([3e3, 8e3], output=path, observer=StopAt("arclength point", 4))
+    assert not first.complete and len(first.states) == 1
+    last = resume(path)
+    assert json.dumps(last.summary()) == json.dumps(complete.summary())
+    assert last.before_limit is not None and np.array_equal(last.before_limit.nodal, complete.before_limit.nodal)
+
+
+@pytest.mark.slow
+def test_a_killed_run_has_lost_no_finished_state(whole, tmp_path):
+    path = tmp_path / "run.h5"
+    words = [f"--set={key}={value}" for key, value in COARSE.items()]
+    command = [
+        sys.executable,
+        "-m",
+        "dbvfiv",
+        "closure",
+        *words,
+        *(f"--pressure={p:g}" for p in PRESSURES),
+        "-o",
+        str(path),
+    ]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    for line in run.stdout:
+        if line.split()[:1] == ["4"]:
+            break
+    time.sleep(0.05)
+    os.kill(run.pid, signal.SIGKILL)
+    run.wait()
+    kept = load_result(path)
+    assert not kept.complete and len(kept.states) >= 1
+    assert np.array_equal(kept.states[0].nodal, whole.states[0].nodal)
+    agree(resume(path), whole)

@@ -1,0 +1,95 @@
+"""How far a valve under back pressure is from its first limit."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.case import Case
+from dbvfiv.results import load_result
+from dbvfiv.studies.closure.safety import find_safety
+
+
+def result(pressures, sealed, overlap=None, buckling=(), supports="contact", failure=None, **changes):
+    overlap = np.zeros(len(pressures)) if overlap is None else overlap
+    walk = [
+        SimpleNamespace(pressure=p, sealed_length=s, overlap=o, arclength=False)
+        for p, s, o in zip(pressures, sealed, overlap)
+    ]
+    case = Case().replace({"closure.pressures": [max(pressures)]} | {f"closure.{k}": v for k, v in changes.items()})
+    buckled = [SimpleNamespace(pressure=p) for p in buckling]
+    return SimpleNamespace(walk=walk, case=case, buckling=buckled, supports=supports, walk_failure=failure)
+
+
+def test_without_a_limit_the_factor_is_a_lower_bound_and_says_so():
+    found = find_safety(result([1e3, 7e3, 28e3], [0.0, 0.1, 0.1], rated_pressure=7e3))
+    assert found.at_least and found.factor == pytest.approx(4.0) and found.limit is None
+    assert "at least 4" in found.sentence and "rated 7 kPa" in found.sentence
+    assert find_safety(result([28e3], [0.1])).factor == 1.0
+
+
+def test_the_first_of_several_limits_counts():
+    found = find_safety(result([1e3, 7e3, 14e3, 28e3], [0.1, 0.1, 0.1, 0.0], buckling=[20e3], rated_pressure=10e3))
+    assert (found.limit, found.limit_pressure) == ("loss of seal", 14e3) and found.factor == pytest.approx(1.4)
+    found = find_safety(result([1e3, 7e3, 28e3], [0.1, 0.1, 0.1], buckling=[20e3, 9e3], rated_pressure=10e3))
+    assert (found.limit, found.limit_pressure) == ("buckling", 20e3)  # as met: the path turns back beyond it
+    assert not found.at_least and "buckling at 20 kPa" in found.sentence
+
+
+def test_a_seal_that_never_was_is_no_seal_that_was_lost():
+    assert find_safety(result([1e3, 2e3], [0.0, 0.1])).at_least  # it shuts on the way
+    found = find_safety(result([1e3, 2e3], [0.0, 0.0]))
+    assert found.factor == 0.0 and "no section was shut" in found.sentence
+    assert find_safety(result([1e3, 7e3, 2e3], [0.1, 0.1, 0.0])).at_least  # opens as the pressure falls again
+
+
+def test_faces_cross_only_where_supports_do_not_look_at_them():
+    overlap = [0.0, 1e-4, 1e-3]
+    found = find_safety(result([7e3, 14e3, 28e3], [0.2] * 3, overlap, supports="held-lips"))
+    assert (found.limit, found.limit_pressure) == ("faces crossing", 7e3)
+    assert find_safety(result([7e3, 14e3, 28e3], [0.2] * 3, overlap)).at_least
+
+
+def test_a_seal_that_supports_give_is_not_found_but_assumed():
+    held = find_safety(result([7e3, 14e3], [0.2, 0.2], supports="held-lips"))
+    assert held.at_least and held.seal_assumed and "assumption" in held.sentence
+    free = find_safety(result([7e3, 14e3], [0.2, 0.2]))
+    assert not free.seal_assumed and "does not lose its seal" in free.sentence
+
+
+def test_where_equilibria_end_is_a_limit():
+    found = find_safety(result([1e3, 1.8e3], [0.1, 0.1], failure="No equilibrium was found.", rated_pressure=3e3))
+    assert (found.limit, found.factor) == ("end of the path", pytest.approx(0.6))
+    assert find_safety(SimpleNamespace(walk=[])) is None
+
+
+THIN = {
+    "mesh.around": 8,
+    "mesh.along": 14,
+    "valve.thickness_factor": 0.4,
+    "closure.max_step": "0.5 kPa",
+    "closure.rated_pressure": "2.5 kPa",
+}
+
+
+@pytest.mark.slow
+def test_a_wall_that_snaps_shows_its_last_state_before_and_the_factor(tmp_path):
+    path = tmp_path / "thin.h5"
+    found = dbvfiv.load(changes=THIN).closure(["3 kPa", "8 kPa"], output=path)
+    assert [state.pressure for state in found.states] == [3e3, 8e3]
+    limit, last = found.buckling[0], found.before_limit
+    assert limit.kind == "limit point" and 3e3 < last.pressure < limit.pressure
+    assert limit.pressure - last.pressure < 0.001 * limit.pressure
+    assert last.stable and not last.beyond_limit and last.penetration <= found.case.closure.penetration
+    assert found.states[1].beyond_limit
+    # its softest stiffness has all but gone
+    assert last.lowest_stiffness_eigenvalue < 0.2 * found.states[0].lowest_stiffness_eigenvalue
+    assert found.safety.factor == pytest.approx(limit.pressure / 2.5e3) and found.safety.limit == "buckling"
+    rows = [line.split()[0] for line in found.lines()[2:5]]
+    assert rows == ["3", f"{last.pressure / 1e3:.6g}", "8"]
+    again = load_result(path)
+    assert again.summary()["before_limit"]["pressure"] == last.pressure
+    assert again.summary()["safety"] == found.summary()["safety"]
