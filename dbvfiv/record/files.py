@@ -109,6 +109,8 @@ def _opened(path: Path) -> h5py.File:
             raise
         except OSError as error:
             plain = error
+        if not _marked_as_open(path):  # reading a cut file as a growing one would never end
+            raise plain
         try:
             return h5py.File(path, "r", locking=False, libver="latest", swmr=True)
         except OSError:
@@ -116,6 +118,13 @@ def _opened(path: Path) -> h5py.File:
                 raise plain from None
         sleep(_PAUSE)  # caught between two writes of the same instant
     raise plain
+
+
+def _marked_as_open(path: Path) -> bool:
+    """Whether the file's superblock (version 3) says that a writer has not closed it."""
+    with open(path, "rb") as file:
+        head = file.read(12)
+    return len(head) == 12 and head[8] == 3 and bool(head[11] & 0b101)
 
 
 def create(path: str | Path, single_writer: bool = False) -> h5py.File:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...plots import layers
+from ...drawing import layers
 from ...record.header import Header
 from ...record.layout import Column
 from ...record.record import Record, plain
