@@ -14,7 +14,7 @@ from dbvfiv.model import ValveModel
 from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header
 from dbvfiv.transient.file import TransientFile
-from dbvfiv.transient.options import RunOptions
+from dbvfiv.motion.options import RunOptions
 from dbvfiv.transient.run import Runner
 
 from .registry import Row, benchmark

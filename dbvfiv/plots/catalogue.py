@@ -26,7 +26,6 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "sweep": ("sweep_curves", "sweep_locus"),
     "onset": ("onset",),
     "map": ("map",),
-    "transient": ("transient",),
 }
 FORMATS = ("png", "svg")
 

@@ -128,13 +128,15 @@ class GrowingRecord(Record, Observer):
                     self.extend(name, {c.name: known.column(name, c.name) for c in table.columns})
             self._log.extend(known.log)
         if self.path is not None:
-            self._journal = Journal(self.path, header, mesh, self.tables.values())
-            for name in self.tables:
-                if self.rows(name):
-                    self._journal.extend(name, {c: self.column(name, c) for c in self._rows[name]})
-            if self._log:
-                self._journal.write_log(pack_documents(self._log))
+            self._journal = Journal(self.path, header, mesh, self.tables.values(), self._write_known)
         self.note("begin")
+
+    def _write_known(self, journal: Journal) -> None:
+        for name in self.tables:
+            if self.rows(name):
+                journal.extend(name, {c: self.column(name, c) for c in self._rows[name]})
+        if self._log:
+            journal.write_log(pack_documents(self._log))
 
     # -- reading ----
 

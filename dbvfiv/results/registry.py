@@ -23,7 +23,6 @@ READERS: dict[str, str] = {
     "closure": "dbvfiv.results.closure:ClosureResults",
     "onset": "dbvfiv.results.onset:OnsetResults",
     "map": "dbvfiv.results.map:MapResults",
-    "transient": "dbvfiv.transient.result:TransientResults",
 }
 
 

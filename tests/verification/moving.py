@@ -8,10 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from dbvfiv.model.linear import CoupledFactor
+from dbvfiv.motion.kernels import inertia_force, kinetic_energy, strain_energy
+from dbvfiv.motion.terms import Load
 from dbvfiv.shell import Shell
 from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
-from dbvfiv.transient.equations import Load
-from dbvfiv.transient.kernels import inertia_force, kinetic_energy, strain_energy
 
 NONE = np.zeros(1)
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..verdict import JudgeOptions, Verdict, judge
-from .history import History
+from ...verdict import JudgeOptions, Verdict, judge
 
+#: Columns of a history by name.
+Columns = Mapping[str, np.ndarray]
 #: Areas below this multiple of the lip gap at rest count as closed.
 CLOSED = 2.0
 #: Pascal; no fluid's pressure falls further below that of the surroundings.
@@ -77,12 +79,14 @@ _LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undeci
 
 
 def assess(
-    history: History, gap: float, residual: float = np.nan, options: JudgeOptions = JudgeOptions(), since: float = 0.0
+    history: Columns, gap: float, residual: float = np.nan, options: JudgeOptions = JudgeOptions(), since: float = 0.0
 ) -> RunVerdict:
     """Verdict on a history.
 
     Parameters
     ----------
+    history : mapping of str to array
+        See `dbvfiv.studies.transient.tables.SCALARS`.
     gap : float
         Flow area of the whole valve at the lip at rest, m2.
     residual : float
@@ -99,10 +103,10 @@ def assess(
     if closed.name == "closed":
         reason = "The smallest flow area stays at that of the lip gap at rest."
         found = [Verdict(**{**vars(v), "name": "closed", "decided": True, "reason": reason}) for v in found]
-    return RunVerdict(*found, residual, history.rows - 1, float(time[-1]))
+    return RunVerdict(*found, residual, len(time) - 1, float(time[-1]))
 
 
-def beyond_model(history: History) -> str | None:
+def beyond_model(history: Columns) -> str | None:
     """Sentence on pressures that no fluid could have, None without any.
 
     An ideal incompressible fluid pays any price for passing a gap that shuts; a real one separates, cavitates or is
