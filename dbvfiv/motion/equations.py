@@ -26,6 +26,11 @@ class ValveMotion:
     model : ValveModel
     conditions : Conditions, optional
         Density and damping; those of the model's case by default.
+
+    Attributes
+    ----------
+    resolution : float
+        Smallest displacement that positions resolve, m.
     """
 
     def __init__(self, model: ValveModel, conditions: Conditions | None = None):
@@ -34,6 +39,7 @@ class ValveMotion:
         self.moving_fluid = model.flow.unsteady
         self.fluid = model.flow.stepping(self.conditions.density) if self.moving_fluid else None
         self.size = model.size
+        self.resolution = float(np.finfo(float).eps * np.abs(model.shell.mesh.nodes).max())
         self.stations = model.stations
         shell = model.shell
         self._quads = shell.mesh.quads

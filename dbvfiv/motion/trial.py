@@ -84,7 +84,7 @@ class Trial:
         motion = self.motion
         moved = self.h**2 * self.scheme.beta * motion.length(self.a_mid)
         floor = max(floor, 1e3 * np.finfo(float).eps)
-        return tolerance * moved + floor * motion.length(self.q) + np.finfo(float).tiny
+        return max(tolerance * moved + floor * motion.length(self.q), motion.resolution, np.finfo(float).tiny)
 
     def state(self) -> MotionState:
         old, load = self.old, self.load

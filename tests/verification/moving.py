@@ -20,6 +20,7 @@ class Motion:
     """What the stepper asks of any motion without a fluid; the load is a force that the positions fix."""
 
     moving_fluid = False
+    resolution = 0.0
 
     def __init__(self, size: int, alpha: float = 0.0, beta: float = 0.0):
         self.size, self.conditions = size, SimpleNamespace(alpha=alpha, beta=beta, density=0.0)

@@ -26,7 +26,7 @@ from .tables import HISTORY, PROFILES, SCALARS, STATE_COLUMNS, STATES
 _NO_VERDICT = {
     "verdict": None,
     "decided": False,
-    "reason": "No step was made.",
+    "reason": "No step was made: the run has just begun, or was ended before the first.",
     **dict.fromkeys(("amplitude", "frequency", "mean", "cycles_observed", "periodicity_error")),
     "steps": 0,
     "time": 0.0,
@@ -172,7 +172,7 @@ class TransientResult(StudyResult):
     def lines(self) -> list[str]:
         verdict, h = self.verdict, self.history
         if not self.begun:
-            return ["No step was made: the run has just begun, or was ended before the first."]
+            return [verdict["reason"]]
         lines = [
             (
                 f"{verdict['verdict']}{'' if verdict['decided'] else ' (not certain)'} after "

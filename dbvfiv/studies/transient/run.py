@@ -42,7 +42,8 @@ class TransientRun:
     history : Keeper
         Columns of the history by their names.
     progress : Progress
-    verdict : RunVerdict
+    verdict : RunVerdict or None
+        None if not even one step was made.
     failures : list of str
     interrupted : bool
     stopped : bool
@@ -54,7 +55,7 @@ class TransientRun:
     model: ValveModel
     history: Keeper
     progress: Progress
-    verdict: RunVerdict
+    verdict: RunVerdict | None
     failures: list[str] = field(default_factory=list)
     interrupted: bool = False
     stopped: bool = False
@@ -167,7 +168,7 @@ class Runner:
         self.keeper.flush()
         if not interrupted and not failures:
             self._checkpoint(progress, needed=True)
-        verdict = self._verdict(progress)
+        verdict = self._verdict(progress) if self.keeper.rows > 1 else None
         sentence = beyond_model(self.keeper)
         if sentence:
             self.record.warn(sentence)

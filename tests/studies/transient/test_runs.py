@@ -296,6 +296,43 @@ def test_a_run_that_fails_keeps_everything_and_says_where(tmp_path, valve, monke
     assert dbvfiv.resume(tmp_path / "run.h5").complete  # with better luck
 
 
+def test_a_run_that_fails_or_is_interrupted_at_once_can_be_read_and_resumed(
+    tmp_path, valve, monkeypatch, command_line, one_sentence
+):
+    path = tmp_path / "run.h5"
+
+    def refuse(self, state, h):
+        raise stepper.StepFailure("Nothing helps.")
+
+    def interrupt(self, state, h):
+        raise KeyboardInterrupt
+
+    whole = transient(valve(SHORT))
+    for step, failures in ((refuse, 1), (interrupt, 0)):
+        with monkeypatch.context() as patched:
+            patched.setattr(stepper.Stepper, "step", step)
+            result = transient(valve(SHORT), output=path)
+        assert len(result.failures) == failures and not result.complete and result.interrupted == (not failures)
+        assert result.summary()["verdict"] is None and not result.drawable
+        assert command_line("info", path).status == 0
+        for arguments in (["plot", path, "--animate", 1], ["compare", path], ["verdict", path]):
+            outcome = command_line(*arguments)
+            assert outcome.status == 2 and one_sentence(outcome.err), outcome.err
+        resumed = dbvfiv.resume(path)
+        assert resumed.complete and np.array_equal(resumed.history["mass_flow"], whole.history["mass_flow"])
+
+
+@pytest.mark.parametrize("start", ["rest", "steady", "kick"])
+@pytest.mark.parametrize("law", ["quasi-steady", "storage"])
+def test_a_valve_without_pressure_stays_as_it_is(tmp_path, valve, command_line, start, law):
+    changes = {"drive.pressure": 0.0, "transient.start": start, "fluid.continuity": law, "transient.kick_opening": 1e-5}
+    result = transient(valve(SHORT | changes), output=tmp_path / "run.h5")
+    assert result.complete and result.verdict["verdict"] == "closed" and len(result.history["time"]) == 21
+    limit = 1e-12 if start != "kick" else 1.1e-5
+    assert np.abs(result.history["lip_displacement"]).max() < limit
+    assert command_line("info", tmp_path / "run.h5").status == 0
+
+
 def test_the_verdict_ends_the_run(valve):
     model = valve(
         {
@@ -327,7 +364,7 @@ def test_a_resumed_run_is_ended_by_the_same_verdict(tmp_path, valve, all_restart
     model = valve(changes)
     whole = transient(model)
     assert whole.stopped and whole.complete
-    judged = [note for note in whole.record.notes("verdict")]
+    judged = whole.record.notes("verdict")
     first = next(note["steps"] for note in judged if note["decided"])
     end = len(whole.history["time"]) - 1
     assert first < end
