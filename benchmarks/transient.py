@@ -110,7 +110,7 @@ def time_steps():
     )
     yield Row(
         "file per 10 000 steps",
-        (size - empty) / steps * 1e4 / 2**20,
+        (size - empty - restarts) / steps * 1e4 / 2**20,
         "MiB",
-        note=f"of it {restarts / steps * 1e4 / 2**20:.2f} MiB for restart points; {empty / 2**20:.2f} MiB for the mesh",
+        note=f"and {empty / 2**20:.2f} MiB for the mesh, {restarts / 2**20:.2f} MiB for restart points",
     )
