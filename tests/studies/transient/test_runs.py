@@ -92,6 +92,18 @@ def test_kick_rings_at_the_eigenvalue(valve):
     assert np.abs(h["lip_displacement"] - still - expected).max() < 0.02 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize("beta, number", [(3e-3, 1), (0.0, 1), (0.0, 3)])
+def test_a_kick_follows_a_leading_mode_by_the_rule_of_all_studies(valve, beta, number):
+    """Without stiffness damping too, where a band of structural frequencies says what is leading."""
+    changes = {"drive.pressure": 6e3, "fluid.density": 10.0, "damping.alpha": 0.0, "damping.beta": beta}
+    kick = {"transient.start": "kick", "transient.kick_mode": number, "transient.duration": 1e-3}
+    model = valve(changes | kick)
+    listed = [m for m in dbvfiv.load(model.case).modes().modes if m.frequency > 0]
+    followed = run_transient(model).progress.eigenvalue
+    mode = listed[number - 1]
+    assert followed == pytest.approx(complex(mode.growth_rate, 2 * np.pi * mode.frequency), rel=1e-6)
+
+
 def test_storage_law_lets_the_wall_displace_fluid(valve):
     changes = {
         "transient.start": "kick",
