@@ -19,6 +19,7 @@ from dbvfiv.motion.drive import Drive
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.record.header import Header
+from dbvfiv.record.journal import Journal
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.part import RecordPart
 from dbvfiv.record.record import GrowingRecord, StoredRecord
@@ -272,6 +273,22 @@ def test_torn_restart_points_are_passed_over(tmp_path, valve, all_restart_points
     assert rows_to_keep(known, whole.case) == {HISTORY: 8, STATES: 2, RESTART: 2}
     resumed = dbvfiv.resume(path)
     assert all(np.array_equal(resumed.history[name], whole.history[name]) for name in whole.history)
+
+
+def test_a_resume_that_dies_at_once_leaves_the_file_as_it_was(tmp_path, valve, monkeypatch):
+    path = tmp_path / "run.h5"
+    transient(valve(SHORT), output=path, observer=Stop(9))
+    before = path.read_bytes()
+
+    def die(self, documents):
+        raise OSError("The machine goes down.")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Journal, "write_log", die)  # when the rows are copied
+        with pytest.raises(OSError, match="goes down"):
+            dbvfiv.resume(path)
+    assert path.read_bytes() == before and [file.name for file in tmp_path.iterdir()] == ["run.h5"]
+    assert dbvfiv.resume(path).complete
 
 
 def test_restart_points_take_little_of_the_file(tmp_path, valve, monkeypatch):
