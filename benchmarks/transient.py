@@ -11,11 +11,14 @@ import numpy as np
 
 from dbvfiv.case.model import Case
 from dbvfiv.model import ValveModel
+from dbvfiv.motion.options import RunOptions
 from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header
-from dbvfiv.transient.file import TransientFile
-from dbvfiv.transient.options import RunOptions
-from dbvfiv.transient.run import Runner
+from dbvfiv.record.mesh import MeshData
+from dbvfiv.record.record import GrowingRecord
+from dbvfiv.studies.transient.keeping import row_bytes
+from dbvfiv.studies.transient.run import Runner
+from dbvfiv.studies.transient.tables import RESTART, tables_of
 
 from .registry import Row, benchmark
 
@@ -67,18 +70,19 @@ def time_steps():
     model = ValveModel(case)
     cycle = Runner(model).start().progress.state
     case = case.replace({"transient.step": 1e-4, "transient.duration": cycle.time + STEPS * 1e-4})
-    model.case = case
     unit = Unit()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.h5"
-        with TransientFile(path, model, Header.of("transient", case)) as file:
+        mesh = MeshData.of(model)
+        with GrowingRecord(Header.of("transient", case), mesh, tables_of(mesh), path, unit) as record:
+            runner = Runner(model, RunOptions.of(case), record, case)
             empty = os.path.getsize(path)
-            runner = Runner(model, RunOptions.of(case), unit, file)
             unit.motion, unit.q = runner.motion, cycle.q
             start, wall = process_time(), perf_counter()
             run = runner.start(cycle)
             spent, wall = process_time() - start - unit.spent, perf_counter() - wall - unit.wall
-            file.conclude(run)
+            record.conclude(True)
+            restarts = record.rows(RESTART) * row_bytes(record.tables[RESTART])
         size = os.path.getsize(path)
     force, solve = np.median(unit.force), np.median(unit.solve)
     steps = run.progress.steps
@@ -106,7 +110,7 @@ def time_steps():
     )
     yield Row(
         "file per 10 000 steps",
-        (size - empty) / steps * 1e4 / 2**20,
+        (size - empty - restarts) / steps * 1e4 / 2**20,
         "MiB",
-        note=f"and {empty / 2**20:.2f} MiB for mesh and restart points",
+        note=f"and {empty / 2**20:.2f} MiB for the mesh, {restarts / 2**20:.2f} MiB for restart points",
     )

@@ -18,12 +18,12 @@ from .studies.session import Session, named_changes
 from .studies.state import State
 from .studies.steady.result import SteadyResult
 from .studies.sweep.result import SweepResult
+from .studies.transient.result import TransientResult
 
 if TYPE_CHECKING:
     from .observer import Observer
     from .results.map import MapResults
     from .results.onset import OnsetResults
-    from .transient.result import TransientResults
 
 _PRESSURE = PARAMETERS["pressure"]
 
@@ -260,8 +260,9 @@ class Valve:
         output: str | Path | None = None,
         observer: Observer | None = None,
         **changes: Any,
-    ) -> TransientResults:
-        """A time history of the coupled valve that ends with a verdict; see `dbvfiv.transient`.
+    ) -> TransientResult:
+        """A time history of the coupled valve that ends with a verdict; see
+        `dbvfiv.studies.transient`.
 
         Parameters
         ----------
@@ -285,11 +286,7 @@ class Valve:
         >>> run = dbvfiv.load("cases/light-fluid.toml").transient()      # doctest: +SKIP
         >>> run.verdict["verdict"], run.history["lip_opening"]           # doctest: +SKIP
         """
-        from .transient.api import transient
-
-        keys = {"transient.duration": duration} | named_changes(changes)
-        valve = self.replace({key: value for key, value in keys.items() if value is not None})
-        return transient(valve.model, valve.name, output, observer)
+        return self._ask({"transient.duration": duration}, changes).perform("transient", output, observer)
 
     def _ask(self, keys: Mapping[str, Any], given: Mapping[str, Any]) -> Session:
         """The session with keys and named arguments put into its case; None stands for nothing given."""

@@ -41,17 +41,17 @@ def resume(
     from .record.files import kind_of
 
     kind = kind_of(path)
+    if duration is not None and kind != "transient":
+        raise CaseError(f"A new duration belongs to transient runs; {str(path)!r} is of kind {kind!r}.")
     if kind in KINDS:
         from .studies.session import resume_result
 
-        return resume_result(path, observer)
-    if kind not in ("transient", "map", "onset"):
+        return resume_result(path, observer, {} if duration is None else {"transient.duration": duration})
+    if kind not in ("map", "onset"):
         raise CaseError(
             f"{str(path)!r} holds a result of kind {kind!r}; what can be resumed are transient, map, onset "
             f"and closure runs."
         )
-    if duration is not None and kind != "transient":
-        raise CaseError(f"A new duration belongs to transient runs; {str(path)!r} is of kind {kind!r}.")
     if kind == "map":
         from .stability import resume_map
 
@@ -60,6 +60,3 @@ def resume(
         from .stability import resume_onset
 
         return resume_onset(path, observer)
-    from .transient.api import resume as resume_transient
-
-    return resume_transient(path, duration, observer)

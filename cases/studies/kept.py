@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import dbvfiv
-from dbvfiv.errors import CaseError
-from dbvfiv.transient.api import resume, transient
+from dbvfiv.api import Valve
 
 
 def kept_run(case, path: Path, observer=None):
@@ -19,11 +18,8 @@ def kept_run(case, path: Path, observer=None):
     """
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        return transient(dbvfiv.load(case).model, path.stem, path, observer)
-    try:
-        result = dbvfiv.load_result(path)
-    except CaseError:  # killed before its first step was safe
-        return resume(path, observer=observer)
+        return Valve(case, path.stem).transient(output=path, observer=observer)
+    result = dbvfiv.load_result(path)
     kept, wanted = result.case.to_dict(), case.to_dict()
     longer = case.transient.duration > result.case.transient.duration
     for one in (kept, wanted):
@@ -38,5 +34,7 @@ def kept_run(case, path: Path, observer=None):
     return (
         result
         if ended or result.failures
-        else resume(path, max(case.transient.duration, result.case.transient.duration), observer)
+        else dbvfiv.resume(
+            path, duration=max(case.transient.duration, result.case.transient.duration), observer=observer
+        )
     )

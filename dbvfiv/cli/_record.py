@@ -10,8 +10,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ..drawing.signal import save_signal
 from ..errors import CaseError
-from ..plots.transient_signal import save_signal
 from ..results import load_result
 from ..verdict import JudgeOptions, Series, Verdict, in_steps, judge, spectrum
 from ..verdict.table import Table, read_table

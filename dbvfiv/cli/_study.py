@@ -102,7 +102,7 @@ def report(
         if lines:
             print("\n".join(lines))
         print_places(output, figures, plots)
-    if not result.complete:
+    if result.interrupted:
         raise KeyboardInterrupt
     shortfall = result.shortfall()
     if shortfall is not None:

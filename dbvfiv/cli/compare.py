@@ -24,13 +24,14 @@ def command(
     tell them apart.
     """
     from ..errors import CaseError
-    from ..plots.transient_compare import labels, save_comparison
     from ..results import load_result
+    from ..studies.transient.comparison import labels, save_comparison
 
     results = [load_result(file) for file in files]
     for file, result in zip(files, results):
         if result.kind != "transient":
             raise CaseError(f"{str(file)!r} holds a result of kind {result.kind!r} and not a transient run.")
+        result.require_steps()
     path = save_comparison(results, output)
     names = labels(results)
     if as_json:

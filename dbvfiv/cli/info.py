@@ -30,8 +30,9 @@ def command(
     if as_json:
         facts = {
             name: getattr(header, name)
-            for name in ("kind", "name", "complete", "created", "program", "command", "layout", "versions")
+            for name in ("kind", "name", "created", "program", "command", "layout", "versions")
         }
+        facts["complete"] = result.complete
         mesh = {"around": around, "along": along, "layers": list(result.mesh.layer_names)}
         print_json(facts | {"mesh": mesh, "case": header.case.to_dict() if case else None} | result.summary())
         return
@@ -46,7 +47,7 @@ def command(
             "result",
             (
                 f"{header.kind} of {header.name}, "
-                f"{'complete' if header.complete else 'not complete: interrupted or still running'}"
+                f"{'complete' if result.complete else 'not complete: interrupted or still running'}"
             ),
         ),
         ("written", f"{header.created} by {header.program}"),

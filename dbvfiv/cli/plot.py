@@ -74,12 +74,13 @@ def command(
 def _film(result, file: Path, folder: Path, number: int) -> Callable[[], Path]:
     """What writes the film that ``--animate`` asks of a result."""
     from ..errors import CaseError
-    from ..plots.transient_motion import cycles_to_animate
+    from ..studies.transient.animation import cycles_to_animate
 
     if result.kind == "modes":
         result.mode(number)
         return lambda: result.animate(folder / f"mode-{number}.gif", number)
     if result.kind == "transient":
+        result.require_steps()
         duration = cycles_to_animate(result, number)
         frames = min(48 * number, 240)
         name = f"last-{number}-cycles.gif" if number > 1 else "last-cycle.gif" if result.cycle else "run.gif"

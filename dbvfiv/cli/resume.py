@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -56,9 +57,13 @@ def command(
             raise CaseError(f"--duration is given as {duration!r}, {error}.") from None
     result = resume(file, duration=end, workers=workers, observer=Progress(quiet=as_json))
     if kind in KINDS:
-        return report_study(result, file, plots, as_json)
-    report = import_module(f"..{kind}", __name__).report
-    report(result, file, plots, *([animate] if kind == "transient" else []), as_json)
+        films = animate is not None and result.drawable
+        return report_study(result, file, plots, as_json, further=_film_into(animate) if films else None)
+    import_module(f"..{kind}", __name__).report(result, file, plots, as_json)
+
+
+def _film_into(path: Path) -> Callable[[Any], list[Path]]:
+    return lambda result: [result.animate(path)]
 
 
 def _number_or_text(text: str) -> float | str:

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 FAMILIES: dict[str, tuple[str, ...]] = {
     "onset": ("onset",),
     "map": ("map",),
-    "transient": ("transient",),
 }
 FORMATS = ("png", "svg")
 

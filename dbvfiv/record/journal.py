@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -50,8 +50,9 @@ class Journal:
     header : Header
     mesh : MeshData, optional
     tables : iterable of TableSpec
-    fill : callable, optional
-        Called as fill(journal) before the file takes the name, so that rows of an earlier attempt are never out of it.
+    first : callable, optional
+        Given the journal, writes what an earlier attempt found; the file takes its name after that only, so that
+        nothing is lost whenever the process ends.
 
     Raises
     ------
@@ -60,7 +61,14 @@ class Journal:
     DiskFull
     """
 
-    def __init__(self, path: str | Path, header: Header, mesh: MeshData | None, tables: Iterable[TableSpec], fill=None):
+    def __init__(
+        self,
+        path: str | Path,
+        header: Header,
+        mesh: MeshData | None,
+        tables: Iterable[TableSpec],
+        first: Callable[[Journal], None] | None = None,
+    ):
         self.path = Path(path)
         self._tables = {table.name: table for table in tables}
         refuse_foreign(self.path)
@@ -79,9 +87,9 @@ class Journal:
                     table.create(file.require_group("tables"))
                 log = file.create_dataset("log", (0,), "u1", maxshape=(None,), chunks=(4096,))
                 log.attrs["description"] = "JSON documents, each closed by a line feed"
-            if fill is not None:
-                with h5py.File(new, "r+", libver="latest", locking=False) as self._file:
-                    fill(self)
+                if first is not None:
+                    self._file = file
+                    first(self)
             self._lock.move(new)
             self._file = h5py.File(self.path, "r+", libver="latest", locking=False)
             self._file.swmr_mode = True

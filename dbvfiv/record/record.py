@@ -128,13 +128,13 @@ class GrowingRecord(Record, Observer):
                     self.extend(name, {c.name: known.column(name, c.name) for c in table.columns})
             self._log.extend(known.log)
         if self.path is not None:
-            self._journal = Journal(self.path, header, mesh, self.tables.values(), self._copy)
+            self._journal = Journal(self.path, header, mesh, self.tables.values(), self._write_known)
         self.note("begin")
 
-    def _copy(self, journal: Journal) -> None:
-        """Write what is known already into a new file."""
+    def _write_known(self, journal: Journal) -> None:
         for name in self.tables:
-            journal.extend(name, {c: self.column(name, c) for c in self._rows[name]})
+            if self.rows(name):
+                journal.extend(name, {c: self.column(name, c) for c in self._rows[name]})
         if self._log:
             journal.write_log(pack_documents(self._log))
 

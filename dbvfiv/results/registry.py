@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 READERS: dict[str, str] = {
     "onset": "dbvfiv.results.onset:OnsetResults",
     "map": "dbvfiv.results.map:MapResults",
-    "transient": "dbvfiv.transient.result:TransientResults",
 }
 
 

@@ -87,6 +87,11 @@ class StudyResult:
         """Whether the run went to its end."""
         return self.record.complete
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether the run was ended from outside."""
+        return not self.complete
+
     # -- numbers ----
 
     def summary(self) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from ..observer import Observer
 from ..record.files import kind_of
 from ..record.header import Header
 from ..record.mesh import MeshData
+from ..record.part import RecordPart
 from ..record.record import GrowingRecord, Record, StoredRecord
 from . import KINDS
 from .study import Study, find_study
@@ -207,10 +208,12 @@ def resume_result(path: str | Path, observer: Observer | None = None, changes: M
     CaseError
         If the file cannot be read or there is nothing left to do.
     """
-    known = _read(path)
-    if known.complete and not changes:
+    study, known = _find(path), _read(path)
+    if study.rows_to_keep is None and known.complete and not changes:
         raise CaseError(f"The {known.header.kind} run in {str(path)!r} is complete; there is nothing to resume.")
     session = Session(known.header.rebuildable_case(), known.header.name).replace(changes)
+    if study.rows_to_keep is not None:
+        known = RecordPart(known, study.rows_to_keep(known, session.case))
     return session.resume(known, observer, **choices)
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 from ..case.model import Case
 from ..record.mesh import MeshData
+from ..record.record import Record
 from ..record.table import TableSpec
 from . import KINDS
 
@@ -30,6 +31,10 @@ class Study:
         `StudyResult` of its records.
     resumable : bool
         Whether an interrupted run goes on where it ended.
+    rows_to_keep : callable, optional
+        From what an earlier attempt kept and the case as it is to go on, to how many rows of each table the run goes on
+        from; it refuses with a `CaseError` if there is nothing left to do. Without it a run goes on from all rows, and
+        a complete one is refused.
     live : callable, optional
         From the case to what writes an item that was found as a line of a table, as soon as it is; the first line has
         the head of the table above it. Without it everything is printed at the end.
@@ -40,6 +45,7 @@ class Study:
     run: Callable[..., None]
     result: type[Any]
     resumable: bool = True
+    rows_to_keep: Callable[[Record, Case], Mapping[str, int]] | None = None
     live: Callable[[Case], Callable[[Any], str]] | None = None
 
 

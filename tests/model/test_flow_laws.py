@@ -13,10 +13,10 @@ from dbvfiv.model.contract import EquilibriumModel, MotionForms
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.system import ValveSystem
-from dbvfiv.transient.equations import ValveMotion
-from dbvfiv.transient.scheme import scheme
-from dbvfiv.transient.state import consistent_state
-from dbvfiv.transient.stepper import StepOptions, Stepper
+from dbvfiv.motion.equations import ValveMotion
+from dbvfiv.motion.scheme import scheme
+from dbvfiv.motion.state import consistent_state
+from dbvfiv.motion.stepper import StepOptions, Stepper
 from eigen import leading_modes
 from tests.flow.test_adding_a_law import LipLoss, Pipe
 from tests.flow.vessel import Vessel

@@ -1,19 +1,15 @@
-"""Figures of stability, closure and time histories: what they say is what the result holds."""
+"""Figures of stability and closure: what they say is what the result holds."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from matplotlib.colors import BoundaryNorm
-from PIL import Image
 
-import dbvfiv
 from dbvfiv.case import Case
-from dbvfiv.errors import CaseError
 from dbvfiv.plots import map as map_figures
 from dbvfiv.plots import onset as onset_figures
 from dbvfiv.studies.map_column import MapPlan
-from dbvfiv.verdict import Series, in_steps
 
 
 def texts(figure):
@@ -166,63 +162,3 @@ def test_cells_without_a_certificate_are_hatched_and_not_called_stable():
     assert {t.get_text() for t in axes.texts} & {"stable", "unstable"} == {"unstable"}
     assert sum(bool(c.get_hatch()) for c in axes.collections) == 15
     assert any("the others hatched" in text for text in texts(figure))
-
-
-# -- runs in time
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    path = tmp_path_factory.mktemp("run") / "run.h5"
-    changes = {"mesh.around": 6, "mesh.along": 8, "transient.duration": 0.04, "drive.pressure": 12e3}
-    return dbvfiv.load(changes=changes).transient(output=path)
-
-
-def test_the_imbalance_has_an_axis_of_its_own(run):
-    figure = run.figures(only=["energies"])["energies"]
-    *_, rest = figure.axes
-    assert rest.get_ylabel().startswith("Imbalance, ")
-    factor = {"J": 1.0, "mJ": 1e3, "µJ": 1e6, "nJ": 1e9}[rest.get_ylabel().split(", ")[1]]
-    assert np.allclose(rest.lines[0].get_ydata(), factor * run.history["balance"])
-    reach = np.ptp(rest.get_ylim()) / np.ptp(rest.lines[0].get_ydata())
-    assert reach < 3.0  # it can be seen
-    assert "of the work turned over" in rest.get_title("left")
-
-
-def test_spectra_say_their_resolution_and_print_no_more_digits(run, monkeypatch):
-    half = len(run.history["time"]) // 2
-    fine = 1.0 / Series.of(run.history["time"][half:], run.history["mass_flow"][half:]).duration
-    monkeypatch.setitem(run.verdict["lip_opening"], "frequency", 54.98)
-    figure = run.figures(only=["spectrum"])["spectrum"]
-    assert f"resolution {fine:.2g} Hz" in figure.get_suptitle()
-    assert figure.axes[1].get_title("right").endswith(f" {in_steps(54.98, fine)} Hz") and fine > 1
-    assert in_steps(54.98, 50.0) == "55" and in_steps(54.98, 0.3) == "55.0" and in_steps(54.983, 0.02) == "54.98"
-
-
-def test_figures_of_runs_say_clear_opening_and_static_pressure(run):
-    drawn = run.figures(only=["history", "phase-portrait", "station-pressures"])
-    assert "Clear lip opening, mm" in texts(drawn["history"])
-    assert "Velocity of one lip, m/s" in texts(drawn["phase-portrait"])
-    assert "Static pressure, kPa" in texts(drawn["station-pressures"])
-
-
-def test_films_of_a_run_take_cycles_and_of_modes_a_mode(run, modes, coarse_run, command_line, tmp_path, one_sentence):
-    file = run.path
-    outcome = command_line("plot", file, "-o", tmp_path, "--only", "history", "--animate", 1)
-    assert outcome.status == 0, outcome.err
-    (film,) = tmp_path.glob("*.gif")
-    assert film.name in ("run.gif", "last-cycle.gif")
-    with Image.open(film) as picture:
-        assert picture.n_frames > 10
-    shapes = modes.save(tmp_path / "modes.h5")
-    for path, number, words in (
-        (file, 500, "--animate 500"),
-        (file, 0, "1 or more"),
-        (shapes, 40, "40"),
-        (coarse_run.path, 1, "does not move"),
-    ):
-        outcome = command_line("plot", path, "-o", tmp_path / "new", "--animate", number)
-        assert outcome.status == 2 and words in outcome.err and one_sentence(outcome.err), outcome.err
-        assert not (tmp_path / "new").exists()  # misuse shows before anything is drawn
-    with pytest.raises(CaseError, match="at least 2 frames"):
-        run.animate(tmp_path / "one.gif", frames=1)

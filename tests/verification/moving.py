@@ -8,10 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from dbvfiv.model.linear import CoupledFactor
+from dbvfiv.motion.kernels import inertia_force, kinetic_energy, strain_energy
+from dbvfiv.motion.terms import Load
 from dbvfiv.shell import Shell
 from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
-from dbvfiv.transient.equations import Load
-from dbvfiv.transient.kernels import inertia_force, kinetic_energy, strain_energy
 
 NONE = np.zeros(1)
 
@@ -20,6 +20,7 @@ class Motion:
     """What the stepper asks of any motion without a fluid; the load is a force that the positions fix."""
 
     moving_fluid = False
+    resolution = 0.0
 
     def __init__(self, size: int, alpha: float = 0.0, beta: float = 0.0):
         self.size, self.conditions = size, SimpleNamespace(alpha=alpha, beta=beta, density=0.0)

@@ -13,7 +13,7 @@ from dbvfiv.case import load_case
 from dbvfiv.model import ValveModel
 from dbvfiv.studies.onset import OnsetOptions, OnsetSearch
 from dbvfiv.studies.onset_normal_form import normal_form
-from dbvfiv.transient.api import transient
+from dbvfiv.studies.transient.run import run_transient
 
 #: Relative distance from the onset density.
 ASIDE = 0.02
@@ -61,7 +61,7 @@ class Onset:
             "transient.duration": 0.5,
             "transient.step": 4e-4,
         }
-        history = transient(ValveModel(self.case.replace(changes))).history
+        history = run_transient(ValveModel(self.case.replace(changes))).history
         time, lip = np.array(history["time"]), np.array(history["lip_displacement"]) - self.steady
         period = 1.0 / self.point.frequency
         starts = np.arange(0.1, time[-1] - period, period)

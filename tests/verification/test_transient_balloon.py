@@ -12,9 +12,9 @@ from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from dbvfiv.transient.scheme import scheme
-from dbvfiv.transient.state import consistent_state
-from dbvfiv.transient.stepper import StepOptions, Stepper
+from dbvfiv.motion.scheme import scheme
+from dbvfiv.motion.state import consistent_state
+from dbvfiv.motion.stepper import StepOptions, Stepper
 from tests.shell.structures import richardson
 from tests.verification.moving import ShellMotion
 from tests.verification.test_shell_balloon import RUBBER, H, octant

@@ -15,10 +15,10 @@ import pytest
 
 import dbvfiv
 from dbvfiv.model import Conditions, linearise
-from dbvfiv.transient.options import RunOptions
-from dbvfiv.transient.run import Runner
-from dbvfiv.transient.start import steady_positions
-from dbvfiv.transient.stepper import StepOptions
+from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.start import steady_positions
+from dbvfiv.motion.stepper import StepOptions
+from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, sweep
 
 PUSH = 1e-8  # m; at 2 kPa, where stops at the corners of the lips part, 1e-6 m changes the frequency by 0.5 %

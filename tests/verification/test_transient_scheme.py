@@ -9,11 +9,11 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import dbvfiv
-from dbvfiv.transient.equations import ValveMotion
-from dbvfiv.transient.scheme import scheme
-from dbvfiv.transient.start import steady_positions
-from dbvfiv.transient.state import consistent_state
-from dbvfiv.transient.stepper import StepOptions, Stepper
+from dbvfiv.motion.equations import ValveMotion
+from dbvfiv.motion.scheme import scheme
+from dbvfiv.motion.start import steady_positions
+from dbvfiv.motion.state import consistent_state
+from dbvfiv.motion.stepper import StepOptions, Stepper
 from tests.verification.moving import PointMotion
 
 TIGHT = StepOptions(tolerance=1e-9, floor=1e-13)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.transient.run import run_transient
+from dbvfiv.studies.transient.run import run_transient
 
 STUDY = Path(__file__).parents[2] / "cases" / "studies" / "sudden_pressure.py"
 

@@ -13,12 +13,12 @@ import numpy as np
 from ...case.model import Case
 from ...errors import SolveError
 from ...model.lip import LipCentre
+from ...motion.control import ControlOptions, FixedSteps
+from ...motion.scheme import scheme
+from ...motion.start import steady_positions
+from ...motion.state import consistent_state
+from ...motion.stepper import StepFailure, StepOptions, Stepper
 from ...observer import Observer
-from ...transient.control import ControlOptions, FixedSteps
-from ...transient.scheme import scheme
-from ...transient.start import steady_positions
-from ...transient.state import consistent_state
-from ...transient.stepper import StepFailure, StepOptions, Stepper
 from .closing_motion import ClosingMotion, ContactValve
 from .opening import FACES, measure
 from .state import QUARTERS

@@ -9,7 +9,7 @@ import numpy as np
 from ...case.model import Case
 from ...contact import ContactLaw, PlaneContact, nodal_thickness, tributary_area
 from ...model import ValveModel
-from ...transient.equations import ValveMotion
+from ...motion.equations import ValveMotion
 from .model import ROUNDING
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..verdict import JudgeOptions, Verdict, judge
-from .history import History
+from ...verdict import JudgeOptions, Verdict, judge
 
+#: Columns of a history by name.
+Columns = Mapping[str, np.ndarray]
 #: Areas below this multiple of the lip gap at rest count as closed.
 CLOSED = 2.0
 #: Pascal; no fluid's pressure falls further below that of the surroundings.
@@ -77,12 +79,14 @@ _LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undeci
 
 
 def assess(
-    history: History, gap: float, residual: float = np.nan, options: JudgeOptions = JudgeOptions(), since: float = 0.0
+    history: Columns, gap: float, residual: float = np.nan, options: JudgeOptions = JudgeOptions(), since: float = 0.0
 ) -> RunVerdict:
     """Verdict on a history.
 
     Parameters
     ----------
+    history : mapping of str to array
+        See `dbvfiv.studies.transient.tables.SCALARS`.
     gap : float
         Flow area of the whole valve at the lip at rest, m2.
     residual : float
@@ -94,24 +98,15 @@ def assess(
     chosen = time >= since
     known = residual if np.isfinite(residual) else None
     signals = ("mass_flow", "lip_displacement", "lip_opening")
-    if np.count_nonzero(chosen) < 2:
-        found = [_unjudged(float(history[name][-1])) for name in signals]
-        return RunVerdict(*found, residual, history.rows - 1, float(time[-1]))
     found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in signals]
     closed = judge(time[chosen], history["smallest_area"][chosen], options, closed_below=CLOSED * gap)
     if closed.name == "closed":
         reason = "The smallest flow area stays at that of the lip gap at rest."
         found = [Verdict(**{**vars(v), "name": "closed", "decided": True, "reason": reason}) for v in found]
-    return RunVerdict(*found, residual, history.rows - 1, float(time[-1]))
+    return RunVerdict(*found, residual, len(time) - 1, float(time[-1]))
 
 
-def _unjudged(value: float) -> Verdict:
-    """Verdict on a run without a step."""
-    reason = "No step was found, so there is nothing to judge."
-    return Verdict("undecided", False, reason, mean=value, amplitude=0.0, rms=0.0, smallest=value, largest=value)
-
-
-def beyond_model(history: History) -> str | None:
+def beyond_model(history: Columns) -> str | None:
     """Sentence on pressures that no fluid could have, None without any.
 
     An ideal incompressible fluid pays any price for passing a gap that shuts; a real one separates, cavitates or is

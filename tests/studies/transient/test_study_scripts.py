@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-STUDIES = Path(__file__).parents[2] / "cases" / "studies"
+STUDIES = Path(__file__).parents[3] / "cases" / "studies"
 
 
 def study(name, *arguments):

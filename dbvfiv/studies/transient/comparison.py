@@ -10,11 +10,11 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..drawing.style import new_figure, style
-from ..errors import CaseError
+from ...drawing.style import new_figure, style
+from ...errors import CaseError
 
 if TYPE_CHECKING:
-    from ..transient.result import TransientResults
+    from .result import TransientResult
 
 
 _QUIET = tuple(
@@ -22,14 +22,14 @@ _QUIET = tuple(
 )
 
 
-def differing_keys(results: Sequence[TransientResults]) -> list[str]:
+def differing_keys(results: Sequence[TransientResult]) -> list[str]:
     """Keys of the cases that are not the same in all runs, those that only steer the run left out."""
     flat = [_flat(result.case.to_dict()) for result in results]
     keys = [key for key in flat[0] if any(case.get(key) != flat[0][key] for case in flat)]
     return [key for key in keys if key not in _QUIET]
 
 
-def labels(results: Sequence[TransientResults]) -> list[str]:
+def labels(results: Sequence[TransientResult]) -> list[str]:
     """Legend entries that say what tells the runs apart."""
     keys = differing_keys(results)[:3]
     if not keys:
@@ -41,7 +41,7 @@ def labels(results: Sequence[TransientResults]) -> list[str]:
     return found
 
 
-def compare(results: Sequence[TransientResults]) -> Figure:
+def compare(results: Sequence[TransientResult]) -> Figure:
     """Mass flow and lip opening of several runs over time (compare Figs. 5-3 to 5-10, 7-13 and 7-14 of Wang 2014);
     where all end in cycles, these in phase.
     """
@@ -80,7 +80,7 @@ def compare(results: Sequence[TransientResults]) -> Figure:
     return figure
 
 
-def _last_cycles(result: TransientResults, count: int = 2) -> tuple[slice, np.ndarray]:
+def _last_cycles(result: TransientResult, count: int = 2) -> tuple[slice, np.ndarray]:
     """Rows of the last cycles, and times, ms, from the instant at which the lip rises through its mean."""
     h = result.history
     t, x = h["time"], h["lip_displacement"] - result.verdict["lip_displacement"]["mean"]
@@ -95,7 +95,7 @@ def _last_cycles(result: TransientResults, count: int = 2) -> tuple[slice, np.nd
     return slice(at, end), 1e3 * (t[at:end] - begin)
 
 
-def save_comparison(results: Sequence[TransientResults], path: Path) -> Path:
+def save_comparison(results: Sequence[TransientResult], path: Path) -> Path:
     """Draw a comparison into a file.
 
     Raises

@@ -1,4 +1,4 @@
-"""Options of a transient run."""
+"""Options of a run in time."""
 
 from __future__ import annotations
 
@@ -38,6 +38,11 @@ class RunOptions:
     restart_every: int = 500
     stop_when: tuple[str, ...] = ()
     judge_every: int = 100
+
+    @property
+    def end(self) -> float:
+        """Time, s, from which on no further step is made: that of the last step but for rounding."""
+        return self.duration * (1 - 1e-12) - 1e-9 * self.control.step
 
     @classmethod
     def of(cls, case: Case) -> RunOptions:

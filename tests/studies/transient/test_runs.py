@@ -11,16 +11,40 @@ import h5py
 import numpy as np
 import pytest
 
-from dbvfiv.case import CaseError
+import dbvfiv
+from dbvfiv.case import CaseError, load_case
 from dbvfiv.errors import SolveError
+from dbvfiv.motion import stepper
+from dbvfiv.motion.drive import Drive
+from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.start import steady_positions
+from dbvfiv.record.header import Header
+from dbvfiv.record.journal import Journal
+from dbvfiv.record.mesh import MeshData
+from dbvfiv.record.part import RecordPart
+from dbvfiv.record.record import GrowingRecord, StoredRecord
 from dbvfiv.results import load_result
-from dbvfiv.transient.api import resume, transient
-from dbvfiv.transient.drive import Drive
-from dbvfiv.transient.file import read_restart
-from dbvfiv.transient.history import History
-from dbvfiv.transient.options import RunOptions
-from dbvfiv.transient.run import Progress, Runner, run_transient
-from dbvfiv.transient.start import steady_positions
+from dbvfiv.studies.session import Session
+from dbvfiv.studies.transient import keeping
+from dbvfiv.studies.transient.assess import beyond_model
+from dbvfiv.studies.transient.keeping import rows_to_keep
+from dbvfiv.studies.transient.progress import Progress
+from dbvfiv.studies.transient.run import Runner, run_transient
+from dbvfiv.studies.transient.tables import HISTORY, RESTART, STATES, tables_of
+
+
+def transient(model, name="case", output=None, observer=None):
+    """A run of a model's case, as the command makes it."""
+    session = Session(model.case, name)
+    session.model = model
+    return session.perform("transient", output, observer)
+
+
+@pytest.fixture
+def all_restart_points(monkeypatch):
+    """Keep every restart point, however large."""
+    monkeypatch.setattr(keeping, "RESTART_SHARE", float("inf"))
+
 
 SHORT = {"transient.duration": 0.02, "transient.restart_every": 7, "transient.save_every": 0.005}
 
@@ -67,6 +91,18 @@ def test_kick_rings_at_the_eigenvalue(valve):
     expected = 1e-5 * np.exp(value * h["time"]).real
     assert h["lip_displacement"][0] - still == pytest.approx(1e-5, rel=1e-6)
     assert np.abs(h["lip_displacement"] - still - expected).max() < 0.02 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("beta, number", [(3e-3, 1), (0.0, 1), (0.0, 3)])
+def test_a_kick_follows_a_leading_mode_by_the_rule_of_all_studies(valve, beta, number):
+    """Without stiffness damping too, where a band of structural frequencies says what is leading."""
+    changes = {"drive.pressure": 6e3, "fluid.density": 10.0, "damping.alpha": 0.0, "damping.beta": beta}
+    kick = {"transient.start": "kick", "transient.kick_mode": number, "transient.duration": 1e-3}
+    model = valve(changes | kick)
+    listed = [m for m in dbvfiv.load(model.case).modes().modes if m.frequency > 0]
+    followed = run_transient(model).progress.eigenvalue
+    mode = listed[number - 1]
+    assert followed == pytest.approx(complex(mode.growth_rate, 2 * np.pi * mode.frequency), rel=1e-6)
 
 
 def test_storage_law_lets_the_wall_displace_fluid(valve):
@@ -131,14 +167,13 @@ def test_bad_drive_tables(tmp_path, valve, text, words):
     table.write_text(text)
     with pytest.raises(CaseError, match=words):
         valve().case.replace({"transient.drive_table": str(table)})
-        from dbvfiv.case import load_case
-
         load_case(None, [f"transient.drive_table={table}"])
 
 
 def test_a_file_holds_the_run(tmp_path, valve):
     model = valve(SHORT)
     kept = transient(model, "small", tmp_path / "run.h5")
+    assert [state.time for state in kept.states] == pytest.approx([0, 0.005, 0.01, 0.015, 0.02])
     result = load_result(tmp_path / "run.h5")
     assert result.complete and result.kind == "transient" and result.case == model.case
     assert all(np.array_equal(result.history[name], kept.history[name]) for name in kept.history)
@@ -184,7 +219,7 @@ class Stop:
 
 
 @pytest.mark.parametrize("adaptive", [False, True])
-def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive):
+def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive, all_restart_points):
     # light fluid: the lips are slamming when it is interrupted
     changes = SHORT | {
         "transient.duration": 0.045,
@@ -202,7 +237,9 @@ def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive):
     for after in (1, 66):
         stopped = transient(model, output=tmp_path / "parts.h5", observer=Stop(after))
         assert not stopped.complete and len(stopped.history["time"]) == after + 1
-        resumed = resume(tmp_path / "parts.h5")
+        known = StoredRecord(tmp_path / "parts.h5", tables_of)
+        assert rows_to_keep(known, model.case)[HISTORY] == 1 + 7 * (after // 7)
+        resumed = dbvfiv.resume(tmp_path / "parts.h5")
         assert resumed.complete
         for name in whole.history:
             assert np.array_equal(resumed.history[name], whole.history[name]), name
@@ -214,33 +251,62 @@ def test_a_finished_run_goes_on_to_a_later_end(tmp_path, valve):
     path = tmp_path / "run.h5"
     transient(valve(SHORT), output=path)
     with pytest.raises(CaseError, match="has reached its end"):
-        resume(path)
-    longer = resume(path, 0.03)
+        dbvfiv.resume(path)
+    with pytest.raises(CaseError, match="has reached its end"):
+        dbvfiv.resume(path, duration=0.01)
+    assert load_result(path).complete
+    longer = dbvfiv.resume(path, duration=0.03)
     assert longer.history["time"][-1] == pytest.approx(0.03) and longer.case.transient.duration == 0.03
     assert load_result(path).complete
 
 
-def test_torn_restart_points_are_passed_over(tmp_path, valve):
+def test_torn_restart_points_are_passed_over(tmp_path, valve, all_restart_points):
     path = tmp_path / "run.h5"
-    transient(valve(SHORT), output=path)
-    last = read_restart(path)
+    whole = transient(valve(SHORT), output=path)
+    steps = StoredRecord(path, tables_of).column(RESTART, "steps")
+    assert list(steps) == [0, 7, 14, 20]
     with h5py.File(path, "r+") as file:
-        file[f"restart/{(last.sequence - 1) % 2}"][40] += 1.0
-    assert read_restart(path).sequence == last.sequence - 1
-    assert read_restart(path).rows < last.rows
+        file["tables/restart/#"][-1] = 0  # its last row did not arrive whole
+        file["tables/history/#"].resize(14, axis=0)  # nor did the rows that the one before stands upon
+        file["log"].resize(0, axis=0)
+    known = StoredRecord(path, tables_of)
+    assert rows_to_keep(known, whole.case) == {HISTORY: 8, STATES: 2, RESTART: 2}
+    resumed = dbvfiv.resume(path)
+    assert all(np.array_equal(resumed.history[name], whole.history[name]) for name in whole.history)
 
 
-def test_only_transient_runs_are_resumed(tmp_path):
-    import dbvfiv
+def test_a_resume_that_dies_at_once_leaves_the_file_as_it_was(tmp_path, valve, monkeypatch):
+    path = tmp_path / "run.h5"
+    transient(valve(SHORT), output=path, observer=Stop(9))
+    before = path.read_bytes()
 
-    dbvfiv.load().replace({"mesh.around": 4, "mesh.along": 6}).steady([6e3], output=tmp_path / "steady.h5")
-    with pytest.raises(CaseError, match="only transient runs"):
-        resume(tmp_path / "steady.h5")
+    def die(self, documents):
+        raise OSError("The machine goes down.")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Journal, "write_log", die)  # when the rows are copied
+        with pytest.raises(OSError, match="goes down"):
+            dbvfiv.resume(path)
+    assert path.read_bytes() == before and [file.name for file in tmp_path.iterdir()] == ["run.h5"]
+    assert dbvfiv.resume(path).complete
+
+
+def test_restart_points_take_little_of_the_file(tmp_path, valve, monkeypatch):
+    changes = {"transient.duration": 0.3, "transient.restart_every": 7, "transient.step": 5e-4}
+    transient(valve(changes), output=tmp_path / "run.h5")
+    record = StoredRecord(tmp_path / "run.h5", tables_of)
+    sizes = {table.name: keeping.row_bytes(table) * record.rows(table.name) for table in record.tables.values()}
+    first_and_last = 2 * keeping.row_bytes(record.tables[RESTART])
+    assert sizes[RESTART] - first_and_last <= keeping.RESTART_SHARE * (sizes[HISTORY] + sizes[STATES])
+    assert 2 < record.rows(RESTART) < 601 // 7
+    # but no more than so many seconds of work may be lost
+    monkeypatch.setattr(keeping, "RESTART_SECONDS", 0.0)
+    monkeypatch.setattr(keeping, "RESTART_LOSS", 0.0)
+    transient(valve(changes), output=tmp_path / "run.h5")
+    assert StoredRecord(tmp_path / "run.h5", tables_of).rows(RESTART) == 2 + 600 // 7
 
 
 def test_a_run_that_fails_keeps_everything_and_says_where(tmp_path, valve, monkeypatch):
-    from dbvfiv.transient import stepper
-
     step = stepper.Stepper.step
 
     def refuse(self, state, h):
@@ -256,7 +322,44 @@ def test_a_run_that_fails_keeps_everything_and_says_where(tmp_path, valve, monke
     assert kept.failures == result.failures and not kept.complete
     assert kept.history["time"][-1] == pytest.approx(0.011)
     monkeypatch.undo()
-    assert resume(tmp_path / "run.h5").complete  # with better luck
+    assert dbvfiv.resume(tmp_path / "run.h5").complete  # with better luck
+
+
+def test_a_run_that_fails_or_is_interrupted_at_once_can_be_read_and_resumed(
+    tmp_path, valve, monkeypatch, command_line, one_sentence
+):
+    path = tmp_path / "run.h5"
+
+    def refuse(self, state, h):
+        raise stepper.StepFailure("Nothing helps.")
+
+    def interrupt(self, state, h):
+        raise KeyboardInterrupt
+
+    whole = transient(valve(SHORT))
+    for step, failures in ((refuse, 1), (interrupt, 0)):
+        with monkeypatch.context() as patched:
+            patched.setattr(stepper.Stepper, "step", step)
+            result = transient(valve(SHORT), output=path)
+        assert len(result.failures) == failures and not result.complete and result.interrupted == (not failures)
+        assert result.summary()["verdict"] is None and not result.drawable
+        assert command_line("info", path).status == 0
+        for arguments in (["plot", path, "--animate", 1], ["compare", path], ["verdict", path]):
+            outcome = command_line(*arguments)
+            assert outcome.status == 2 and one_sentence(outcome.err), outcome.err
+        resumed = dbvfiv.resume(path)
+        assert resumed.complete and np.array_equal(resumed.history["mass_flow"], whole.history["mass_flow"])
+
+
+@pytest.mark.parametrize("start", ["rest", "steady", "kick"])
+@pytest.mark.parametrize("law", ["quasi-steady", "storage"])
+def test_a_valve_without_pressure_stays_as_it_is(tmp_path, valve, command_line, start, law):
+    changes = {"drive.pressure": 0.0, "transient.start": start, "fluid.continuity": law, "transient.kick_opening": 1e-5}
+    result = transient(valve(SHORT | changes), output=tmp_path / "run.h5")
+    assert result.complete and result.verdict["verdict"] == "closed" and len(result.history["time"]) == 21
+    limit = 1e-12 if start != "kick" else 1.1e-5
+    assert np.abs(result.history["lip_displacement"]).max() < limit
+    assert command_line("info", tmp_path / "run.h5").status == 0
 
 
 def test_the_verdict_ends_the_run(valve):
@@ -273,6 +376,33 @@ def test_the_verdict_ends_the_run(valve):
     )
     run = run_transient(model)
     assert run.stopped and run.verdict.name == "steady" and run.progress.state.time < 4.0
+
+
+def test_a_resumed_run_is_ended_by_the_same_verdict(tmp_path, valve, all_restart_points):
+    changes = {
+        "transient.duration": 5.0,
+        "transient.stop_when": ["steady"],
+        "transient.numerical_damping": 0.1,
+        "transient.restart_every": 50,
+        "transient.step": 5e-3,
+        "drive.pressure": 6e3,
+        "transient.start": "kick",
+        "damping.alpha": 5.0,
+        "transient.kick_opening": 1e-6,
+    }
+    model = valve(changes)
+    whole = transient(model)
+    assert whole.stopped and whole.complete
+    judged = whole.record.notes("verdict")
+    first = next(note["steps"] for note in judged if note["decided"])
+    end = len(whole.history["time"]) - 1
+    assert first < end
+    transient(model, output=tmp_path / "run.h5", observer=Stop((first + end) // 2))
+    resumed = dbvfiv.resume(tmp_path / "run.h5")
+    assert resumed.stopped and np.array_equal(resumed.history["time"], whole.history["time"])
+    with pytest.raises(CaseError, match="was ended by its verdict"):
+        dbvfiv.resume(tmp_path / "run.h5")
+    assert load_result(tmp_path / "run.h5").complete
 
 
 def test_staggered_coupling_reaches_the_same_state(valve):
@@ -310,20 +440,26 @@ def test_impossible_starts(tmp_path, valve):
         run_transient(type(valve())(case.replace({"transient.start_state": 77})))
 
 
-def test_progress_and_history_survive_packing(valve):
-    runner = Runner(valve(), replace(RunOptions.of(valve().case), duration=0.003))
-    run = runner.start()
-    again = Progress.unpack(run.progress.pack(), run.model.stations)
-    assert (again.steps, again.saved, again.work) == (run.progress.steps, run.progress.saved, run.progress.work)
-    assert np.array_equal(again.state.q, run.progress.state.q)
-    history = History(run.model.stations)
-    history.restore({name: run.history[name].copy() for name in run.history._columns})
-    assert history.rows == run.history.rows and np.array_equal(history["station_area"], run.history["station_area"])
+def test_progress_and_history_go_through_a_file_unchanged(tmp_path, valve):
+    model, path = valve(), tmp_path / "run.h5"
+    mesh = MeshData.of(model)
+    with GrowingRecord(Header.of("transient", model.case), mesh, tables_of(mesh), path) as record:
+        run = Runner(model, replace(RunOptions.of(model.case), duration=0.003), record).start()
+    stored = StoredRecord(path, tables_of)
+    again = Progress.read(stored)
+    assert all(np.array_equal(v, getattr(again.state, name)) for name, v in vars(run.progress.state).items())
+    left, right = ({n: v for n, v in vars(p).items() if n != "state"} for p in (again, run.progress))
+    assert np.isnan([left.pop("eigenvalue"), right.pop("eigenvalue")]).all()
+    assert left == right
+    part = RecordPart(stored, {HISTORY: 2})
+    assert (part.rows(HISTORY), part.rows(STATES)) == (2, stored.rows(STATES)) and part.log == stored.log
+    assert np.array_equal(part.column(HISTORY, "station_area"), run.history["station_area"][:2])
+    assert part.value(HISTORY, "time", -1) == run.history["time"][1]
+    with pytest.raises(IndexError):
+        part.value(HISTORY, "time", 2)
 
 
 def test_the_python_interface_runs_and_resumes(tmp_path):
-    import dbvfiv
-
     small = dbvfiv.load(changes={"mesh.around": 4, "mesh.along": 6, "transient.step": "2 ms"})
     path = tmp_path / "run.h5"
     run = small.transient("10 ms", density=500.0, output=path)
@@ -363,29 +499,26 @@ def test_killed_with_signal_9_at_any_moment(tmp_path, valve):
     for wait in [0.0, 0.02, *rng.uniform(0.1, 6.0, 5)]:
         path.unlink(missing_ok=True)
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        while not path.exists():
+        while not (path.exists() and path.stat().st_size):  # an empty file holds the name before
             assert process.poll() is None
             time.sleep(0.005)
         time.sleep(wait)
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
-        restart = read_restart(path)  # None if it died before the first
-        rows = restart.rows if restart else 0
+        rows = rows_to_keep(StoredRecord(path, tables_of), case.case)[HISTORY]  # none if it died before the first
         if rows:
             read = load_result(path)
             assert len(read.history["time"]) >= rows
             assert np.array_equal(read.history["lip_displacement"][:rows], whole.history["lip_displacement"][:rows])
         found.append(rows)
         if rows < 601:
-            resumed = resume(path)
+            resumed = dbvfiv.resume(path)
             assert all(np.array_equal(resumed.history[name], whole.history[name]) for name in whole.history)
     assert len(set(found)) >= 3
     assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
 
 
 def test_pressures_below_vacuum_are_told():
-    from dbvfiv.transient.assess import beyond_model
-
     pressure = np.zeros((100, 5))
     history = {"time": np.linspace(0, 1, 100), "station_pressure": pressure}
     pressure[40:] = -1.0e5

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .equations import Load, Step, ValveMotion
+from .equations import ValveMotion
+from .terms import Load, Step
 
 
 class StaggeredMotion(ValveMotion):

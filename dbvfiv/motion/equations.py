@@ -9,100 +9,13 @@ tangent without an evaluation of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
 
 from ..model import ValveModel
 from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
 from .kernels import inertia_force, kinetic_energy, row_motion, strain_energy
-
-
-@dataclass(frozen=True)
-class Weights:
-    """How the parts of the equations depend on what is new in a step.
-
-    Attributes
-    ----------
-    theta : float
-        Where in the step the fluid's equations are met: the share of the new state there.
-    load : float
-        Factor of G p there.
-    inertia : float
-        Factor of M, 1/s2; mass damping included.
-    force : float
-        Factor of the tangent of F.
-    velocity : float
-        Derivative of the new velocities with respect to the new positions, 1/s.
-    psi : float
-        Derivative of the rate of psi with respect to the new psi, 1/s.
-    """
-
-    theta: float
-    load: float
-    inertia: float
-    force: float
-    velocity: float
-    psi: float
-
-
-@dataclass(frozen=True)
-class Step:
-    """What the fluid of a step starts from.
-
-    Attributes
-    ----------
-    theta : float
-        See `Weights`.
-    speed : float
-        Inlet velocity at the start, m/s.
-    psi_weight : float
-    psi_known : (m,) array
-        The rate of psi is psi_weight psi + psi_known, with the new psi.
-    inlet : float
-        Inlet pressure where the equations are met, Pa.
-    """
-
-    theta: float
-    speed: float
-    psi_weight: float
-    psi_known: np.ndarray
-    inlet: float
-
-
-@dataclass
-class Load:
-    """Fluid of a step and its force on the wall.
-
-    Attributes
-    ----------
-    force : (n,) array
-        G p, where the equations are met.
-    outlet : float
-        Pressure at the outlet, Pa, to vanish; zero where U is no unknown.
-    pressure : (m,) array
-        Pa, where the equations are met.
-    area, speed, psi : (m,) arrays
-        At the end of the step: m2 of a quarter, m/s, m2/s.
-    psi_rate : (m,) array
-        Where the equations are met, m2/s2.
-    inlet : float
-        Inlet pressure there, Pa.
-    mid_speed : float
-        Inlet velocity there, m/s.
-    """
-
-    force: np.ndarray
-    outlet: float
-    pressure: np.ndarray
-    area: np.ndarray
-    speed: np.ndarray
-    psi: np.ndarray
-    psi_rate: np.ndarray
-    inlet: float
-    mid_speed: float
+from .terms import Load, Step, Weights
 
 
 class ValveMotion:
@@ -113,6 +26,11 @@ class ValveMotion:
     model : ValveModel
     conditions : Conditions, optional
         Density and damping; those of the model's case by default.
+
+    Attributes
+    ----------
+    resolution : float
+        Smallest displacement that positions resolve, m.
     """
 
     def __init__(self, model: ValveModel, conditions: Conditions | None = None):
@@ -121,6 +39,7 @@ class ValveMotion:
         self.moving_fluid = model.flow.unsteady
         self.fluid = model.flow.stepping(self.conditions.density) if self.moving_fluid else None
         self.size = model.size
+        self.resolution = float(np.finfo(float).eps * np.abs(model.shell.mesh.nodes).max())
         self.stations = model.stations
         shell = model.shell
         self._quads = shell.mesh.quads
@@ -225,11 +144,6 @@ class ValveMotion:
         out[:, :3] += self.model.shell.mesh.nodes
         return out
 
-    @cached_property
-    def rounding(self) -> float:
-        """What rounding of the positions makes of a displacement that is nothing, m."""
-        return float(np.finfo(float).eps * np.abs(self.model.mesh.nodes).max())
-
     def length(self, dq: np.ndarray) -> float:
         """Largest displacement in a change (n,) of the unknowns, m; rotations count by the path of the wall's face."""
         return float(np.max(np.abs(dq * self._scale)))
@@ -315,7 +229,6 @@ class ValveMotion:
         """
         model, alpha, beta = self.model, self.conditions.alpha, self.conditions.beta
         nodal = model.nodal(q)
-        np.zeros(self.size)
         forces = self.internal_force(q) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
         mass = model.mass(q)
         if not self.moving_fluid:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dbvfiv.transient.scheme import SCHEMES, scheme
+from dbvfiv.motion.scheme import SCHEMES, scheme
 
 MEMBERS = [("generalised-alpha", nd) for nd in (0.0, 0.1, 0.3, 0.5)] + [
     ("hht", 0.0),

@@ -8,10 +8,10 @@ import pytest
 from dbvfiv.flow import FlowMotion
 from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.model.dynamics import dynamic_residual
-from dbvfiv.transient.equations import ValveMotion
-from dbvfiv.transient.scheme import scheme
-from dbvfiv.transient.state import MotionState, consistent_state
-from dbvfiv.transient.stepper import _Trial
+from dbvfiv.motion.equations import ValveMotion
+from dbvfiv.motion.scheme import scheme
+from dbvfiv.motion.state import consistent_state
+from dbvfiv.motion.trial import Trial
 
 LAWS = [{"fluid.continuity": "quasi-steady"}, {"fluid.continuity": "storage"}]
 
@@ -99,7 +99,7 @@ def test_the_inlet_velocity_is_the_root_without_reversal(valve, law, theta):
 def test_iteration_matrix_against_differences(valve, open_state, law, h, robust):
     motion = ValveMotion(valve({"fluid.density": 200.0} | law))
     state = consistent_state(motion, 0.0, open_state, 0.02 * open_state / np.abs(open_state).max(), 0.3, 12e3)
-    trial = _Trial(motion, scheme("generalised-alpha", 0.1), state, h, lambda t: 12e3, robust)
+    trial = Trial(motion, scheme("generalised-alpha", 0.1), state, h, lambda t: 12e3, robust)
     trial.set(0.5 * state.a)
     trial.evaluate()
     trial.linearise()
@@ -122,11 +122,3 @@ def test_energies_against_their_definition(valve, open_state):
     assert kinetic == pytest.approx(0.5 * v @ (model.shell.dofs.matrix(model.mass(open_state)) @ v), rel=1e-12)
     assert strain == pytest.approx(model.shell.energy(open_state), rel=1e-12)
     assert stop == model.stops.energy(open_state)
-
-
-def test_a_state_goes_through_a_file_unchanged():
-    rng = np.random.default_rng(5)
-    parts = [rng.standard_normal(7) for _ in range(6)] + [rng.standard_normal(3) for _ in range(2)]
-    state = MotionState(0.1, 0.2, *parts)
-    again = MotionState.unpack(state.pack(), 3)
-    assert all(np.array_equal(a, b) for a, b in zip(vars(state).values(), vars(again).values()))

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
 
-from ..drawing.faces import nodal_thickness, offset_line
-from ..drawing.style import ACCENT, COMPUTED, REST, new_figure, style
-from ..errors import CaseError
+from ...drawing.faces import nodal_thickness, offset_line
+from ...drawing.style import ACCENT, COMPUTED, REST, new_figure, style
+from ...errors import CaseError
 
 if TYPE_CHECKING:
-    from ..transient.result import TransientResults
+    from .result import TransientResult
 
 
-def animate(result: TransientResults, path: Path, frames: int = 48, duration: float | None = None) -> Path:
+def animate(result: TransientResult, path: Path, frames: int = 48, duration: float | None = None) -> Path:
     """Write a GIF of the faces at x = 0, the flow area and the lip's history.
 
     Parameters
@@ -43,7 +43,7 @@ def animate(result: TransientResults, path: Path, frames: int = 48, duration: fl
     return path
 
 
-def cycles_to_animate(result: TransientResults, count: int) -> float:
+def cycles_to_animate(result: TransientResult, count: int) -> float:
     """Length, s, of the last `count` cycles; of the whole run for 1 where there is no cycle.
 
     Raises
@@ -68,7 +68,7 @@ def cycles_to_animate(result: TransientResults, count: int) -> float:
     return count * period
 
 
-def _shown_rows(result: TransientResults, frames: int, duration: float | None) -> tuple[np.ndarray, np.ndarray]:
+def _shown_rows(result: TransientResult, frames: int, duration: float | None) -> tuple[np.ndarray, np.ndarray]:
     """Rows of the history that are pictures, and whether each row is in the history shown."""
     t = result.history["time"]
     start, end = result.cycle or (t[0], t[-1])
@@ -78,7 +78,7 @@ def _shown_rows(result: TransientResults, frames: int, duration: float | None) -
     return rows, (t >= start - (end - start)) & (t <= end)
 
 
-def _picture(result: TransientResults, rows: np.ndarray, shown: np.ndarray):
+def _picture(result: TransientResult, rows: np.ndarray, shown: np.ndarray):
     """The figure, and the function that takes it to a row of the history."""
     h, mesh = result.history, result.mesh
     t, z = h["time"], 1e3 * mesh.z

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from dbvfiv.transient.control import ControlOptions, FixedSteps, step_control
-from dbvfiv.transient.equations import ValveMotion
-from dbvfiv.transient.scheme import scheme
-from dbvfiv.transient.state import consistent_state
-from dbvfiv.transient.stepper import StepFailure, StepOptions, Stepper
+from dbvfiv.motion.control import ControlOptions, FixedSteps, step_control
+from dbvfiv.motion.equations import ValveMotion
+from dbvfiv.motion.scheme import scheme
+from dbvfiv.motion.state import consistent_state
+from dbvfiv.motion.stepper import StepFailure, StepOptions, Stepper
 
 TIGHT = StepOptions(tolerance=1e-9, floor=1e-13)
 
@@ -62,7 +62,7 @@ def test_work_and_damping_account_for_the_energy(valve):
 
 
 def test_a_free_swing_keeps_its_energy(valve, open_state):
-    from dbvfiv.transient.start import steady_positions
+    from dbvfiv.motion.start import steady_positions
 
     start = steady_positions(valve(), 2e3)
     model = valve(

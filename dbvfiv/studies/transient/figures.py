@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..drawing.axes import colour_bar, headline
-from ..drawing.style import ACCENT, COMPUTED, MAGNITUDE, REST, new_figure, phase_looks, static
-from ..verdict import Series, in_steps, spectrum
+from ...drawing.axes import colour_bar, headline
+from ...drawing.style import ACCENT, COMPUTED, MAGNITUDE, REST, new_figure, phase_looks, static
+from ...verdict import Series, in_steps, spectrum
 
 if TYPE_CHECKING:
-    from ..transient.result import TransientResults
+    from .result import TransientResult
 
 
-def draw(result: TransientResults) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: TransientResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a transient result, each with its name."""
     flow = result.case.drive.kind == "flow"
     yield "history", lambda: history(result)
@@ -31,13 +31,13 @@ def draw(result: TransientResults) -> Iterator[tuple[str, Callable[[], Figure]]]
         yield "station-pressures", lambda: pressures(result)
 
 
-def title(result: TransientResults) -> str:
+def title(result: TransientResult) -> str:
     case = result.case
     fluid = f", {case.fluid.density:g} kg/m³, {case.fluid.continuity}" if case.drive.kind == "flow" else ""
     return f"{result.header.name}: {static(float(result.history['inlet_pressure'][-1]))}{fluid}"
 
 
-def history(result: TransientResults) -> Figure:
+def history(result: TransientResult) -> Figure:
     """Mass flow, lip opening and areas over time."""
     h, case = result.history, result.case
     flow = case.drive.kind == "flow"
@@ -69,7 +69,7 @@ def history(result: TransientResults) -> Figure:
     return figure
 
 
-def energies(result: TransientResults) -> Figure:
+def energies(result: TransientResult) -> Figure:
     """Energies of the wall, what has gone in and out, and, on an axis of its own, what these leave unexplained."""
     h = result.history
     figure = new_figure(8.0, 7.2)
@@ -118,14 +118,14 @@ def _readable(energy: np.ndarray) -> tuple[float, str]:
     return 1e9, "nJ"
 
 
-def _cycle_rows(result: TransientResults) -> np.ndarray:
+def _cycle_rows(result: TransientResult) -> np.ndarray:
     """Rows of the last cycle; of the last fifth of the run where there is none."""
     t = result.history["time"]
     start, end = result.cycle or (t[-1] - 0.2 * (t[-1] - t[0]), t[-1])
     return np.flatnonzero((t >= start - 1e-12) & (t <= end))
 
 
-def centre_line(result: TransientResults, count: int = 6) -> Figure:
+def centre_line(result: TransientResult, count: int = 6) -> Figure:
     """Displacement in y along the line x = 0 at several times of a cycle (compare Fig. 7-16 of Wang 2014)."""
     h, rows = result.history, _cycle_rows(result)
     chosen = rows[
@@ -154,7 +154,7 @@ def centre_line(result: TransientResults, count: int = 6) -> Figure:
     return figure
 
 
-def phase_portrait(result: TransientResults) -> Figure:
+def phase_portrait(result: TransientResult) -> Figure:
     """Velocity of the lip over its opening; the last cycles stand out."""
     h = result.history
     figure = new_figure(6.0, 4.6)
@@ -174,7 +174,7 @@ def phase_portrait(result: TransientResults) -> Figure:
     return figure
 
 
-def spectra(result: TransientResults) -> Figure:
+def spectra(result: TransientResult) -> Figure:
     """Amplitude spectra of mass flow and lip opening over the second half of the run, with their resolution."""
     h = result.history
     figure = new_figure(7.2, 5.2)
@@ -217,17 +217,17 @@ def _spectrum(axes, series: Series) -> float:
     return float(frequency[above[-1]]) if len(above) else 0.0
 
 
-def wave(result: TransientResults) -> Figure:
+def wave(result: TransientResult) -> Figure:
     """Displacement of the centre line in space and time: slanted bands are waves."""
     return _space_time(result, "centre_line", 1e3, "Displacement in y, mm", "Motion of the centre line")
 
 
-def pressures(result: TransientResults) -> Figure:
+def pressures(result: TransientResult) -> Figure:
     """Pressure in space and time."""
     return _space_time(result, "station_pressure", 1e-3, "Static pressure, kPa", "Pressure along the valve")
 
 
-def _space_time(result: TransientResults, name: str, factor: float, label: str, heading: str) -> Figure:
+def _space_time(result: TransientResult, name: str, factor: float, label: str, heading: str) -> Figure:
     h = result.history
     t = h["time"]
     start = max(t[0], t[-1] - (4.0 * (result.cycle[1] - result.cycle[0]) if result.cycle else t[-1] - t[0]))

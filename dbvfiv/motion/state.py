@@ -37,27 +37,6 @@ class MotionState:
     psi: np.ndarray
     psi_rate: np.ndarray
 
-    def pack(self) -> np.ndarray:
-        """One vector (6 n + 2 m + 2,) for a file."""
-        parts = [
-            [self.time, self.speed],
-            self.q,
-            self.v,
-            self.a,
-            self.force,
-            self.force_rate,
-            self.load,
-            self.psi,
-            self.psi_rate,
-        ]
-        return np.concatenate(parts)
-
-    @classmethod
-    def unpack(cls, packed: np.ndarray, stations: int) -> MotionState:
-        """Undo `pack` for a number m of stations."""
-        wall, fluid = np.split(np.array(packed[2:], float), [len(packed) - 2 - 2 * stations])
-        return cls(float(packed[0]), float(packed[1]), *np.split(wall, 6), *np.split(fluid, 2))
-
 
 def consistent_state(motion, time: float, q, v, speed: float, inlet: float) -> MotionState:
     """State at given positions, velocities and inlet velocity with the accelerations that the equations of motion ask

@@ -14,10 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model.linear import SingularMatrix
-from .equations import Load, Step, Weights
+from .predictor import Predictor
 from .scheme import Scheme
 from .scheme import scheme as member
 from .state import MotionState
+from .terms import Load
+from .trial import Trial
 
 #: Speed inwards, relative to the largest speed, that is none.
 INWARD = 1e-6
@@ -122,7 +124,7 @@ class Stepper:
         if all:
             self.motion.drop_factors()
         self._factored: tuple[float, bool, float] | None = None
-        self._history: list[tuple[float, np.ndarray]] = []
+        self._past = Predictor()
 
     # -- the step
     # ----
@@ -138,7 +140,7 @@ class Stepper:
         outward = _outward(self.motion.speeds(state))
         scheme = self.scheme if outward else self._damped
         for robust in (self.options.backward or not (outward and self._smooth(state, h)), True):
-            trial = _Trial(self.motion, scheme, state, h, self.pressure, robust)
+            trial = Trial(self.motion, scheme, state, h, self.pressure, robust)
             self.motion.begin_step(state, h, trial.fluid.inlet)
             try:
                 self._iterate(trial)
@@ -149,12 +151,11 @@ class Stepper:
             self._factored = None
         turn = self.motion.turn(trial.q - state.q)
         if turn > self.options.largest_turn:
-            self._history = self._history[-1:]
+            self._past.shorten()
             raise StepFailure(f"A director turned by {turn:.2g} rad.")
         new = trial.state()
-        past = self._history[-1] if self._history else None
-        here = (state.time + (1.0 - scheme.alpha_m) * h, trial.a_mid)
-        self._history = [*self._history[-3:], here]
+        past, here = self._past.last, (state.time + (1.0 - scheme.alpha_m) * h, trial.a_mid)
+        self._past.add(*here)
         work = [now - then for now, then in zip((self.residuals, self.solves, self.factorisations), before)]
         jump = 0.0 if past is None else self.motion.length(here[1] - past[1]) * h / (here[0] - past[0])
         return StepResult(new, trial.load, *self._works(trial), *work, scheme.error_constant * h * h * jump)
@@ -170,14 +171,14 @@ class Stepper:
         return bool(np.abs(change).sum() <= 0.34 * np.abs(now).sum()) and _outward(now - change)
 
     @staticmethod
-    def _kept_momentum(trial: _Trial) -> bool:
+    def _kept_momentum(trial: Trial) -> bool:
         """Whether the fluid's sections kept most of their momentum in a step and none turned round; if not, its
         equations are better met at the end.
         """
         new, old = _sections(trial.load.psi), _sections(trial.old.psi)
         return bool(np.clip(old - new, 0.0, old).sum() <= 0.5 * old.sum()) and _outward(trial.load.speed)
 
-    def _works(self, trial: _Trial) -> tuple[float, float]:
+    def _works(self, trial: Trial) -> tuple[float, float]:
         """Work of the pressure and dissipation of a step, by the scheme's own weights."""
         way = trial.q - trial.old.q
         alpha = self.motion.conditions.alpha
@@ -189,7 +190,7 @@ class Stepper:
     # -- the iteration
     # ----
 
-    def _iterate(self, trial: _Trial) -> None:
+    def _iterate(self, trial: Trial) -> None:
         """Correct a trial until the next correction would be below what is allowed.
 
         Three attempts, each for what defeats the one before: kept factors as long as they contract; full corrections
@@ -205,7 +206,7 @@ class Stepper:
             return
         raise StepFailure("Newton's corrections did not converge, neither whole nor with a line search.")
 
-    def _full(self, trial: _Trial, norm: float, renew: bool) -> bool:
+    def _full(self, trial: Trial, norm: float, renew: bool) -> bool:
         """Whole corrections. Factors that contract too slowly are renewed, or end the attempt."""
         options = self.options
         if renew:
@@ -213,7 +214,7 @@ class Stepper:
         correction = self._solve(trial)
         size = first = self.motion.length(correction)
         for _ in range(options.max_iterations):
-            allowed = trial.allowed(options)
+            allowed = trial.allowed(options.tolerance, options.floor)
             if size <= 1e-2 * allowed:
                 return True
             trial.move(1.0, correction)
@@ -237,7 +238,7 @@ class Stepper:
                     return False
         return False
 
-    def _searched(self, trial: _Trial, norm: float) -> bool:
+    def _searched(self, trial: Trial, norm: float) -> bool:
         """Parts of corrections such that the next one by the same factors is smaller: the natural monotonicity test
         (Deuflhard 2011).
         """
@@ -246,7 +247,7 @@ class Stepper:
             self._factor(trial)
             correction = self._solve(trial)
             size, fraction = self.motion.length(correction), 1.0
-            if size <= 1e-2 * trial.allowed(options):
+            if size <= 1e-2 * trial.allowed(options.tolerance, options.floor):
                 return True
             while True:
                 trial.move(fraction, correction)
@@ -258,19 +259,19 @@ class Stepper:
                 fraction *= 0.5
                 if not fraction >= options.smallest_fraction:
                     return False
-            if left <= trial.allowed(options):
+            if left <= trial.allowed(options.tolerance, options.floor):
                 return True
         return False
 
-    def _start(self, trial: _Trial) -> float:
+    def _start(self, trial: Trial) -> float:
         """Predict the accelerations at the instant where they are taken.
 
         Those at the ends of steps would not do: without numerical damping they alternate about the true ones. From a
         state without a past, the step goes on at its velocities.
         """
         state, s, h = trial.old, trial.scheme, trial.h
-        if self._history:
-            a = self._extrapolated(state.time + (1.0 - s.alpha_m) * h)
+        if self._past.last is not None:
+            a = self._past.accelerations(state.time + (1.0 - s.alpha_m) * h)
             trial.set((a - s.alpha_m * state.a) / (1.0 - s.alpha_m))
             norm = self._residual(trial)
             if np.isfinite(norm):
@@ -281,34 +282,17 @@ class Stepper:
             raise StepFailure("The equations cannot be evaluated at the start of the step.")
         return norm
 
-    def _extrapolated(self, time: float) -> np.ndarray:
-        """Accelerations at a later instant.
-
-        On even steps by formulas that are exact for a parabola (or a straight line) plus a part of alternating sign:
-        without numerical damping, stiff modes with much stiffness damping alternate, and a parabola alone would throw
-        that part up sevenfold.
-        """
-        points = self._history
-        gaps = np.diff([t for t, _ in points] + [time])
-        if len(points) >= 3 and np.ptp(gaps) <= 1e-6 * gaps[-1]:
-            values = [value for _, value in points]
-            if len(values) >= 4:
-                return 2.0 * (values[-1] - values[-3]) + values[-4]
-            return values[-1] + values[-2] - values[-3]
-        (before, old), (here, new) = points[-2:] if len(points) > 1 else (points[0], (points[0][0] + 1.0, points[0][1]))
-        return new + (time - here) / (here - before) * (new - old)
-
-    def _residual(self, trial: _Trial) -> float:
+    def _residual(self, trial: Trial) -> float:
         self.residuals += 1
         return trial.evaluate()
 
-    def _factor(self, trial: _Trial) -> None:
+    def _factor(self, trial: Trial) -> None:
         self.factorisations += 1
         self._factored = None
         trial.linearise()
         self._factored = trial.kind
 
-    def _solve(self, trial: _Trial) -> np.ndarray:
+    def _solve(self, trial: Trial) -> np.ndarray:
         self.solves += 1
         return self.motion.solve(-trial.residual, -trial.load.outlet)[0]
 
@@ -321,95 +305,3 @@ def _sections(psi: np.ndarray) -> np.ndarray:
 def _outward(speed: np.ndarray) -> bool:
     """Whether no speed (m,), or momentum of a section, points inwards."""
     return not np.any(speed < -INWARD * np.abs(speed).max(initial=0.0))
-
-
-class _Trial:
-    """A candidate for the new state; its unknowns are the accelerations. The inlet velocity follows from them.
-
-    With `robust` the fluid's equations are met at the end of the step, psi by a backward difference: of first order,
-    but momentum that is lost within a step, when lips slam, does not come back with the opposite sign. Its force is
-    then the weighted mean of this and the last one, as spikes that change their sign from step to step would otherwise
-    do work on stops that ring.
-    """
-
-    def __init__(
-        self, motion, scheme: Scheme, old: MotionState, h: float, pressure: Callable[[float], float], robust: bool
-    ):
-        self.motion, self.scheme, self.old, self.h = motion, scheme, old, h
-        s, now = scheme, scheme.now
-        theta, rate = (1.0, 1.0) if robust else (now, s.rate)
-        self.kind = (h, robust, s.gamma)
-        self.weights = Weights(
-            theta=theta,
-            load=now if robust else 1.0,
-            inertia=(1.0 - s.alpha_m) / (s.beta * h * h) + motion.conditions.alpha * now * s.gamma / (s.beta * h),
-            force=now + motion.conditions.beta * s.rate / h,
-            velocity=s.gamma / (s.beta * h),
-            psi=rate / h,
-        )
-        self.fluid = Step(
-            theta,
-            old.speed,
-            rate / h,
-            (1.0 - rate) * old.psi_rate - (rate / h) * old.psi,
-            pressure(old.time + theta * h),
-        )
-
-    def set(self, a: np.ndarray) -> None:
-        """Start from new accelerations."""
-        s, h, old = self.scheme, self.h, self.old
-        self.a = np.array(a)
-        self.v = old.v + h * ((1.0 - s.gamma) * old.a + s.gamma * self.a)
-        self.q = old.q + h * old.v + h * h * ((0.5 - s.beta) * old.a + s.beta * self.a)
-
-    def move(self, fraction: float, dq: np.ndarray) -> None:
-        """Add a fraction of a correction of q."""
-        s, h = self.scheme, self.h
-        self.q = self.q + fraction * dq
-        self.v = self.v + (fraction * s.gamma / (s.beta * h)) * dq
-        self.a = self.a + (fraction / (s.beta * h * h)) * dq
-
-    def evaluate(self) -> float:
-        """Set residual and forces; return the norm of the former."""
-        s, now, old, motion = self.scheme, self.scheme.now, self.old, self.motion
-        self.force = motion.internal_force(self.q)
-        self.force_rate = (self.force - old.force) / self.h
-        self.q_mid = old.q + now * (self.q - old.q)
-        self.v_mid = old.v + now * (self.v - old.v)
-        self.a_mid = old.a + (1.0 - s.alpha_m) * (self.a - old.a)
-        self.at_load = (self.q, self.v) if self.fluid.theta == 1.0 else (self.q_mid, self.v_mid)
-        self.load = motion.load(*self.at_load, self.q, self.v, self.fluid)
-        alpha, beta = motion.conditions.alpha, motion.conditions.beta
-        self.damping = beta * (old.force_rate + s.rate * (self.force_rate - old.force_rate))
-        elastic = old.force + now * (self.force - old.force)
-        inertia = motion.inertia(self.q_mid, self.v_mid, self.a_mid + alpha * self.v_mid if alpha else self.a_mid)
-        share = self.weights.load
-        self.push = self.load.force if share == 1.0 else old.load + share * (self.load.force - old.load)
-        self.residual = inertia + self.damping + elastic - self.push
-        return float(np.linalg.norm(self.residual))
-
-    def linearise(self) -> None:
-        self.motion.linearise(self.q, self.v, self.q_mid, self.v_mid, self.load, self.weights, *self.at_load)
-
-    def allowed(self, options: StepOptions) -> float:
-        """Largest correction that may be left, m."""
-        motion = self.motion
-        moved = self.h**2 * self.scheme.beta * motion.length(self.a_mid)
-        floor = max(options.floor, 1e3 * np.finfo(float).eps)
-        return options.tolerance * moved + floor * motion.length(self.q) + motion.rounding
-
-    def state(self) -> MotionState:
-        old, load = self.old, self.load
-        rate = (load.psi - old.psi) / self.h if self.motion.moving_fluid else load.psi_rate
-        return MotionState(
-            old.time + self.h,
-            float(load.speed[-1]),
-            self.q,
-            self.v,
-            self.a,
-            self.force,
-            self.force_rate,
-            load.force,
-            load.psi,
-            rate,
-        )

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..drawing.style import ACCENT, COMPUTED, new_figure, style
 from ..errors import CaseError
 from ..verdict import Series, Verdict, spectrum
+from .style import ACCENT, COMPUTED, new_figure, style
 
 
 def signal(name: str, time: np.ndarray, values: np.ndarray, verdict: Verdict) -> Figure:

@@ -1,0 +1,1 @@
+"""The valve in time: equations of motion, scheme, steps and their control."""

@@ -1,0 +1,156 @@
+"""First states of motions: at rest, steady, kicked along a mode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from eigen import CoupledPencil, SearchOptions, SingularShiftError, Spectrum, leading_modes, lowest_frequencies
+
+from ..case.model import Case
+from ..errors import SolveError
+from ..model import ValveModel
+from ..model.dynamics import Conditions, linearise
+from ..model.equilibria import LoadPath, SteadyOptions
+from ..model.leading import select_search
+from ..model.newton import NewtonOptions
+from ..observer import Observer
+from .equations import ValveMotion
+from .state import MotionState, consistent_state
+
+
+@dataclass(frozen=True)
+class Kick:
+    """The mode that a push followed.
+
+    Attributes
+    ----------
+    eigenvalue : complex, 1/s
+    """
+
+    eigenvalue: complex
+
+
+def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observer) -> tuple[MotionState, Kick | None]:
+    """State that a case starts from, with inlet pressure (Pa) of the first instant.
+
+    Parameters
+    ----------
+    motion : ValveMotion
+    case : Case
+        Its transient.start is "rest", "steady" or "kick".
+    inlet : float
+    observer : Observer
+
+    Raises
+    ------
+    SolveError
+        If the steady state or the mode was not found.
+    """
+    model, transient = motion.model, case.transient
+    if transient.start == "rest":
+        return consistent_state(motion, 0.0, model.rest(), model.rest(), 0.0, inlet), None
+    observer.progress(f"steady state at {inlet:.6g} Pa")
+    q = steady_positions(model, inlet, SteadyOptions.of(case))
+    areas = model.rows.areas(model.nodal(q))
+    speed = model.flow.inlet_velocity(areas, inlet, motion.conditions.density) if inlet > 0 else 0.0
+    if transient.start == "steady":
+        return consistent_state(motion, 0.0, q, np.zeros(model.size), speed, inlet), None
+    observer.progress("mode to follow")
+    push = Push(
+        transient.kick_mode,
+        transient.kick_opening,
+        case.modes.count,
+        SearchOptions(case.modes.max_frequency, tolerance=case.modes.tolerance),
+    )
+    return kicked(motion, q, speed, inlet, push)
+
+
+def steady_positions(model: ValveModel, inlet: float, options: SteadyOptions | None = None) -> np.ndarray:
+    """Equilibrium (n,) at an inlet pressure, Pa.
+
+    It is as exact as rounding allows: what is left of a residual would shake light parts of the wall.
+    """
+    if inlet <= 0:
+        return model.rest()
+    options = SteadyOptions.of(model.case) if options is None else options
+    path = LoadPath(model, SteadyOptions(NewtonOptions(1e-13, options.newton.max_iterations), options.min_step))
+    path.go_to(inlet)
+    return path.q
+
+
+@dataclass(frozen=True)
+class Push:
+    """A push along a mode.
+
+    Attributes
+    ----------
+    mode : int
+        Which oscillating mode, counted by growth rate from 1.
+    opening : float
+        By how much it moves the lip in y, m: half of what the clear opening changes by.
+    count : int
+        Among how many leading modes it is looked for; more are searched where these hold too few that oscillate.
+    search : SearchOptions
+        What is asked of the search; see `dbvfiv.model.leading.select_search`.
+    """
+
+    mode: int
+    opening: float
+    count: int = 10
+    search: SearchOptions = field(default_factory=SearchOptions)
+
+
+def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, push: Push) -> tuple[MotionState, Kick]:
+    """Steady state pushed along one of its leading modes.
+
+    Parameters
+    ----------
+    motion : ValveMotion
+    q : (n,) array
+        The steady state.
+    speed : float
+        Its inlet velocity, m/s.
+    inlet : float
+        Its inlet pressure, Pa.
+    push : Push
+
+    Raises
+    ------
+    SolveError
+        If there is no such mode, or it does not move the lip.
+    """
+    model = motion.model
+    pencil = linearise(model, q, inlet).pencil(motion.conditions)
+    try:
+        found, index = _find_mode(pencil, motion.conditions, push)
+    except (SingularShiftError, np.linalg.LinAlgError) as error:
+        said = str(error).rstrip(".")
+        raise SolveError(f"The mode to push along at {inlet:.6g} Pa was not found: {said}.") from error
+    mode = found.mode(index)
+    nodal = model.nodal(mode.q)
+    lip = nodal[model.mesh.rows[0, 0], 1]
+    if abs(lip) < 1e-6 * np.abs(nodal[:, :3]).max():
+        raise SolveError(f"Mode {push.mode} does not move the middle of the lip, so no push can be measured there.")
+    shape = push.opening / lip * mode.q
+    flow = float((push.opening / lip * mode.u[0]).real) if motion.moving_fluid and len(mode.u) else 0.0
+    state = consistent_state(motion, 0.0, q + shape.real, (mode.eigenvalue * shape).real, speed + flow, inlet)
+    return state, Kick(complex(mode.eigenvalue))
+
+
+def _find_mode(pencil: CoupledPencil, conditions: Conditions, push: Push) -> tuple[Spectrum, int]:
+    """Leading modes, by the rule of all studies, and the place of the one to push along among them."""
+    count = max(push.count, push.mode)
+    while True:
+        search = select_search(push.search, conditions, lambda n: lowest_frequencies(pencil, n), count)
+        found = leading_modes(pencil, count, search.options)
+        oscillating = [i for i in range(len(found)) if found.eigenvalues[i].imag > 1e-6 * abs(found.eigenvalues[i])]
+        if len(oscillating) >= push.mode:
+            return found, oscillating[push.mode - 1]
+        if len(found) < count or count > 100:
+            raise SolveError(
+                f"Only {len(oscillating)} oscillating modes were found, so there is no mode {push.mode} to push the "
+                f"valve along."
+            )
+        count *= 2

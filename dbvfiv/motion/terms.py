@@ -1,0 +1,92 @@
+"""What the equations of a step are made of: weights of its parts, where its fluid starts from, what the fluid does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Weights:
+    """How the parts of the equations depend on what is new in a step.
+
+    Attributes
+    ----------
+    theta : float
+        Where in the step the fluid's equations are met: the share of the new state there.
+    load : float
+        Factor of G p there.
+    inertia : float
+        Factor of M, 1/s2; mass damping included.
+    force : float
+        Factor of the tangent of F.
+    velocity : float
+        Derivative of the new velocities with respect to the new positions, 1/s.
+    psi : float
+        Derivative of the rate of psi with respect to the new psi, 1/s.
+    """
+
+    theta: float
+    load: float
+    inertia: float
+    force: float
+    velocity: float
+    psi: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """What the fluid of a step starts from.
+
+    Attributes
+    ----------
+    theta : float
+        See `Weights`.
+    speed : float
+        Inlet velocity at the start, m/s.
+    psi_weight : float
+    psi_known : (m,) array
+        The rate of psi is psi_weight psi + psi_known, with the new psi.
+    inlet : float
+        Inlet pressure where the equations are met, Pa.
+    """
+
+    theta: float
+    speed: float
+    psi_weight: float
+    psi_known: np.ndarray
+    inlet: float
+
+
+@dataclass
+class Load:
+    """Fluid of a step and its force on the wall.
+
+    Attributes
+    ----------
+    force : (n,) array
+        G p, where the equations are met.
+    outlet : float
+        Pressure at the outlet, Pa, to vanish; zero where U is no unknown.
+    pressure : (m,) array
+        Pa, where the equations are met.
+    area, speed, psi : (m,) arrays
+        At the end of the step: m2 of a quarter, m/s, m2/s.
+    psi_rate : (m,) array
+        Where the equations are met, m2/s2.
+    inlet : float
+        Inlet pressure there, Pa.
+    mid_speed : float
+        Inlet velocity there, m/s.
+    """
+
+    force: np.ndarray
+    outlet: float
+    pressure: np.ndarray
+    area: np.ndarray
+    speed: np.ndarray
+    psi: np.ndarray
+    psi_rate: np.ndarray
+    inlet: float
+    mid_speed: float

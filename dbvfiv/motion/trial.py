@@ -1,0 +1,103 @@
+"""A candidate for the new state of a step: its equations, their iteration matrix, and the state that it becomes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .scheme import Scheme
+from .state import MotionState
+from .terms import Step, Weights
+
+
+class Trial:
+    """A candidate for the new state; its unknowns are the accelerations. The inlet velocity follows from them.
+
+    With `robust` the fluid's equations are met at the end of the step, psi by a backward difference: of first order,
+    but momentum that is lost within a step, when lips slam, does not come back with the opposite sign. Its force is
+    then the weighted mean of this and the last one, as spikes that change their sign from step to step would otherwise
+    do work on stops that ring.
+    """
+
+    def __init__(
+        self, motion, scheme: Scheme, old: MotionState, h: float, pressure: Callable[[float], float], robust: bool
+    ):
+        self.motion, self.scheme, self.old, self.h = motion, scheme, old, h
+        s, now = scheme, scheme.now
+        theta, rate = (1.0, 1.0) if robust else (now, s.rate)
+        self.kind = (h, robust, s.gamma)
+        self.weights = Weights(
+            theta=theta,
+            load=now if robust else 1.0,
+            inertia=(1.0 - s.alpha_m) / (s.beta * h * h) + motion.conditions.alpha * now * s.gamma / (s.beta * h),
+            force=now + motion.conditions.beta * s.rate / h,
+            velocity=s.gamma / (s.beta * h),
+            psi=rate / h,
+        )
+        self.fluid = Step(
+            theta,
+            old.speed,
+            rate / h,
+            (1.0 - rate) * old.psi_rate - (rate / h) * old.psi,
+            pressure(old.time + theta * h),
+        )
+
+    def set(self, a: np.ndarray) -> None:
+        """Start from new accelerations."""
+        s, h, old = self.scheme, self.h, self.old
+        self.a = np.array(a)
+        self.v = old.v + h * ((1.0 - s.gamma) * old.a + s.gamma * self.a)
+        self.q = old.q + h * old.v + h * h * ((0.5 - s.beta) * old.a + s.beta * self.a)
+
+    def move(self, fraction: float, dq: np.ndarray) -> None:
+        """Add a fraction of a correction of q."""
+        s, h = self.scheme, self.h
+        self.q = self.q + fraction * dq
+        self.v = self.v + (fraction * s.gamma / (s.beta * h)) * dq
+        self.a = self.a + (fraction / (s.beta * h * h)) * dq
+
+    def evaluate(self) -> float:
+        """Set residual and forces; return the norm of the former."""
+        s, now, old, motion = self.scheme, self.scheme.now, self.old, self.motion
+        self.force = motion.internal_force(self.q)
+        self.force_rate = (self.force - old.force) / self.h
+        self.q_mid = old.q + now * (self.q - old.q)
+        self.v_mid = old.v + now * (self.v - old.v)
+        self.a_mid = old.a + (1.0 - s.alpha_m) * (self.a - old.a)
+        self.at_load = (self.q, self.v) if self.fluid.theta == 1.0 else (self.q_mid, self.v_mid)
+        self.load = motion.load(*self.at_load, self.q, self.v, self.fluid)
+        alpha, beta = motion.conditions.alpha, motion.conditions.beta
+        self.damping = beta * (old.force_rate + s.rate * (self.force_rate - old.force_rate))
+        elastic = old.force + now * (self.force - old.force)
+        inertia = motion.inertia(self.q_mid, self.v_mid, self.a_mid + alpha * self.v_mid if alpha else self.a_mid)
+        share = self.weights.load
+        self.push = self.load.force if share == 1.0 else old.load + share * (self.load.force - old.load)
+        self.residual = inertia + self.damping + elastic - self.push
+        return float(np.linalg.norm(self.residual))
+
+    def linearise(self) -> None:
+        self.motion.linearise(self.q, self.v, self.q_mid, self.v_mid, self.load, self.weights, *self.at_load)
+
+    def allowed(self, tolerance: float, floor: float) -> float:
+        """Largest correction that may be left, m; see `dbvfiv.motion.stepper.StepOptions`."""
+        motion = self.motion
+        moved = self.h**2 * self.scheme.beta * motion.length(self.a_mid)
+        floor = max(floor, 1e3 * np.finfo(float).eps)
+        return max(tolerance * moved + floor * motion.length(self.q), motion.resolution, np.finfo(float).tiny)
+
+    def state(self) -> MotionState:
+        old, load = self.old, self.load
+        rate = (load.psi - old.psi) / self.h if self.motion.moving_fluid else load.psi_rate
+        return MotionState(
+            old.time + self.h,
+            float(load.speed[-1]),
+            self.q,
+            self.v,
+            self.a,
+            self.force,
+            self.force_rate,
+            load.force,
+            load.psi,
+            rate,
+        )

@@ -1,0 +1,1 @@
+"""A time history of the coupled valve and its verdict."""

@@ -1,0 +1,82 @@
+"""What is read off every step: rows of `dbvfiv.studies.transient.tables.HISTORY`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...model.lip import LipCentre
+from ...model.valve import QUARTERS
+from ...motion.equations import ValveMotion
+from ...motion.stepper import StepResult
+from ...motion.terms import Step
+
+
+class Reader:
+    """Makes rows of the history of one run and keeps the books of energy.
+
+    Parameters
+    ----------
+    motion : ValveMotion
+    energy : float
+        Energy at the start, J of a quarter.
+    """
+
+    def __init__(self, motion: ValveMotion, energy: float, work: float = 0.0, dissipation: float = 0.0):
+        self.motion, self.energy, self.work, self.dissipation = motion, energy, work, dissipation
+        model = motion.model
+        index = model.shell.dofs.index
+        self._lip = LipCentre(model.mesh, model.shell)
+        centre = index[model.mesh.rows[:, 0], 1]
+        self._centre, self._moves = np.maximum(centre, 0), centre >= 0
+        self._inlet_area = float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
+
+    def first(self, state, inlet: float) -> dict[str, Any]:
+        """Row of the start."""
+        motion = self.motion
+        load = motion.load(
+            state.q, state.v, state.q, state.v, Step(1.0, state.speed, 0.0, state.psi_rate, inlet), state.speed
+        )
+        return self._row(state, load, 0.0, 0)
+
+    def row(self, result: StepResult, h: float) -> dict[str, Any]:
+        """Row of a step."""
+        self.work += result.work
+        self.dissipation += result.dissipation
+        return self._row(result.state, result.load, h, result.residuals)
+
+    def _row(self, state, load, h: float, evaluations: int) -> dict[str, Any]:
+        motion, model = self.motion, self.motion.model
+        kinetic, strain, stop = motion.energies(state.q, state.v)
+        density = motion.conditions.density
+        area = load.area
+        throat = int(np.argmin(area))
+        out = density * load.speed[0] * float(self.motion.model.flow.open_area(area[0]))
+        balance = kinetic + strain + stop - self.energy - self.work + self.dissipation
+        return {
+            "time": state.time,
+            "inlet_pressure": load.inlet,
+            "mass_flow": QUARTERS * out,
+            "inlet_mass_flow": QUARTERS * density * load.speed[-1] * self._inlet_area,
+            "outlet_area": QUARTERS * area[0],
+            "smallest_area": QUARTERS * area[throat],
+            "throat": float(model.mesh.z[throat]),
+            "inlet_velocity": load.speed[-1],
+            "outlet_velocity": load.speed[0],
+            "lip_opening": self._lip.opening(state.q),
+            "lip_displacement": self._lip.displacement(state.q),
+            "lip_velocity": self._lip.displacement(state.v),
+            "stops": model.stops.touching(state.q),
+            "kinetic_energy": QUARTERS * kinetic,
+            "strain_energy": QUARTERS * strain,
+            "stop_energy": QUARTERS * stop,
+            "pressure_work": QUARTERS * self.work,
+            "dissipation": QUARTERS * self.dissipation,
+            "balance": QUARTERS * balance,
+            "step": h,
+            "evaluations": evaluations,
+            "station_pressure": load.pressure,
+            "station_area": area,
+            "centre_line": np.where(self._moves, state.q[self._centre], 0.0),
+        }

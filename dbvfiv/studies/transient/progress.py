@@ -1,0 +1,67 @@
+"""Where a run stands: all that is needed to go on with the same numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from ...motion.state import MotionState
+from ...record.record import Record
+from .tables import BOOKS, COUNTS, MOTION_COLUMNS, RESTART
+
+
+@dataclass
+class Progress:
+    """Where a run stands.
+
+    Attributes
+    ----------
+    state : MotionState
+    steps : int
+    saved : int
+        Full states kept so far.
+    work, dissipation, energy : float
+        The books of energy, J of a quarter.
+    control : tuple of float
+        Of the step control.
+    eigenvalue : complex
+        Of the mode of a kick; not a number without.
+    """
+
+    state: MotionState
+    steps: int = 0
+    saved: int = 0
+    work: float = 0.0
+    dissipation: float = 0.0
+    energy: float = 0.0
+    control: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    eigenvalue: complex = complex(np.nan, np.nan)
+
+    @property
+    def rows(self) -> int:
+        """Rows of the history up to here: one for the start and one for each step."""
+        return self.steps + 1
+
+    def row(self) -> dict[str, Any]:
+        """A row of the table of restart points."""
+        values = {c.name: getattr(self, c.name) for c in (*COUNTS, *BOOKS)}
+        values["eigenvalue"] = [self.eigenvalue.real, self.eigenvalue.imag]
+        return values | {f.name: getattr(self.state, f.name) for f in fields(MotionState)}
+
+    @classmethod
+    def read(cls, record: Record, index: int = -1) -> Progress:
+        """Undo `row` for a restart point of a record; the last one by default."""
+        at = range(record.rows(RESTART))[index]
+        values = {c.name: record.value(RESTART, c.name, at) for c in (*COUNTS, *BOOKS, *MOTION_COLUMNS)}
+        motion = {c.name: values[c.name] for c in MOTION_COLUMNS}
+        state = MotionState(**{name: float(v) if np.ndim(v) == 0 else np.array(v, float) for name, v in motion.items()})
+        return cls(
+            state,
+            int(values["steps"]),
+            int(values["saved"]),
+            *(float(values[name]) for name in ("work", "dissipation", "energy")),
+            tuple(float(value) for value in values["control"]),
+            complex(*values["eigenvalue"]),
+        )

@@ -1,0 +1,105 @@
+"""What the file of a transient run holds: a row for each step, full states, and points to go on from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...record.layout import Column
+from ...record.mesh import MeshData
+from ...record.table import TableSpec
+
+HISTORY, STATES, RESTART = "history", "states", "restart"
+
+#: One number a step; of the whole valve.
+SCALARS = (
+    Column("time", "s", "Time"),
+    Column("inlet_pressure", "Pa", "Static pressure at the flange"),
+    Column("mass_flow", "kg/s", "Mass flow leaving at the lip"),
+    Column("inlet_mass_flow", "kg/s", "Mass flow entering at the flange"),
+    Column("outlet_area", "m^2", "Flow area at the lip; below zero where the lips cross"),
+    Column("smallest_area", "m^2", "Smallest flow area of all rows"),
+    Column("throat", "m", "Axial position of the smallest area, from the lip"),
+    Column("inlet_velocity", "m/s", "Velocity at the flange"),
+    Column("outlet_velocity", "m/s", "Jet velocity at the lip"),
+    Column("lip_opening", "m", "Full clear opening between the inner faces of both lips at x = z = 0"),
+    Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
+    Column("lip_velocity", "m/s", "Rate of the lip displacement"),
+    Column("stops", "", "Lip stops in contact, of a quarter"),
+    Column("kinetic_energy", "J", "Kinetic energy of the wall"),
+    Column("strain_energy", "J", "Strain energy of the wall"),
+    Column("stop_energy", "J", "Energy of the lip stops"),
+    Column("pressure_work", "J", "Work of the pressure on the wall since the start"),
+    Column("dissipation", "J", "Energy lost to Rayleigh damping since the start"),
+    Column(
+        "balance", "J", "Energy gained since the start less work plus dissipation: what the scheme itself adds or takes"
+    ),
+    Column("step", "s", "Length of the step"),
+    Column("evaluations", "", "Residuals evaluated in the step"),
+)
+#: One number a row of the mesh and step; of a quarter.
+PROFILES = (
+    Column(
+        "station_pressure",
+        "Pa",
+        (
+            "Pressure at each row, lip first, where the step meets the equations: halfway through it without "
+            "numerical damping"
+        ),
+        "f4",
+    ),
+    Column("station_area", "m^2", "Flow area at each row", "f4"),
+    Column("centre_line", "m", "Displacement in y of the line x = 0 at each row", "f4"),
+)
+#: Full states.
+STATE_COLUMNS = (
+    Column("time", "s", "Time"),
+    Column("nodal", "m, rad", "Displacements ux uy uz and two rotations of each node"),
+    Column("nodal_rate", "m/s, rad/s", "Their rates"),
+    Column("station_pressure", "Pa", "Pressure at each row"),
+    Column("station_area", "m^2", "Flow area of a quarter at each row"),
+    Column("inlet_velocity", "m/s", "Velocity at the flange"),
+)
+#: The state of a motion between two steps, see `dbvfiv.motion.state.MotionState`.
+MOTION_COLUMNS = (
+    Column("time", "s", "Time"),
+    Column("speed", "m/s", "Inlet velocity"),
+    Column("q", "m, rad", "Free unknowns"),
+    Column("v", "m/s, rad/s", "Their velocities"),
+    Column("a", "m/s^2, rad/s^2", "Their accelerations"),
+    Column("force", "N, N m", "Internal force of a quarter"),
+    Column("force_rate", "N/s, N m/s", "The scheme's value of its rate"),
+    Column("load", "N, N m", "Force of the fluid where the equations were last met"),
+    Column("psi", "m^2/s", "Integral of the flow's speed from the inlet, at each row"),
+    Column("psi_rate", "m^2/s^2", "The scheme's value of its rate"),
+)
+#: How far a run has come.
+COUNTS = (
+    Column("steps", "", "Steps made", "i8"),
+    Column("saved", "", "Full states kept", "i8"),
+)
+#: Books of energy, step control and the mode of a kick.
+BOOKS = (
+    Column("work", "J", "Work of the pressure on a quarter since the start"),
+    Column("dissipation", "J", "Energy of a quarter lost to damping since the start"),
+    Column("energy", "J", "Energy of a quarter at the start"),
+    Column("control", "", "Numbers of the step control"),
+    Column("eigenvalue", "1/s", "Real and imaginary part of that of the mode of a kick"),
+)
+
+
+def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
+    """Tables of a transient run on a mesh."""
+    stations, nodes, unknowns = len(mesh.z), len(mesh.nodes), int(mesh.free.sum())
+    by_row = {"station_pressure": (stations,), "station_area": (stations,)}
+    motion = dict.fromkeys(("q", "v", "a", "force", "force_rate", "load"), (unknowns,))
+    motion |= dict.fromkeys(("psi", "psi_rate"), (stations,)) | {"control": (4,), "eigenvalue": (2,)}
+    return (
+        TableSpec(HISTORY, (*SCALARS, *PROFILES), by_row | {"centre_line": (stations,)}, chunk=512),
+        TableSpec(STATES, STATE_COLUMNS, by_row | {"nodal": (nodes, 5), "nodal_rate": (nodes, 5)}),
+        TableSpec(RESTART, (*COUNTS, *BOOKS, *MOTION_COLUMNS), motion),
+    )
+
+
+def row_bytes(table: TableSpec) -> int:
+    """Bytes of one row of a table in a file."""
+    return sum(int(np.prod(table.shape(c))) * table.dtype(c).itemsize for c in table.columns)

@@ -1,0 +1,25 @@
+"""A valve on a mesh on which a step takes a millisecond."""
+
+from functools import cache
+from types import MappingProxyType
+
+import dbvfiv
+from dbvfiv.model import ValveModel
+from dbvfiv.motion.start import steady_positions
+
+
+@cache
+def small_model(*changes):
+    case = dbvfiv.load().case.replace({"mesh.around": 6, "mesh.along": 8} | dict(changes))
+    return ValveModel(case)
+
+
+def make_valve(changes=MappingProxyType({})):
+    """A coarse model with some keys of its case changed."""
+    return small_model(*sorted((k, tuple(v) if isinstance(v, list) else v) for k, v in changes.items()))
+
+
+@cache
+def find_open_state():
+    """A strongly deformed equilibrium of the coarse mesh."""
+    return steady_positions(small_model(), 12e3)
