@@ -12,7 +12,9 @@ from .case.model import Case
 from .case.parameters import PARAMETERS
 from .errors import CaseError, SolveError
 from .model import ValveModel
+from .studies.map.result import MapResult
 from .studies.modes.result import ModesResult
+from .studies.onset.result import OnsetResult
 from .studies.session import Session, named_changes
 from .studies.state import State
 from .studies.steady.result import SteadyResult
@@ -21,8 +23,6 @@ from .studies.sweep.result import SweepResult
 if TYPE_CHECKING:
     from .observer import Observer
     from .results.closure import ClosureResults
-    from .results.map import MapResults
-    from .results.onset import OnsetResults
     from .transient.result import TransientResults
 
 _PRESSURE = PARAMETERS["pressure"]
@@ -214,20 +214,34 @@ class Valve:
         )
 
     def onset(
-        self, over: str | None = None, *, output: str | Path | None = None, observer: Observer | None = None
-    ) -> OnsetResults:
-        """Every onset along one parameter; see `dbvfiv.stability.onset`.
+        self,
+        over: str | None = None,
+        *,
+        output: str | Path | None = None,
+        observer: Observer | None = None,
+        **changes: Any,
+    ) -> OnsetResult:
+        """Every onset along one parameter: where the valve loses or regains stability.
 
         Parameters
         ----------
         over : str, optional
-            Parameter, or PARAMETER=START:STOP:COUNT[:log]; that of the case by default.
-        """
-        from .stability import onset
+            Parameter, or PARAMETER=START:STOP:COUNT[:log]; onset.over of the case by default.
+        output : path, optional
+            Result file, written sample by sample; `dbvfiv.resume` continues it.
+        observer, changes
+            As for `modes`; also pressure, for onsets over something else.
 
-        return onset(
-            self.case if over is None else self.case.replace({"onset.over": over}), self.name, output, observer
-        )
+        Raises
+        ------
+        CaseError, SolveError
+
+        Examples
+        --------
+        >>> found = dbvfiv.load().onset("density", pressure="6 kPa")    # doctest: +SKIP
+        >>> [(p["value"], p["frequency"]) for p in found.points]        # doctest: +SKIP
+        """
+        return self._ask({"onset.over": over}, changes).perform("onset", output, observer)
 
     def map(
         self,
@@ -237,20 +251,28 @@ class Valve:
         workers: int | None = None,
         output: str | Path | None = None,
         observer: Observer | None = None,
-    ) -> MapResults:
-        """Stability over two parameters; see `dbvfiv.stability.stability_map`.
+        **changes: Any,
+    ) -> MapResult:
+        """Stability over two parameters: growth rate of the leading mode, and onset curves.
 
         Parameters
         ----------
         x, y : str, optional
-            PARAMETER=START:STOP:COUNT[:log]; those of the case by default.
+            PARAMETER=START:STOP:COUNT[:log]; map.x and map.y of the case by default.
         workers : int, optional
-            Processes that share the columns.
-        """
-        from .stability import stability_map
+            Processes that share the columns; map.workers of the case by default. Under ``mpiexec`` with mpi4py all its
+            processes.
+        output : path, optional
+            Result file, written column by column; `dbvfiv.resume` continues it.
+        observer, changes
+            As for `modes`; also pressure, for maps over something else.
 
-        changes = {key: value for key, value in (("map.x", x), ("map.y", y)) if value is not None}
-        return stability_map(self.case.replace(changes) if changes else self.case, self.name, output, observer, workers)
+        Raises
+        ------
+        CaseError, SolveError
+        """
+        session = self._ask({"map.x": x, "map.y": y}, changes)
+        return session.perform("map", output, observer, workers=workers)
 
     def transient(
         self,

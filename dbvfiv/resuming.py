@@ -41,25 +41,14 @@ def resume(
     from .record.files import kind_of
 
     kind = kind_of(path)
+    if workers is not None and kind != "map":
+        raise CaseError(f"Workers belong to maps; {str(path)!r} is of kind {kind!r}.")
+    if duration is not None and kind != "transient":
+        raise CaseError(f"A new duration belongs to transient runs; {str(path)!r} is of kind {kind!r}.")
     if kind in KINDS:
         from .studies.session import resume_result
 
-        return resume_result(path, observer)
-    if kind not in ("transient", "map", "onset", "closure"):
-        raise CaseError(
-            f"{str(path)!r} holds a result of kind {kind!r}; what can be resumed are transient, map, onset "
-            f"and closure runs."
-        )
-    if duration is not None and kind != "transient":
-        raise CaseError(f"A new duration belongs to transient runs; {str(path)!r} is of kind {kind!r}.")
-    if kind == "map":
-        from .stability import resume_map
-
-        return resume_map(path, observer, workers)
-    if kind == "onset":
-        from .stability import resume_onset
-
-        return resume_onset(path, observer)
+        return resume_result(path, observer, **({} if workers is None else {"workers": workers}))
     if kind == "closure":
         from .results.closure_run import resume_closure
 

@@ -24,8 +24,6 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "closure": ("closure", "closure_curves", "layers"),
     "modes": ("modes_plane", "modes_shapes", "modes_centre_line", "modes_winding"),
     "sweep": ("sweep_curves", "sweep_locus"),
-    "onset": ("onset",),
-    "map": ("map",),
     "transient": ("transient",),
 }
 FORMATS = ("png", "svg")

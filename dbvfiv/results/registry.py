@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 READERS: dict[str, str] = {
     "closure": "dbvfiv.results.closure:ClosureResults",
-    "onset": "dbvfiv.results.onset:OnsetResults",
-    "map": "dbvfiv.results.map:MapResults",
     "transient": "dbvfiv.transient.result:TransientResults",
 }
 
