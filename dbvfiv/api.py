@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -15,8 +15,9 @@ from .model import ValveModel
 from .studies.map.result import MapResult
 from .studies.modes.result import ModesResult
 from .studies.onset.result import OnsetResult
+from .studies.sensitivity.result import SensitivityResult
 from .studies.session import Session, named_changes
-from .studies.state import State
+from .studies.state import State, sensitivity_keys
 from .studies.steady.result import SteadyResult
 from .studies.sweep.result import SweepResult
 
@@ -174,6 +175,33 @@ class Valve:
             As for `modes`; also pressure, for sweeps over something else.
         """
         return self._ask({"sweep.over": over, "sweep.count": count}, changes).perform("sweep", output, observer)
+
+    def sensitivity(
+        self,
+        of: str | Sequence[str] = (),
+        *,
+        mode: int | None = None,
+        output: str | Path | None = None,
+        observer: Observer | None = None,
+        **changes: Any,
+    ) -> SensitivityResult:
+        """Derivatives of the leading mode's growth rate and frequency by the parameters of the valve.
+
+        Parameters
+        ----------
+        of : str or sequence of str, optional
+            Names of parameters, "pressure" or "layer 3 angle"; all that the valve has by default.
+        mode : int, optional
+            Another mode, by falling growth rate from 1.
+        output, observer, changes
+            As for `modes`; also pressure.
+
+        Examples
+        --------
+        >>> found = dbvfiv.load().sensitivity(["thickness", "layer 3 angle"], pressure="6 kPa")     # doctest: +SKIP
+        >>> [(s.parameter, s.growth_rate) for s in found.sensitivities]                             # doctest: +SKIP
+        """
+        return self._ask(sensitivity_keys(of, mode), changes).perform("sensitivity", output, observer)
 
     def closure(
         self,

@@ -16,11 +16,11 @@ import numpy as np
 from eigen import Mode
 from eigen.derivative import difference, eigenvalue_derivative
 
-from ...case.parameters import SURROUNDINGS
-from ...errors import SolveError
+from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS
+from ...errors import CaseError, SolveError
 from ...model import Conditions, ValveModel, linearise
 from ...model.newton import EquilibriumSolver, NewtonOptions
-from ..stability.place import redesigned
+from ..stability.place import redesigned, require_parameter
 
 #: Parameters of the surroundings that a pencil takes.
 _OF_PENCIL = tuple(name for name in SURROUNDINGS if name in {field.name for field in fields(Conditions)})
@@ -58,19 +58,46 @@ class Sensitivity:
         """Change of the eigenvalue for a change of the parameter by its own size, 1/s."""
         return self.derivative * self.value
 
+    @property
+    def per_percent(self) -> complex:
+        """Change of the eigenvalue for one percent more of the parameter, 1/s."""
+        return 0.01 * self.relative
+
 
 def parameters_of(model: ValveModel) -> tuple[str, ...]:
     """Every parameter an eigenvalue of this valve can be differentiated by.
 
-    Those of `dbvfiv.case.parameters` that a model can be stepped along, and the layers, which count from 1, inside to
-    outside: "layer 3 angle", "layer 1 thickness" (its share of the wall), "layer 1 c10"
-    (a constant of its law).
+    Those of `dbvfiv.case.parameters` that it has, and the layers, which count from 1, inside to outside: "layer 3
+    angle", "layer 1 thickness" (its share of the wall), "layer 1 c10" (a constant of its law).
     """
-    names = ["pressure", *_OF_PENCIL, "thickness"]
+    names = [name for name in PARAMETERS if _has(model, name)]
     for i, layer in enumerate(model.shell.section.layers, 1):
         names += [f"layer {i} thickness", f"layer {i} angle"]
         names += [f"layer {i} {field.name}" for field in fields(layer.law)]
     return tuple(names)
+
+
+def _has(model: ValveModel, name: str) -> bool:
+    """Whether anything in a valve depends on a parameter of the table in one way."""
+    if name in ("density", "storage"):
+        return model.flow.has_fluid and model.flow.unsteady
+    if name == "angle":  # of all plies at once
+        return len({abs(layer.angle) for layer in model.case.layers if layer.angle}) == 1
+    try:
+        require_parameter(model.case, name)
+    except CaseError:
+        return False
+    return True
+
+
+def unit_of(name: str) -> str:
+    """Unit of the values of a parameter."""
+    if name in PARAMETERS:
+        return PARAMETERS[name].quantity.si
+    _, quantity = _layer(name)
+    if quantity.startswith(("nu", "poisson")):
+        return ""
+    return {"thickness": "m", "angle": "deg", "density": "kg/m^3"}.get(quantity, "Pa")
 
 
 def eigenvalue_sensitivities(
@@ -102,17 +129,42 @@ def eigenvalue_sensitivities(
     SolveError
         If the steady state is lost beside its place.
     """
+    return [differentiate(model, q, pressure, conditions, mode, name, step) for name in parameters]
+
+
+def differentiate(
+    model: ValveModel, q: np.ndarray, pressure: float, conditions: Conditions, mode: Mode, name: str, step: float = 1e-4
+) -> Sensitivity:
+    """Derivative of one eigenvalue by one parameter; see `eigenvalue_sensitivities`.
+
+    At an end of what a parameter may be, such as the strain level of 10 %, that towards its inside, to second order as
+    central ones are. Strain levels are interpolated linearly between the tests: at one of those, 20 or 40 %, the
+    derivative is the mean of both sides.
+    """
     known = parameters_of(model)
+    if name not in known:
+        raise ValueError(f"An eigenvalue cannot be differentiated by '{name}'; it can by {', '.join(known)}.")
+    value = _value(model, pressure, conditions, name)
+    h = step * (abs(value) or 1.0)
     pencil = linearise(model, q, pressure).pencil(conditions)
-    found = []
-    for name in parameters:
-        if name not in known:
-            raise ValueError(f"An eigenvalue cannot be differentiated by '{name}'; it can by {', '.join(known)}.")
-        value = _value(model, pressure, conditions, name)
-        h = step * (abs(value) or 1.0)
-        low, high = (_pencil(model, q, pressure, conditions, name, value + sign * h) for sign in (-1, 1))
-        found.append(Sensitivity(name, value, eigenvalue_derivative(pencil, mode, difference(low, high, 2 * h))))
-    return found
+
+    def slope(low: float, high: float) -> complex:
+        ends = (_pencil(model, q, pressure, conditions, name, v) for v in (low, high))
+        return eigenvalue_derivative(pencil, mode, difference(*ends, high - low))
+
+    inward = _inward(name, value, h)
+    if inward == 0:
+        return Sensitivity(name, value, slope(value - h, value + h))
+    near, far = (slope(*sorted((value, value + inward * reach))) for reach in (h, 2 * h))
+    return Sensitivity(name, value, 2 * near - far)
+
+
+def _inward(name: str, value: float, h: float) -> int:
+    """+1 at the lower end of a parameter for which the model is built anew, -1 at the upper end, 0 elsewhere."""
+    if name not in DESIGN or name == "thickness":
+        return 0
+    row = PARAMETERS[name]
+    return 1 if value - h < row.low else -1 if value + h > row.high else 0
 
 
 def _layer(name: str) -> tuple[int, str]:
@@ -125,8 +177,14 @@ def _value(model, pressure, conditions, name) -> float:
         return pressure
     if name in _OF_PENCIL:
         return getattr(conditions, name)
+    if name == "storage":
+        return 1.0 if model.case.fluid.continuity == "storage" else 0.0
     if name == "thickness":
         return 1.0
+    if name == "angle":
+        return max(abs(layer.angle) for layer in model.case.layers)
+    if name == "strain":
+        return model.case.materials.strain_level
     i, quantity = _layer(name)
     layer = model.shell.section.layers[i]
     return float(getattr(layer if quantity in ("thickness", "angle") else layer.law, quantity))
@@ -136,10 +194,12 @@ def _pencil(model, q, pressure, conditions, name, value):
     """Pencil at the steady state with one parameter changed."""
     if name in _OF_PENCIL:
         return linearise(model, q, pressure).pencil(replace(conditions, **{name: value}))
+    if name == "storage":
+        return linearise(model, q, pressure).pencil(conditions, storage=value)
     changed = model
     if name == "pressure":
         pressure = value
-    elif name == "thickness":
+    elif name in DESIGN:
         changed = ValveModel(redesigned(model.case, {name: value}))
     else:
         changed = ValveModel(model.case, _section(model.shell.section, name, value))

@@ -118,14 +118,26 @@ def check_scan(case: Case, *names: str) -> None:
         Without flow.
     """
     check_flow(case)
+    for name in names:
+        require_parameter(case, name)
+
+
+def require_parameter(case: Case, name: str) -> None:
+    """Refuse a parameter that nothing in a case depends on.
+
+    Raises
+    ------
+    CaseError
+        For strain levels without a rubber that has them, and angles without a ply that has one.
+    """
     used = {layer.material for layer in case.layers}
     shipped = [name for name in RUBBERS if name not in case.materials.named]
-    if "strain" in names and not used & set(shipped):
+    if name == "strain" and not used & set(shipped):
         raise CaseError(
             "There is no strain level to change, because no layer is one of the built-in rubbers "
             f"{', '.join(RUBBERS)}; the layers are of {', '.join(sorted(used))}."
         )
-    if "angle" in names and not any(layer.angle for layer in case.layers):
+    if name == "angle" and not any(layer.angle for layer in case.layers):
         raise CaseError("There is no fibre angle to change, because every layer lies at 0 degrees.")
 
 
