@@ -11,9 +11,9 @@ import time
 import numpy as np
 
 from dbvfiv.case import load_case
-from dbvfiv.studies.map import run_map
-from dbvfiv.studies.map_column import MapPlan
-from dbvfiv.studies.stability_walk import StabilityWalk
+from dbvfiv.studies.map.column import MapPlan
+from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import leading_modes
 
 from .registry import Row, benchmark, seconds

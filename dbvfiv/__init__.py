@@ -7,23 +7,34 @@ equilibria, modes, onset of flutter, time histories and closure.
 Importing the package sets JAX to double precision (see ``dbvfiv.runtime``).
 """
 
+from importlib import import_module
+
 from . import runtime
 
 runtime.prepare()
 
 __version__ = "0.1.0"
-__all__ = ["load", "load_result", "resume"]
+#: Public names and the modules that hold them.
+_PUBLIC = {
+    "Valve": "api",
+    "load": "api",
+    "load_result": "studies.session",
+    "resume": "resuming",
+    "CaseError": "errors",
+    "SolveError": "errors",
+    "Observer": "observer",
+}
+__all__ = sorted(_PUBLIC)
 
 
 def __getattr__(name: str):
     """Load the Python interface when it is first asked for: the command line's help does without numpy."""
-    if name == "load":
-        from .api import load as found
-    elif name == "load_result":
-        from .results import load_result as found
-    elif name == "resume":
-        from .resuming import resume as found
-    else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _PUBLIC:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it offers {', '.join(__all__)}")
+    found = getattr(import_module(f".{_PUBLIC[name]}", __name__), name)
     globals()[name] = found
     return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -13,17 +13,18 @@ from .case.parameters import PARAMETERS
 from .errors import CaseError, SolveError
 from .model import ValveModel
 from .studies.closure.result import ClosureResult
+from .studies.map.result import MapResult
 from .studies.modes.result import ModesResult
+from .studies.onset.result import OnsetResult
+from .studies.sensitivity.result import SensitivityResult
 from .studies.session import Session, named_changes
-from .studies.state import State
+from .studies.state import State, sensitivity_keys
 from .studies.steady.result import SteadyResult
 from .studies.sweep.result import SweepResult
 from .studies.transient.result import TransientResult
 
 if TYPE_CHECKING:
     from .observer import Observer
-    from .results.map import MapResults
-    from .results.onset import OnsetResults
 
 _PRESSURE = PARAMETERS["pressure"]
 
@@ -175,6 +176,33 @@ class Valve:
         """
         return self._ask({"sweep.over": over, "sweep.count": count}, changes).perform("sweep", output, observer)
 
+    def sensitivity(
+        self,
+        of: str | Sequence[str] = (),
+        *,
+        mode: int | None = None,
+        output: str | Path | None = None,
+        observer: Observer | None = None,
+        **changes: Any,
+    ) -> SensitivityResult:
+        """Derivatives of the leading mode's growth rate and frequency by the parameters of the valve.
+
+        Parameters
+        ----------
+        of : str or sequence of str, optional
+            Names of parameters, "pressure" or "layer 3 angle"; all that the valve has by default.
+        mode : int, optional
+            Another mode, by falling growth rate from 1.
+        output, observer, changes
+            As for `modes`; also pressure.
+
+        Examples
+        --------
+        >>> found = dbvfiv.load().sensitivity(["thickness", "layer 3 angle"], pressure="6 kPa")     # doctest: +SKIP
+        >>> [(s.parameter, s.growth_rate) for s in found.sensitivities]                             # doctest: +SKIP
+        """
+        return self._ask(sensitivity_keys(of, mode), changes).perform("sensitivity", output, observer)
+
     def closure(
         self,
         pressure: float | str | Iterable[float | str] | None = None,
@@ -215,20 +243,34 @@ class Valve:
         return session.perform("closure", output, observer, in_time=in_time, compare=compare)
 
     def onset(
-        self, over: str | None = None, *, output: str | Path | None = None, observer: Observer | None = None
-    ) -> OnsetResults:
-        """Every onset along one parameter; see `dbvfiv.stability.onset`.
+        self,
+        over: str | None = None,
+        *,
+        output: str | Path | None = None,
+        observer: Observer | None = None,
+        **changes: Any,
+    ) -> OnsetResult:
+        """Every onset along one parameter: where the valve loses or regains stability.
 
         Parameters
         ----------
         over : str, optional
-            Parameter, or PARAMETER=START:STOP:COUNT[:log]; that of the case by default.
-        """
-        from .stability import onset
+            Parameter, or PARAMETER=START:STOP:COUNT[:log]; onset.over of the case by default.
+        output : path, optional
+            Result file, written sample by sample; `dbvfiv.resume` continues it.
+        observer, changes
+            As for `modes`; also pressure, for onsets over something else.
 
-        return onset(
-            self.case if over is None else self.case.replace({"onset.over": over}), self.name, output, observer
-        )
+        Raises
+        ------
+        CaseError, SolveError
+
+        Examples
+        --------
+        >>> found = dbvfiv.load().onset("density", pressure="6 kPa")    # doctest: +SKIP
+        >>> [(p["value"], p["frequency"]) for p in found.points]        # doctest: +SKIP
+        """
+        return self._ask({"onset.over": over}, changes).perform("onset", output, observer)
 
     def map(
         self,
@@ -238,20 +280,28 @@ class Valve:
         workers: int | None = None,
         output: str | Path | None = None,
         observer: Observer | None = None,
-    ) -> MapResults:
-        """Stability over two parameters; see `dbvfiv.stability.stability_map`.
+        **changes: Any,
+    ) -> MapResult:
+        """Stability over two parameters: growth rate of the leading mode, and onset curves.
 
         Parameters
         ----------
         x, y : str, optional
-            PARAMETER=START:STOP:COUNT[:log]; those of the case by default.
+            PARAMETER=START:STOP:COUNT[:log]; map.x and map.y of the case by default.
         workers : int, optional
-            Processes that share the columns.
-        """
-        from .stability import stability_map
+            Processes that share the columns; map.workers of the case by default. Under ``mpiexec`` with mpi4py all its
+            processes.
+        output : path, optional
+            Result file, written column by column; `dbvfiv.resume` continues it.
+        observer, changes
+            As for `modes`; also pressure, for maps over something else.
 
-        changes = {key: value for key, value in (("map.x", x), ("map.y", y)) if value is not None}
-        return stability_map(self.case.replace(changes) if changes else self.case, self.name, output, observer, workers)
+        Raises
+        ------
+        CaseError, SolveError
+        """
+        session = self._ask({"map.x": x, "map.y": y}, changes)
+        return session.perform("map", output, observer, workers=workers)
 
     def transient(
         self,

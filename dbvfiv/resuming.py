@@ -3,60 +3,58 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from .errors import CaseError
-from .studies import KINDS
+from .observer import Observer
+from .record.files import kind_of
+from .studies.session import resume_result
 
-if TYPE_CHECKING:
-    from .observer import Observer
-    from .record.result import Result
+#: What a resumed study may be given anew, the study that takes it, and what it is called in a sentence.
+_OWN = {
+    "duration": ("transient", "A new duration belongs to transient runs"),
+    "workers": ("map", "Workers belong to maps"),
+}
 
 
 def resume(
-    path: str | Path, *, duration: float | None = None, workers: int | None = None, observer: Observer | None = None
-) -> Result:
-    """Continue an interrupted or killed study in its file: a transient run, a map, an onset or a closure run.
+    path: str | Path,
+    *,
+    duration: float | str | None = None,
+    workers: int | None = None,
+    observer: Observer | None = None,
+) -> Any:
+    """Continue an interrupted or killed study in its file.
 
     Parameters
     ----------
     path : path
         Result file; its case says what is still to do.
-    duration : float, optional
-        Of a transient run: a later end, s.
+    duration : number (s) or text with a unit, optional
+        Of a transient run: a later end.
     workers : int, optional
         Of a map: processes that share the columns.
     observer : Observer, optional
 
     Returns
     -------
-    Result
+    StudyResult
         As of the study itself.
 
     Raises
     ------
     CaseError
-        If the file is none of these, or there is nothing left to do.
+        If the file cannot be read, or there is nothing left to do.
+
+    Examples
+    --------
+    >>> run = dbvfiv.resume("run.h5", duration="2 s")     # doctest: +SKIP
     """
-    from .record.files import kind_of
-
     kind = kind_of(path)
-    if duration is not None and kind != "transient":
-        raise CaseError(f"A new duration belongs to transient runs; {str(path)!r} is of kind {kind!r}.")
-    if kind in KINDS:
-        from .studies.session import resume_result
-
-        return resume_result(path, observer, {} if duration is None else {"transient.duration": duration})
-    if kind not in ("map", "onset"):
-        raise CaseError(
-            f"{str(path)!r} holds a result of kind {kind!r}; what can be resumed are transient, map, onset "
-            f"and closure runs."
-        )
-    if kind == "map":
-        from .stability import resume_map
-
-        return resume_map(path, observer, workers)
-    if kind == "onset":
-        from .stability import resume_onset
-
-        return resume_onset(path, observer)
+    given = {"duration": duration, "workers": workers}
+    for name, value in given.items():
+        owner, words = _OWN[name]
+        if value is not None and kind != owner:
+            raise CaseError(f"{words}; {str(path)!r} is of kind {kind!r}.")
+    changes = {} if duration is None else {"transient.duration": duration}
+    return resume_result(path, observer, changes, **({} if workers is None else {"workers": workers}))

@@ -18,8 +18,9 @@ prepare()
 import numpy as np  # noqa: E402
 
 from dbvfiv.case import load_case  # noqa: E402
-from dbvfiv.studies.onset import OnsetOptions, run_onset  # noqa: E402
-from dbvfiv.studies.stability_walk import StabilityWalk  # noqa: E402
+from dbvfiv.studies.onset.run import run_onset  # noqa: E402
+from dbvfiv.studies.onset.search import OnsetOptions  # noqa: E402
+from dbvfiv.studies.stability.walk import StabilityWalk  # noqa: E402
 
 MESH = (28, 48)
 LAWS = ("quasi-steady", "storage")
@@ -80,7 +81,7 @@ def rows(entry: dict) -> list[str]:
 
 def compare(numbers: Path, map_file: Path) -> None:
     """Distances of onsets from the curves of a map, and cells whose sign the curves contradict."""
-    from dbvfiv.results.registry import load_result
+    from dbvfiv.studies.session import load_result
 
     result = load_result(map_file)
     plan = result.plan
@@ -119,7 +120,7 @@ def compare(numbers: Path, map_file: Path) -> None:
 
 
 def _distance(point: np.ndarray, line: np.ndarray) -> float:
-    from dbvfiv.studies.map_curves import merged
+    from dbvfiv.studies.map.curves import merged
 
     return merged(np.column_stack([line, line[:, :1]]), np.append(point, 0.0)[None])[1]
 

@@ -184,9 +184,9 @@ def _theory(base, path: Path) -> dict:
         return json.loads(path.read_text())
     from scipy.optimize import brentq
 
-    from dbvfiv.studies.onset_normal_form import normal_form
-    from dbvfiv.studies.parameters import Place
-    from dbvfiv.studies.stability_walk import StabilityWalk
+    from dbvfiv.studies.onset.normal_form import normal_form
+    from dbvfiv.studies.stability.place import Place
+    from dbvfiv.studies.stability.walk import StabilityWalk
 
     walk = StabilityWalk(base)
 

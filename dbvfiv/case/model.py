@@ -43,6 +43,7 @@ class Case(Section):
     steady: studies.Steady = key(studies.Steady(), "Equilibria over a list of pressures.")
     modes: studies.Modes = key(studies.Modes(), "Leading eigenvalues of the coupled state.")
     sweep: studies.Sweep = key(studies.Sweep(), "Modes tracked along one parameter.")
+    sensitivity: studies.Sensitivity = key(studies.Sensitivity(), "Derivatives of an eigenvalue by parameters.")
     onset: studies.Onset = key(studies.Onset(), "Where a state loses stability.")
     map: studies.StabilityMap = key(studies.StabilityMap(), "Stability over two parameters.")
     transient: studies.Transient = key(studies.Transient(), "A time history.")

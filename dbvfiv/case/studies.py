@@ -87,6 +87,18 @@ class Sweep(Section):
         return parse_axis(self.over)
 
 
+class Sensitivity(Section):
+    """How the leading mode answers to parameters."""
+
+    of: tuple[StrictStr, ...] = key(
+        (),
+        f"Parameters to differentiate by: {listed()}, or of a layer, counted from 1 inside to outside, such as "
+        "'layer 3 angle', 'layer 1 thickness' or 'layer 2 c10'; all that the valve has where none is named.",
+    )
+    mode: StrictInt = key(1, "Number of the mode, by falling growth rate.", ge=1, le=1000)
+    step: Number = key(1e-4, "Relative step of the differences.", gt=1e-8, le=1e-2)
+
+
 class Onset(Section):
     """Where a state loses stability."""
 

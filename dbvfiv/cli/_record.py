@@ -12,7 +12,7 @@ import numpy as np
 
 from ..drawing.signal import save_signal
 from ..errors import CaseError
-from ..results import load_result
+from ..studies.session import load_result
 from ..verdict import JudgeOptions, Series, Verdict, in_steps, judge, spectrum
 from ..verdict.table import Table, read_table
 from ..verdict.units import seconds_in

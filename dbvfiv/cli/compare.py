@@ -24,7 +24,7 @@ def command(
     tell them apart.
     """
     from ..errors import CaseError
-    from ..results import load_result
+    from ..studies.session import load_result
     from ..studies.transient.comparison import labels, save_comparison
 
     results = [load_result(file) for file in files]

@@ -43,7 +43,7 @@ def command(
     is the number of the mode: mode_real, mode_imag and mode_amplitude come with the displacement of the steady state;
     --mode N writes one cycle of that mode instead.
     """
-    from ..results import load_result
+    from ..studies.session import load_result
 
     result = load_result(file)
     choices = {} if mode is None else {"mode": mode}

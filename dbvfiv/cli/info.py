@@ -18,7 +18,7 @@ def command(
     case: Annotated[bool, typer.Option("--case", help="Print the case it was computed from, as a case file.")] = False,
 ) -> None:
     """Summarise a result file: what was run, with which versions, and its numbers. Also while the run goes on."""
-    from ..results import load_result
+    from ..studies.session import load_result
 
     result = load_result(file)
     header, (around, along) = result.header, result.mesh.shape

@@ -52,7 +52,7 @@ def command(
     as_json: AsJson = False,
 ) -> None:
     """Draw the figures of a result file; those of one state show the highest pressure unless --pressure is given."""
-    from ..results import load_result
+    from ..studies.session import load_result
 
     choices = {}
     if pressure is not None:

@@ -8,10 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
-from ..studies import KINDS
 from ._options import AsJson, PlotFolder, ResultFile
 from ._progress import Progress
-from ._study import report as report_study
+from ._study import report
 
 ORDER = 45
 
@@ -31,15 +30,11 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Continue a transient run, a stability map, an onset or a closure run that was interrupted or killed, or a
-    finished transient run with a later --duration.
+    """Continue a run that was interrupted or killed in its file, or a finished transient run with a later --duration.
 
-    A transient run goes on from the last restart point in the same file, with the same numbers as a run that was never
-    interrupted; a map solves the columns that are missing in it, an onset run the values, a closure run the back
-    pressures.
+    The numbers are those of a run that was never interrupted: a transient run goes on from its last restart point, a
+    map solves the columns that are missing in it, an onset run the values, steady and closure runs the pressures.
     """
-    from importlib import import_module
-
     from ..case.quantity import Quantity
     from ..errors import CaseError
     from ..record.files import kind_of
@@ -56,10 +51,8 @@ def command(
         except ValueError as error:
             raise CaseError(f"--duration is given as {duration!r}, {error}.") from None
     result = resume(file, duration=end, workers=workers, observer=Progress(quiet=as_json))
-    if kind in KINDS:
-        films = animate is not None and result.drawable
-        return report_study(result, file, plots, as_json, further=_film_into(animate) if films else None)
-    import_module(f"..{kind}", __name__).report(result, file, plots, as_json)
+    films = animate is not None and result.drawable
+    report(result, file, plots, as_json, further=_film_into(animate) if films else None)
 
 
 def _film_into(path: Path) -> Callable[[Any], list[Path]]:

@@ -12,7 +12,7 @@ from .style import MOTION
 
 if TYPE_CHECKING:
     from ..record.mesh import MeshData
-    from ..record.result import Result
+    from ..studies.result import StudyResult as Result
 
 #: Of displacements.
 COLOURS = matplotlib.colormaps[MOTION]

@@ -30,7 +30,7 @@ class Header:
     Attributes
     ----------
     kind : str
-        "steady", "modes", ...; see `dbvfiv.results.registry`.
+        "steady", "modes", ...; see `dbvfiv.studies.KINDS`.
     case : Case
         Complete, its defaults included.
     name : str

@@ -178,7 +178,7 @@ class Session:
         return study.result(record, self)
 
 
-def read_result(path: str | Path) -> Any:
+def load_result(path: str | Path) -> Any:
     """Read a result file of any kind.
 
     Raises

@@ -90,6 +90,20 @@ class State(SteadyState):
         """Modes of this state tracked along density, alpha or beta, such as "density=1:1000:40:log"."""
         return self._session(changes, {"sweep.over": over, "sweep.count": count}).perform("sweep", output, observer)
 
+    def sensitivity(
+        self,
+        of: str | Sequence[str] = (),
+        *,
+        mode: int | None = None,
+        output: str | Path | None = None,
+        observer: Any = None,
+        **changes: Any,
+    ) -> Any:
+        """Derivatives of the leading mode of this state by parameters, such as ["pressure", "layer 3 angle"]; by all
+        that the valve has without them.
+        """
+        return self._session(changes, sensitivity_keys(of, mode)).perform("sensitivity", output, observer)
+
     def _session(self, given: dict[str, Any], keys: dict[str, Any]) -> Session:
         changes = {"drive.pressure": self.pressure} | named_changes(given) | keys
         session = self.results.session.replace({key: value for key, value in changes.items() if value is not None})
@@ -107,6 +121,12 @@ class State(SteadyState):
     def export(self, path: str | Path, quarter: bool = False, deformed: bool = False) -> Path:
         """Write this state for ParaView."""
         return gather_states(self.results, [self]).export(path, quarter, deformed)
+
+
+def sensitivity_keys(of: str | Sequence[str], mode: int | None) -> dict[str, Any]:
+    """Keys of the case from what a sensitivity is asked for."""
+    names = [of] if isinstance(of, str) else list(of)
+    return {"sensitivity.of": names or None, "sensitivity.mode": mode}
 
 
 def states_of(result: StudyResult, table: str) -> tuple[State, ...]:

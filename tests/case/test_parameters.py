@@ -10,8 +10,8 @@ from dbvfiv.case.parameters import CONDITIONS, DESIGN, PARAMETERS, SURROUNDINGS,
 from dbvfiv.case.stability_axis import parse_stability_axis
 from dbvfiv.model.analytic import PARAMETERS as RESIDUAL
 from dbvfiv.model.dynamics import Conditions
-from dbvfiv.studies.parameters import Place
 from dbvfiv.studies.session import KEYWORDS
+from dbvfiv.studies.stability.place import Place
 
 
 @pytest.mark.parametrize("row", PARAMETERS.values(), ids=PARAMETERS)

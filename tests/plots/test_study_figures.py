@@ -7,9 +7,10 @@ import pytest
 from matplotlib.colors import BoundaryNorm
 
 from dbvfiv.case import Case
-from dbvfiv.plots import map as map_figures
-from dbvfiv.plots import onset as onset_figures
-from dbvfiv.studies.map_column import MapPlan
+from dbvfiv.studies.map import figures as map_figures
+from dbvfiv.studies.map.column import MapPlan
+from dbvfiv.studies.onset import figures as onset_figures
+from dbvfiv.studies.onset.intervals import known_intervals, uncertain_intervals
 
 
 def texts(figure):
@@ -80,11 +81,14 @@ def test_branches_are_told_apart_without_colour(sweep):
 # -- onsets and maps
 
 
-def onset_result(values, growth):
+def onset_result(values, growth, certified=None):
     case = Case().replace({"onset.over": f"pressure={values[0]:g}:{values[-1] + 1:g}:5"})
     rows = np.stack([growth, *(np.full(len(growth), -100.0 * k) for k in (1, 2, 3))], axis=1)
     point = {"value": 9e3, "frequency": 37.0, "growth_rate": 0.0, "criticality": "super", "uncertainty": 200.0}
     point |= {"edge": True, "gains": False}
+    points = [point] if len(values) > 1 else []
+    certified = np.ones(len(values), bool) if certified is None else np.array(certified)
+    stretches = [known_intervals(values, growth, certified, [p["value"] for p in points], which) for which in (0, 1)]
     return SimpleNamespace(
         case=case,
         parameter="pressure",
@@ -92,7 +96,10 @@ def onset_result(values, growth):
         values=np.array(values),
         growth_rates=rows,
         frequencies=np.full(rows.shape, 37.0),
-        points=[point] if len(values) > 1 else [],
+        points=points,
+        stable_intervals=stretches[0],
+        unstable_intervals=stretches[1],
+        uncertain_intervals=uncertain_intervals(values, certified),
     )
 
 
@@ -103,6 +110,18 @@ def test_onsets_say_static_pressure_and_keep_legend_and_title_apart():
     (legend,) = figure.legends
     assert legend.get_window_extent().y1 <= figure.axes[1].get_window_extent().y0
     assert any("9 kPa" in text and "supercritical" in text for text in texts(figure))
+
+
+def test_onsets_shade_what_is_certified_alone_and_hatch_the_rest():
+    """Before, everything between two onsets was called unstable or stable by the middle one of its values."""
+    values, growth = [2e3, 5e3, 8e3, 15e3, 20e3], np.array([50.0, 30.0, 10.0, -20.0, -30.0])
+    figure = onset_figures.onset(onset_result(values, growth, [True, True, True, True, False]))
+    stretches = {"unstable": [], "uncertain": []}
+    for patch in figure.axes[0].patches:
+        name = "uncertain" if patch.get_hatch() else "unstable"
+        stretches[name].append((patch.get_x(), patch.get_x() + patch.get_width()))
+    assert stretches == {"unstable": [(2.0, 9.0)], "uncertain": [(15.0, 20.0)]}
+    assert {t.get_text() for t in figure.legends[0].get_texts()} >= {"unstable", "uncertain"}
 
 
 def test_an_onset_scan_of_one_value_shows_it():
@@ -129,6 +148,7 @@ def map_result(certified=None):
         checks=[],
         case=case,
         header=SimpleNamespace(name="valve"),
+        moved=("pressure", "density"),
         grid=grids.get,
     )
 

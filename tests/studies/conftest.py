@@ -1,7 +1,7 @@
 import pytest
 
 from dbvfiv.case import load_case
-from dbvfiv.studies.stability_walk import StabilityWalk
+from dbvfiv.studies.stability.walk import StabilityWalk
 
 COARSE = [
     "mesh.around=8",

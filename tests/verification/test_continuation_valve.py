@@ -7,9 +7,9 @@ import pytest
 
 from continuation import ContinuationOptions, NewtonOptions, continue_branch
 from dbvfiv.case import load_case
-from dbvfiv.studies.onset_normal_form import system_of
-from dbvfiv.studies.parameters import Place
-from dbvfiv.studies.stability_walk import StabilityWalk
+from dbvfiv.studies.onset.normal_form import system_of
+from dbvfiv.studies.stability.place import Place
+from dbvfiv.studies.stability.walk import StabilityWalk
 
 HIGHEST = 60e3
 

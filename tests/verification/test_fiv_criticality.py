@@ -11,8 +11,8 @@ import pytest
 
 from dbvfiv.case import load_case
 from dbvfiv.model import ValveModel
-from dbvfiv.studies.onset import OnsetOptions, OnsetSearch
-from dbvfiv.studies.onset_normal_form import normal_form
+from dbvfiv.studies.onset.normal_form import normal_form
+from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
 from dbvfiv.studies.transient.run import run_transient
 
 #: Relative distance from the onset density.

@@ -24,9 +24,9 @@ def measured() -> dict:
     continuity laws.
     """
     from dbvfiv.case import Case
-    from dbvfiv.studies.onset import OnsetOptions, OnsetSearch
-    from dbvfiv.studies.parameters import Place
-    from dbvfiv.studies.stability_walk import StabilityWalk
+    from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
+    from dbvfiv.studies.stability.place import Place
+    from dbvfiv.studies.stability.walk import StabilityWalk
 
     case = Case().replace(MESH)
     walk, base = StabilityWalk(case), Place.of(case)

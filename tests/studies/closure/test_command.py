@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from dbvfiv.results import load_result
+from dbvfiv.studies.session import load_result
 
 COARSE = ("--set", "mesh.around=6", "--set", "mesh.along=10", "--set", "closure.max_step=5 kPa")
 

@@ -10,9 +10,8 @@ import pytest
 
 import dbvfiv
 from dbvfiv.api import load
-from dbvfiv.results import load_result
 from dbvfiv.studies.closure.curves import supports_compared
-from dbvfiv.studies.session import Session
+from dbvfiv.studies.session import Session, load_result
 
 COARSE = {
     "mesh.around": 6,

@@ -15,8 +15,8 @@ import pytest
 from dbvfiv.api import load
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
-from dbvfiv.results import load_result
 from dbvfiv.resuming import resume
+from dbvfiv.studies.session import load_result
 
 COARSE = {
     "mesh.around": 6,

@@ -9,8 +9,8 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case import Case
-from dbvfiv.results import load_result
 from dbvfiv.studies.closure.safety import find_safety
+from dbvfiv.studies.session import load_result
 
 
 def result(pressures, sealed, overlap=None, buckling=(), supports="contact", failure=None, **changes):

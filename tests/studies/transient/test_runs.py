@@ -23,8 +23,7 @@ from dbvfiv.record.journal import Journal
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.part import RecordPart
 from dbvfiv.record.record import GrowingRecord, StoredRecord
-from dbvfiv.results import load_result
-from dbvfiv.studies.session import Session
+from dbvfiv.studies.session import Session, load_result
 from dbvfiv.studies.transient import keeping
 from dbvfiv.studies.transient.assess import beyond_model
 from dbvfiv.studies.transient.keeping import rows_to_keep

@@ -1,0 +1,1 @@
+"""Stability over two parameters."""

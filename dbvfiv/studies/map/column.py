@@ -1,0 +1,246 @@
+"""One column of a stability map: all its cells, and where along it modes reach the imaginary axis."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from eigen import Column, Condition
+from eigen.columns import MISSING
+
+from ...case.axis import Axis
+from ...case.model import Case
+from ...errors import CaseError, SolveError
+from ..stability.crossings import Sample, Scan, locate
+from ..stability.place import Place, is_surrounding
+from ..stability.walk import StabilityWalk
+from .correction import OnsetCorrection
+
+#: What is kept of each cell.
+CELLS = ("growth_rate", "frequency", "second", "unstable", "counted", "certified", "how")
+#: Relative accuracy of onsets along a column.
+LOCATED = 1e-10
+
+
+@dataclass(frozen=True)
+class MapPlan:
+    """Which cells a map has, and in which order they are found.
+
+    Attributes
+    ----------
+    case : Case
+    x, y : Axis
+    laws : tuple of float
+        Blends of the continuity laws, one picture each.
+    refine : int
+        How often columns are halved where the number of onsets changes.
+    """
+
+    case: Case
+    x: Axis
+    y: Axis
+    laws: tuple[float, ...]
+    refine: int = 2
+
+    @classmethod
+    def of(cls, case: Case) -> MapPlan:
+        """The map of a case file."""
+        x, y = case.map.axes
+        storage = Place.of(case).storage
+        both = case.map.continuity == "both" and "storage" not in (x.parameter, y.parameter)
+        return cls(case, x, y, (0.0, 1.0) if both else (storage,), case.map.refine)
+
+    @property
+    def transposed(self) -> bool:
+        """Whether columns run along x: where only y changes the steady state."""
+        return is_surrounding(self.x.parameter) and not is_surrounding(self.y.parameter)
+
+    @property
+    def across(self) -> Axis:
+        """Axis with one column for each of its values."""
+        return self.y if self.transposed else self.x
+
+    @property
+    def along(self) -> Axis:
+        """Axis of the cells of one column."""
+        return self.x if self.transposed else self.y
+
+    @cached_property
+    def base(self) -> Place:
+        return Place.of(self.case)
+
+    def place(self, across: float, along: float, law: float) -> Place:
+        """Parameters of a cell."""
+        named = {self.across.parameter: across, self.along.parameter: along}
+        return self.base.at(**({"storage": law} | named))
+
+    def coordinate(self, axis: Axis, value: float) -> float:
+        """0..1 along an axis, in the logarithm if its values are spaced so."""
+        a, b = axis.values[0], axis.values[-1]
+        return math.log(value / a) / math.log(b / a) if axis.log else (value - a) / (b - a)
+
+    def value(self, axis: Axis, coordinate: float) -> float:
+        """Inverse of `coordinate`."""
+        a, b = axis.values[0], axis.values[-1]
+        return a * (b / a) ** coordinate if axis.log else a + (b - a) * coordinate
+
+
+@dataclass(frozen=True)
+class MapColumn:
+    """A finished column.
+
+    Attributes
+    ----------
+    value : float
+        Of the axis across.
+    level : int
+        0 for a column of the grid, more for one that was put between two of them.
+    cells : dict of (laws, cells) arrays
+        See `CELLS`.
+    onsets : (k, 5) array
+        Law (its number), value along the column, frequency in Hz, +1 where a mode becomes unstable along the column, -1
+        where it ceases to be, and the growth rate over the size of the eigenvalue that the full matrices leave there,
+        NaN where it was not corrected by them.
+    error : float
+        Largest estimated relative error of a leading eigenvalue.
+    failure : str
+        Why there is no column; empty if there is one.
+    seconds : float
+        Processor time.
+    band : float
+        Hz; modes were searched for up to it, infinite for all.
+    """
+
+    value: float
+    level: int
+    cells: dict[str, np.ndarray]
+    onsets: np.ndarray
+    error: float
+    failure: str = ""
+    seconds: float = 0.0
+    band: float = math.inf
+
+    @classmethod
+    def missing(cls, plan: MapPlan, value: float, level: int, sentence: str, seconds: float = 0.0) -> MapColumn:
+        """A marked gap."""
+        shape = (len(plan.laws), len(plan.along.values))
+        cells = {name: np.full(shape, np.nan) for name in CELLS[:3]}
+        cells |= {
+            "unstable": np.full(shape, -1),
+            "counted": np.full(shape, -1),
+            "certified": np.zeros(shape, bool),
+            "how": np.full(shape, MISSING),
+        }
+        return cls(value, level, cells, np.zeros((0, 5)), np.nan, sentence, seconds)
+
+
+def grid_of(plan: MapPlan, found, name: str) -> np.ndarray:
+    """A quantity of finished columns on the grid of a plan, (laws, y values, x values)."""
+    blank = MapColumn.missing(plan, 0.0, 0, "").cells[name]
+    by_value = {column.value: column.cells[name] for column in found if column.level == 0}
+    table = np.stack([by_value.get(value, blank) for value in plan.across.values], axis=2)
+    return table.transpose(0, 2, 1) if plan.transposed else table
+
+
+def solve_column(plan: MapPlan, walk: StabilityWalk, value: float, level: int = 0) -> MapColumn:
+    """All cells of a column; a steady state that is not found leaves a gap with the reason."""
+    started = time.process_time()
+    columns, onsets = [], []
+    try:
+        for number, law in enumerate(plan.laws):
+            column, found = _law(plan, walk, value, law)
+            columns.append(column)
+            onsets += [(number, *onset) for onset in found]
+    except (SolveError, CaseError) as error:
+        return MapColumn.missing(plan, value, level, str(error), time.process_time() - started)
+    cells = {name: np.array([getattr(column, name) for column in columns]) for name in CELLS}
+    return MapColumn(
+        value,
+        level,
+        cells,
+        np.array(onsets, float).reshape(-1, 5),
+        max(column.error for column in columns),
+        "",
+        time.process_time() - started,
+        min(float(column.band.min()) for column in columns),
+    )
+
+
+def _law(plan: MapPlan, walk: StabilityWalk, value: float, law: float) -> tuple[Column, list[tuple[float, ...]]]:
+    along = plan.along
+    places = [plan.place(value, other, law) for other in along.values]
+    if not is_surrounding(along.parameter):
+        return _state_by_state(plan, walk.apart(), places)
+    column = walk.column(places)
+    sample = column.eigenvalues or (lambda condition: walk.column([_under(places[0], condition)]).leading[0])
+    cell = column.cell or (lambda condition: walk.column([_under(places[0], condition)]))
+    scan = Scan(
+        lambda other: sample(plan.place(value, other, law).condition),
+        along.log,
+        lambda other: bool(cell(plan.place(value, other, law).condition).certified[0]),
+    )
+    # what the cells know need not be found again
+    scan.samples.update(_known(along, column))
+    found = _onsets(scan, along)
+    if column.corrected is None:
+        return column, found
+
+    correct = OnsetCorrection(
+        column,
+        lambda other: plan.place(value, other, law).condition,
+        lambda other: walk.spectrum(plan.place(value, other, law)).eigenvalues,
+    )
+    onsets = []
+    for other, frequency, direction, _ in found:
+        other, frequency, left = correct(other, frequency)
+        onsets.append((other, frequency, direction, left))
+    return column, onsets
+
+
+def shared_place(plan: MapPlan, value: float) -> Place | None:
+    """Where the steady state of a column lies; None if its cells have states of their own."""
+    if not is_surrounding(plan.along.parameter):
+        return None
+    return plan.place(value, plan.along.values[0], plan.laws[0])
+
+
+def _under(place: Place, condition: Condition) -> Place:
+    """The same steady state under another condition."""
+    return place.at(**dict(zip(("density", "alpha", "beta", "storage"), condition)))
+
+
+def _known(along: Axis, column: Column) -> dict[float, Sample]:
+    rows = zip(along.values, column.leading, column.certified)
+    return {float(v): Sample(float(v), row, bool(sure)) for v, row, sure in rows}
+
+
+def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):
+    """Both axes change the steady state: every cell has its own, solved directly, whatever columns came before."""
+    parts = [walk.column([place]) for place in places]
+    names = ("growth_rate", "frequency", "second", "unstable", "counted", "certain", "how", "line", "band")
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    column = Column(**joined, error=0.0, leading=[part.leading[0] for part in parts])
+    parameter = plan.along.parameter
+
+    def cell(other: float) -> Column:
+        return walk.column([places[0].at(**{parameter: other})])
+
+    scan = Scan(lambda other: cell(other).leading[0], plan.along.log, lambda other: bool(cell(other).certified[0]))
+    scan.samples.update(_known(plan.along, column))
+    return column, _onsets(scan, plan.along)
+
+
+def _onsets(scan: Scan, along: Axis) -> list[tuple[float, float, float, float]]:
+    """Value, frequency, direction, and what is left of the growth rate over the size of the eigenvalue."""
+    found = []
+    for crossing in scan.run(along.values):
+        value = locate(scan, crossing, LOCATED)
+        eigenvalue = complex(scan.at(value).eigenvalues[crossing.index])
+        direction = 1.0 if crossing.high.unstable > crossing.low.unstable else -1.0
+        left = abs(eigenvalue.real) / max(abs(eigenvalue), 1.0)
+        found.append((value, abs(eigenvalue.imag) / (2 * np.pi), direction, left))
+    return found

@@ -1,0 +1,62 @@
+"""``dbvfiv map``: stability over two parameters."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ...case.model import Case
+from ...case.parameters import listed
+from ..request import Request, number_or_text
+from ..stability.fixed import refuse_moved
+
+ORDER = 30
+
+_RANGE = f"PARAMETER=START:STOP:COUNT[:log] of {listed()}"
+
+
+def command(
+    case: Case,
+    x: Annotated[
+        str | None, typer.Option("--x", metavar="RANGE", help=f"Horizontal axis, {_RANGE}; map.x without it.")
+    ] = None,
+    y: Annotated[
+        str | None, typer.Option("--y", metavar="RANGE", help="Vertical axis, likewise; map.y without it.")
+    ] = None,
+    pressure: Annotated[
+        str | None,
+        typer.Option("--pressure", "-p", metavar="P", help="Static inlet pressure where no axis moves it."),
+    ] = None,
+    density: Annotated[
+        str | None, typer.Option("--density", metavar="RHO", help="Fluid density where no axis moves it.")
+    ] = None,
+    both: Annotated[bool, typer.Option("--both", help="Both continuity laws side by side.")] = False,
+    workers: Annotated[
+        int | None, typer.Option("--workers", "-w", metavar="N", min=1, help="Processes that share the columns.")
+    ] = None,
+) -> Request:
+    """Growth rate of the leading mode over two parameters, with the exact onset curves.
+
+    Every cell carries two counts of its unstable modes, by eigenvalues and by the argument principle; where they
+    disagree it is uncertain, and hatched. Some cells are solved again with the full matrices (map.checks). Columns are
+    put in where onsets appear or vanish (map.refine), and until the onset curves are known between them too; every
+    point of a curve is neutral by the full matrices (map.curve).
+
+    With -o every finished column is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash. Under mpiexec with
+    mpi4py the columns are shared among its processes.
+
+    dbvfiv map cases/dbv12.toml --x "pressure=0.5 kPa:20 kPa:64" --y density=1:1000:64:log --workers 2 -o map.h5 --plots
+    figures
+    """
+    ranges = {"map.x": x or case.map.x, "map.y": y or case.map.y}
+    refuse_moved(ranges, pressure=pressure, density=density)
+    changes = {
+        "drive.pressure": number_or_text(pressure),
+        "fluid.density": number_or_text(density),
+        "map.x": x,
+        "map.y": y,
+        "map.continuity": "both" if both else None,
+        "map.workers": workers,
+    }
+    return Request(changes)

@@ -1,0 +1,88 @@
+"""Onsets of a column, found on a small model, brought to where the full matrices have them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from eigen import Column, Condition
+
+from ...errors import SolveError
+
+#: Growth rate over the size of the eigenvalue up to which an onset counts as neutral.
+ACCURATE = 1e-6
+#: The same, at which corrections end.
+NEUTRAL = 1e-8
+#: Corrections at most.
+CORRECTIONS = 5
+#: Step along the column for the slope of the growth rate, relative.
+STEP = 1e-4
+#: Largest step along the column, relative.
+REACH = 0.05
+#: Largest relative difference of one mode on the small model and with the full matrices.
+SAME = 1e-2
+
+
+@dataclass(frozen=True)
+class OnsetCorrection:
+    """Newton steps along a column with eigenvalues of the full matrices and slopes of the small model.
+
+    Parameters
+    ----------
+    column : Column
+    condition : callable
+        From a value along the column to its condition.
+    direct : callable
+        From a value to leading eigenvalues of the full pencil, where corrections on the small model do not settle.
+    """
+
+    column: Column
+    condition: Callable[[float], Condition]
+    direct: Callable[[float], np.ndarray]
+
+    def __call__(self, value: float, frequency: float) -> tuple[float, float, float]:
+        """Value, frequency (Hz) and growth rate over the size of the eigenvalue, NaN where no mode was followed."""
+        near = 2j * np.pi * frequency
+        for eigenvalue in (self._by_correction, self._by_solving):
+            found = self._settled(eigenvalue, value, near)
+            if found is not None:
+                return found
+        return value, frequency, float("nan")
+
+    def _settled(self, eigenvalue, value: float, near: complex):
+        slope = self._slope(value, near)
+        for _ in range(CORRECTIONS):
+            found = eigenvalue(value, near)
+            if found is None or not np.isfinite(found):
+                return None
+            near, left = found, abs(found.real) / max(abs(found), 1.0)
+            if left <= NEUTRAL:
+                break
+            if abs(found.real) > REACH * abs(slope) * (abs(value) or 1.0):
+                return None  # a growth rate that hardly changes along the column leads astray
+            value -= found.real / slope
+        return (value, abs(near.imag) / (2 * np.pi), left) if left <= ACCURATE else None
+
+    def _small(self, value: float, near: complex) -> complex:
+        values = self.column.eigenvalues(self.condition(value))
+        return complex(values[int(np.argmin(np.abs(values - near)))])
+
+    def _slope(self, value: float, near: complex) -> float:
+        step = STEP * (abs(value) or 1.0)
+        up, down = (self._small(v, near).real for v in (value + step, value - step))
+        return (up - down) / (2 * step)
+
+    def _by_correction(self, value: float, near: complex) -> complex | None:
+        found = self._small(value, near)
+        change = self.column.corrected(self.condition(value), found)
+        return found + change if abs(change) < SAME * max(abs(found), 1.0) else None
+
+    def _by_solving(self, value: float, near: complex) -> complex | None:
+        try:
+            values = self.direct(value)
+        except SolveError:
+            return None
+        nearest = complex(values[int(np.argmin(np.abs(values - near)))])
+        return nearest if abs(nearest - near) < SAME * max(abs(near), 1.0) else None

@@ -1,0 +1,145 @@
+"""Stability maps: what can be read off a run or its file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..result import StudyResult
+from ..stability.place import describe_fixed, fixed_conditions
+from . import figures
+from .checks import Check
+from .column import MapColumn, MapPlan, grid_of
+from .curves import OnsetCurve, linked
+from .rows import gap_sentence, read_checks, read_columns, read_curves
+
+LAWS = {0.0: "quasi-steady", 1.0: "storage"}
+
+
+class MapResult(StudyResult):
+    """Growth rate of the leading mode over two parameters.
+
+    Attributes
+    ----------
+    plan : MapPlan
+        Axes and continuity laws.
+    columns : tuple of MapColumn
+    curves : tuple of OnsetCurve
+    checks : tuple of Check
+    """
+
+    kind = "map"
+
+    @cached_property
+    def plan(self) -> MapPlan:
+        return MapPlan.of(self.case)
+
+    @cached_property
+    def columns(self) -> tuple[MapColumn, ...]:
+        return tuple(sorted(read_columns(self.record, self.plan), key=lambda column: column.value))
+
+    @cached_property
+    def curves(self) -> tuple[OnsetCurve, ...]:
+        found = read_curves(self.record)
+        return linked(self.plan, self.columns) if found is None else found
+
+    @cached_property
+    def checks(self) -> tuple[Check, ...]:
+        return read_checks(self.record)
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        return tuple(gap_sentence(self.plan, column) for column in self.columns if column.failure)
+
+    def grid(self, name: str) -> np.ndarray:
+        """growth_rate, frequency, second, unstable, counted, certified or how on the grid (laws, y, x)."""
+        return grid_of(self.plan, self.columns, name)
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """Parameters that are not the same all over the map."""
+        laws = ("storage",) if len(self.plan.laws) > 1 else ()
+        return (self.plan.x.parameter, self.plan.y.parameter, *laws)
+
+    def summary(self) -> dict[str, Any]:
+        pictures = [self._picture(i) for i in range(len(self.plan.laws))]
+        shared = {
+            "x": _axis(self.plan.x),
+            "y": _axis(self.plan.y),
+            "fixed": fixed_conditions(self.case, *self.moved),
+            "checks": [{f.name: getattr(check, f.name) for f in fields(check)} for check in self.checks],
+            "gaps": list(self.failures),
+            "warnings": list(self.warnings),
+            "interrupted": not self.complete,
+        }
+        document = shared | pictures[0]
+        if len(pictures) > 1:
+            document["laws"] = pictures
+        return document
+
+    def _picture(self, law: int) -> dict[str, Any]:
+        mine = [curve for curve in self.curves if curve.law == law]
+        return {
+            "continuity": LAWS.get(self.plan.laws[law], self.plan.laws[law]),
+            "growth_rate": self.grid("growth_rate")[law].tolist(),
+            "frequency": self.grid("frequency")[law].tolist(),
+            "unstable_count": self.grid("unstable")[law].tolist(),
+            "unstable_count_independent": self.grid("counted")[law].tolist(),
+            "certified": self.grid("certified")[law].astype(bool).tolist(),
+            "onset_curves": [curve.points() for curve in mine],
+            "onset_frequencies": [curve.frequency.tolist() for curve in mine],
+            "onset_curves_exact": [bool(curve.exact) for curve in mine],
+        }
+
+    def shortfall(self) -> str | None:
+        gaps = len(self.failures)
+        return f"{gaps} of {len(self.columns)} columns were not reached" if gaps else None
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        yield from figures.draw(self)
+
+    def lines(self) -> list[str]:
+        lines = [f"At {describe_fixed(self.case, *self.moved)}:"]
+        for i in range(len(self.plan.laws)):
+            lines.append(self._cells_line(i))
+            lines += [self._curve_line(curve) for curve in self.curves if curve.law == i]
+        if self.checks:
+            worst = max(check.error for check in self.checks)
+            agreeing = sum(check.agrees for check in self.checks)
+            lines.append(
+                f"{agreeing} of {len(self.checks)} cells solved again with the full pencil agree; largest "
+                f"difference {worst:.1e}."
+            )
+        return lines
+
+    def _cells_line(self, law: int) -> str:
+        unstable, certified, how = (self.grid(name)[law] for name in ("unstable", "certified", "how"))
+        certified = certified.astype(bool)
+        gaps, direct = int((unstable < 0).sum()), int((how == 1).sum())
+        name = LAWS.get(self.plan.laws[law], f"blend {self.plan.laws[law]:g}")
+        return (
+            f"{name}: {unstable.shape[1]} x {unstable.shape[0]} cells, "
+            f"{int(((unstable > 0) & certified).sum())} unstable, {int(((unstable == 0) & certified).sum())} "
+            f"stable, {int(certified.sum())} of {unstable.size} certified"
+            + (f", {direct} solved directly" if direct else "")
+            + (f", {gaps} in gaps" if gaps else "")
+            + "."
+        )
+
+    def _curve_line(self, curve: OnsetCurve) -> str:
+        kind = "exact" if curve.exact else "not exact"
+        return (
+            f"  onset curve, {kind}, {len(curve.x)} points: {self.plan.x.parameter} "
+            f"{min(curve.x):.6g} to {max(curve.x):.6g}, "
+            f"{self.plan.y.parameter} {min(curve.y):.6g} to {max(curve.y):.6g}, "
+            f"{min(curve.frequency):.4g} to {max(curve.frequency):.4g} Hz"
+        )
+
+
+def _axis(axis) -> dict[str, Any]:
+    return {"parameter": axis.parameter, "values": list(axis.values), "log": axis.log}

@@ -1,0 +1,191 @@
+"""Stability over two parameters: columns of cells, refined near onset, and exact onset curves on top."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...case.model import Case
+from ...errors import SolveError
+from ...observer import Observer
+from ..stability.place import check_scan
+from ..stability.walk import StabilityWalk
+from .checks import Check, check_cells
+from .column import MapColumn, MapPlan, grid_of
+from .curves import OnsetCurve, doubts, linked
+from .pool import ColumnPool
+from .web import Web
+
+
+@dataclass(frozen=True)
+class FoundMap:
+    """A stability map.
+
+    Attributes
+    ----------
+    plan : MapPlan
+    columns : tuple of MapColumn
+        In ascending order, those between the grid's included.
+    curves : tuple of OnsetCurve
+    checks : tuple of Check
+        Cells solved again with the full pencil.
+    warnings : tuple of str
+    interrupted : bool
+    """
+
+    plan: MapPlan
+    columns: tuple[MapColumn, ...]
+    curves: tuple[OnsetCurve, ...] = ()
+    checks: tuple[Check, ...] = ()
+    warnings: tuple[str, ...] = ()
+    interrupted: bool = False
+
+    def grid(self, name: str) -> np.ndarray:
+        """A quantity of the cells on the grid; see `dbvfiv.studies.map.column.grid_of`."""
+        return grid_of(self.plan, self.columns, name)
+
+
+#: Rounds of columns put in for the onset curves.
+ROUNDS = 14
+#: Columns put in for them at most: as many as the map has, or this many.
+LEAST_ROOM = 40
+
+
+@dataclass
+class _Run:
+    plan: MapPlan
+    observer: Observer
+    pool: ColumnPool
+    found: dict[tuple[float, int], MapColumn] = field(default_factory=dict)
+
+    def fill(self, wanted) -> None:
+        """Columns that are not there yet: those an earlier run has found, and the others solved."""
+        wanted = [task for task in wanted if task not in self.found]
+        for column in self.pool.columns(wanted):
+            task = column.value, column.level
+            self.found[task] = column
+            if task not in self.pool.known:
+                self.observer.item(column)
+
+    def between(self, level: int) -> list[tuple[float, int]]:
+        """Columns to put in where the number of onsets differs between neighbours."""
+        ordered = sorted((c for c in self.found.values() if not c.failure), key=lambda c: c.value)
+        wanted = []
+        for a, b in zip(ordered[:-1], ordered[1:]):
+            if _pattern(a) != _pattern(b) and max(a.level, b.level) == level - 1:
+                middle = 0.5 * (
+                    self.plan.coordinate(self.plan.across, a.value) + self.plan.coordinate(self.plan.across, b.value)
+                )
+                wanted.append((self.plan.value(self.plan.across, middle), level))
+        return wanted
+
+    def trace(self) -> None:
+        """Columns that the onset curves need to be known everywhere."""
+        across = self.plan.across
+        level = max(column.level for column in self.found.values())
+        room = max(LEAST_ROOM, len(across.values))
+        for _ in range(ROUNDS):
+            wanted = Web.of(self.plan, self.found.values()).wanted()[:room]
+            if not wanted:
+                return
+            room -= len(wanted)
+            level += 1
+            self.observer.progress(f"onset curves, {len(wanted)} more columns")
+            self.fill([(self.plan.value(across, place), level) for place in wanted])
+
+
+def _pattern(column: MapColumn) -> tuple:
+    return tuple((int(row[0]), int(row[3])) for row in column.onsets)
+
+
+def run_map(
+    case: Case,
+    observer: Observer | None = None,
+    workers: int | None = None,
+    known: Iterable[MapColumn] = (),
+    walk: StabilityWalk | None = None,
+) -> FoundMap:
+    """A stability map of a case.
+
+    Parameters
+    ----------
+    case : Case
+    observer : Observer, optional
+        `item` is told of every finished `MapColumn`.
+    workers : int, optional
+        Processes; those of the case by default.
+    known : iterable of MapColumn
+        Columns of an interrupted run, which are not solved again: the run repeats its decisions with them, so that it
+        ends with the numbers of one that was never interrupted.
+    walk : StabilityWalk, optional
+        Of the case.
+
+    Raises
+    ------
+    CaseError
+        If the case has nothing that a parameter could change.
+    SolveError
+        If the case has no flow, or no column was found at all.
+    """
+    plan = MapPlan.of(case)
+    check_scan(case, plan.x.parameter, plan.y.parameter)
+    observer = observer or Observer()
+    walk = walk or StabilityWalk(case)
+    observer.begin("map", len(plan.across.values))
+    curves: tuple[OnsetCurve, ...] = ()
+    checks: tuple[Check, ...] = ()
+    warnings: list[str] = []
+    interrupted = False
+    with ColumnPool(plan, case.map.workers if workers is None else workers, observer.warn, walk, known) as pool:
+        run = _Run(plan, observer, pool)
+        try:
+            run.fill([(value, 0) for value in plan.across.values])
+            for level in range(1, plan.refine + 1):
+                run.fill(run.between(level))
+            if all(column.failure for column in run.found.values()):
+                raise SolveError(f"No state of the map was found: {_ordered(run.found)[0].failure}")
+            if case.map.curve:
+                run.trace()
+            ordered = _ordered(run.found)
+            checks = check_cells(plan, ordered, walk, case.map.checks)
+            curves = linked(plan, ordered)
+            if case.map.curve:
+                warnings += doubts(plan, curves)
+            warnings += _doubts(plan, ordered, checks)
+        except KeyboardInterrupt:
+            interrupted = True
+    for sentence in warnings:
+        observer.warn(sentence)
+    observer.end(interrupted)
+    return FoundMap(plan, _ordered(run.found), curves, checks, tuple(warnings), interrupted)
+
+
+def _ordered(found) -> tuple[MapColumn, ...]:
+    return tuple(sorted(found.values(), key=lambda column: column.value))
+
+
+def _doubts(plan: MapPlan, ordered, checks) -> list[str]:
+    """Sentences about cells that are not certified or fail a check."""
+    doubtful = sum(int((~c.cells["certified"]).sum()) for c in ordered if not c.failure and c.level == 0)
+    said = []
+    if doubtful:
+        said.append(
+            f"{doubtful} cells are uncertain: spectrum and independent count disagree, or the count is not certain; "
+            "they are called neither stable nor unstable."
+        )
+    bands = [c.band for c in ordered if not c.failure and np.isfinite(c.band)]
+    if bands:
+        said.append(
+            f"Modes were searched for up to {min(bands):.4g} Hz"
+            + (f" to {max(bands):.4g} Hz, by the column" if max(bands) > min(bands) else "")
+            + "; modes.max_frequency chooses another end."
+        )
+    for check in checks:
+        if not check.agrees:
+            said.append(
+                f"At {plan.x.parameter} = {check.x:.6g}, {plan.y.parameter} = {check.y:.6g} the full pencil "
+                f"differs by {check.error:.1e}."
+            )
+    return said

@@ -1,0 +1,1 @@
+"""Where a valve loses or regains stability along one parameter."""

@@ -1,0 +1,51 @@
+"""``dbvfiv onset``: where a state loses stability."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ...case.model import Case
+from ...case.parameters import listed
+from ..request import Request, number_or_text
+from ..stability.fixed import refuse_moved
+
+ORDER = 28
+
+
+def command(
+    case: Case,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over",
+            metavar="PARAMETER",
+            help=f"{listed()}, with =START:STOP:COUNT[:log] for a range of one's own; onset.over without it.",
+        ),
+    ] = None,
+    pressure: Annotated[
+        str | None,
+        typer.Option("--pressure", "-p", metavar="P", help="Static inlet pressure in place of drive.pressure."),
+    ] = None,
+    density: Annotated[
+        str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
+    ] = None,
+) -> Request:
+    """Every onset along one parameter: value, frequency, super- or subcritical, uncertainty of the mesh.
+
+    All crossings of the range are looked for, also tongues of instability that close again. Each is located with the
+    full matrices, confirmed by direct eigenvalues and independent counts on both sides, described by its first Lyapunov
+    coefficient (onset.normal_form), and found again on a coarser mesh for an uncertainty (onset.coarse_mesh).
+
+    With -o every value of the scan and every onset is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash.
+
+    dbvfiv onset cases/dbv12.toml --over density -p "6 kPa"
+    """
+    refuse_moved({"onset.over": over or case.onset.over}, pressure=pressure, density=density)
+    changes = {
+        "drive.pressure": number_or_text(pressure),
+        "fluid.density": number_or_text(density),
+        "onset.over": over,
+    }
+    return Request(changes)

@@ -1,0 +1,57 @@
+"""Stretches of a scan that are known to be stable or unstable, and those that are not known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+Interval = tuple[float, float]
+
+
+def known_intervals(
+    values: np.ndarray, growth: np.ndarray, certified: np.ndarray, edges: Iterable[float], unstable: bool
+) -> list[Interval]:
+    """Where a state is known to be unstable, or stable.
+
+    Parameters
+    ----------
+    values : (s,) array
+        Of the scan, ascending.
+    growth : (s,) array, 1/s
+        Growth rate of the leading mode there.
+    certified : (s,) bool array
+        Nothing is claimed beside a value without a certificate.
+    edges : iterable of float
+        Onsets at which the state changes between stable and unstable.
+    unstable : bool
+        Which of the two is asked for.
+    """
+    edges, found = sorted(edges), []
+    for i in range(len(values) - 1):
+        if not (certified[i] and certified[i + 1]):
+            continue
+        marks = [values[i], *(e for e in edges if values[i] < e < values[i + 1]), values[i + 1]]
+        state = bool(growth[i] > 0)
+        for a, b in zip(marks[:-1], marks[1:]):
+            if state == unstable:
+                _append(found, float(a), float(b))
+            state = not state
+    return found
+
+
+def uncertain_intervals(values: np.ndarray, certified: np.ndarray) -> list[Interval]:
+    """Where nothing is claimed, because a neighbour lacks a certificate."""
+    found: list[Interval] = []
+    for i in range(len(values) - 1):
+        if not (certified[i] and certified[i + 1]):
+            _append(found, float(values[i]), float(values[i + 1]))
+    return found
+
+
+def _append(found: list[Interval], low: float, high: float) -> None:
+    """Add an interval, joined with the last one if they touch."""
+    if found and found[-1][1] == low:
+        found[-1] = (found[-1][0], high)
+    else:
+        found.append((low, high))

@@ -1,0 +1,58 @@
+"""Super- or subcritical: the Hopf normal form of a located onset."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from continuation import ContinuationError
+from continuation.hopf import hopf_borders
+from continuation.normal_form import hopf_normal_form
+
+from ...case.model import Case
+from ...case.parameters import PARAMETERS
+from ...errors import SolveError
+from ...model.system import ValveSystem
+from ..stability.place import Place, rebuilder
+from ..stability.walk import StabilityWalk
+from .point import OnsetPoint
+
+#: What the note of a point begins with where its normal form was not found.
+MISSING = "No normal form:"
+
+
+def described(point: OnsetPoint, case: Case, walk: StabilityWalk, mode) -> OnsetPoint:
+    """A point with its criticality, by the multilinear forms of the coupled residual; with the reason in its note where
+    there is none.
+    """
+    try:
+        form = normal_form(case, walk, point.place, mode, point.parameter)
+    except (ContinuationError, SolveError, ArithmeticError, ValueError) as error:
+        return replace(point, note=f"{point.note} {MISSING} {error}".strip())
+    speed = form.crossing.real if form.crossing is not None else None
+    return replace(point, criticality=form.criticality, first_lyapunov_coefficient=form.l1, crossing_speed=speed)
+
+
+def system_of(case: Case, walk: StabilityWalk, place: Place) -> ValveSystem:
+    """The valve as a System of `continuation` at a place."""
+    model = walk.built(replace(place, design={})).model
+    return ValveSystem(model, rebuilder(case), walk.search(place))
+
+
+def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: str | None = None):
+    """Hopf normal form at a located onset, a `continuation.HopfNormalForm`.
+
+    Raises
+    ------
+    ContinuationError
+        If the eigenvalue is not simple.
+    """
+    system = system_of(case, walk, place)
+    mu = place.mu()
+    u = system.state(walk.equilibrium(place), mu)
+    omega = abs(complex(mode.eigenvalue).imag)
+    vector = np.concatenate([mode.q, 1j * omega * mode.q, mode.u])
+    left, right = hopf_borders(system.linear(u, mu), omega, vector / np.linalg.norm(vector))
+    name = PARAMETERS[parameter].system_name or None if parameter else None
+    return hopf_normal_form(system, u, mu, omega, right, left, name)

@@ -1,0 +1,191 @@
+"""What a run over one parameter finds: samples of its scan, and crossings of the imaginary axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from ...case.model import Case
+from ..stability.place import Place
+
+#: Meshes of a run: that of the case, and the coarser one for the uncertainty.
+FINE, COARSE = 0, 1
+
+
+@dataclass(frozen=True)
+class OnsetSample:
+    """Leading eigenvalues at one value, or why there are none.
+
+    Attributes
+    ----------
+    value : float
+    eigenvalues : (k,) complex array, 1/s
+        Sorted by growth rate, a conjugate pair given once.
+    mesh : int
+        `FINE` or `COARSE`.
+    failure : str
+        Empty if there is a state.
+    certified : bool
+        An independent count of the unstable eigenvalues agrees with them.
+    """
+
+    value: float
+    eigenvalues: np.ndarray
+    mesh: int = FINE
+    failure: str = ""
+    certified: bool = False
+
+
+@dataclass(frozen=True)
+class Side:
+    """What the full pencil says a little beside an onset.
+
+    Attributes
+    ----------
+    value : float
+    growth_rate, frequency : float, 1/s, Hz
+        Of the crossing mode.
+    leading : float, 1/s
+        Growth rate of the leading mode.
+    unstable, counted : int
+        Unstable eigenvalues by the spectrum and by the argument principle.
+    """
+
+    value: float
+    growth_rate: float
+    frequency: float
+    leading: float
+    unstable: int
+    counted: int
+
+    @property
+    def eigenvalue(self) -> complex:
+        """Of the crossing mode, 1/s."""
+        return complex(self.growth_rate, 2 * np.pi * self.frequency)
+
+    def summary(self) -> dict:
+        """Plain numbers for JSON, frequencies in Hz."""
+        return {
+            "value": self.value,
+            "growth_rate": self.growth_rate,
+            "frequency": self.frequency,
+            "leading_growth_rate": self.leading,
+            "unstable_count": self.unstable,
+            "unstable_count_independent": self.counted,
+        }
+
+    @classmethod
+    def of(cls, summary) -> Side:
+        """From what `summary` gave."""
+        names = ("value", "growth_rate", "frequency", "leading_growth_rate")
+        counts = (int(summary[name]) for name in ("unstable_count", "unstable_count_independent"))
+        return cls(*(float(summary[name]) for name in names), *counts)
+
+
+@dataclass(frozen=True)
+class OnsetPoint:
+    """One crossing of the imaginary axis.
+
+    Attributes
+    ----------
+    parameter : str
+    value : float
+    frequency : float, Hz
+        0 for a real eigenvalue (divergence).
+    growth_rate : float, 1/s
+        Left over at the value: how well it is located.
+    gains : bool
+        True if the mode becomes unstable as the parameter grows.
+    edge : bool
+        True if no other mode is unstable there, so that the state itself changes between stable and unstable.
+    below, above : Side
+        Direct eigenvalues on both sides.
+    confirmed : bool
+        Both sides agree with the crossing, and both counts agree on each side.
+    place : Place
+    bracket : (2,) tuple of float
+        Neighbouring values of the scan that it lies between.
+    ahead : int
+        Modes that grow faster there.
+    criticality : str or None
+        "super", "sub" or "degenerate"; None for a real eigenvalue or where it was not asked for.
+    first_lyapunov_coefficient : float or None
+        Scaled for eigenvectors of unit norm in (q, v, U), 1/s; only its sign carries over to other scalings.
+    crossing_speed : float or None
+        Derivative of the growth rate with respect to the parameter.
+    uncertainty : float or None
+        By Richardson's rule from a second mesh, in units of the parameter.
+    coarse_value : float or None
+        The onset on the second mesh.
+    note : str
+    """
+
+    parameter: str
+    value: float
+    frequency: float
+    growth_rate: float
+    gains: bool
+    edge: bool
+    below: Side
+    above: Side
+    confirmed: bool
+    place: Place
+    bracket: tuple[float, float]
+    ahead: int = 0
+    criticality: str | None = None
+    first_lyapunov_coefficient: float | None = None
+    crossing_speed: float | None = None
+    uncertainty: float | None = None
+    coarse_value: float | None = None
+    note: str = ""
+
+    @property
+    def kind(self) -> str:
+        """ "Hopf" or "divergence"."""
+        return "Hopf" if self.frequency > 0 else "divergence"
+
+    @property
+    def key(self) -> tuple[float, float, int]:
+        """What tells it from other crossings of the same scan."""
+        return (*self.bracket, self.ahead)
+
+    def summary(self) -> dict:
+        """Plain SI numbers for JSON."""
+        return {
+            "parameter": self.parameter,
+            "value": self.value,
+            "frequency": self.frequency,
+            "growth_rate": self.growth_rate,
+            "criticality": self.criticality,
+            "first_lyapunov_coefficient": self.first_lyapunov_coefficient,
+            "uncertainty": self.uncertainty,
+            "kind": self.kind,
+            "gains": self.gains,
+            "edge": self.edge,
+            "confirmed": self.confirmed,
+            "crossing_speed": self.crossing_speed,
+            "coarse_value": self.coarse_value,
+            "below": self.below.summary(),
+            "above": self.above.summary(),
+            "note": self.note or None,
+            "bracket": list(self.bracket),
+            "ahead": self.ahead,
+        }
+
+    @classmethod
+    def of(cls, summary: Mapping[str, Any], case: Case) -> OnsetPoint:
+        """From what `summary` gave, of a case that says the other parameters."""
+        given = {field.name: summary[field.name] for field in fields(cls) if field.name in summary}
+        return cls(
+            **given
+            | {
+                "below": Side.of(summary["below"]),
+                "above": Side.of(summary["above"]),
+                "bracket": tuple(summary["bracket"]),
+                "note": summary["note"] or "",
+                "place": Place.of(case).at(**{summary["parameter"]: summary["value"]}),
+            }
+        )

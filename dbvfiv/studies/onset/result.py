@@ -1,0 +1,159 @@
+"""Onsets along one parameter: what can be read off a run or its file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...case.parameters import PARAMETERS
+from ..result import StudyResult
+from ..stability.crossings import WATCHED
+from ..stability.place import describe_fixed, fixed_conditions
+from . import figures
+from .intervals import Interval, known_intervals, uncertain_intervals
+from .point import FINE, OnsetSample
+from .rows import read_points, read_samples
+
+CRITICALITY = {"super": "supercritical", "sub": "subcritical"}
+
+
+class OnsetResult(StudyResult):
+    """Onsets in ascending order of the parameter, and the scan that found them.
+
+    Attributes
+    ----------
+    parameter : str
+    points : tuple of dict
+        One for each onset, see `dbvfiv.studies.onset.point.OnsetPoint.summary`; None where something is not known.
+    values, growth_rates, frequencies : (s,), (s, 4), (s, 4) arrays, SI, 1/s, Hz
+        The scan; NaN where there are fewer modes.
+    certified : (s,) bool array
+        An independent count agrees there.
+
+    Examples
+    --------
+    >>> found = dbvfiv.load().onset("density", pressure="6 kPa")            # doctest: +SKIP
+    >>> [(point["value"], point["frequency"]) for point in found.points]    # doctest: +SKIP
+    """
+
+    kind = "onset"
+
+    @property
+    def parameter(self) -> str:
+        return self.case.onset.axis.parameter
+
+    @cached_property
+    def points(self) -> tuple[dict[str, Any], ...]:
+        return tuple(read_points(self.record))
+
+    @cached_property
+    def _scan(self) -> list[OnsetSample]:
+        # the second mesh and values without a state belong to the run and not to its result
+        found = {s.value: s for s in read_samples(self.record) if s.mesh == FINE and not s.failure}
+        return [found[value] for value in sorted(found)]
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        return np.array([sample.value for sample in self._scan])
+
+    @cached_property
+    def _modes(self) -> np.ndarray:
+        table = np.full((len(self._scan), WATCHED), complex(np.nan, np.nan))
+        for row, sample in zip(table, self._scan):
+            row[: len(sample.eigenvalues)] = sample.eigenvalues
+        return table
+
+    @property
+    def growth_rates(self) -> np.ndarray:
+        return self._modes.real
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        return self._modes.imag / (2 * np.pi)
+
+    @cached_property
+    def certified(self) -> np.ndarray:
+        return np.array([sample.certified for sample in self._scan], bool)
+
+    @property
+    def unstable_intervals(self) -> list[Interval]:
+        """Where the state is known to be unstable within the range scanned."""
+        return self._intervals(True)
+
+    @property
+    def stable_intervals(self) -> list[Interval]:
+        """Where it is known to be stable."""
+        return self._intervals(False)
+
+    @property
+    def uncertain_intervals(self) -> list[Interval]:
+        """Where neither is claimed."""
+        return uncertain_intervals(self.values, self.certified)
+
+    def _intervals(self, unstable: bool) -> list[Interval]:
+        edges = [point["value"] for point in self.points if point["edge"]]
+        return known_intervals(self.values, self.growth_rates[:, 0], self.certified, edges, unstable)
+
+    def summary(self) -> dict[str, Any]:
+        return {
+            "parameter": self.parameter,
+            "points": list(self.points),
+            "scan": {
+                "values": self.values.tolist(),
+                "growth_rate": self.growth_rates[:, 0].tolist(),
+                "frequency": self.frequencies[:, 0].tolist(),
+                "certified": self.certified.tolist(),
+            },
+            "fixed": fixed_conditions(self.case, self.parameter),
+            "failures": list(self.failures),
+            "warnings": list(self.warnings),
+            "interrupted": not self.complete,
+        }
+
+    def shortfall(self) -> str | None:
+        failed = len(self.failures)
+        return f"Parts of the range were not reached: {failed} states failed" if failed else None
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        yield from figures.draw(self)
+
+    def lines(self) -> list[str]:
+        fixed = f"At {describe_fixed(self.case, self.parameter)}:"
+        if not self.points:
+            return [fixed, self._without_onset()]
+        unit = PARAMETERS[self.parameter].shown_unit
+        head = (
+            f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  "
+            f"{'':<28}{'below, 1/s':>11}{'above, 1/s':>11}"
+        )
+        return [fixed, head, *(self._line(point) for point in self.points)]
+
+    def _without_onset(self) -> str:
+        row = PARAMETERS[self.parameter]
+        low, high = (self.values[[0, -1]] / row.scale) if len(self.values) else (math.nan, math.nan)
+        if not len(self.values) or not self.certified.all():
+            sure = int(self.certified.sum())
+            return (
+                f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values from {low:.6g} to "
+                f"{high:.6g} {row.shown_unit} carry a certificate."
+            )
+        state = "unstable" if self.growth_rates[0, 0] > 0 else "stable"
+        return f"No onset: the valve is {state} from {low:.6g} to {high:.6g} {row.shown_unit}."
+
+    def _line(self, point: dict[str, Any]) -> str:
+        scale = PARAMETERS[self.parameter].scale
+        becomes = "unstable above" if point["gains"] else "stable above"
+        which = CRITICALITY.get(point["criticality"], point["criticality"])
+        words = becomes + (f", {which}" if which else "") if point["edge"] else f"a further mode {becomes}"
+        spread = " " * 9 if point["uncertainty"] is None else f"{point['uncertainty'] / scale:9.2g}"
+        below, above = (point[side]["growth_rate"] for side in ("below", "above"))
+        mark = "" if point["confirmed"] else "  not confirmed"
+        return (
+            f"{point['value'] / scale:16.8g} {spread} {point['frequency']:8.3f}  "
+            f"{words:<28}{below:11.4g}{above:11.4g}{mark}"
+        )

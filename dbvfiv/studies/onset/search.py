@@ -1,0 +1,306 @@
+"""Scan, location and confirmation of onsets along one parameter of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from eigen import Certificate
+
+from ...case.model import Case
+from ...errors import CaseError, SolveError
+from ...observer import Observer
+from ..stability.crossings import WATCHED, Crossing, Sample, Scan, locate
+from ..stability.place import Place, is_surrounding
+from ..stability.walk import StabilityWalk
+from .normal_form import MISSING, described
+from .point import FINE, OnsetPoint, OnsetSample, Side
+
+#: Relative distance from an onset at which it is confirmed on both sides.
+ASIDE = 2e-3
+#: Largest relative difference of a mode on the small model and with the full matrices.
+SAME = 1e-3
+#: Values of a scan at which leading vectors are taken.
+SNAPSHOTS = 6
+
+
+@dataclass(frozen=True)
+class OnsetOptions:
+    """Options of `run_onset`.
+
+    Attributes
+    ----------
+    parameter : str
+    values : tuple of float
+        Values of the scan; crossings are looked for between the first and the last.
+    log : bool
+        Whether they are spaced logarithmically.
+    tolerance : float
+        Relative accuracy of an onset on its mesh.
+    normal_form : bool
+    coarse_mesh : float
+        Elements of the second mesh over those of the first; 0 for no uncertainty.
+    """
+
+    parameter: str
+    values: tuple[float, ...]
+    log: bool = False
+    tolerance: float = 1e-9
+    normal_form: bool = True
+    coarse_mesh: float = 0.5
+
+    @classmethod
+    def of(cls, case: Case) -> OnsetOptions:
+        """Options of a case file."""
+        axis = case.onset.axis
+        return cls(
+            axis.parameter, axis.values, axis.log, case.onset.tolerance, case.onset.normal_form, case.onset.coarse_mesh
+        )
+
+
+class OnsetSearch:
+    """Onsets along one parameter.
+
+    The order in which values are asked for follows from their eigenvalues alone, so a search that is given what an
+    interrupted one had found repeats its steps without solving anything, and goes on where it ended.
+
+    Parameters
+    ----------
+    case : Case
+    options : OnsetOptions
+    observer : Observer, optional
+        `item` is told of every `OnsetSample` and `OnsetPoint`; of a point again when more is known about it.
+    walk : StabilityWalk, optional
+    place : Place, optional
+        The other parameters; those of the case by default.
+    known : iterable of OnsetSample and OnsetPoint
+        What is not to be solved again; a later point takes the place of an earlier one. Samples of other meshes are
+        left aside.
+    mesh : int
+        `FINE` or `COARSE`, for the samples.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        options: OnsetOptions,
+        observer: Observer | None = None,
+        walk: StabilityWalk | None = None,
+        place: Place | None = None,
+        known: Iterable[OnsetSample | OnsetPoint] = (),
+        mesh: int = FINE,
+    ):
+        self.case, self.options, self.mesh = case, options, mesh
+        self.observer = observer or Observer()
+        self.walk = walk or StabilityWalk(case, self.observer)
+        self.base = place or Place.of(case)
+        known = list(known)
+        self._samples = {item.value: item for item in known if isinstance(item, OnsetSample) and item.mesh == mesh}
+        self._known = {item.key: item for item in known if isinstance(item, OnsetPoint)}
+        self.points: dict[tuple, OnsetPoint] = {}
+        self.scan = Scan(self._scanned, options.log)
+        self._column = None
+
+    def place(self, value: float) -> Place:
+        return self.base.at(**{self.options.parameter: value})
+
+    # -- samples
+    # ----
+
+    def _sample(self, value: float) -> OnsetSample:
+        if value not in self._samples:
+            self._samples[value] = self._solved(value)
+            self.observer.item(self._samples[value])
+        elif not self._samples[value].failure:
+            self.walk.recall(self.place(value))
+        return self._samples[value]
+
+    def _scanned(self, value: float) -> Sample:
+        known = self._sample(value)
+        if known.failure:
+            raise SolveError(known.failure)
+        return Sample(value, known.eigenvalues, known.certified)
+
+    def _solved(self, value: float) -> OnsetSample:
+        place = self.place(value)
+        try:
+            cell = self._cell(place)
+        except (SolveError, CaseError) as error:
+            return OnsetSample(value, np.zeros(0, complex), self.mesh, str(error))
+        found, certificate = cell.leading[0], cell.certificate(0)
+        if len(found):
+            said = "" if certificate.agrees else ", uncertain"
+            self.observer.progress(f"{self.options.parameter} = {value:.6g}: {found[0].real:.4g} 1/s{said}")
+        # as many as the scan looks at, so that a file holds all that matters
+        return OnsetSample(value, np.asarray(found)[:WATCHED], self.mesh, certified=certificate.agrees)
+
+    def _cell(self, place: Place):
+        """Leading eigenvalues and their certificate: on a small model where the steady state stays the same, with the
+        full pencil elsewhere.
+        """
+        if not is_surrounding(self.options.parameter):
+            return self.walk.column([place])
+        if self._column is None:
+            ends = np.array(self.options.values)
+            taken = ends[np.unique(np.linspace(0, len(ends) - 1, SNAPSHOTS).astype(int))]
+            self._column = self.walk.column([self.place(v) for v in taken], len(taken))
+        if self._column.cell is None:
+            return self.walk.column([place])
+        return self._column.cell(place.condition)
+
+    def uncertainties(self) -> list[str]:
+        """Sentences about what is not known: stretches of the scan without a certificate, and a band that was searched
+        instead of all frequencies.
+        """
+        name, said, joined = self.options.parameter, [], []
+        for low, high in self.scan.uncertain:
+            if joined and joined[-1][1] == low:
+                joined[-1][1] = high
+            else:
+                joined.append([low, high])
+        for low, high in joined:
+            said.append(
+                f"Between {name} = {low:.6g} and {high:.6g} spectrum and independent count do not agree everywhere, so "
+                "nothing is claimed there."
+            )
+        band = self.walk.search(self.place(self.options.values[0])).max_frequency
+        if band is not None:
+            said.append(f"Modes were searched for up to {band:.4g} Hz; modes.max_frequency chooses another end.")
+        return said
+
+    # -- points
+    # ----
+
+    def point(self, crossing: Crossing) -> OnsetPoint:
+        """Locate, confirm and describe one crossing.
+
+        Raises
+        ------
+        SolveError
+        """
+        key = (crossing.low.value, crossing.high.value, crossing.index)
+        point, mode = self._known.get(key), None
+        if point is None:
+            point, mode = self._located(crossing)
+            self._keep(point)
+        else:
+            locate(self.scan, crossing, self.options.tolerance)  # only repeats known samples, which belong to the scan
+            for value in (point.value, point.below.value, point.above.value):
+                self.walk.recall(self.place(value))
+        if self.options.normal_form and point.frequency > 0 and point.criticality is None and MISSING not in point.note:
+            self.observer.progress(f"normal form at {point.value:.6g}")
+            self.points[key] = point  # an interruption does not take away what is known
+            mode = self.critical(point.place, 2j * np.pi * point.frequency) if mode is None else mode
+            point = described(point, self.case, self.walk, mode)
+            self._keep(point)
+        self.points[key] = point
+        return point
+
+    def _keep(self, point: OnsetPoint) -> None:
+        self.points[point.key] = point
+        self.observer.item(point)
+
+    def _located(self, crossing: Crossing):
+        parameter = self.options.parameter
+        value = locate(self.scan, crossing, self.options.tolerance)
+        expected = complex(self.scan.at(value).eigenvalues[crossing.index])
+        if is_surrounding(parameter):
+            value = self._polished(value, crossing, expected)
+        place = self.place(value)
+        mode = self.critical(place, expected)
+        eigenvalue = complex(mode.eigenvalue)
+        gains = crossing.high.unstable > crossing.low.unstable
+        width = ASIDE * abs(value) if value else ASIDE * (self.options.values[-1] - self.options.values[0])
+        (below, one), (above, two) = (self._side(v, eigenvalue) for v in (value - width, value + width))
+        confirmed, note = _confirmed(below, above, gains, one.agrees and two.agrees, max(one.line, two.line))
+        edge = min(below.unstable, above.unstable) == 0
+        bracket = (crossing.low.value, crossing.high.value)
+        frequency = abs(eigenvalue.imag) / (2 * np.pi)
+        return OnsetPoint(
+            parameter,
+            value,
+            frequency,
+            eigenvalue.real,
+            gains,
+            edge,
+            below,
+            above,
+            confirmed,
+            place,
+            bracket,
+            crossing.index,
+            note=note,
+        ), mode
+
+    def _polished(self, value: float, crossing: Crossing, expected: complex) -> float:
+        """Secant steps with the full pencil from the root on the small model."""
+        scale = max(abs(crossing.low.value), abs(crossing.high.value))
+
+        def growth(v):
+            return float(self.critical(self.place(v), expected).eigenvalue.real)
+
+        a, fa = value, growth(value)
+        b = value + 1e-6 * scale
+        for _ in range(6):
+            fb = growth(b)
+            if fb == fa or abs(b - a) <= 0.1 * self.options.tolerance * scale:
+                break
+            c = b - fb * (b - a) / (fb - fa)
+            if not crossing.low.value <= c <= crossing.high.value:
+                break
+            a, fa, b = b, fb, c
+            if abs(b - a) <= self.options.tolerance * scale:
+                break
+        return float(b if crossing.low.value <= b <= crossing.high.value else value)
+
+    def critical(self, place: Place, eigenvalue: complex):
+        """The mode of the full pencil at a place that an eigenvalue found otherwise belongs to.
+
+        Raises
+        ------
+        SolveError
+            If the full pencil has no such mode.
+        """
+        spectrum = self.walk.spectrum(place)
+        apart = np.abs(spectrum.eigenvalues - eigenvalue)
+        if not len(spectrum) or apart.min() > SAME * abs(eigenvalue):
+            raise SolveError(
+                f"At {self.options.parameter} = {place.value(self.options.parameter):.6g} the full pencil has no mode "
+                f"near {abs(eigenvalue.imag) / (2 * np.pi):.4g} Hz that is neutral, so no onset is claimed there."
+            )
+        return spectrum.mode(int(np.argmin(apart)))
+
+    def _side(self, value: float, eigenvalue: complex) -> tuple[Side, Certificate]:
+        """What the full pencil says at a value, and what vouches for it."""
+        cell = self.walk.column([self.place(value)])
+        values, certificate = cell.leading[0], cell.certificate(0)
+        crossing = complex(values[int(np.argmin(np.abs(values - eigenvalue)))])
+        frequency = crossing.imag / (2 * np.pi)
+        leading = float(values[0].real)
+        side = Side(value, crossing.real, frequency, leading, certificate.unstable, certificate.counted)
+        return side, certificate
+
+
+def _confirmed(below: Side, above: Side, gains: bool, certified: bool, line: float) -> tuple[bool, str]:
+    for side in (below, above):
+        if side.unstable != side.counted:
+            return (
+                False,
+                (
+                    f"at {side.value:.6g} the spectrum lists {side.unstable} unstable eigenvalues and the "
+                    f"independent count finds {side.counted}."
+                ),
+            )
+    if not certified:
+        return False, "the independent count beside it is uncertain."
+    first, second = (below, above) if gains else (above, below)
+    if first.eigenvalue.real < 0 < second.eigenvalue.real and first.unstable == second.unstable and line > 0:
+        return False, f"the independent count looks right of {line:.4g} 1/s only, where an undamped wall ends."
+    if not (first.eigenvalue.real < 0 < second.eigenvalue.real and first.unstable < second.unstable):
+        return (
+            False,
+            f"the eigenvalues {below.eigenvalue:.5g} and {above.eigenvalue:.5g} 1/s on both sides do not show it.",
+        )
+    return True, ""

@@ -1,0 +1,1 @@
+"""How the leading mode answers to every parameter of a valve."""

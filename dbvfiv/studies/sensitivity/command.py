@@ -1,0 +1,48 @@
+"""``dbvfiv sensitivity``: how the leading mode answers to the parameters."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ..request import Request, number_or_text
+
+ORDER = 27
+
+
+def command(
+    of: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--of",
+            metavar="PARAMETER",
+            help="pressure, density, ..., or 'layer 3 angle', 'layer 2 c10'; may be repeated; all without it.",
+        ),
+    ] = None,
+    pressure: Annotated[
+        str | None,
+        typer.Option("--pressure", "-p", metavar="P", help="Static inlet pressure in place of drive.pressure."),
+    ] = None,
+    density: Annotated[
+        str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
+    ] = None,
+    mode: Annotated[
+        int | None, typer.Option("--mode", metavar="N", help="Number of the mode, by falling growth rate.")
+    ] = None,
+) -> Request:
+    """Change of growth rate and frequency of the leading mode with every parameter: load, fluid, damping, wall, and the
+    thickness, angle and constants of each layer.
+
+    The equilibrium moves along. Derivatives by the left and right vectors of the mode: no eigenvalue search beside the
+    state, two equilibria for each parameter that moves it.
+
+    dbvfiv sensitivity cases/dbv12.toml -p "6 kPa" --density 10 --of pressure --of thickness --of "layer 3 angle"
+    """
+    changes = {
+        "sensitivity.of": list(of) if of else None,
+        "sensitivity.mode": mode,
+        "drive.pressure": number_or_text(pressure),
+        "fluid.density": number_or_text(density),
+    }
+    return Request(changes)

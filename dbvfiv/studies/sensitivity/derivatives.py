@@ -1,0 +1,219 @@
+"""How an eigenvalue answers to a parameter: of the load, of the surroundings, of the wall.
+
+d lambda = - w^H dT x / (w^H T' x) with left and right vectors of the coupled pencil (`eigen.eigenvalue_derivative`).
+The change of the pencil is taken through the equilibrium: parameters that move it are stepped by a small amount to
+either side and the steady state is found anew. Left and right vectors are needed at the state itself only, so one mode
+costs two warm-started equilibria for each parameter and no further eigenvalue search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from eigen import Mode
+from eigen.derivative import difference, eigenvalue_derivative
+
+from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS
+from ...errors import CaseError, SolveError
+from ...model import Conditions, ValveModel, linearise
+from ...model.newton import EquilibriumSolver, NewtonOptions
+from ..stability.place import redesigned, require_parameter
+
+#: Parameters of the surroundings that a pencil takes.
+_OF_PENCIL = tuple(name for name in SURROUNDINGS if name in {field.name for field in fields(Conditions)})
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivative of one eigenvalue.
+
+    Attributes
+    ----------
+    parameter : str
+    value : float
+        SI; angles in degrees.
+    derivative : complex
+        1/s per unit of the parameter: growth rate and angular frequency.
+    """
+
+    parameter: str
+    value: float
+    derivative: complex
+
+    @property
+    def growth_rate(self) -> float:
+        """Change of the growth rate, 1/s per unit."""
+        return self.derivative.real
+
+    @property
+    def frequency(self) -> float:
+        """Change of the frequency, Hz per unit."""
+        return self.derivative.imag / (2 * np.pi)
+
+    @property
+    def relative(self) -> complex:
+        """Change of the eigenvalue for a change of the parameter by its own size, 1/s."""
+        return self.derivative * self.value
+
+    @property
+    def per_percent(self) -> complex:
+        """Change of the eigenvalue for one percent more of the parameter, 1/s."""
+        return 0.01 * self.relative
+
+
+def parameters_of(model: ValveModel) -> tuple[str, ...]:
+    """Every parameter an eigenvalue of this valve can be differentiated by.
+
+    Those of `dbvfiv.case.parameters` that it has, and the layers, which count from 1, inside to outside: "layer 3
+    angle", "layer 1 thickness" (its share of the wall), "layer 1 c10" (a constant of its law).
+    """
+    names = [name for name in PARAMETERS if _has(model, name)]
+    for i, layer in enumerate(model.shell.section.layers, 1):
+        names += [f"layer {i} thickness", f"layer {i} angle"]
+        names += [f"layer {i} {field.name}" for field in fields(layer.law)]
+    return tuple(names)
+
+
+def _has(model: ValveModel, name: str) -> bool:
+    """Whether anything in a valve depends on a parameter of the table in one way."""
+    if name in ("density", "storage"):
+        return model.flow.has_fluid and model.flow.unsteady
+    if name == "angle":  # of all plies at once
+        return len({abs(layer.angle) for layer in model.case.layers if layer.angle}) == 1
+    try:
+        require_parameter(model.case, name)
+    except CaseError:
+        return False
+    return True
+
+
+def unit_of(name: str) -> str:
+    """Unit of the values of a parameter."""
+    if name in PARAMETERS:
+        return PARAMETERS[name].quantity.si
+    _, quantity = _layer(name)
+    if quantity.startswith(("nu", "poisson")):
+        return ""
+    return {"thickness": "m", "angle": "deg", "density": "kg/m^3"}.get(quantity, "Pa")
+
+
+def eigenvalue_sensitivities(
+    model: ValveModel,
+    q: np.ndarray,
+    pressure: float,
+    conditions: Conditions,
+    mode: Mode,
+    parameters: Iterable[str],
+    step: float = 1e-4,
+) -> list[Sensitivity]:
+    """Derivatives of one eigenvalue of a steady state.
+
+    Parameters
+    ----------
+    q : (n,) array
+        The steady state at the inlet pressure, Pa.
+    mode : eigen.Mode
+        With left vectors (`SearchOptions(left=True)`).
+    parameters : iterable of str
+        Of `parameters_of`.
+    step : float
+        Relative size of the central differences of the pencil; of a parameter that is zero, its absolute size.
+
+    Raises
+    ------
+    ValueError
+        If a parameter does not exist or the mode has no left vector.
+    SolveError
+        If the steady state is lost beside its place.
+    """
+    return [differentiate(model, q, pressure, conditions, mode, name, step) for name in parameters]
+
+
+def differentiate(
+    model: ValveModel, q: np.ndarray, pressure: float, conditions: Conditions, mode: Mode, name: str, step: float = 1e-4
+) -> Sensitivity:
+    """Derivative of one eigenvalue by one parameter; see `eigenvalue_sensitivities`.
+
+    At an end of what a parameter may be, such as the strain level of 10 %, that towards its inside, to second order as
+    central ones are. Strain levels are interpolated linearly between the tests: at one of those, 20 or 40 %, the
+    derivative is the mean of both sides.
+    """
+    known = parameters_of(model)
+    if name not in known:
+        raise ValueError(f"An eigenvalue cannot be differentiated by '{name}'; it can by {', '.join(known)}.")
+    value = _value(model, pressure, conditions, name)
+    h = step * (abs(value) or 1.0)
+    pencil = linearise(model, q, pressure).pencil(conditions)
+
+    def slope(low: float, high: float) -> complex:
+        ends = (_pencil(model, q, pressure, conditions, name, v) for v in (low, high))
+        return eigenvalue_derivative(pencil, mode, difference(*ends, high - low))
+
+    inward = _inward(name, value, h)
+    if inward == 0:
+        return Sensitivity(name, value, slope(value - h, value + h))
+    near, far = (slope(*sorted((value, value + inward * reach))) for reach in (h, 2 * h))
+    return Sensitivity(name, value, 2 * near - far)
+
+
+def _inward(name: str, value: float, h: float) -> int:
+    """+1 at the lower end of a parameter for which the model is built anew, -1 at the upper end, 0 elsewhere."""
+    if name not in DESIGN or name == "thickness":
+        return 0
+    row = PARAMETERS[name]
+    return 1 if value - h < row.low else -1 if value + h > row.high else 0
+
+
+def _layer(name: str) -> tuple[int, str]:
+    _, number, quantity = name.split()
+    return int(number) - 1, quantity
+
+
+def _value(model, pressure, conditions, name) -> float:
+    if name == "pressure":
+        return pressure
+    if name in _OF_PENCIL:
+        return getattr(conditions, name)
+    if name == "storage":
+        return 1.0 if model.case.fluid.continuity == "storage" else 0.0
+    if name == "thickness":
+        return 1.0
+    if name == "angle":
+        return max(abs(layer.angle) for layer in model.case.layers)
+    if name == "strain":
+        return model.case.materials.strain_level
+    i, quantity = _layer(name)
+    layer = model.shell.section.layers[i]
+    return float(getattr(layer if quantity in ("thickness", "angle") else layer.law, quantity))
+
+
+def _pencil(model, q, pressure, conditions, name, value):
+    """Pencil at the steady state with one parameter changed."""
+    if name in _OF_PENCIL:
+        return linearise(model, q, pressure).pencil(replace(conditions, **{name: value}))
+    if name == "storage":
+        return linearise(model, q, pressure).pencil(conditions, storage=value)
+    changed = model
+    if name == "pressure":
+        pressure = value
+    elif name in DESIGN:
+        changed = ValveModel(redesigned(model.case, {name: value}))
+    else:
+        changed = ValveModel(model.case, _section(model.shell.section, name, value))
+    result = EquilibriumSolver(changed, NewtonOptions(tolerance=1e-11)).solve(q, pressure)
+    if not result.converged:
+        raise SolveError(f"The steady state was lost with {name} at {value:.6g}: {result.reason}.")
+    return linearise(changed, result.q, pressure).pencil(conditions)
+
+
+def _section(section, name, value):
+    i, quantity = _layer(name)
+    layer = section.layers[i]
+    if quantity in ("thickness", "angle"):
+        layer = replace(layer, **{quantity: value})
+    else:
+        layer = replace(layer, law=replace(layer.law, **{quantity: value}))
+    return replace(section, layers=(*section.layers[:i], layer, *section.layers[i + 1 :]))

@@ -1,0 +1,75 @@
+"""How derivatives of an eigenvalue are found and kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from eigen import Mode, leading_modes
+
+from ...errors import CaseError, SolveError
+from ...model.dynamics import Conditions, linearise
+from ...model.equilibria import require_equilibrium
+from ...model.state import SteadyState
+from ...record.record import GrowingRecord
+from ...record.states import read_states, state_row
+from ..session import Session
+from ..solving import solving
+from ..stability.family import ValveFamily
+from ..stability.place import Place
+from ..study import Study
+from .derivatives import differentiate, parameters_of
+from .result import MODE, STATE, VALUES, SensitivityResult, row_of, tables_of
+
+#: Modes searched for beyond the one asked for, so that its rank is certain.
+_MARGIN = 3
+
+
+def run(session: Session, record: GrowingRecord) -> None:
+    """Derivatives of the mode `sensitivity.mode` at drive.pressure by the parameters `sensitivity.of`."""
+    model, asked = session.model, session.case.sensitivity
+    known = parameters_of(model)
+    names = asked.of or known
+    for name in names:
+        if name not in known:
+            raise CaseError(
+                f"sensitivity.of names {name!r}, by which nothing of this valve can be differentiated; it can by "
+                f"{', '.join(known)}."
+            )
+    if not record.rows(STATE):
+        record.append(STATE, state_row(model, session.equilibrium(record)))
+    (state,) = read_states(record, STATE)
+    conditions = Conditions.of(session.case)
+    mode = _find_mode(session, state, conditions)
+    record.note(MODE, number=asked.mode, eigenvalue=complex(mode.eigenvalue))
+    record.begin("sensitivity", len(names))
+    done = set(record.column(VALUES, "parameter"))
+    for name in names:
+        if name in done:
+            continue
+        record.progress(name)
+        try:
+            found = differentiate(model, state.q, state.pressure, conditions, mode, name, asked.step)
+        except SolveError as error:
+            record.fail(str(error))
+            continue
+        record.append(VALUES, row_of(found))
+        record.item(found)
+
+
+def _find_mode(session: Session, state: SteadyState, conditions: Conditions) -> Mode:
+    """The mode asked for, with its left vector."""
+    model, number = session.model, session.case.sensitivity.mode
+    require_equilibrium(model, state)
+    if model.flow.has_fluid and state.pressure <= 0:
+        raise CaseError("Coupled modes need an inlet pressure greater than 0.")
+    linear = linearise(model, state.q, state.pressure)
+    family = ValveFamily(linear, session.case.modes.max_frequency, session.case.modes.count)
+    with solving(state.pressure):
+        options = replace(family.search(Place.of(session.case).condition), left=True)
+        found = leading_modes(linear.pencil(conditions), number + _MARGIN, options)
+    if len(found) < number:
+        raise SolveError(f"The state at {state.pressure:.6g} Pa has {len(found)} leading modes, and no mode {number}.")
+    return found.mode(number - 1)
+
+
+STUDY = Study("sensitivity", tables_of, run, SensitivityResult)

@@ -1,0 +1,189 @@
+"""Every value of one parameter at which an eigenvalue of the coupled valve reaches the imaginary axis.
+
+The k-th largest growth rate g_k is a continuous function of the parameter wherever the spectrum is, so crossings are
+its zeros. Between the values of a scan they are bracketed by the number of unstable modes; where the parabola through
+three values of g_k reaches zero between them although no number changes, the scan is refined, so that narrow tongues of
+instability or stability are not stepped over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ...errors import SolveError
+
+#: Times that an interval of the scan is halved in search of a narrow tongue.
+HALVINGS = 6
+#: A vertex of the parabola this close to zero, as a share of the values around it, calls for a closer look.
+MARGIN = 0.35
+#: Modes whose order is watched.
+WATCHED = 4
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Leading eigenvalues at one value, sorted by growth rate, a conjugate pair given once.
+
+    `certified` says whether an independent count agrees with them, None where it was not asked.
+    """
+
+    value: float
+    eigenvalues: np.ndarray
+    certified: bool | None = None
+
+    @property
+    def growth(self) -> np.ndarray:
+        """(WATCHED,) largest growth rates; very negative where there are fewer."""
+        found = np.full(WATCHED, -1e9)
+        kept = self.eigenvalues.real[:WATCHED]
+        found[: len(kept)] = kept
+        return found
+
+    @property
+    def unstable(self) -> int:
+        """Unstable modes, a pair being one."""
+        return int(np.sum(self.eigenvalues.real > 0))
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A bracketed crossing of the k-th largest growth rate (k from 0)."""
+
+    index: int
+    low: Sample
+    high: Sample
+
+
+class Scan:
+    """Samples along one parameter.
+
+    Parameters
+    ----------
+    sample : callable
+        Value to eigenvalues, sorted by growth rate, or to a whole `Sample`; raises SolveError where there is no
+        equilibrium.
+    log : bool
+        Intervals are halved in the logarithm.
+    certify : callable, optional
+        From a value to whether an independent count agrees with its sample; asked at the ends of brackets. Without it
+        all samples are taken as they are.
+
+    Attributes
+    ----------
+    uncertain : list of (float, float)
+        Intervals between neighbours of the scan, one of which lacks a certificate: nothing is claimed about them.
+    """
+
+    def __init__(
+        self,
+        sample: Callable[[float], np.ndarray | Sample],
+        log: bool = False,
+        certify: Callable[[float], bool] | None = None,
+    ):
+        self._sample, self.log, self._certify = sample, log, certify
+        self.samples: dict[float, Sample] = {}
+        self.failures: dict[float, str] = {}
+        self.uncertain: list[tuple[float, float]] = []
+
+    def at(self, value: float) -> Sample | None:
+        """The sample at a value; None where there is no equilibrium, with the sentence kept in `failures`."""
+        value = float(value)
+        if value in self.failures:
+            return None
+        if value not in self.samples:
+            try:
+                found = self._sample(value)
+                self.samples[value] = found if isinstance(found, Sample) else Sample(value, np.asarray(found))
+            except SolveError as error:
+                self.failures[value] = str(error)
+                return None
+        return self.samples[value]
+
+    def middle(self, a: float, b: float) -> float:
+        return float(np.sqrt(a * b)) if self.log and a > 0 else 0.5 * (a + b)
+
+    def run(self, values) -> list[Crossing]:
+        """Scan values and narrow tongues between them; crossings in ascending order."""
+        for value in sorted(map(float, values)):
+            self.at(value)
+        for _ in range(HALVINGS):
+            wanted = self._suspects()
+            if not wanted:
+                break
+            for value in wanted:
+                self.at(value)
+        return self.crossings()
+
+    def _coordinate(self, values: np.ndarray) -> np.ndarray:
+        return np.log(values) if self.log and np.all(values > 0) else values
+
+    def _suspects(self) -> list[float]:
+        """Middles of intervals within which a growth rate may reach zero and turn back."""
+        values = np.array(sorted(self.samples))
+        if len(values) < 3:
+            return []
+        x = self._coordinate(values)
+        growth = np.array([self.samples[v].growth for v in values])
+        wanted = set()
+        for k in range(WATCHED):
+            for i in range(1, len(values) - 1):
+                g = growth[i - 1 : i + 2, k]
+                if g.min() < -1e8 or not (np.all(g > 0) or np.all(g < 0)):
+                    continue
+                # nearest to zero in the middle: a summit below the axis or a hollow above it
+                if not abs(g[1]) <= min(abs(g[0]), abs(g[2])):
+                    continue
+                c2, c1, c0 = np.polyfit(x[i - 1 : i + 2] - x[i], g, 2)
+                vertex = c0 - c1 * c1 / (4 * c2) if c2 else c0
+                reach = max(abs(g[0]), abs(g[2])) - abs(g[1])
+                if vertex * g[1] <= 0 or abs(vertex) < MARGIN * reach:
+                    wanted.update((self.middle(values[i - 1], values[i]), self.middle(values[i], values[i + 1])))
+        return sorted(wanted)
+
+    def certified(self, value: float) -> bool:
+        """Whether the sample at a value of the scan may be claimed."""
+        sample = self.samples[value]
+        if sample.certified is None:
+            vouched = True if self._certify is None else bool(self._certify(value))
+            sample = self.samples[value] = replace(sample, certified=vouched)
+        return bool(sample.certified)
+
+    def crossings(self) -> list[Crossing]:
+        """Brackets of all crossings between neighbours of the scan that both have a certificate."""
+        found = []
+        self.uncertain = []
+        values = sorted(self.samples)
+        for a, b in zip(values[:-1], values[1:]):
+            low, high = self.samples[a], self.samples[b]
+            few, many = sorted((low.unstable, high.unstable))
+            known = (low.certified is not False) and (high.certified is not False)
+            if known and few != many:
+                known = self.certified(a) and self.certified(b)
+            if not known:
+                self.uncertain.append((a, b))
+                continue
+            found += [Crossing(k, low, high) for k in range(few, min(many, WATCHED))]
+        return found
+
+
+def locate(scan: Scan, crossing: Crossing, tolerance: float) -> float:
+    """The value at which the growth rate of a bracketed crossing vanishes (Brent's method).
+
+    Raises
+    ------
+    SolveError
+        If an equilibrium inside the bracket was not found.
+    """
+
+    def growth(value: float) -> float:
+        sample = scan.at(value)
+        if sample is None:
+            raise SolveError(scan.failures[float(value)])
+        return float(sample.growth[crossing.index])
+
+    low, high = crossing.low.value, crossing.high.value
+    return float(brentq(growth, low, high, xtol=tolerance * max(abs(low), abs(high)), rtol=8.9e-16, maxiter=80))

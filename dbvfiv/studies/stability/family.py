@@ -1,0 +1,73 @@
+"""A steady state of the valve as a family of pencils: any fluid density, damping and continuity law."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from eigen import Condition, CoupledPencil, PencilFamily, SearchOptions, lowest_frequencies
+from eigen.reduction import POWERS
+
+from ...model.dynamics import Conditions, LinearisedState, fluid_parts
+from ...model.leading import select_search
+
+#: Blends of the continuity laws whose fluid is kept.
+_KEPT = 256
+
+
+class ValveFamily(PencilFamily):
+    """Conditions are (density, alpha, beta, storage); at unit density the fluid's unknown is the inlet velocity, at
+    others that times the root of the density.
+
+    Parameters
+    ----------
+    linear : LinearisedState
+    max_frequency : float, optional
+        Hz; only modes up to it are searched for. Without it and without stiffness damping the band follows from the
+        structural frequencies of the state.
+    modes : int
+        Structural frequencies that such a band holds.
+    """
+
+    def __init__(self, linear: LinearisedState, max_frequency: float | None = None, modes: int = 10):
+        self.linear, self.max_frequency, self.modes = linear, max_frequency, modes
+        self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
+        self.forces, self.slope = linear.forces, linear.slope
+        self._parts: dict[float, dict[str, np.ndarray]] = {}
+        self._frequencies = np.zeros(0)
+
+    def _lowest(self, count: int) -> np.ndarray:
+        """Structural frequencies of the state."""
+        if len(self._frequencies) < count:
+            structure = CoupledPencil(self.mass, 0.0 * self.mass, self.stiffness)
+            self._frequencies = lowest_frequencies(structure, count)
+        return self._frequencies[:count]
+
+    def search(self, condition: Condition) -> SearchOptions:
+        """What is searched in the spectrum: the rule that every study follows."""
+        conditions = Conditions(condition.inertia, condition.alpha, condition.beta)
+        asked = SearchOptions(max_frequency=self.max_frequency)
+        return select_search(asked, conditions, self._lowest, self.modes).options
+
+    def parts(self, law: float) -> dict[str, np.ndarray]:
+        """A0 to S1 at density 1."""
+        law = float(law)
+        if law not in self._parts:
+            if len(self._parts) > _KEPT:
+                self._parts.clear()
+            self._parts[law] = self._computed(law)
+        return self._parts[law]
+
+    def _computed(self, storage: float) -> dict[str, np.ndarray]:
+        linear, flow, m = self.linear, self.linear.model.flow, len(self.linear.area)
+        if flow.has_fluid and flow.unsteady:
+            return fluid_parts(flow, linear.area, linear.inlet, 1.0, storage)
+        zero = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
+        parts = {name: np.zeros(zero[name[0]]) for name in POWERS}
+        if flow.has_fluid:
+            parts["A0"] = flow.steady_operator(linear.area, linear.inlet)[1]
+        return parts
+
+    def pencil(self, condition: Condition) -> CoupledPencil:
+        """The full pencil, with the inlet velocity itself as unknown."""
+        density, alpha, beta, storage = condition
+        return self.linear.pencil(Conditions(density, alpha, beta), storage=storage)

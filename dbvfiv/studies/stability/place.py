@@ -1,0 +1,169 @@
+"""Parameters that stability is asked over: of the load, of the surroundings, of the design."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+from eigen import Condition
+
+from ...case.materials import RUBBERS
+from ...case.model import Case
+from ...case.parameters import CONDITIONS, DESIGN, PARAMETERS
+from ...errors import CaseError, SolveError
+from ...model import ValveModel
+from ...model.dynamics import Conditions
+
+
+@dataclass(frozen=True)
+class Place:
+    """One set of parameters.
+
+    Attributes
+    ----------
+    pressure : float, Pa
+    density, alpha, beta : float
+        kg/m3, 1/s, s.
+    storage : float
+        Blend of the continuity laws, 0 quasi-steady, 1 storage.
+    design : dict
+        Values of those parameters of the design (`dbvfiv.case.parameters.DESIGN`) that are not the case's own.
+    """
+
+    pressure: float
+    density: float
+    alpha: float
+    beta: float
+    storage: float
+    design: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, case: Case) -> Place:
+        """The parameters of a case."""
+        storage = 1.0 if case.fluid.continuity == "storage" else 0.0
+        return cls(case.drive.pressure, case.fluid.density, case.damping.alpha, case.damping.beta, storage)
+
+    def at(self, **values: float) -> Place:
+        """With some parameters changed."""
+        own = {name: float(value) for name, value in values.items() if name not in DESIGN}
+        design = {name: float(value) for name, value in values.items() if name in DESIGN}
+        return replace(self, **own, design={**self.design, **design})
+
+    @property
+    def condition(self) -> Condition:
+        """(density, alpha, beta, storage)."""
+        return Condition(self.density, self.alpha, self.beta, self.storage)
+
+    @property
+    def conditions(self) -> Conditions:
+        return Conditions(self.density, self.alpha, self.beta)
+
+    def value(self, name: str) -> float:
+        return float(self.design[name] if name in DESIGN else getattr(self, name))
+
+    def mu(self) -> dict[str, float]:
+        """Parameters of a `ValveSystem`."""
+        own = {PARAMETERS[name].system_name: getattr(self, name) for name in CONDITIONS}
+        return {**own, **self.design}
+
+
+def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
+    """Load, fluid and damping of a case in SI units, those that are moved left out."""
+    given = {
+        "pressure": case.drive.pressure,
+        "density": case.fluid.density,
+        "storage": case.fluid.continuity,
+        "alpha": case.damping.alpha,
+        "beta": case.damping.beta,
+    }
+    return {name: value for name, value in given.items() if name not in moved}
+
+
+def describe_fixed(case: Case, *moved: str) -> str:
+    """The same in words, "6 kPa static, 10 kg/m³, quasi-steady, α = 0 1/s, β = 0.003 s"."""
+    words = []
+    for name, value in fixed_conditions(case, *moved).items():
+        text = value if isinstance(value, str) else PARAMETERS[name].text(value)
+        words.append(f"{text} static" if name == "pressure" else text)
+    return ", ".join(words)
+
+
+def is_surrounding(name: str) -> bool:
+    """Whether a parameter leaves the linearised structure as it is."""
+    return PARAMETERS[name].surrounding
+
+
+def check_flow(case: Case) -> None:
+    """Refuse a case without flow.
+
+    Raises
+    ------
+    SolveError
+    """
+    if case.drive.kind != "flow":
+        raise SolveError(
+            "Without flow nothing couples the fluid to the wall, so there is no onset to look for; "
+            "drive.kind must be 'flow'."
+        )
+
+
+def check_scan(case: Case, *names: str) -> None:
+    """Refuse to ask over a parameter that this case does not have, or without flow.
+
+    Raises
+    ------
+    CaseError
+        For strain levels without a rubber that has them, and angles without a ply that has one.
+    SolveError
+        Without flow.
+    """
+    check_flow(case)
+    for name in names:
+        require_parameter(case, name)
+
+
+def require_parameter(case: Case, name: str) -> None:
+    """Refuse a parameter that nothing in a case depends on.
+
+    Raises
+    ------
+    CaseError
+        For strain levels without a rubber that has them, and angles without a ply that has one.
+    """
+    used = {layer.material for layer in case.layers}
+    shipped = [name for name in RUBBERS if name not in case.materials.named]
+    if name == "strain" and not used & set(shipped):
+        raise CaseError(
+            "There is no strain level to change, because no layer is one of the built-in rubbers "
+            f"{', '.join(RUBBERS)}; the layers are of {', '.join(sorted(used))}."
+        )
+    if name == "angle" and not any(layer.angle for layer in case.layers):
+        raise CaseError("There is no fibre angle to change, because every layer lies at 0 degrees.")
+
+
+def redesigned(case: Case, design: Mapping[str, float]) -> Case:
+    """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
+    level (0.1 for 10 %).
+
+    Raises
+    ------
+    CaseError
+        For values that the case does not allow.
+    """
+    changes: dict[str, object] = {}
+    if "thickness" in design:
+        changes["valve.thickness_factor"] = case.valve.thickness_factor * design["thickness"]
+    if "strain" in design:
+        changes["materials.strain_level"] = design["strain"]
+    if "angle" in design:
+        layers = case.to_dict()["layers"]
+        for layer in layers:
+            if layer["angle"]:
+                layer["angle"] = design["angle"] if layer["angle"] > 0 else -design["angle"]
+        changes["layers"] = layers
+    return case.replace(changes) if changes else case
+
+
+def rebuilder(case: Case) -> Callable[[Mapping[str, float]], ValveModel]:
+    """Models of a case for design parameters."""
+    return lambda design: ValveModel(redesigned(case, design))

@@ -1,0 +1,202 @@
+"""Steady states and leading eigenvalues anywhere in the space of parameters, each state found from the nearest one
+known.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from eigen import Column, ColumnSolver, SearchOptions
+
+from ...case.model import Case
+from ...errors import SolveError
+from ...model import ValveModel
+from ...model.dynamics import linearise
+from ...model.equilibria import LoadPath, SteadyOptions
+from ...observer import Observer
+from .family import ValveFamily
+from .place import Place, rebuilder
+
+#: Steps over the last one up to which a cubic is trusted ahead of it.
+REACH = 2.0
+
+
+@dataclass
+class _Built:
+    """A model of one design with its load path and the states found so far."""
+
+    model: ValveModel
+    path: LoadPath
+    solver: ColumnSolver
+    known: dict[float, np.ndarray]
+    trail: list[tuple[float, np.ndarray, np.ndarray]] = field(
+        default_factory=list
+    )  # pressure, state and slope of the last two
+
+    def aim(self, target: float) -> None:
+        """Predict the next state by the cubic through the last two and their slopes; along the tangent alone where it
+        reaches too far ahead.
+        """
+        if len(self.trail) < 2 or self.path.slope is None or self.trail[-1][0] != self.path.pressure:
+            return
+        (p0, q0, s0), (p1, q1, s1) = self.trail
+        width, ahead = p1 - p0, target - p1
+        if not 0 < ahead / width <= REACH:
+            return
+        secant = (q1 - q0) / width
+        square, cube = (2 * s1 + s0 - 3 * secant) / width, (s0 + s1 - 2 * secant) / width**2
+        self.path.slope = s1 + ahead * (square + ahead * cube)
+
+    def passed(self) -> None:
+        """Remember where the path has arrived."""
+        if self.path.slope is not None:
+            self.trail = [*self.trail[-1:], (self.path.pressure, self.path.q, self.path.slope)]
+
+
+class StabilityWalk:
+    """Answers for places of the parameter space.
+
+    Parameters
+    ----------
+    case : Case
+    observer : Observer, optional
+    model : ValveModel, optional
+        Of the case, where it is at hand.
+    """
+
+    def __init__(self, case: Case, observer: Observer | None = None, model: ValveModel | None = None):
+        self.case = case
+        self._recalled: list[Place] = []
+        self.observer = observer or Observer()
+        self._rebuild = rebuilder(case)
+        self._built: dict[tuple, _Built] = {}
+        self._last: tuple[tuple, ValveFamily] | None = None
+        if model is not None:
+            self._built[()] = self._new(model)
+
+    def _new(self, model: ValveModel) -> _Built:
+        path = LoadPath(model, SteadyOptions.of(self.case))
+        return _Built(model, path, ColumnSolver(), {})
+
+    def built(self, place: Place) -> _Built:
+        """Model and path of the design of a place."""
+        key = tuple(sorted(place.design.items()))
+        if key not in self._built:
+            if len(self._built) > 4:
+                self._built = dict(list(self._built.items())[-2:])
+            self._built[key] = self._new(self._rebuild(place.design))
+        return self._built[key]
+
+    def equilibrium(self, place: Place) -> np.ndarray:
+        """Displacements q (n,) of the steady state.
+
+        Raises
+        ------
+        SolveError
+        """
+        while self._recalled:
+            with suppress(SolveError):  # that run went on without it too
+                self._reach(self._recalled[0])
+            del self._recalled[0]
+        return self._reach(place)
+
+    def recall(self, place: Place) -> None:
+        """Say that a state was found at a place by an earlier run.
+
+        The next new state is reached from where that run stood, with the same digits: states that were recalled are
+        found again before it, and not at all if none follows.
+        """
+        if not place.design:  # states of other designs are found from rest each
+            self._recalled.append(place)
+
+    def give(self, place: Place, q: np.ndarray) -> None:
+        """Hand over the steady state of a place that was found elsewhere."""
+        self.built(place).known[place.pressure] = q
+
+    def apart(self) -> StabilityWalk:
+        """A walk that knows no states yet, on the model of this one."""
+        return StabilityWalk(self.case, self.observer, self._built[()].model if () in self._built else None)
+
+    def _reach(self, place: Place) -> np.ndarray:
+        built = self.built(place)
+        if place.pressure in built.known:
+            return built.known[place.pressure]
+        path = built.path
+        before = path.pressure, path.q, path.slope
+        nearest = min([0.0, *built.known], key=lambda p: abs(p - place.pressure))
+        if nearest and abs(nearest - place.pressure) < abs(path.pressure - place.pressure):
+            path.pressure, path.q, path.slope = nearest, built.known[nearest], None
+        built.aim(place.pressure)
+        try:
+            path.go_to(place.pressure)
+        except SolveError:
+            path.pressure, path.q, path.slope = before  # where a run that goes on without this place stands too
+            raise
+        built.passed()
+        if len(built.known) > 400:
+            built.known.clear()
+        built.known[place.pressure] = path.q
+        return path.q
+
+    def family(self, place: Place) -> ValveFamily:
+        """The linearised state for any density, damping and continuity law; the last one is kept.
+
+        Raises
+        ------
+        SolveError
+        """
+        key = (place.pressure, tuple(sorted(place.design.items())))
+        if self._last is None or self._last[0] != key:
+            linear = linearise(self.built(place).model, self.equilibrium(place), place.pressure)
+            modes = self.case.modes
+            self._last = (key, ValveFamily(linear, modes.max_frequency, modes.count))
+        return self._last[1]
+
+    def search(self, place: Place) -> SearchOptions:
+        """What is searched in the spectrum of a place.
+
+        Raises
+        ------
+        SolveError
+        """
+        return self.family(place).search(place.condition)
+
+    def spectrum(self, place: Place, count: int = 6):
+        """Leading modes of the full pencil, an `eigen.Spectrum`.
+
+        Raises
+        ------
+        SolveError
+        """
+        family = self.family(place)
+        with _explained(place):
+            return self.built(place).solver.direct(family, place.condition, count)
+
+    def column(self, places: list[Place], snapshots: int = 3) -> Column:
+        """Cells that share a steady state.
+
+        Parameters
+        ----------
+        places : list of Place
+        snapshots : int
+            Of them, at which the vectors of the small model are made.
+
+        Raises
+        ------
+        SolveError
+        """
+        family = self.family(places[0])
+        with _explained(places[0]):
+            return self.built(places[0]).solver.solve(family, [p.condition for p in places], snapshots)
+
+
+@contextmanager
+def _explained(place: Place):
+    """Turns what numerics refuse into a sentence with the pressure."""
+    try:
+        yield
+    except (ArithmeticError, ValueError) as error:
+        raise SolveError(f"The modes at {place.pressure:.6g} Pa were not found: {str(error).rstrip('.')}.") from error

@@ -1,0 +1,377 @@
+"""Stability maps on a coarse mesh: order of columns, certificates, gaps, resume, lost workers."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+from dbvfiv import resume
+from dbvfiv.api import Valve
+from dbvfiv.cli import run
+from dbvfiv.model import ValveModel
+from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.observer import Observer
+from dbvfiv.record.header import Header
+from dbvfiv.record.record import GrowingRecord
+from dbvfiv.studies.map import pool as map_pool
+from dbvfiv.studies.map.column import MapColumn, MapPlan
+from dbvfiv.studies.map.curves import linked
+from dbvfiv.studies.map.figures import stability_map
+from dbvfiv.studies.map.result import MapResult
+from dbvfiv.studies.map.rows import keep_column, tables_of
+from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.modes.run import run_modes
+from dbvfiv.studies.session import load_result
+from dbvfiv.studies.stability.walk import StabilityWalk
+from eigen import SingularShiftError
+from eigen.phase_count import PhaseCounts
+
+AXES = {
+    "map.x": "pressure=1000:12000:6",
+    "map.y": "density=1:1000:10:log",
+    "map.curve": False,
+    "map.refine": 1,
+    "map.checks": 3,
+}
+
+
+@pytest.fixture(scope="module")
+def case(coarse_case):
+    return coarse_case.replace(AXES)
+
+
+@pytest.fixture(scope="module")
+def whole(case):
+    return run_map(case)
+
+
+def test_every_cell_is_certified_and_checks_agree(whole):
+    assert whole.grid("certified").all()
+    assert len(whole.checks) == 3 and all(check.agrees for check in whole.checks)
+    unstable = whole.grid("unstable")[0]
+    assert set(np.unique(unstable)) == {0, 2} and (unstable == whole.grid("counted")[0]).all()
+    assert ((whole.grid("growth_rate")[0] > 0) == (unstable > 0)).all()
+
+
+def test_onsets_of_columns_lie_between_cells_of_opposite_sign(whole):
+    y = np.array(whole.plan.y.values)
+    for column in whole.columns:
+        for _, along, frequency, direction, _ in column.onsets:
+            below, above = column.cells["growth_rate"][0][y < along][-1], column.cells["growth_rate"][0][y > along][0]
+            assert np.sign(above - below) == direction and below * above < 0 and frequency > 10
+
+
+def test_columns_are_put_in_where_onsets_vanish(whole):
+    assert any(column.level == 1 for column in whole.columns)
+    numbers = [len(column.onsets) for column in whole.columns]
+    assert numbers != sorted(set(numbers))
+
+
+def test_transposed_map_gives_the_same_cells(case, whole):
+    turned = case.replace({"map.x": AXES["map.y"], "map.y": AXES["map.x"], "map.refine": 0, "map.checks": 0})
+    other = run_map(turned)
+    assert other.plan.transposed
+    assert other.grid("growth_rate")[0].T == pytest.approx(whole.grid("growth_rate")[0], rel=1e-6, abs=1e-6)
+
+
+def test_linked_curves_go_through_all_onsets(whole):
+    curves = linked(whole.plan, whole.columns)
+    assert sum(len(curve.x) for curve in curves) == sum(len(column.onsets) for column in whole.columns)
+
+
+def test_linked_tongue_is_one_curve(case):
+    plan = MapPlan.of(case)
+    width = {2000.0: 0.1, 3000.0: 0.15, 4000.0: 0.1}
+    columns = []
+    for value in (1000.0, 2000.0, 3000.0, 4000.0, 5000.0):
+        half = width.get(value)
+        middle = 0.5
+        onsets = (
+            []
+            if half is None
+            else [
+                (0, plan.value(plan.y, middle + d), f, way, 0.0) for d, f, way in ((-half, 30.0, 1), (half, 31.0, -1))
+            ]
+        )
+        columns.append(MapColumn(value, 0, {}, np.array(onsets, float).reshape(-1, 5), 0.0))
+    (curve,) = linked(plan, tuple(columns))
+    assert len(curve.x) == 7 and curve.points()[0] == curve.points()[-1], "a tongue is closed"
+    assert not curve.exact and "not known between" in curve.reason
+
+
+def test_both_laws_and_pairs_without_the_load(coarse_case):
+    both = run_map(
+        coarse_case.replace(
+            AXES | {"map.x": "pressure=2000:6000:2", "map.continuity": "both", "map.refine": 0, "map.checks": 2}
+        )
+    )
+    assert both.grid("growth_rate").shape == (2, 10, 2) and both.grid("certified").all()
+    pair = coarse_case.replace(AXES | {"map.x": "beta=0.001:0.004:3", "map.y": "storage=0:1:5", "map.refine": 0})
+    result = run_map(pair)
+    assert result.grid("certified").all() and all(check.agrees for check in result.checks)
+
+
+def test_two_structural_axes(coarse_case):
+    result = run_map(
+        coarse_case.replace(
+            AXES | {"map.x": "pressure=3000:9000:2", "map.y": "thickness=0.9:1.1:2", "map.refine": 0, "map.checks": 1}
+        )
+    )
+    assert result.grid("certified").all() and (result.grid("how") == 1).all()
+
+
+def test_a_missing_state_is_a_marked_gap(case, monkeypatch):
+    from dbvfiv.errors import SolveError
+    from dbvfiv.model.equilibria import LoadPath
+
+    honest = LoadPath.go_to
+
+    def go_to(self, target):
+        if abs(target - 5400) < 1:
+            raise SolveError("No equilibrium was found at 5400 Pa.")
+        return honest(self, target)
+
+    monkeypatch.setattr(LoadPath, "go_to", go_to)
+    result = run_map(case)
+    (failure,) = (column.failure for column in result.columns if column.failure)
+    assert "5400" in failure
+    assert np.isnan(result.grid("growth_rate")[0][:, 2]).all() and (result.grid("unstable")[0][:, 2] == -1).all()
+    assert np.isfinite(result.grid("growth_rate")[0][:, [0, 1, 3, 4, 5]]).all()
+
+
+class _StopAfter(Observer):
+    def __init__(self, number):
+        self.left, self.seen = number, []
+
+    def item(self, result):
+        self.seen.append(result.value)
+        self.left -= 1
+        if not self.left:
+            raise KeyboardInterrupt
+
+
+def same(result, whole):
+    """To the last digit, columns put in for the curves included."""
+    assert len(result.columns) == len(whole.columns)
+    for a, b in zip(result.columns, whole.columns):
+        assert (a.value, a.level, a.error) == (b.value, b.level, b.error)
+        assert np.array_equal(a.onsets, b.onsets, equal_nan=True)
+        for name, values in a.cells.items():
+            assert np.array_equal(values, b.cells[name], equal_nan=True), name
+    assert [c.points() for c in result.curves] == [c.points() for c in whole.curves]
+    assert result.checks == whole.checks and set(result.warnings) == set(whole.warnings)
+
+
+def test_an_interrupted_map_resumes_to_the_same_numbers(case, whole, tmp_path):
+    path = tmp_path / "map.h5"
+    first = _StopAfter(3)
+    assert not Valve(case, "valve").map(output=path, observer=first).complete
+    second = _StopAfter(100)
+    result = resume(path, observer=second)
+    assert result.complete and not set(first.seen) & set(second.seen)
+    again = load_result(path)
+    same(result, whole)
+    same(again, whole)
+    assert [c.points() for c in again.curves] == [c.points() for c in result.curves]
+    assert run(["resume", str(path)]) == 2  # nothing left to do
+
+
+def test_json_and_figures(case, tmp_path, capsys):
+    arguments = [
+        f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()
+    ]
+    mesh = ["--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0"]
+    assert (
+        run(["map", *arguments, *mesh, "--x", "pressure=3 kPa:8 kPa:3", "--json", "--plots", str(tmp_path / "figures")])
+        == 0
+    )
+    import json
+
+    document = json.loads(capsys.readouterr().out)
+    assert np.shape(document["growth_rate"]) == (10, 3) == np.shape(document["unstable_count"])
+    assert document["x"]["parameter"] == "pressure" and document["onset_curves"]
+    assert {p.name for p in (tmp_path / "figures").iterdir()} == {"stability-map.png", "leading-frequency.png"}
+
+
+_RUN = """
+import sys
+from dbvfiv.cli import run
+if __name__ == "__main__":
+    sys.exit(run(sys.argv[1:]))
+"""
+
+
+@pytest.mark.slow
+def test_killed_run_resumes(case, whole, tmp_path):
+    path, script = tmp_path / "map.h5", tmp_path / "go.py"
+    script.write_text(_RUN)
+    settings = [
+        f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()
+    ]
+    mesh = ["--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0"]
+    process = subprocess.Popen([sys.executable, str(script), "map", *settings, *mesh, "-o", str(path)], cwd=os.getcwd())
+    deadline = time.time() + 240
+    while time.time() < deadline:
+        time.sleep(0.2)
+        try:
+            with h5py.File(path, "r", swmr=True, locking=False) as file:
+                if len(file["tables/columns/#"]) >= 2:
+                    break
+        except (OSError, KeyError, RuntimeError):
+            continue
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    kept = len(load_result(path).columns)
+    assert kept >= 2
+    observer = _StopAfter(100)
+    result = resume(path, observer=observer)
+    assert len(observer.seen) == len(result.columns) - kept
+    same(result, whole)
+
+
+def test_workers_find_the_same_digits_also_when_they_go_on(case, whole, tmp_path):
+    path = tmp_path / "map.h5"
+    first = _StopAfter(4)
+    assert not Valve(case, "valve").map(workers=2, output=path, observer=first).complete
+    second = _StopAfter(100)
+    result = resume(path, workers=2, observer=second)
+    assert not set(first.seen) & set(second.seen)
+    same(result, whole)
+
+
+def test_a_map_interrupted_in_its_curves_ends_with_the_same_curves(coarse_case, tmp_path):
+    """Columns that a round of the curves had found do not change what that round asks for."""
+    axes = {"map.x": "pressure=500:30000:4", "map.y": "density=1:1000:10:log", "map.checks": 1}
+    case = coarse_case.replace(axes | {"damping.beta": 0.001})
+    whole, path = run_map(case), tmp_path / "map.h5"
+    stop = 2 * len(whole.columns) // 3
+    assert not Valve(case, "valve").map(output=path, observer=_StopAfter(stop)).complete
+    kept = load_result(path)
+    assert not kept.complete and max(column.level for column in kept.columns) >= 3
+    same(resume(path), whole)
+
+
+@pytest.mark.slow
+def test_a_killed_worker_costs_only_the_columns_in_flight(case, whole):
+    killed = []
+
+    class Killer(Observer):
+        def item(self, result):
+            if not killed:
+                import multiprocessing
+
+                victim = multiprocessing.active_children()[0]
+                os.kill(victim.pid, signal.SIGKILL)
+                killed.append(victim.pid)
+
+    said = []
+    observer = Killer()
+    observer.warn = said.append
+    result = run_map(case, observer, workers=2)
+    assert killed and any("worker was lost" in sentence for sentence in said)
+    assert not any(column.failure for column in result.columns)
+    same(result, whole)
+
+
+def test_without_mpiexec_there_is_one_process(monkeypatch):
+    for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"):
+        monkeypatch.delenv(name, raising=False)
+    assert map_pool.mpi_size() == 1
+    monkeypatch.setenv("PMI_SIZE", "4")
+    assert map_pool.mpi_size() == 4
+
+
+@pytest.fixture(scope="module")
+def traced(coarse_case):
+    """Both laws, lightly damped, with exact curves."""
+    axes = {"map.x": "pressure=1000:12000:8", "map.y": "density=1:1000:10:log", "map.curve": True, "map.checks": 0}
+    return run_map(coarse_case.replace(axes | {"map.continuity": "both", "damping.beta": 0.001}))
+
+
+def test_curves_are_neutral_by_the_full_pencil(traced, coarse_case):
+    walk = StabilityWalk(traced.plan.case)
+    assert len(traced.curves) >= 2 and all(curve.exact and curve.mismatch < 1e-6 for curve in traced.curves)
+    for curve in traced.curves:
+        for i in (0, len(curve.x) // 3, len(curve.x) - 1):
+            place = traced.plan.place(curve.x[i], curve.y[i], traced.plan.laws[curve.law])
+            values = walk.spectrum(place).eigenvalues
+            nearest = values[np.argmin(np.abs(values - 2j * np.pi * curve.frequency[i]))]
+            assert abs(nearest.real) < 1e-6 * abs(nearest)
+
+
+def test_exact_curves_end_at_the_edges_of_the_map_or_close(traced):
+    for curve in traced.curves:
+        unit = np.column_stack([np.log(curve.y) / np.log(1000), (curve.x - 1000) / 11000])
+        for end in (unit[0], unit[-1]):
+            assert np.min([end, 1 - end]) < 0.0101 or np.allclose(unit[0], unit[-1])
+        assert np.hypot(*np.diff(unit, axis=0).T).max() < 0.25
+
+
+def test_a_curve_that_is_not_followed_says_so(case, monkeypatch):
+    monkeypatch.setattr("dbvfiv.studies.map.run.ROUNDS", 0)
+    result = run_map(case.replace({"map.curve": True, "map.refine": 0, "map.checks": 0}))
+    assert result.curves and not any(curve.exact for curve in result.curves)
+    assert all(any(f"= {curve.x[0]:.6g}" in sentence for sentence in result.warnings) for curve in result.curves)
+
+
+def test_cells_that_the_count_does_not_confirm_are_uncertain(case, monkeypatch):
+    # a count that sees one pair too many, whatever the model
+    monkeypatch.setattr("eigen.columns.phase_counts", lambda reduced, conditions, hints: _more(conditions))
+    monkeypatch.setattr("eigen.columns.certified_spectrum", _refuse)
+    result = run_map(case.replace({"map.x": "pressure=3000:8000:2", "map.refine": 0, "map.checks": 0}))
+    assert not result.grid("certified").any()
+    assert not result.curves, "an onset between cells without a certificate was claimed"
+    assert any("20 cells are uncertain" in sentence for sentence in result.warnings)
+    record = GrowingRecord(Header.of("map", result.plan.case, "valve"), None, tables_of(None))
+    for column in result.columns:
+        keep_column(record, result.plan, column)
+    results = MapResult(record)
+    assert " 0 unstable, 0 stable, 0 of 20 certified" in results.lines()[1]
+    axes = stability_map(results).axes[0]
+    assert any(getattr(part, "get_hatch", lambda: None)() for part in axes.collections)
+    assert {text.get_text() for text in axes.texts} <= {"uncertain"}
+
+
+def _more(conditions):
+    return PhaseCounts(np.full(len(conditions), 4), np.ones(len(conditions), bool), 0)
+
+
+def _refuse(*_arguments, **_options):
+    raise SingularShiftError("nothing to count")
+
+
+UNDAMPED = {"damping.alpha": 0, "damping.beta": 0, "map.curve": False, "map.refine": 0, "map.checks": 0}
+
+
+@pytest.fixture(scope="module")
+def undamped(coarse_case):
+    """Neither alpha nor beta, where modes above 80 Hz grow."""
+    axes = {"map.x": "pressure=10000:14000:2", "map.y": "density=1:1000:4:log"}
+    return run_map(coarse_case.replace(UNDAMPED | axes))
+
+
+def test_a_map_without_damping_finds_what_modes_finds(undamped, coarse_case):
+    assert undamped.grid("certified").all()
+    for i, pressure in enumerate(undamped.plan.x.values):
+        for j in (1, 2):
+            case = coarse_case.replace(UNDAMPED | {"fluid.density": undamped.plan.y.values[j]})
+            model = ValveModel(case)
+            (state,) = find_equilibria(model, [pressure]).states
+            modes = run_modes(model, state)
+            assert modes.certified.agrees
+            assert undamped.grid("growth_rate")[0][j, i] == pytest.approx(modes.eigenvalues[0].real, rel=1e-5)
+            assert undamped.grid("unstable")[0][j, i] == modes.certified.unstable_count > 0
+    assert undamped.grid("frequency")[0].max() > 80.0
+    assert any("searched for up to" in sentence for sentence in undamped.warnings)
+
+
+def test_the_band_of_modes_is_that_of_the_map(coarse_case):
+    axes = {"map.x": "pressure=10000:14000:2", "map.y": "density=1:1000:3:log", "modes.max_frequency": 60.0}
+    result = run_map(coarse_case.replace(UNDAMPED | axes))
+    assert result.grid("frequency")[0].max() <= 60.0
+    assert any("up to 60 Hz" in sentence or "up to 59.94 Hz" in sentence for sentence in result.warnings)

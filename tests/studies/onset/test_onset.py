@@ -1,0 +1,146 @@
+"""Onsets of the valve on a coarse mesh."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dbvfiv.case import Case
+from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.onset.run import run_onset
+from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
+from dbvfiv.studies.stability.place import Place
+
+
+@pytest.fixture(scope="module")
+def over_density(coarse_case):
+    options = OnsetOptions("density", tuple(np.geomspace(1, 1000, 21)), True, normal_form=False, coarse_mesh=0)
+    return run_onset(coarse_case, options)
+
+
+def test_the_onset_is_neutral_and_confirmed_on_both_sides(over_density):
+    (point,) = over_density.points
+    assert abs(point.growth_rate) < 1e-6
+    assert point.confirmed and point.edge and not point.gains
+    assert point.below.eigenvalue.real > 0 > point.above.eigenvalue.real
+    assert (point.below.unstable, point.above.unstable) == (2, 0) == (point.below.counted, point.above.counted)
+
+
+def test_onset_over_pressure_meets_onset_over_density(over_density, coarse_case):
+    (point,) = over_density.points
+    case = coarse_case.replace({"fluid.density": point.value})
+    options = OnsetOptions("pressure", (5500.0, 6200.0, 7000.0), False, normal_form=False, coarse_mesh=0)
+    (other,) = run_onset(case, options).points
+    assert other.value == pytest.approx(6000.0, rel=1e-6)
+    assert other.frequency == pytest.approx(point.frequency, rel=1e-6)
+
+
+def test_unstable_intervals(over_density):
+    (interval,) = over_density.unstable_intervals
+    assert interval == (pytest.approx(1.0), pytest.approx(over_density.points[0].value))
+
+
+def test_no_flow_no_onset(coarse_case):
+    with pytest.raises(SolveError, match="flow"):
+        run_onset(coarse_case.replace({"drive.kind": "uniform"}))
+
+
+@pytest.mark.parametrize(
+    "parameter, values", [("alpha", (0.0, 40.0, 120.0)), ("beta", (0.002, 0.004, 0.008)), ("storage", (0.0, 0.5, 1.0))]
+)
+def test_onset_over_other_parameters(coarse_case, parameter, values):
+    options = OnsetOptions(parameter, values, normal_form=False, coarse_mesh=0)
+    result = run_onset(coarse_case.replace({"fluid.density": 20}), options)
+    for point in result.points:
+        assert point.confirmed and not point.gains
+    assert (result.growth_rates[0, 0] > 0) != (result.growth_rates[-1, 0] > 0) or not len(result.points)
+
+
+def test_onset_over_wall_thickness(coarse_case):
+    options = OnsetOptions("thickness", (0.9, 1.1, 1.4), normal_form=False, coarse_mesh=0, tolerance=1e-5)
+    result = run_onset(coarse_case, options)
+    assert len(result.values) >= 3 and not result.failures
+    for point in result.points:
+        assert point.confirmed
+
+
+@pytest.mark.slow
+def test_criticality_and_uncertainty(coarse_case):
+    case = coarse_case.replace({"mesh.around": 12, "mesh.along": 24})
+    options = OnsetOptions("density", tuple(np.geomspace(1, 1000, 21)), True, coarse_mesh=0.5)
+    (point,) = run_onset(case, options).points
+    assert point.criticality == "super" and point.first_lyapunov_coefficient < 0
+    width = point.above.value - point.below.value
+    speed = (point.above.eigenvalue.real - point.below.eigenvalue.real) / width
+    assert point.crossing_speed == pytest.approx(speed, rel=1e-3)
+    assert point.uncertainty == pytest.approx(abs(point.value - point.coarse_value) / 3, rel=0.05)
+
+
+def test_a_place_changes_what_it_is_told(coarse_case):
+    place = Place.of(coarse_case).at(density=3.0, thickness=0.9)
+    assert place.condition == (3.0, 0.0, 0.003, 0.0) and place.design == {"thickness": 0.9}
+    assert place.mu()["inlet"] == 6000.0 and place.mu()["thickness"] == 0.9
+
+
+def _undamped(coarse_case, **more):
+    return coarse_case.replace({"damping.alpha": 0, "damping.beta": 0, "drive.pressure": 14e3, **more})
+
+
+def test_without_damping_growth_above_80_hz_is_no_stable_valve(coarse_case):
+    # all that grows there does so above 100 Hz
+    options = OnsetOptions("density", (900.0, 1000.0, 1100.0), True, normal_form=False, coarse_mesh=0)
+    result = run_onset(_undamped(coarse_case, **{"fluid.continuity": "storage"}), options)
+    assert (result.growth_rates[:, 0] > 0.5).all() and (result.frequencies[:, 0] > 100.0).all()
+    assert not result.stable_intervals and result.unstable_intervals
+    assert any("searched for up to" in sentence for sentence in result.warnings)
+
+
+def test_a_band_that_is_asked_for_is_kept(coarse_case):
+    options = OnsetOptions("density", (100.0, 200.0, 400.0), True, normal_form=False, coarse_mesh=0)
+    result = run_onset(_undamped(coarse_case, **{"modes.max_frequency": 60.0}), options)
+    assert np.nanmax(result.frequencies) <= 60.0
+
+
+def test_each_onset_over_alpha_is_listed_once_and_shown_by_its_sides(coarse_case):
+    options = OnsetOptions("alpha", tuple(np.linspace(0, 100, 6)), normal_form=False, coarse_mesh=0)
+    case = coarse_case.replace({"damping.beta": 0, "fluid.density": 4, "mesh.along": 14})
+    points = run_onset(case, options).points
+    assert len({round(p.value, 6) for p in points}) == len(points) >= 2
+    for p in points:
+        assert p.below.eigenvalue.real > 0 > p.above.eigenvalue.real and p.confirmed
+
+
+def test_nothing_is_claimed_beside_a_value_without_a_certificate(coarse_case, monkeypatch):
+    honest = OnsetSearch._solved
+
+    def doubtful(self, value):
+        sample = honest(self, value)
+        return replace(sample, certified=sample.certified and abs(value - 100.0) > 1e-6)
+
+    monkeypatch.setattr(OnsetSearch, "_solved", doubtful)
+    options = OnsetOptions("density", (1.0, 10.0, 100.0, 1000.0), True, normal_form=False, coarse_mesh=0)
+    result = run_onset(coarse_case, options)
+    assert not result.points
+    assert result.certified.tolist() == [abs(v - 100.0) > 1e-6 for v in result.values]
+    assert all(high <= 10.0 + 1e-9 for _, high in result.unstable_intervals) and not result.stable_intervals
+    assert any("nothing is claimed" in sentence for sentence in result.warnings)
+
+
+@pytest.mark.parametrize(
+    "parameter, words", [("strain", "no layer is one of the built-in rubbers"), ("angle", "ply|angle")]
+)
+def test_what_a_case_does_not_have_is_no_parameter(one_sentence, parameter, words):
+    """Before, every state of such a scan was the same."""
+    own = {"kind": "neo-hookean", "shear_modulus": "1 MPa", "density": 1200}
+    case = Case().replace({"materials.own": own, "layers": [{"material": "own", "thickness": 0.01}]})
+    for ask in (
+        lambda: run_onset(case.replace({"onset.over": parameter})),
+        lambda: run_map(case.replace({"map.x": USUAL[parameter], "map.y": "density=1:10:2"})),
+    ):
+        with pytest.raises(CaseError, match=words) as caught:
+            ask()
+        assert one_sentence(str(caught.value))
+
+
+USUAL = {"strain": "strain=0.1:0.6:3", "angle": "angle=20:80:3"}

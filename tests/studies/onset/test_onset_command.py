@@ -1,0 +1,80 @@
+"""The command onset: JSON keys, result file, figure."""
+
+import json
+
+import pytest
+
+from dbvfiv.cli import run
+from dbvfiv.studies.session import load_result
+
+SETTINGS = [
+    "--set=mesh.around=8",
+    "--set=mesh.along=16",
+    "--set=damping.alpha=0",
+    "--set=onset.normal_form=false",
+    "--set=onset.coarse_mesh=0",
+]
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("onset")
+    path = folder / "onset.h5"
+    import contextlib
+    import io
+
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        status = run(
+            [
+                "onset",
+                "--over",
+                "density=1:1000:15:log",
+                "--set=drive.pressure=6 kPa",
+                *SETTINGS,
+                "--json",
+                "-o",
+                str(path),
+                "--plots",
+                str(folder),
+            ]
+        )
+    return status, json.loads(out.getvalue()), path
+
+
+def test_keys_that_scripts_rely_on(outcome):
+    status, document, _ = outcome
+    assert status == 0
+    (point,) = document["points"]
+    assert {
+        "parameter",
+        "value",
+        "frequency",
+        "growth_rate",
+        "criticality",
+        "first_lyapunov_coefficient",
+        "uncertainty",
+    } <= set(point)
+    assert point["parameter"] == "density" and point["confirmed"] and point["criticality"] is None
+    assert point["below"]["unstable_count"] == point["below"]["unstable_count_independent"] == 2
+
+
+def test_the_file_says_the_same(outcome):
+    _, document, path = outcome
+    result = load_result(path)
+    assert result.complete and result.summary()["points"] == document["points"]
+    assert result.summary()["scan"] == document["scan"]
+    again = load_result(result.save(path.with_name("again.h5")))
+    assert again.summary()["points"] == document["points"]
+    assert "stable above" in "\n".join(result.lines())
+
+
+def test_figure(outcome):
+    assert (outcome[2].parent / "onset.png").stat().st_size > 10_000
+
+
+def test_words_for_a_bad_range(capsys):
+    assert run(["onset", "--over", "angle=20:140:5", *SETTINGS]) == 2
+    assert "not within 0 to 90" in capsys.readouterr().err
+    assert run(["onset", "--over", "colour", *SETTINGS]) == 2
+    assert "onset.over" in capsys.readouterr().err

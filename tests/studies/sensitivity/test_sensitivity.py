@@ -1,0 +1,90 @@
+"""The study sensitivity: command, file, Python, figure."""
+
+import json
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.errors import CaseError
+from dbvfiv.observer import Observer
+
+CHANGES = {"mesh.around": 8, "mesh.along": 14, "damping.alpha": 0, "fluid.density": 10, "drive.pressure": 6e3}
+NAMES = ["pressure", "beta", "layer 3 angle", "alpha"]
+
+
+@pytest.fixture(scope="module")
+def valve():
+    return dbvfiv.load(changes=CHANGES)
+
+
+@pytest.fixture(scope="module")
+def found(valve, tmp_path_factory):
+    return valve.sensitivity(NAMES, output=tmp_path_factory.mktemp("sensitivity") / "s.h5")
+
+
+def test_the_eigenvalue_is_that_of_modes_and_changes_as_said(valve, found):
+    modes = valve.modes(count=2).modes
+    assert found.growth_rate == pytest.approx(modes[0].growth_rate, rel=1e-7)
+    assert found.frequency == pytest.approx(modes[0].frequency, rel=1e-7)
+    (first, *_) = found.sensitivities
+    near = valve.modes(6e3 * 1.001, count=1).modes[0], valve.modes(6e3 * 0.999, count=1).modes[0]
+    assert [s.parameter for s in found.sensitivities] == NAMES
+    assert first.growth_rate == pytest.approx((near[0].growth_rate - near[1].growth_rate) / 12.0, rel=1e-4)
+    assert first.frequency == pytest.approx((near[0].frequency - near[1].frequency) / 12.0, rel=1e-4)
+
+
+def test_another_mode_and_a_state(valve, found):
+    second = valve.sensitivity("density", mode=2)
+    assert second.number == 2 and second.growth_rate < found.growth_rate
+    state = valve.steady(pressure=6e3)
+    again = state.sensitivity("pressure")
+    assert again.sensitivities[0].derivative == pytest.approx(found.sensitivities[0].derivative, rel=1e-6)
+
+
+def test_the_file_says_the_same_and_draws(found, tmp_path):
+    stored = dbvfiv.load_result(found.path)
+    assert stored.complete and stored.summary() == found.summary() and stored.lines() == found.lines()
+    assert stored.sensitivities == found.sensitivities
+    (drawn,) = stored.figures().values()
+    named = [label.get_text() for label in drawn.axes[0].get_yticklabels()]
+    largest = sorted(found.sensitivities, key=lambda s: -abs(s.relative))
+    assert named == [s.parameter for s in largest if s.value] and "alpha" not in named  # of nothing there is no percent
+    widths = [bar.get_width() for bar in drawn.axes[0].patches]
+    assert widths == pytest.approx([s.growth_rate * s.value / 100 for s in largest if s.value])
+
+
+class _StopAtSecond(Observer):
+    left = 2
+
+    def item(self, result):
+        self.left -= 1
+        if not self.left:
+            raise KeyboardInterrupt
+
+
+def test_an_interrupted_run_goes_on_with_the_same_digits(valve, found, tmp_path):
+    path = tmp_path / "s.h5"
+    part = valve.sensitivity(NAMES, output=path, observer=_StopAtSecond())
+    assert not part.complete and len(dbvfiv.load_result(path).sensitivities) == 2
+    assert dbvfiv.resume(path).sensitivities == found.sensitivities
+
+
+def test_command(command_line, found, one_sentence):
+    settings = [f"--set={key}={value}" for key, value in CHANGES.items() if key[:5] not in ("drive", "fluid")]
+    asked = [word for name in NAMES for word in ("--of", name)]
+    outcome = command_line("sensitivity", *settings, "-p", "6 kPa", "--density", 10, *asked, "--json")
+    assert outcome.status == 0, outcome.err
+    document = json.loads(outcome.out)
+    assert document["mode"]["growth_rate"] == found.growth_rate
+    rows = {row["parameter"]: row for row in document["sensitivities"]}
+    assert set(rows) == set(NAMES) and rows["layer 3 angle"]["unit"] == "deg"
+    assert rows["beta"]["growth_rate_per_percent"] == pytest.approx(0.003 / 100 * rows["beta"]["growth_rate"])
+    outcome = command_line("sensitivity", *settings, "--of", "colour")
+    assert outcome.status == 2 and "'colour'" in outcome.err and one_sentence(outcome.err)
+
+
+def test_misuse(valve):
+    with pytest.raises(CaseError, match="layer 9 angle"):
+        valve.sensitivity("layer 9 angle")
+    assert np.isfinite(valve.sensitivity(["storage"]).sensitivities[0].derivative)

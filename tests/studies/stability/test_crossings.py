@@ -1,0 +1,62 @@
+"""Scans along a parameter on spectra known in closed form."""
+
+import numpy as np
+import pytest
+
+from dbvfiv.errors import SolveError
+from dbvfiv.studies.stability.crossings import Scan, locate
+
+
+def modes(*functions):
+    def spectrum(x):
+        values = np.array([complex(f(x), 10.0 * (k + 1)) for k, f in enumerate(functions)])
+        return values[np.argsort(-values.real)]
+
+    return spectrum
+
+
+def test_a_single_crossing_is_located_to_rounding():
+    scan = Scan(modes(lambda x: x**3 - 2.0, lambda x: -5.0))
+    (crossing,) = scan.run(np.linspace(0, 3, 7))
+    assert locate(scan, crossing, 1e-13) == pytest.approx(2 ** (1 / 3), rel=1e-11)
+
+
+def test_every_tongue_is_found_though_all_scan_values_are_stable():
+    # two tongues, each narrower than half a step of the scan
+    scan = Scan(modes(lambda x: 0.02 - 4 * (x - 1.23) ** 2 if x < 2 else 0.01 - 4 * (x - 3.37) ** 2))
+    crossings = scan.run(np.linspace(0, 5, 26))
+    found = [locate(scan, c, 1e-12) for c in crossings]
+    expected = [1.23 - np.sqrt(0.005), 1.23 + np.sqrt(0.005), 3.37 - np.sqrt(0.0025), 3.37 + np.sqrt(0.0025)]
+    assert found == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_narrow_stable_gap_is_found():
+    scan = Scan(modes(lambda x: (x - 0.77) ** 2 - 1e-3), log=False)
+    found = [locate(scan, c, 1e-12) for c in scan.run(np.linspace(0, 2, 11))]
+    assert found == pytest.approx([0.77 - np.sqrt(1e-3), 0.77 + np.sqrt(1e-3)], abs=1e-9)
+
+
+def test_a_second_mode_that_becomes_unstable_counts_too():
+    scan = Scan(modes(lambda x: x - 1, lambda x: x - 2))
+    crossings = scan.run([0.0, 3.0])
+    assert [c.index for c in crossings] == [0, 1]
+    assert [locate(scan, c, 1e-12) for c in crossings] == pytest.approx([1.0, 2.0])
+
+
+def test_missing_states_are_kept_as_sentences():
+    def spectrum(x):
+        if 1.4 < x < 1.6:
+            raise SolveError("No equilibrium.")
+        return np.array([complex(x - 3, 1)])
+
+    scan = Scan(spectrum)
+    crossings = scan.run(np.linspace(1, 4, 7))
+    assert list(scan.failures.values()) == ["No equilibrium."]
+    assert locate(scan, crossings[0], 1e-12) == pytest.approx(3.0)
+
+
+def test_no_crossing_is_claimed_across_a_value_without_a_certificate():
+    scan = Scan(modes(lambda x: x - 1.5), certify=lambda x: x < 1.9)
+    assert scan.run([0.0, 1.0, 2.0]) == [] and scan.uncertain == [(1.0, 2.0)]
+    scan = Scan(modes(lambda x: x - 1.5), certify=lambda x: True)
+    assert len(scan.run([0.0, 1.0, 2.0])) == 1 and scan.uncertain == []
