@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, overload
 
 from .case import load_case
 from .case.model import Case
-from .case.parameters import PARAMETERS
-from .errors import CaseError, SolveError
+from .case.pressures import is_single, read_pressures
+from .errors import SolveError
 from .model import ValveModel
 from .studies.closure.result import ClosureResult
 from .studies.map.result import MapResult
@@ -25,8 +25,6 @@ from .studies.transient.result import TransientResult
 
 if TYPE_CHECKING:
     from .observer import Observer
-
-_PRESSURE = PARAMETERS["pressure"]
 
 
 class Valve:
@@ -103,7 +101,7 @@ class Valve:
             If one pressure was asked for and not reached. Of several, `failures` of the result names those that were
             not.
         """
-        single = _is_single(pressure)
+        single = is_single(pressure)
         asked = self.case.steady_pressures() if pressure is None else [pressure] if single else pressure
         pressures = read_pressures(asked, "drive.pressure" if pressure is None else "pressure", self.case.fluid.density)
         self.model  # shared by what is asked of this valve
@@ -237,7 +235,7 @@ class Valve:
         >>> result.states[-1].closed, result.critical_pressure           # doctest: +SKIP
         >>> result.safety.factor, result.safety.limit                    # doctest: +SKIP
         """
-        asked = self.case.closure.pressures if pressure is None else [pressure] if _is_single(pressure) else pressure
+        asked = self.case.closure.pressures if pressure is None else [pressure] if is_single(pressure) else pressure
         pressures = read_pressures(asked, "pressure", self.case.fluid.density)
         session = self._ask({"closure.pressures": list(pressures)}, {})
         return session.perform("closure", output, observer, in_time=in_time, compare=compare)
@@ -362,45 +360,3 @@ def load(case: str | Path | Case | None = None, changes: Mapping[str, Any] | Non
     name = "dbv12" if case is None else "case" if isinstance(case, Case) else Path(case).stem
     made = case if isinstance(case, Case) else load_case(case)
     return Valve(made.replace(changes) if changes else made, name)
-
-
-def read_pressures(given: Iterable[Any], name: str, density: float | None = None) -> tuple[float, ...]:
-    """Pressures in Pa from numbers and texts with units, heads of a fluid of that density, kg/m3, included.
-
-    Raises
-    ------
-    CaseError
-        For anything that is not a pressure above zero and up to 10 MPa; `name` says in the sentence where it was given.
-    """
-    found = []
-    for value in given:
-        try:
-            pressure = _PRESSURE.quantity.parse(_number(value), density)
-        except ValueError as error:
-            raise CaseError(f"{name} is given as {value!r}, {error}; {_ALLOWED}.") from None
-        if not 0 < pressure <= _PRESSURE.high:
-            raise CaseError(f"{name} is given as {value!r}; {_ALLOWED}.")
-        found.append(pressure)
-    if not found:
-        raise CaseError(f"{name} is an empty list; it needs at least one pressure.")
-    return tuple(found)
-
-
-_ALLOWED = (
-    f"it must be a pressure greater than 0 kPa and at most {_PRESSURE.high / 1e3:g} kPa, such as '36 kPa' or 36e3 (Pa)"
-)
-
-
-def _is_single(pressure: Any) -> bool:
-    """Whether it is one pressure and not several."""
-    return isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0
-
-
-def _number(value: Any) -> Any:
-    """A number where the value is one, numpy's and text such as "36e3" included."""
-    if isinstance(value, (bool, int)):
-        return value
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        return value

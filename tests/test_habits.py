@@ -2,7 +2,10 @@
 
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
+
+from dbvfiv.studies import KINDS
 
 ROOT = Path(__file__).parent.parent
 
@@ -19,3 +22,27 @@ def test_files_are_formatted():
 def test_checks_pass():
     done = ruff("check", "--output-format", "concise")
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_doors_open_one_way():
+    """Contracts of imports between rooms; see docs/developing.md and pyproject.toml."""
+    done = subprocess.run(
+        [sys.executable, "-c", "from importlinter.cli import lint_imports_command as run; run()"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0 and "0 broken" in done.stdout, done.stdout + done.stderr
+
+
+def test_every_study_is_bound_by_the_contracts():
+    with open(ROOT / "pyproject.toml", "rb") as file:
+        contracts = tomllib.load(file)["tool"]["importlinter"]["contracts"]
+    rooms = next(c["modules"] for c in contracts if c["type"] == "independence")
+    assert set(rooms) == {f"dbvfiv.studies.{kind}" for kind in KINDS}
+
+
+def test_modules_and_lines_are_short():
+    for package in ("dbvfiv", "eigen", "continuation"):
+        for path in (ROOT / package).rglob("*.py"):
+            assert len(path.read_text().splitlines()) <= 400, f"{path} has more than 400 lines"

@@ -56,7 +56,7 @@ def command(
 
     choices = {}
     if pressure is not None:
-        from ..api import read_pressures
+        from ..case.pressures import read_pressures
 
         choices["pressure"] = read_pressures([pressure], "--pressure")[0]
     if mode is not None:

@@ -3,14 +3,11 @@
 from .inner_face import nodal_thickness, tributary_area
 from .law import ContactLaw
 from .plane import ContactState, PlaneContact
-from .pressed_shell import PressedShell, PressedTangent
 
 __all__ = [
     "ContactLaw",
     "ContactState",
     "PlaneContact",
-    "PressedShell",
-    "PressedTangent",
     "nodal_thickness",
     "tributary_area",
 ]

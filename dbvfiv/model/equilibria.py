@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SolveError
+from ..materials.stability import stability_margin
 from ..observer import Observer
 from .load_steps import LoadStepOptions, LoadSteps
 from .newton import NewtonOptions
@@ -231,7 +232,6 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
 
 def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str]:
     """Sentences about the states found: strains at which a rubber law is no longer stable."""
-    from ..materials.stability import stability_margin
 
     section = model.shell.section
     worst: dict[str, tuple[float, float]] = {}

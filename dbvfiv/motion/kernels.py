@@ -5,9 +5,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..shell.kernel import bases, edge_shears, gather, strains
 from ..shell.kernel_rubber import FAST
 from ..shell.kernel_section import linear_response, point_strain
+from ..shell.kernel_strain import bases, edge_shears, gather, strains
 
 
 @numba.njit(cache=True, fastmath=FAST)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from dbvfiv.contact import PressedShell
 from dbvfiv.errors import SolveError
 from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.newton import NewtonOptions
+from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.shell import Shell, ShellMesh
 from dbvfiv.studies.closure.arclength import PressedSystem, arclength_path
 from dbvfiv.studies.closure.buckling import BucklingWatch

@@ -9,10 +9,11 @@ import pytest
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 
-from dbvfiv.contact import ContactLaw, PlaneContact, PressedShell, tributary_area
+from dbvfiv.contact import ContactLaw, PlaneContact, tributary_area
 from dbvfiv.model.linear import DirectFactor
 from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.newton import NewtonOptions
+from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.shell import Shell, ShellMesh
 from dbvfiv.studies.closure.balance import force_balance
 from dbvfiv.studies.closure.energy import EnergyLedger

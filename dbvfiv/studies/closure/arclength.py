@@ -10,8 +10,8 @@ from continuation import ContinuationOptions, MatrixLinearisation, SystemBase, c
 from continuation import NewtonOptions as ContinuationNewton
 from continuation.branch import Branch
 
-from ...contact import PressedShell
 from ...contact.second import contact_second
+from ...model.pressed_shell import PressedShell
 from ...observer import Observer
 from .stiffness import stiffness_spectrum
 

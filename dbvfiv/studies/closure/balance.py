@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...contact import PressedShell
+from ...model.pressed_shell import PressedShell
 from ...shell import Shell
 
 

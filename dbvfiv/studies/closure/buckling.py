@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...contact import PressedShell
 from ...model.load_steps import LoadStepOptions, LoadSteps
+from ...model.pressed_shell import PressedShell
 from .stiffness import StiffnessSpectrum, stiffness_spectrum
 
 #: The eigenvalue at a located buckling state over that at the stable end of its bracket.

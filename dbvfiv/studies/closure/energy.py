@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...contact import PressedShell
 from ...model.linear import DirectFactor, SingularMatrix
+from ...model.pressed_shell import PressedShell
 
 #: Gauss points of a stretch, exact for the work of a load that is quadratic in the positions along a cubic path while
 #: the pressure rises linearly.

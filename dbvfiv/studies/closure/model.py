@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...case.model import Case
-from ...contact import ContactLaw, PlaneContact, PressedShell, nodal_thickness, tributary_area
+from ...contact import ContactLaw, PlaneContact, nodal_thickness, tributary_area
 from ...geometry import ValveMesh
 from ...model.build import build_shell
+from ...model.pressed_shell import PressedShell
 from ...model.supports import free_unknowns
 from ...model.valve import loaded_share
 from ...shell import Shell

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse.linalg as spla
 
-from ...contact import PressedShell
 from ...errors import SolveError
 from ...model.linear import DirectFactor
+from ...model.pressed_shell import PressedShell
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.linear import DirectFactor
+from ..contact import ContactState, PlaneContact
 from ..shell import Shell
 from ..shell.pressure import pressure_force, pressure_stiffness
-from .plane import ContactState, PlaneContact
+from .linear import DirectFactor
 
 
 @dataclass(frozen=True)
