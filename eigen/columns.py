@@ -43,7 +43,7 @@ class Column:
     unstable : (cells,) int array
         Eigenvalues right of `line` up to `band`, conjugates counted apart, by the spectrum.
     counted : (cells,) int array
-        The same by the argument principle.
+        The same by the argument principle; -1 where nobody asked.
     certain : (cells,) bool array
         That count followed the phase everywhere.
     error : float
@@ -108,7 +108,7 @@ class ColumnSolver:
             self._last = FamilyReduction(family, self._static)
         return self._last
 
-    def solve(self, family: PencilFamily, conditions, snapshots: int = 3) -> Column:
+    def solve(self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False) -> Column:
         """All conditions at one state.
 
         Parameters
@@ -118,6 +118,9 @@ class ColumnSolver:
         snapshots : int
             Conditions at which leading vectors are taken into the second space; fewer than three conditions are solved
             with the full pencil.
+        edges : bool
+            Count only beside changes of the number of unstable eigenvalues along the list; no other cell gets a
+            certificate.
 
         Raises
         ------
@@ -133,7 +136,7 @@ class ColumnSolver:
         first = reduction.wide if banded else reduction.coarse
         fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
         error = _error(reduction, fine, conditions, _between(places))
-        column = self._on(first, fine, conditions, error)
+        column = self._on(first, fine, conditions, error, edges)
 
         def eigenvalues(condition):
             condition = Condition(*condition)
@@ -148,13 +151,18 @@ class ColumnSolver:
 
         return replace(column, eigenvalues=eigenvalues, corrected=corrected, cell=cell)
 
-    def _on(self, first: ReducedFamily, fine: ReducedFamily, conditions, error: float) -> Column:
+    def _on(self, first: ReducedFamily, fine: ReducedFamily, conditions, error: float, edges: bool = False) -> Column:
         """Cells on a small model, counted on that of the first stage; those without a certificate directly."""
         family = first.family
         values = fine.eigenvalues(conditions)
         leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
-        column = _column(leading, values, count_unstable(first, conditions, leading), error)
-        return self._repaired(column, family, conditions, np.flatnonzero(~column.certified))
+        counted = _beside_changes(leading) if edges else np.arange(len(conditions))
+        counts = _uncounted(family, conditions)
+        if len(counted):
+            found = count_unstable(first, [conditions[i] for i in counted], [leading[i] for i in counted])
+            counts.enter(counted, found)
+        column = _column(leading, values, counts, error)
+        return self._repaired(column, family, conditions, counted[~column.certified[counted]])
 
     def direct(self, family: PencilFamily, condition, count: int = 6):
         """Leading modes of the full pencil, an `eigen.Spectrum`.
@@ -216,6 +224,26 @@ class _Counts:
     certain: np.ndarray
     line: np.ndarray
     band: np.ndarray
+
+    def enter(self, cells: np.ndarray, found: _Counts) -> None:
+        """Put counts of some cells in."""
+        for own, other in zip(vars(self).values(), vars(found).values()):
+            own[cells] = other
+
+
+def _uncounted(family: PencilFamily, conditions) -> _Counts:
+    """What is known before anything is counted."""
+    cells = len(conditions)
+    bands = np.array([family.reach(c).band for c in conditions])
+    band = np.where(np.isinf(bands), np.inf, INSIDE * bands / (2 * np.pi))
+    return _Counts(np.full(cells, -1), np.zeros(cells, bool), np.zeros(cells), band)
+
+
+def _beside_changes(leading) -> np.ndarray:
+    """Cells whose neighbour has another number of unstable eigenvalues."""
+    number = np.array([int((row.real > 0).sum()) for row in leading])
+    change = np.flatnonzero(np.diff(number))
+    return np.unique(np.concatenate([change, change + 1]))
 
 
 def count_unstable(reduced: ReducedFamily, conditions, hints) -> _Counts:

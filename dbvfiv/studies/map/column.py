@@ -6,6 +6,7 @@ import math
 import time
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,29 @@ from .correction import OnsetCorrection
 CELLS = ("growth_rate", "frequency", "second", "unstable", "counted", "certified", "how")
 #: Relative accuracy of onsets along a column.
 LOCATED = 1e-10
+
+
+class ColumnTask(NamedTuple):
+    """A column to solve.
+
+    Attributes
+    ----------
+    value : float
+        Of the axis across.
+    level : int
+        0 for a column of the grid, more for one that is put between two of them.
+    laws : tuple of int
+        Numbers of the continuity laws under which it is needed.
+    """
+
+    value: float
+    level: int
+    laws: tuple[int, ...]
+
+    @property
+    def key(self) -> tuple[float, int]:
+        """What tells it from other columns."""
+        return self.value, self.level
 
 
 @dataclass(frozen=True)
@@ -78,6 +102,10 @@ class MapPlan:
         named = {self.across.parameter: across, self.along.parameter: along}
         return self.base.at(**({"storage": law} | named))
 
+    def task(self, value: float, level: int = 0) -> ColumnTask:
+        """A column under all laws."""
+        return ColumnTask(value, level, tuple(range(len(self.laws))))
+
     def coordinate(self, axis: Axis, value: float) -> float:
         """0..1 along an axis, in the logarithm if its values are spaced so."""
         a, b = axis.values[0], axis.values[-1]
@@ -125,7 +153,7 @@ class MapColumn:
     band: float = math.inf
 
     @classmethod
-    def missing(cls, plan: MapPlan, value: float, level: int, sentence: str, seconds: float = 0.0) -> MapColumn:
+    def missing(cls, plan: MapPlan, task: ColumnTask, sentence: str, seconds: float = 0.0) -> MapColumn:
         """A marked gap."""
         shape = (len(plan.laws), len(plan.along.values))
         cells = {name: np.full(shape, np.nan) for name in CELLS[:3]}
@@ -135,29 +163,42 @@ class MapColumn:
             "certified": np.zeros(shape, bool),
             "how": np.full(shape, MISSING),
         }
-        return cls(value, level, cells, np.zeros((0, 5)), np.nan, sentence, seconds)
+        return cls(task.value, task.level, cells, np.zeros((0, 5)), np.nan, sentence, seconds)
+
+    def has(self, law: int) -> bool:
+        """Whether it was solved under a continuity law."""
+        how = self.cells.get("how")
+        return not self.failure and (how is None or bool((how[law] != MISSING).any()))
 
 
 def grid_of(plan: MapPlan, found, name: str) -> np.ndarray:
     """A quantity of finished columns on the grid of a plan, (laws, y values, x values)."""
-    blank = MapColumn.missing(plan, 0.0, 0, "").cells[name]
+    blank = MapColumn.missing(plan, plan.task(0.0), "").cells[name]
     by_value = {column.value: column.cells[name] for column in found if column.level == 0}
     table = np.stack([by_value.get(value, blank) for value in plan.across.values], axis=2)
     return table.transpose(0, 2, 1) if plan.transposed else table
 
 
-def solve_column(plan: MapPlan, walk: StabilityWalk, value: float, level: int = 0) -> MapColumn:
-    """All cells of a column; a steady state that is not found leaves a gap with the reason."""
+def solve_column(plan: MapPlan, walk: StabilityWalk, task: ColumnTask) -> MapColumn:
+    """A column; a steady state that is not found leaves a gap with the reason.
+
+    On the grid every cell gets a certificate; in columns between, put in for the onset curves, those that onsets lie
+    between.
+    """
     started = time.process_time()
+    value, level, laws = task
     columns, onsets = [], []
     try:
-        for number, law in enumerate(plan.laws):
-            column, found = _law(plan, walk, value, law)
+        for number in laws:
+            column, found = _law(plan, walk, value, plan.laws[number], level > 0)
             columns.append(column)
             onsets += [(number, *onset) for onset in found]
     except (SolveError, CaseError) as error:
-        return MapColumn.missing(plan, value, level, str(error), time.process_time() - started)
-    cells = {name: np.array([getattr(column, name) for column in columns]) for name in CELLS}
+        return MapColumn.missing(plan, task, str(error), time.process_time() - started)
+    cells = MapColumn.missing(plan, task, "").cells
+    for number, column in zip(laws, columns):
+        for name in CELLS:
+            cells[name][number] = getattr(column, name)
     return MapColumn(
         value,
         level,
@@ -170,12 +211,14 @@ def solve_column(plan: MapPlan, walk: StabilityWalk, value: float, level: int = 
     )
 
 
-def _law(plan: MapPlan, walk: StabilityWalk, value: float, law: float) -> tuple[Column, list[tuple[float, ...]]]:
+def _law(
+    plan: MapPlan, walk: StabilityWalk, value: float, law: float, edges: bool
+) -> tuple[Column, list[tuple[float, ...]]]:
     along = plan.along
     places = [plan.place(value, other, law) for other in along.values]
     if not is_surrounding(along.parameter):
         return _state_by_state(plan, walk.apart(), places)
-    column = walk.column(places)
+    column = walk.column(places, edges=edges)
     sample = column.eigenvalues or (lambda condition: walk.column([_under(places[0], condition)]).leading[0])
     cell = column.cell or (lambda condition: walk.column([_under(places[0], condition)]))
     scan = Scan(
@@ -214,8 +257,8 @@ def _under(place: Place, condition: Condition) -> Place:
 
 
 def _known(along: Axis, column: Column) -> dict[float, Sample]:
-    rows = zip(along.values, column.leading, column.certified)
-    return {float(v): Sample(float(v), row, bool(sure)) for v, row, sure in rows}
+    sure = [bool(s) if counted >= 0 else None for s, counted in zip(column.certified, column.counted)]
+    return {float(v): Sample(float(v), row, s) for v, row, s in zip(along.values, column.leading, sure)}
 
 
 def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):

@@ -51,8 +51,8 @@ class OnsetCurve:
 
 def linked(plan: MapPlan, columns: tuple[MapColumn, ...]) -> tuple[OnsetCurve, ...]:
     """Curves through the onsets of columns."""
-    web = Web.of(plan, columns)
-    return tuple(_curve(plan, web, chain) for chain in _chains(web))
+    webs = (Web.of(plan, columns, law) for law in range(len(plan.laws)))
+    return tuple(_curve(plan, web, chain) for web in webs for chain in _chains(web))
 
 
 def doubts(plan: MapPlan, curves) -> Iterator[str]:

@@ -15,13 +15,10 @@ from ...case.model import Case
 from ...errors import SolveError
 from ...runtime import mpi_size, prepare
 from ..stability.walk import StabilityWalk
-from .column import MapColumn, MapPlan, shared_place, solve_column
+from .column import ColumnTask, MapColumn, MapPlan, shared_place, solve_column
 
 #: Times that a column is tried again after a worker died over it.
 TRIES = 3
-
-#: Value across and level of a column.
-Task = tuple[float, int]
 
 _walk: StabilityWalk | None = None
 _plan: MapPlan | None = None
@@ -72,23 +69,23 @@ class ColumnPool:
         """Whether this process does all the work itself."""
         return self.workers <= 1 and mpi_size() == 1
 
-    def columns(self, wanted: Iterable[tuple[float, int]]) -> Iterator[MapColumn]:
+    def columns(self, wanted: Iterable[ColumnTask]) -> Iterator[MapColumn]:
         """Columns as they are finished, in any order.
 
         Parameters
         ----------
-        wanted : iterable of (value, level)
+        wanted : iterable of ColumnTask
         """
         wanted = list(wanted)
         if self.is_here:
             for task in wanted:
-                yield self._recalled(task) or solve_column(self.plan, self.walk, *task)
+                yield self._recalled(task) or solve_column(self.plan, self.walk, task)
             return
         tries = dict.fromkeys(wanted, 0)
         left = set(wanted)
         while left:
             self._pool = self._pool or _pool(self.plan, self.workers)
-            lost: list[Task] = []
+            lost: list[ColumnTask] = []
             finished = False
             try:
                 for task, column in self._round(sorted(left)):
@@ -105,24 +102,24 @@ class ColumnPool:
                 tries[task] += 1
                 if tries[task] >= TRIES:
                     left.discard(task)
-                    yield MapColumn.missing(self.plan, *task, f"{TRIES} workers died over this column.")
+                    yield MapColumn.missing(self.plan, task, f"{TRIES} workers died over this column.")
             if lost:
                 self.warn(f"A worker was lost; {len(left)} columns are given to new ones.")
 
-    def _recalled(self, task: Task) -> MapColumn | None:
+    def _recalled(self, task: ColumnTask) -> MapColumn | None:
         """A column that is known, and its state for the walk."""
-        column = self.known.get(task)
-        place = shared_place(self.plan, task[0])
+        column = self.known.get(task.key)
+        place = shared_place(self.plan, task.value)
         if column is not None and place is not None:
             self.walk.recall(place)
         return column
 
-    def _state(self, task: Task) -> np.ndarray | None:
+    def _state(self, task: ColumnTask) -> np.ndarray | None:
         """Steady state of a column, where its cells share one of the case's own design."""
-        place = shared_place(self.plan, task[0])
+        place = shared_place(self.plan, task.value)
         return None if place is None or place.design else self.walk.equilibrium(place)
 
-    def _round(self, tasks: list[Task]) -> Iterator[tuple[Task, MapColumn | None]]:
+    def _round(self, tasks: list[ColumnTask]) -> Iterator[tuple[ColumnTask, MapColumn | None]]:
         """Finished columns, and None for those in flight when a worker died; the round then ends."""
         queue, running = list(tasks), {}
         most = max(self.workers, mpi_size() - 1) + 1
@@ -134,9 +131,9 @@ class ColumnPool:
                     yield task, column
                     continue
                 try:
-                    running[self._pool.submit(_solve, *task, self._state(task))] = task
+                    running[self._pool.submit(_solve, task, self._state(task))] = task
                 except SolveError as error:
-                    yield task, MapColumn.missing(self.plan, *task, str(error))
+                    yield task, MapColumn.missing(self.plan, task, str(error))
                 except BrokenProcessPool:
                     queue.insert(0, task)
                     break
@@ -180,7 +177,7 @@ def _start(case: dict, laws: tuple[float, ...]) -> None:
     _walk = StabilityWalk(read)
 
 
-def _solve(value: float, level: int, state: np.ndarray | None) -> MapColumn:
+def _solve(task: ColumnTask, state: np.ndarray | None) -> MapColumn:
     if state is not None:
-        _walk.give(shared_place(_plan, value), state)
-    return solve_column(_plan, _walk, value, level)
+        _walk.give(shared_place(_plan, task.value), state)
+    return solve_column(_plan, _walk, task)

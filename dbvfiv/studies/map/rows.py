@@ -37,9 +37,16 @@ _CELLS = (
     Column("growth_rate", "1/s", "Of the leading mode"),
     Column("frequency", "Hz", "Of the leading mode"),
     Column("second", "1/s", "Growth rate of the next mode"),
-    Column("unstable", "", "Unstable eigenvalues by the spectrum, conjugates counted apart; -1 in gaps", "i8"),
-    Column("counted", "", "The same by the argument principle", "i8"),
-    Column("certified", "", "Whether both counts agree and the leading eigenvalue is accurate", "bool"),
+    Column(
+        "unstable", "", "Unstable eigenvalues by the spectrum, conjugates counted apart; -1 where there is none", "i8"
+    ),
+    Column("counted", "", "The same by the argument principle; -1 where nobody asked", "i8"),
+    Column(
+        "certified",
+        "",
+        "Whether both counts agree and the leading eigenvalue is accurate; only beside onsets in columns put in",
+        "bool",
+    ),
     Column("how", "", "0 on the small model, 1 with the full pencil, 2 a gap", "i8"),
 )
 _ONSETS = (

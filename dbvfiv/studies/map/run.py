@@ -13,7 +13,7 @@ from ...observer import Observer
 from ..stability.place import check_scan
 from ..stability.walk import StabilityWalk
 from .checks import Check, check_cells
-from .column import MapColumn, MapPlan, grid_of
+from .column import ColumnTask, MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, doubts, linked
 from .pool import ColumnPool
 from .web import Web
@@ -49,7 +49,7 @@ class FoundMap:
 
 #: Rounds of columns put in for the onset curves.
 ROUNDS = 14
-#: Columns put in for them at most: as many as the map has, or this many.
+#: Columns put in for them at most under each law: as many as the map has, or this many.
 LEAST_ROOM = 40
 
 
@@ -60,44 +60,55 @@ class _Run:
     pool: ColumnPool
     found: dict[tuple[float, int], MapColumn] = field(default_factory=dict)
 
-    def fill(self, wanted) -> None:
+    def fill(self, wanted: Iterable[ColumnTask]) -> None:
         """Columns that are not there yet: those an earlier run has found, and the others solved."""
-        wanted = [task for task in wanted if task not in self.found]
+        wanted = [task for task in wanted if task.key not in self.found]
         for column in self.pool.columns(wanted):
-            task = column.value, column.level
-            self.found[task] = column
-            if task not in self.pool.known:
+            key = column.value, column.level
+            self.found[key] = column
+            if key not in self.pool.known:
                 self.observer.item(column)
 
-    def between(self, level: int) -> list[tuple[float, int]]:
-        """Columns to put in where the number of onsets differs between neighbours."""
-        ordered = sorted((c for c in self.found.values() if not c.failure), key=lambda c: c.value)
-        wanted = []
-        for a, b in zip(ordered[:-1], ordered[1:]):
-            if _pattern(a) != _pattern(b) and max(a.level, b.level) == level - 1:
-                middle = 0.5 * (
-                    self.plan.coordinate(self.plan.across, a.value) + self.plan.coordinate(self.plan.across, b.value)
-                )
-                wanted.append((self.plan.value(self.plan.across, middle), level))
-        return wanted
+    def between(self, level: int) -> list[ColumnTask]:
+        """Columns to put in where the number of onsets under a law differs between neighbours."""
+        across, wanted = self.plan.across, []
+        for law in range(len(self.plan.laws)):
+            ordered = [column for column in _ordered(self.found) if column.has(law)]
+            for a, b in zip(ordered[:-1], ordered[1:]):
+                if _pattern(a, law) != _pattern(b, law) and max(a.level, b.level) == level - 1:
+                    ends = (self.plan.coordinate(across, column.value) for column in (a, b))
+                    wanted.append((0.5 * sum(ends), law))
+        return self._tasks(wanted, level)
+
+    def _tasks(self, wanted: Iterable[tuple[float, int]], level: int) -> list[ColumnTask]:
+        """Columns at places, each under the laws that ask for it, in ascending order."""
+        laws: dict[float, tuple[int, ...]] = {}
+        for place, law in wanted:
+            laws[place] = (*laws.get(place, ()), law)
+        return [ColumnTask(self.plan.value(self.plan.across, place), level, laws[place]) for place in sorted(laws)]
 
     def trace(self) -> None:
         """Columns that the onset curves need to be known everywhere."""
-        across = self.plan.across
+        numbers = range(len(self.plan.laws))
         level = max(column.level for column in self.found.values())
-        room = max(LEAST_ROOM, len(across.values))
+        room = max(LEAST_ROOM, len(self.plan.across.values)) * len(numbers)
         for _ in range(ROUNDS):
-            wanted = Web.of(self.plan, self.found.values()).wanted()[:room]
+            wanted = sorted((place, law) for law in numbers for place in self._web(law).wanted())[:room]
             if not wanted:
                 return
             room -= len(wanted)
             level += 1
-            self.observer.progress(f"onset curves, {len(wanted)} more columns")
-            self.fill([(self.plan.value(across, place), level) for place in wanted])
+            tasks = self._tasks(wanted, level)
+            self.observer.progress(f"onset curves, {len(tasks)} more columns")
+            self.fill(tasks)
+
+    def _web(self, law: int) -> Web:
+        return Web.of(self.plan, self.found.values(), law)
 
 
-def _pattern(column: MapColumn) -> tuple:
-    return tuple((int(row[0]), int(row[3])) for row in column.onsets)
+def _pattern(column: MapColumn, law: int) -> tuple[int, ...]:
+    """Directions of the onsets along a column."""
+    return tuple(int(row[3]) for row in column.onsets if int(row[0]) == law)
 
 
 def run_map(
@@ -141,7 +152,7 @@ def run_map(
     with ColumnPool(plan, case.map.workers if workers is None else workers, observer.warn, walk, known) as pool:
         run = _Run(plan, observer, pool)
         try:
-            run.fill([(value, 0) for value in plan.across.values])
+            run.fill([plan.task(value) for value in plan.across.values])
             for level in range(1, plan.refine + 1):
                 run.fill(run.between(level))
             if all(column.failure for column in run.found.values()):

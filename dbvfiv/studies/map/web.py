@@ -63,12 +63,14 @@ class Tip:
 
 @dataclass
 class Web:
-    """Links between the onsets of neighbouring columns.
+    """Links between the onsets of neighbouring columns under one continuity law.
 
     Attributes
     ----------
+    law : int
+        Number of the law.
     columns : list of MapColumn
-        Those with a state, ascending.
+        Those solved under it, ascending.
     place : (columns,) list of float
         0..1 across.
     onsets : list of lists of Onset
@@ -79,6 +81,7 @@ class Web:
         Columns with a gap between them and the next.
     """
 
+    law: int
     columns: list[MapColumn]
     place: list[float]
     onsets: list[list[Onset]]
@@ -88,14 +91,15 @@ class Web:
     gaps: set[int] = field(default_factory=set)
 
     @classmethod
-    def of(cls, plan: MapPlan, columns) -> Web:
-        """Of all columns of a map."""
+    def of(cls, plan: MapPlan, columns, law: int) -> Web:
+        """Of all columns of a map under a law."""
         ordered = sorted(columns, key=lambda column: column.value)
-        usable = [column for column in ordered if not column.failure]
+        usable = [column for column in ordered if column.has(law)]
         web = cls(
+            law,
             usable,
             [plan.coordinate(plan.across, column.value) for column in usable],
-            [[_onset(plan, row) for row in column.onsets] for column in usable],
+            [[_onset(plan, row) for row in column.onsets if int(row[0]) == law] for column in usable],
         )
         lost = [column.value for column in ordered if column.failure]
         web.gaps = {
@@ -237,16 +241,16 @@ class Web:
         """Whether the cells at the lower edge change between two columns otherwise than the ends of curves there
         say.
         """
-        a, b = (self.columns[j].cells.get("unstable") for j in (i, i + 1))
-        if a is None or b is None or (a[:, 0] < 0).any() or (b[:, 0] < 0).any():
+        cells = [self.columns[j].cells.get("unstable") for j in (i, i + 1)]
+        if any(table is None or table[self.law, 0] < 0 for table in cells):
             return False
-        change = (b[:, 0] - a[:, 0]).astype(float)
+        change = float(cells[1][self.law, 0] - cells[0][self.law, 0])
         for column, side, sign in ((i, 1, 1.0), (i + 1, -1, -1.0)):
             for k in self.loose(column, side):
                 onset = self.onsets[column][k]
                 if onset.y <= EDGE:
-                    change[onset.law] -= sign * onset.direction * (2 if onset.frequency > 0 else 1)
-        return bool(np.any(change != 0))
+                    change -= sign * onset.direction * (2 if onset.frequency > 0 else 1)
+        return change != 0
 
 
 def _onset(plan: MapPlan, row) -> Onset:

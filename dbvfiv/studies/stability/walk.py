@@ -175,7 +175,7 @@ class StabilityWalk:
         with _explained(place):
             return self.built(place).solver.direct(family, place.condition, count)
 
-    def column(self, places: list[Place], snapshots: int = 3) -> Column:
+    def column(self, places: list[Place], snapshots: int = 3, edges: bool = False) -> Column:
         """Cells that share a steady state.
 
         Parameters
@@ -183,6 +183,8 @@ class StabilityWalk:
         places : list of Place
         snapshots : int
             Of them, at which the vectors of the small model are made.
+        edges : bool
+            Certify only the places between which the number of unstable modes changes.
 
         Raises
         ------
@@ -190,7 +192,7 @@ class StabilityWalk:
         """
         family = self.family(places[0])
         with _explained(places[0]):
-            return self.built(places[0]).solver.solve(family, [p.condition for p in places], snapshots)
+            return self.built(places[0]).solver.solve(family, [p.condition for p in places], snapshots, edges)
 
 
 @contextmanager

@@ -198,6 +198,20 @@ def test_json_and_figures(case, tmp_path, capsys):
     assert {p.name for p in (tmp_path / "figures").iterdir()} == {"stability-map.png", "leading-frequency.png"}
 
 
+def test_the_command_says_what_is_fixed(command_line, one_sentence, tmp_path):
+    mesh = ["--set=mesh.around=6", "--set=mesh.along=10", "--set=map.checks=0", "--set=map.curve=false"]
+    axes = ["--x", "density=1:100:3:log", "--y", "beta=0.001:0.004:3"]
+    path = tmp_path / "map.h5"
+    outcome = command_line("map", *mesh, *axes, "-p", "4 kPa", "-o", path)
+    assert outcome.status == 0, outcome.err
+    assert outcome.out.startswith("At 4 kPa static, quasi-steady, α = ")
+    fixed = load_result(path).summary()["fixed"]
+    assert fixed["pressure"] == 4e3 and not {"density", "beta"} & set(fixed)
+    outcome = command_line("map", *mesh, *axes, "--density", 10)
+    assert outcome.status == 2 and "map.x" in outcome.err and one_sentence(outcome.err)
+    assert command_line("resume", path, "--workers", 2).status == 2  # complete
+
+
 _RUN = """
 import sys
 from dbvfiv.cli import run
@@ -310,6 +324,33 @@ def test_exact_curves_end_at_the_edges_of_the_map_or_close(traced):
         for end in (unit[0], unit[-1]):
             assert np.min([end, 1 - end]) < 0.0101 or np.allclose(unit[0], unit[-1])
         assert np.hypot(*np.diff(unit, axis=0).T).max() < 0.25
+
+
+def test_columns_put_in_certify_what_onsets_lie_between_and_nothing_else(traced):
+    along = np.array(traced.plan.along.values)
+    put_in = [column for column in traced.columns if column.level > 0]
+    assert put_in
+    for column in put_in:
+        for law in range(2):
+            certified = np.flatnonzero(column.cells["certified"][law])
+            onsets = [row[1] for row in column.onsets if int(row[0]) == law]
+            beside = {i for value in onsets for i in (np.searchsorted(along, value) - 1, np.searchsorted(along, value))}
+            assert set(certified) == beside
+            counted = column.cells["counted"][law]
+            assert (counted[certified] == column.cells["unstable"][law][certified]).all()
+            assert (np.delete(counted, certified) == -1).all()
+
+
+def test_a_column_is_put_in_under_the_law_that_asks_for_it(coarse_case):
+    """Under the quasi-steady law no curve needs more than the grid where the other one has a tip."""
+    axes = {"map.x": "pressure=6000:30000:4", "map.y": "density=1:1000:8:log", "map.checks": 0}
+    result = run_map(coarse_case.replace(axes | {"map.continuity": "both", "damping.beta": 0.001}))
+    put_in = [column for column in result.columns if column.level > 0]
+    assert any(column.has(0) != column.has(1) for column in put_in)
+    for column in put_in:
+        for law in (0, 1):
+            assert column.has(law) == np.isfinite(column.cells["growth_rate"][law]).all()
+    assert all(curve.exact for curve in result.curves)
 
 
 def test_a_curve_that_is_not_followed_says_so(case, monkeypatch):

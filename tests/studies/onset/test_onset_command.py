@@ -73,6 +73,22 @@ def test_figure(outcome):
     assert (outcome[2].parent / "onset.png").stat().st_size > 10_000
 
 
+def test_the_command_says_what_is_fixed(command_line, one_sentence, outcome):
+    asked = ["onset", "--over", "alpha=0:40:3", "--set=onset.normal_form=false", "--set=onset.coarse_mesh=0"]
+    mesh = ["--set=mesh.around=6", "--set=mesh.along=10"]
+    done = command_line(*asked, *mesh, "-p", "4 kPa", "--density", 10)
+    assert done.status == 0, done.err
+    assert done.out.startswith("At 4 kPa static, 10 kg/m³, quasi-steady, β = 0.003 s:")
+    _, document, path = outcome
+    assert document["fixed"]["pressure"] == 6e3 and "density" not in document["fixed"]
+    (figure,) = load_result(path).figures().values()
+    assert "6 kPa static" in figure.axes[0].get_title("left")
+    done = command_line("onset", "--over", "density", "--density", 10)
+    assert done.status == 2 and "onset.over" in done.err and one_sentence(done.err)
+    done = command_line("resume", path, "--workers", 2)
+    assert done.status == 2 and "Workers belong to maps" in done.err and one_sentence(done.err)
+
+
 def test_words_for_a_bad_range(capsys):
     assert run(["onset", "--over", "angle=20:140:5", *SETTINGS]) == 2
     assert "not within 0 to 90" in capsys.readouterr().err
