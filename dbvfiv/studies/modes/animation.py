@@ -15,8 +15,8 @@ from .plane import conditions, mode_title
 from .shapes import ModeSurface
 
 if TYPE_CHECKING:
-    from ...studies.modes.mode import ModeShape
-    from ...studies.modes.result import ModesResult
+    from .mode import ModeShape
+    from .result import ModesResult
 
 _PICTURES_A_SECOND, _DOTS = 15, 90
 

@@ -16,8 +16,8 @@ from .plane import conditions, mode_title
 from .shapes import drawn_amplitude
 
 if TYPE_CHECKING:
-    from ...studies.modes.mode import ModeShape
-    from ...studies.modes.result import ModesResult
+    from .mode import ModeShape
+    from .result import ModesResult
 
 _PHASES, _DRAWN = 10, 3
 #: Part of the largest swing below which a phase means nothing.

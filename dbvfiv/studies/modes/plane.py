@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ...drawing.style import DANGER, STABLE, UNSTABLE, new_figure, static
 
 if TYPE_CHECKING:
-    from ...studies.modes.result import ModesResult
+    from .result import ModesResult
 
 _RATIOS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7)
 

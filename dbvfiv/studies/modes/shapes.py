@@ -18,9 +18,9 @@ from ...drawing.views import COLOURS, frame, shaded
 from .plane import conditions, mode_title
 
 if TYPE_CHECKING:
-    from ...studies.modes.mode import ModeShape
-    from ...studies.modes.result import ModesResult
-    from ...studies.state import State
+    from ..state import State
+    from .mode import ModeShape
+    from .result import ModesResult
 
 _PANELS = 6
 #: Share of the clear height that a drawn mode may take, and share of the amplitude it is drawn with in any case.

@@ -13,7 +13,7 @@ from ...drawing.style import COMPUTED, STABLE, UNSTABLE, new_figure
 from .plane import conditions
 
 if TYPE_CHECKING:
-    from ...studies.modes.result import ModesResult
+    from .result import ModesResult
 
 
 def draw(result: ModesResult) -> Iterator[tuple[str, Callable[[], Figure]]]:

@@ -12,8 +12,8 @@ from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, new_figure
 from . import published
 
 if TYPE_CHECKING:
-    from ...studies.state import State
-    from ...studies.steady.result import SteadyResult
+    from ..state import State
+    from .result import SteadyResult
 
 
 def draw(result: SteadyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:

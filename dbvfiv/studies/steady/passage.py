@@ -12,7 +12,7 @@ from ...drawing.views import mark_pieces
 from .discharge import ordered
 
 if TYPE_CHECKING:
-    from ...studies.steady.result import SteadyResult
+    from .result import SteadyResult
 
 _QUARTERS = 4
 _PANELS = (

@@ -14,7 +14,7 @@ from ...drawing.views import mark_pieces
 from .discharge import ordered
 
 if TYPE_CHECKING:
-    from ...studies.steady.result import SteadyResult
+    from .result import SteadyResult
 
 
 def draw(result: SteadyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:

@@ -14,7 +14,7 @@ from ...drawing.axes import HALO, limits, log_axis
 from ...drawing.style import DANGER, UNSTABLE, branch_looks, new_figure, static
 
 if TYPE_CHECKING:
-    from ...studies.sweep.result import Branch, Crossing, SweepResult
+    from .result import Branch, Crossing, SweepResult
 
 #: Confidence below which a match is drawn as doubtful.
 DOUBTFUL = 0.5

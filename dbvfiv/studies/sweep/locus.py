@@ -18,7 +18,7 @@ from ...drawing.style import DANGER, MAGNITUDE, UNSTABLE, new_figure
 from .curves import surroundings_of
 
 if TYPE_CHECKING:
-    from ...studies.sweep.result import SweepResult
+    from .result import SweepResult
 
 
 def draw(result: SweepResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
