@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from dbvfiv.case import Case, CaseError, load_case, make_case, parse_axis
+from dbvfiv.case import CaseError, make_case, parse_axis
 from dbvfiv.case.describe import walk
 from dbvfiv.case.reference import explain, page
 from dbvfiv.case.write import case_toml
+from dbvfiv.studies.case import Case, load_case
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -19,7 +20,7 @@ def test_the_reference_case_spells_out_the_defaults():
 
 def test_the_reference_case_names_every_key():
     text = (ROOT / "cases/dbv12.toml").read_text()
-    names = {info.key.split(".")[-1] for info in walk() if not info.key.startswith("materials.NAME")}
+    names = {info.key.split(".")[-1] for info in walk(Case) if not info.key.startswith("materials.NAME")}
     assert not [name for name in names if name not in text]
 
 
@@ -152,14 +153,14 @@ def test_written_text_reads_back_as_the_same_case(tmp_path, overrides, comments)
 
 
 def test_the_reference_page_is_up_to_date():
-    assert (ROOT / "docs/case-reference.md").read_text() == page(), "run `make docs`"
+    assert (ROOT / "docs/case-reference.md").read_text() == page(Case), "run `make docs`"
 
 
 def test_every_key_is_described():
-    for info in walk():
+    for info in walk(Case):
         assert info.description.endswith("."), info.key
         assert info.allowed, info.key
-        assert explain(info.key)[0].description
+        assert explain(Case, info.key)[0].description
 
 
 def test_parameter_ranges():
@@ -206,5 +207,5 @@ def test_the_true_metric_by_its_word_or_as_truth(tmp_path):
 def test_a_start_file_that_cannot_be(name, one_sentence):
     """A name longer than the system allows ended in a traceback."""
     with pytest.raises(CaseError, match="transient.start_file is given as .* which does not exist") as caught:
-        make_case({"transient": {"start": "state", "start_file": name}})
+        make_case(Case, {"transient": {"start": "state", "start_file": name}})
     assert one_sentence(str(caught.value))
