@@ -1,14 +1,20 @@
 """The case model: defaults, units, overrides, copies, and the texts made from the declarations."""
 
+import inspect
 import math
+import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from dbvfiv.case import Case as PhysicsCase
 from dbvfiv.case import CaseError, make_case, parse_axis
 from dbvfiv.case.describe import walk
 from dbvfiv.case.reference import explain, page
 from dbvfiv.case.write import case_toml
+from dbvfiv.studies import KINDS
 from dbvfiv.studies.case import Case, load_case
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -209,3 +215,34 @@ def test_a_start_file_that_cannot_be(name, one_sentence):
     with pytest.raises(CaseError, match="transient.start_file is given as .* which does not exist") as caught:
         make_case(Case, {"transient": {"start": "state", "start_file": name}})
     assert one_sentence(str(caught.value))
+
+
+def test_every_study_brings_its_section_and_the_physics_does_without():
+    case = Case()
+    assert list(Case.model_fields) == [*PhysicsCase.model_fields, *KINDS]
+    for kind in KINDS:
+        keys = type(getattr(case, kind))
+        assert keys.__module__ == f"dbvfiv.studies.{kind}.keys"
+        assert Case.model_fields[kind].description == inspect.getdoc(keys).splitlines()[0]
+    physics = make_case(PhysicsCase, {name: case.to_dict()[name] for name in PhysicsCase.model_fields})
+    assert physics.replace({"drive.pressure": "36 kPa"}).drive.pressure == 36e3
+    with pytest.raises(CaseError, match="^steady is not a key of the case file"):
+        make_case(PhysicsCase, {"steady": {}})
+
+
+def test_the_whole_case_travels_between_processes():
+    case = load_case(None, ["modes.count=3", "drive.pressure=7 kPa"])
+    assert pickle.loads(pickle.dumps(case)) == case
+
+
+def test_keys_are_light_to_import():
+    code = "import sys, dbvfiv.studies.case; print({'numpy', 'jax', 'scipy', 'h5py'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+
+
+def test_of_several_slips_the_first_section_is_told():
+    with pytest.raises(CaseError, match="^map.y is .*another parameter than map.x"):
+        load_case(None, ["map.x=density", "transient.step=2"])
+    with pytest.raises(CaseError, match="transient.step is 2 s; it must be at most transient.duration"):
+        load_case(None, ["transient.step=2"])
