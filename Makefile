@@ -22,7 +22,7 @@ demo: setup
 	@PYTHON="$(PYTHON)" tools/demo
 
 docs: setup
-	@$(PYTHON) -m dbvfiv.case.reference > docs/case-reference.md
+	@$(PYTHON) -m dbvfiv.studies.case > docs/case-reference.md
 
 clean:
 	rm -rf out build

@@ -19,7 +19,7 @@ from .statics import MESHES, model_of, refactorisation
 _ONE_EQUILIBRIUM = """
 import json, sys
 import dbvfiv
-from dbvfiv.case.model import Case
+from dbvfiv.studies.case import Case
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import find_equilibria
 def peak():  # getrusage would count what the parent process held when it started this one

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from dbvfiv.case import load_case
+from dbvfiv.studies.case import load_case
 from dbvfiv.studies.map.column import MapPlan
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.stability.walk import StabilityWalk

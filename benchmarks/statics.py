@@ -10,10 +10,10 @@ import tempfile
 
 import numpy as np
 
-from dbvfiv.case.model import Case
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.model.linear import DirectFactor
+from dbvfiv.studies.case import Case
 
 from .registry import Row, benchmark, medians, seconds
 

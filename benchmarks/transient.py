@@ -9,13 +9,13 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from dbvfiv.case.model import Case
 from dbvfiv.model import ValveModel
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.record import GrowingRecord
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.transient.keeping import row_bytes
 from dbvfiv.studies.transient.run import Runner
 from dbvfiv.studies.transient.tables import RESTART, tables_of

@@ -7,11 +7,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from .case import load_case
-from .case.model import Case
 from .case.pressures import is_single, read_pressures
 from .errors import SolveError
 from .model import ValveModel
+from .studies.case import Case, load_case
 from .studies.closure.result import ClosureResult
 from .studies.map.result import MapResult
 from .studies.modes.result import ModesResult

@@ -17,7 +17,7 @@ prepare()
 
 import numpy as np  # noqa: E402
 
-from dbvfiv.case import load_case  # noqa: E402
+from dbvfiv.studies.case import load_case  # noqa: E402
 from dbvfiv.studies.onset.run import run_onset  # noqa: E402
 from dbvfiv.studies.onset.search import OnsetOptions  # noqa: E402
 from dbvfiv.studies.stability.walk import StabilityWalk  # noqa: E402

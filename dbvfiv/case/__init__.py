@@ -1,12 +1,12 @@
 """The case file: typed, unit-aware, every key declared once.
 
-``load_case`` reads one, ``Case()`` is the 12-inch valve, ``CaseError`` is the
-one way in which a case is refused.
+``Case()`` is the 12-inch valve in its fluid, ``CaseError`` is the one way in which a case is refused. The keys of the
+studies are theirs: the whole case, and what loads one, is `dbvfiv.studies.case`.
 """
 
 from ..errors import CaseError
 from .axis import Axis, parse_axis
-from .load import load_case, make_case
+from .load import make_case
 from .materials import RUBBERS, Card, Layer, Materials
 from .model import Case
 from .valve import Mesh, Valve
@@ -21,7 +21,6 @@ __all__ = [
     "Mesh",
     "RUBBERS",
     "Valve",
-    "load_case",
     "make_case",
     "parse_axis",
 ]

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import AfterValidator, StrictStr
 
 from .parameters import PARAMETERS, SWEPT, Parameter
 
@@ -78,3 +81,12 @@ def _value(row: Parameter, text: str, density: float | None) -> float:
         return row.quantity.parse(float(text))
     except ValueError:
         return row.quantity.parse(text, density)
+
+
+def _readable(text: str) -> str:
+    parse_axis(text)
+    return text
+
+
+#: A key that holds the text of a range.
+Range = Annotated[StrictStr, AfterValidator(_readable)]

@@ -13,7 +13,6 @@ from pydantic.fields import FieldInfo
 
 from .axis import FORM
 from .materials import KINDS, Materials
-from .model import Case
 from .quantity import DIMENSION, Quantity
 from .section import Section
 
@@ -189,8 +188,8 @@ def describe_field(key: str, field: FieldInfo) -> KeyInfo:
     )
 
 
-def walk(model: type[Section] = Case, prefix: str = "") -> Iterator[KeyInfo]:
-    """Every key that a case file may hold, in order; list elements and material kinds included."""
+def walk(model: type[Section], prefix: str = "") -> Iterator[KeyInfo]:
+    """Every key that a case file of this model may hold, in order; list elements and material kinds included."""
     for name, field in model.model_fields.items():
         key = f"{prefix}{name}"
         if model is Materials and name == "named":

@@ -1,28 +1,31 @@
-"""From a TOML file and overrides to a validated ``Case``; every failure is one sentence."""
+"""From a TOML file and overrides to a validated case of a given model; every failure is one sentence."""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from ..errors import CaseError
 from .lines import key_lines
 from .message import sentence
-from .model import Case
+from .section import Section
 
 _LARGEST_FILE = 10_000_000
+Model = TypeVar("Model", bound=Section)
 
 
-def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> Case:
+def read_case_file(model: type[Model], path: str | Path | None = None, overrides: Iterable[str] = ()) -> Model:
     """Read and check a case file.
 
     Parameters
     ----------
+    model : type
+        The sections that the file may hold.
     path : path, optional
         TOML file; without it the 12-inch valve of the defaults.
     overrides : iterable of str
@@ -30,7 +33,7 @@ def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> 
 
     Returns
     -------
-    Case
+    Model
 
     Raises
     ------
@@ -44,19 +47,12 @@ def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> 
         data = parse_toml(text, name)
     overridden = set()
     for override in overrides:
-        overridden.add(_apply(data, override))
-    case = make_case(data, folder=folder, source=name, text=text, overridden=overridden)
-    replace_list_by_pressure(case, overridden)
-    return case
-
-
-def replace_list_by_pressure(case: Case, changed: Collection[tuple[str, ...]]) -> None:
-    """Let a drive.pressure that was changed by itself stand before the list, see `Case.steady_pressures`."""
-    if ("drive", "pressure") in changed and ("steady", "pressures") not in changed:
-        case.steady.model_fields_set.discard("pressures")
+        overridden.add(_apply(model, data, override))
+    return make_case(model, data, folder=folder, source=name, text=text, overridden=overridden)
 
 
 def make_case(
+    model: type[Model],
     data: Mapping[str, Any],
     *,
     folder: Path = Path("."),
@@ -64,11 +60,13 @@ def make_case(
     text: str = "",
     overridden: Iterable[tuple[str, ...]] = (),
     check_files: bool = True,
-) -> Case:
+) -> Model:
     """Validate plain data as it comes out of a TOML file.
 
     Parameters
     ----------
+    model : type
+        The sections that a case may hold.
     data : mapping
         Sections by name.
     folder : Path
@@ -86,9 +84,9 @@ def make_case(
     """
     context = {"folder": folder, "check_files": check_files}
     try:
-        return Case.model_validate(dict(data), context=context)
+        return model.model_validate(dict(data), context=context)
     except ValidationError as error:
-        raise sentence(error, source, key_lines(text), tuple(overridden)) from None
+        raise sentence(error, model, source, key_lines(text), tuple(overridden)) from None
     except RecursionError:
         raise CaseError(f"{source or 'The case'} is nested too deeply to be a case.") from None
 
@@ -132,12 +130,11 @@ def parse_toml(text: str, name: str = "") -> dict[str, Any]:
         raise CaseError(f"{where} is not valid TOML: {reason}.", line=line) from None
 
 
-def _apply(data: dict[str, Any], override: str) -> tuple[str, ...]:
+def _apply(model: type[Section], data: dict[str, Any], override: str) -> tuple[str, ...]:
     key, equals, value = override.partition("=")
-    key = key.strip()
-    if not equals or not key:
+    if not equals or not key.strip():
         raise CaseError(f'The override {override!r} is not of the form KEY=VALUE, such as drive.pressure="18 kPa".')
-    return put(data, key, _value(value.strip()))
+    return put(model, data, key.strip(), _value(value.strip()))
 
 
 def _value(text: str) -> Any:
@@ -149,17 +146,22 @@ def _value(text: str) -> Any:
     return parsed["value"] if set(parsed) == {"value"} else text
 
 
-def put(data: dict[str, Any], dotted: str, value: Any) -> tuple[str, ...]:
+def key_path(dotted: str) -> tuple[str, ...]:
+    """The parts of a key as an override writes it."""
+    return tuple(part.strip() for part in dotted.strip().split("."))
+
+
+def put(model: type[Section], data: dict[str, Any], dotted: str, value: Any) -> tuple[str, ...]:
     """Set ``data["a"]["b"] = value`` for ``"a.b"``; lists are entered by index.
 
-    A list that the data does not hold yet starts from its default.
+    A list that the data does not hold yet starts from its default in the model.
 
     Raises
     ------
     CaseError
         When a list has no such element, or a value stands where a table is needed.
     """
-    path = tuple(part.strip() for part in dotted.split("."))
+    path = key_path(dotted)
     target: Any = data
     for depth, part in enumerate(path):
         here = ".".join(path[: depth + 1])
@@ -175,7 +177,7 @@ def put(data: dict[str, Any], dotted: str, value: Any) -> tuple[str, ...]:
         elif not isinstance(target, dict):
             raise CaseError(f"{here} does not exist, because {'.'.join(path[:depth])} is not a table.", key=dotted)
         elif not last and part not in target:
-            target[part] = _default(path[: depth + 1])
+            target[part] = _default(model, path[: depth + 1])
         if last:
             target[part] = value
         else:
@@ -183,9 +185,9 @@ def put(data: dict[str, Any], dotted: str, value: Any) -> tuple[str, ...]:
     return path
 
 
-def _default(path: tuple[str, ...]) -> Any:
+def _default(model: type[Section], path: tuple[str, ...]) -> Any:
     """The default of a list (so that an element can be changed), an empty table otherwise."""
-    value: Any = Case()
+    value: Any = model()
     for part in path:
         value = getattr(value, part, None) if part in getattr(type(value), "model_fields", {}) else None
     if not isinstance(value, tuple):

@@ -13,27 +13,32 @@ from ..errors import CaseError
 from .describe import allowed_words, element_model
 from .lines import line_of
 from .materials import KINDS, Materials
-from .model import Case
 from .section import BrokenRule, Section
 
 Path = tuple[str, ...]
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,60}")
 
 
-def sentence(error: ValidationError, source: str, lines: dict[Path, int], overridden: tuple[Path, ...]) -> CaseError:
-    """Turn a validation error into a ``CaseError``.
+def sentence(
+    error: ValidationError,
+    model: type[Section],
+    source: str,
+    lines: dict[Path, int],
+    overridden: tuple[Path, ...],
+) -> CaseError:
+    """Turn a validation error of a case of the given model into a ``CaseError``.
 
     An unknown key goes first: what else is wrong often follows from it.
     """
     problems = error.errors(include_url=False)
     problem = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
-    path, owner, field = _resolve(problem["loc"])
+    path, owner, field = _resolve(problem["loc"], model)
     cause = (problem.get("ctx") or {}).get("error")
     if isinstance(cause, BrokenRule):
         path += tuple(cause.key.split("."))
         body = f"{_dotted(path)} is {cause.given}; {cause.allowed}."
     elif problem["type"] == "extra_forbidden":
-        body = _unknown(path, owner)
+        body = _unknown(path, owner, model)
     elif problem["type"] == "missing":
         body = (
             f"{_dotted(path)} is missing; it must be {allowed_words(field)}."
@@ -59,10 +64,10 @@ def sentence(error: ValidationError, source: str, lines: dict[Path, int], overri
     return CaseError(where + body, key=_dotted(path), line=line)
 
 
-def _resolve(loc: tuple[Any, ...]) -> tuple[Path, type[Section] | None, Any]:
+def _resolve(loc: tuple[Any, ...], case: type[Section]) -> tuple[Path, type[Section] | None, Any]:
     """Key path as a user writes it, the section it is in, and its field if it has one."""
     path: Path = ()
-    model: type[Section] | None = Case
+    model: type[Section] | None = case
     owner, field, in_named = model, None, False
     for part in loc:
         if in_named and isinstance(part, str) and model is None and part in KINDS and len(path) >= 2:
@@ -86,14 +91,14 @@ def _dotted(path: Path) -> str:
     return ".".join(p if _BARE_KEY.fullmatch(p) else f'"{_clean(p, quoted=True)}"' for p in path)
 
 
-def _unknown(path: Path, owner: type[Section] | None) -> str:
+def _unknown(path: Path, owner: type[Section] | None, model: type[Section]) -> str:
     key = path[-1]
     names = [n for n in (owner.model_fields if owner else {}) if n != "named"]
     if owner is Materials:
         names += ["NAME"]
     place = ".".join(path[:-1])
     close = difflib.get_close_matches(key.lower(), names, n=1, cutoff=0.6)
-    nearest = _elsewhere(key) or (".".join(filter(None, (place, close[0]))) if close else None)
+    nearest = _elsewhere(key, model) or (".".join(filter(None, (place, close[0]))) if close else None)
     if nearest:
         hint = f"the nearest valid key is {nearest}"
     else:
@@ -101,9 +106,9 @@ def _unknown(path: Path, owner: type[Section] | None) -> str:
     return f"{_dotted(path)} is not a key of the case file; {hint}."
 
 
-def _elsewhere(key: str) -> str | None:
+def _elsewhere(key: str, case: type[Section]) -> str | None:
     """The key's namesake in another section, for keys put in the wrong table."""
-    for section, field in Case.model_fields.items():
+    for section, field in case.model_fields.items():
         model = element_model(field.annotation)
         if model and key in model.model_fields and typing.get_origin(field.annotation) is not tuple:
             return f"{section}.{key}"

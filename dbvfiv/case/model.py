@@ -1,13 +1,14 @@
-"""The whole case: every section, and the rules between sections."""
+"""The physics of a case: its sections, and the rules between them; the keys of the studies come on top."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 from pydantic import ValidationInfo, model_validator
 
-from . import physics, studies
+from . import physics
+from .load import make_case, put
 from .materials import DEFAULT_LAYERS, Layer, Materials
 from .parameters import PARAMETERS
 from .section import BrokenRule, Section, key
@@ -15,7 +16,7 @@ from .valve import Mesh, Valve
 
 
 class Case(Section):
-    """Everything a run depends on; ``Case()`` is the 12-inch inline valve.
+    """The valve, its fluid and its load; ``Case()`` is the 12-inch inline valve.
 
     All numbers are SI floats; layer angles are in degrees.
 
@@ -40,14 +41,6 @@ class Case(Section):
     fluid: physics.Fluid = key(physics.Fluid(), "The fluid and its conservation laws.")
     drive: physics.Drive = key(physics.Drive(), "The load.")
     supports: physics.Supports = key(physics.Supports(), "One-sided stops of the lips.")
-    steady: studies.Steady = key(studies.Steady(), "Equilibria over a list of pressures.")
-    modes: studies.Modes = key(studies.Modes(), "Leading eigenvalues of the coupled state.")
-    sweep: studies.Sweep = key(studies.Sweep(), "Modes tracked along one parameter.")
-    sensitivity: studies.Sensitivity = key(studies.Sensitivity(), "Derivatives of an eigenvalue by parameters.")
-    onset: studies.Onset = key(studies.Onset(), "Where a state loses stability.")
-    map: studies.StabilityMap = key(studies.StabilityMap(), "Stability over two parameters.")
-    transient: studies.Transient = key(studies.Transient(), "A time history.")
-    closure: studies.Closure = key(studies.Closure(), "Back pressure on the outside, no flow.")
 
     @model_validator(mode="before")
     @classmethod
@@ -82,52 +75,30 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
-        if self.map.axes[0].parameter == self.map.axes[1].parameter:
-            raise BrokenRule(
-                "map.y", f"{self.map.y!r}", f"it must range over another parameter than map.x = {self.map.x!r}"
-            )
-        if self.transient.step > self.transient.duration:
-            raise BrokenRule(
-                "transient.step",
-                f"{self.transient.step:g} s",
-                f"it must be at most transient.duration = {self.transient.duration:g} s",
-            )
         return self
-
-    def steady_pressures(self) -> tuple[float, ...]:
-        """Pressures, Pa, of `steady` where none are asked for: drive.pressure if that was given, or changed later, and
-        steady.pressures was not; else steady.pressures.
-        """
-        alone = "pressure" in self.drive.model_fields_set and "pressures" not in self.steady.model_fields_set
-        return (self.drive.pressure,) if alone else self.steady.pressures
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""
         return self.model_dump(mode="json")
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Case:
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Rebuild a case from ``to_dict`` without looking for the files it was made from."""
-        from .load import make_case
+        return make_case(cls, data, check_files=False)
 
-        return make_case(data, check_files=False)
-
-    def replace(self, changes: Mapping[str, Any]) -> Case:
+    def replace(self, changes: Mapping[str, Any]) -> Self:
         """Return a validated copy with some keys changed, ``{"drive.pressure": 36e3, ...}``.
 
         Raises
         ------
         CaseError
-            As ``load_case`` does.
+            As `dbvfiv.case.load.make_case` does.
         """
-        from .load import make_case, put, replace_list_by_pressure
-
         data = self.to_dict()
-        changed = {put(data, dotted, value) for dotted, value in changes.items()}
-        made = make_case(data, check_files=False)
-        for section in ("drive", "steady"):  # a dictionary holds every key, but not all were given
-            if (section,) not in changed:
-                given = getattr(self, section).model_fields_set | {path[1] for path in changed if path[0] == section}
-                getattr(made, section).model_fields_set.intersection_update(given)
-        replace_list_by_pressure(made, changed)
+        changed = {put(type(self), data, dotted, value) for dotted, value in changes.items()}
+        made = make_case(type(self), data, check_files=False)
+        for name, before in self:  # a dictionary holds every key, but not all were given
+            if isinstance(before, Section) and (name,) not in changed:
+                given = before.model_fields_set | {path[1] for path in changed if path[0] == name}
+                getattr(made, name).model_fields_set.intersection_update(given)
         return made

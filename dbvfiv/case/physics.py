@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import StrictBool, field_validator
+from pydantic import Field, StrictBool, field_validator
 
 from .parameters import PARAMETERS
 from .quantity import Density, Number, Pressure, Rate, Stiffness, Time
 from .section import Section, key
+
+#: A pressure that loads the valve: above zero, and within what the parameter may be.
+LoadPressure = Annotated[Pressure, Field(**PARAMETERS["pressure"].limits)]
 
 
 class Shell(Section):

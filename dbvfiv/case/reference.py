@@ -1,6 +1,6 @@
 """The reference of all keys: for ``dbvfiv case --explain`` and for ``docs/case-reference.md``.
 
-``python -m dbvfiv.case.reference`` prints the page.
+``python -m dbvfiv.studies.case`` prints the page.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ import re
 
 from ..errors import CaseError
 from .describe import KeyInfo, walk
+from .materials import KINDS
+from .section import Section
 
 HEAD = """# The case file, key by key
 
@@ -27,15 +29,15 @@ built in and may be replaced the same way.
 """
 
 
-def explain(key: str | None = None) -> list[KeyInfo]:
-    """Return the keys that a word stands for: a key, a section, or all of them for None.
+def explain(model: type[Section], key: str | None = None) -> list[KeyInfo]:
+    """Return the keys of a case that a word stands for: a key, a section, or all of them for None.
 
     Raises
     ------
     CaseError
         For a key there is not, naming the nearest.
     """
-    infos = list(walk())
+    infos = list(walk(model))
     if key is None:
         return infos
     plain = _plain(key)
@@ -75,16 +77,18 @@ def _paragraph(info: KeyInfo) -> str:
     return "\n".join(lines)
 
 
-def page() -> str:
+def page(model: type[Section]) -> str:
     """The whole of ``docs/case-reference.md``."""
     parts, section = [HEAD], None
-    for info in walk():
+    for info in walk(model):
         here = _section(info)
         if info.type == "table" and "." not in info.key:
             continue
         if here != section:
             section = here
-            parts.append(f"\n## {here}\n\n{_intro(here)}\n\n| key | default | allowed | meaning |\n|---|---|---|---|\n")
+            parts.append(
+                f"\n## {here}\n\n{_intro(here, model)}\n\n| key | default | allowed | meaning |\n|---|---|---|---|\n"
+            )
         default = "*required*" if info.required else (f"`{info.shown}`" if info.shown else "none")
         if info.type == "list of tables" and "." not in info.key:
             continue
@@ -98,15 +102,8 @@ def _section(info: KeyInfo) -> str:
     return f"[materials.NAME] of kind {match[1]}" if match else f"[{re.split(r'[.[]', info.key)[0]}]"
 
 
-def _intro(section: str) -> str:
-    from .materials import KINDS
-    from .model import Case
-
+def _intro(section: str, model: type[Section]) -> str:
     match = re.fullmatch(r"\[materials\.NAME\] of kind (.*)", section)
     if match:
         return (KINDS[match[1]].__doc__ or "").split("\n")[0]
-    return Case.model_fields[section.strip("[]")].description or ""
-
-
-if __name__ == "__main__":
-    print(page(), end="")
+    return model.model_fields[section.strip("[]")].description or ""

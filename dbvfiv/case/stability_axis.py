@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from pydantic import AfterValidator, StrictStr
+
 from .axis import Axis, parse_axis
 from .parameters import PARAMETERS
 
@@ -17,3 +21,12 @@ def parse_stability_axis(text: str) -> Axis:
     if isinstance(text, str) and text.strip() in PARAMETERS:
         text = PARAMETERS[text.strip()].usual_range
     return parse_axis(text, tuple(PARAMETERS))
+
+
+def _readable(text: str) -> str:
+    parse_stability_axis(text)
+    return text
+
+
+#: A key that holds the text of such a range.
+StabilityRange = Annotated[StrictStr, AfterValidator(_readable)]

@@ -10,7 +10,6 @@ from typing import Any
 from .. import __version__
 from .describe import allowed_words, element_model, quantity_of, show_value
 from .materials import Materials
-from .model import Case
 from .section import Section
 
 _WIDTH = 110
@@ -34,17 +33,18 @@ OWN_MATERIAL = """
 """
 
 
-def case_toml(case: Case, comments: bool = True) -> str:
+def case_toml(case: Section, comments: bool = True) -> str:
     """Return the case as TOML.
 
     Parameters
     ----------
-    case : Case
+    case : Section
+        Of any model: every section that it has is written.
     comments : bool
         Put description and allowed values above each key.
     """
     parts = [HEAD] if comments else [f"# dbvfiv {__version__}: every key of this case"]
-    for name, field in Case.model_fields.items():
+    for name, field in type(case).model_fields.items():
         value = getattr(case, name)
         if comments:
             parts.append(f"\n# ---- {field.description}")

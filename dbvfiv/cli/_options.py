@@ -10,7 +10,7 @@ import typer
 from ..errors import CaseError
 
 if TYPE_CHECKING:
-    from ..case import Case
+    from ..studies.case import Case
 
 
 def _writable(path: Path | None) -> Path | None:
@@ -52,6 +52,6 @@ def read_case(path: Path | None, overrides: list[str] | None) -> Case:
     ------
     CaseError
     """
-    from ..case import load_case
+    from ..studies.case import load_case
 
     return load_case(path, overrides or ())

@@ -43,8 +43,8 @@ def command(
 
 
 def _check(target: str | None, overrides: list[str] | None, as_json: bool) -> None:
-    from ..case import load_case
     from ..case.write import case_toml
+    from ..studies.case import load_case
 
     case = load_case(target, overrides or ())
     if as_json:
@@ -54,9 +54,9 @@ def _check(target: str | None, overrides: list[str] | None, as_json: bool) -> No
 
 
 def _write_new(target: str | None, overrides: list[str] | None, as_json: bool) -> None:
-    from ..case import load_case
     from ..case.write import case_toml
     from ..errors import CaseError
+    from ..studies.case import load_case
 
     if target is None:
         raise CaseError("--new needs the name of the file to write, such as my.toml.")
@@ -78,8 +78,9 @@ def _write_new(target: str | None, overrides: list[str] | None, as_json: bool) -
 
 def _explain(key: str | None, as_json: bool) -> None:
     from ..case.reference import explain, explanation_text
+    from ..studies.case import Case
 
-    found = explain(key)
+    found = explain(Case, key)
     if as_json:
         print_json({"keys": [_as_json(info) for info in found]})
     else:

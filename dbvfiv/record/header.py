@@ -69,7 +69,7 @@ class Header:
         """The case, with files that have gone or changed since put back from the attachments."""
         if not self.attachments:
             return self.case
-        return Case.from_dict(placed(self.case.to_dict(), self.attachments))
+        return type(self.case).from_dict(placed(self.case.to_dict(), self.attachments))
 
 
 def versions() -> dict[str, str]:
@@ -109,14 +109,14 @@ def write_header(file: h5py.File, header: Header) -> None:
         group.attrs[name] = version
 
 
-def read_header(file: h5py.File) -> Header:
-    """Read what `write_header` wrote."""
+def read_header(file: h5py.File, case_model: type[Case]) -> Header:
+    """Read what `write_header` wrote; the case has the sections of the model given."""
     attributes = file.attrs
     files = file["case/files"]
     attached = [files[name] for name in sorted(files, key=int)]
     return Header(
         kind=str(attributes["dbvfiv_kind"]),
-        case=_case(file["case/json"].asstr()[()]),
+        case=_case(file["case/json"].asstr()[()], case_model),
         versions={name: str(version) for name, version in file["versions"].attrs.items()},
         attachments=tuple(Attachment(str(d.attrs["path"]), d.asstr()[()]) for d in attached),
         complete=bool(attributes["complete"]),
@@ -125,8 +125,8 @@ def read_header(file: h5py.File) -> Header:
     )
 
 
-def _case(text: str) -> Case:
+def _case(text: str, model: type[Case]) -> Case:
     try:
-        return Case.from_dict(json.loads(text))
+        return model.from_dict(json.loads(text))
     except CaseError as error:  # not the user's slip but the file's
         raise ValueError(f"its case cannot be used, {error}") from error

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..case.model import Case
 from ..observer import Observer
 from .files import reading
 from .header import Header, read_header
@@ -234,6 +235,8 @@ class StoredRecord(Record):
     path : path
     tables : callable
         From the mesh to the tables that are read.
+    case_model : type
+        Sections that its case may hold.
 
     Raises
     ------
@@ -241,7 +244,9 @@ class StoredRecord(Record):
         If the file cannot be read.
     """
 
-    def __init__(self, path: str | Path, tables: Callable[[MeshData | None], Iterable[TableSpec]]):
+    def __init__(
+        self, path: str | Path, tables: Callable[[MeshData | None], Iterable[TableSpec]], case_model: type[Case]
+    ):
         self.path = Path(path)
         self._columns: dict[tuple[str, str], np.ndarray] = {}
         with reading(self.path) as file:
@@ -253,7 +258,7 @@ class StoredRecord(Record):
                 if missing:
                     raise KeyError(f"{table.name}/{missing[0]}")
             self._count = {name: read_rows(file["tables"][name]) for name in self.tables}
-            self.header = replace(read_header(file), complete=self.complete)
+            self.header = replace(read_header(file, case_model), complete=self.complete)
 
     def rows(self, table: str) -> int:
         return self._count[table]

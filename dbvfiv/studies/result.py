@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-from ..case.model import Case
 from ..drawing.files import draw_figures, write_figures
 from ..model import ValveModel
 from ..record.fields import export_result
@@ -17,6 +16,7 @@ from ..record.mesh import MeshData
 from ..record.record import Record, copy_record
 from ..record.vtkhdf import Step
 from ..record.whole_valve import WholeValve
+from .case import Case
 from .session import Session
 from .study import find_study
 

@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..case.model import Case
 from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 from ..model import ValveModel
@@ -20,6 +19,7 @@ from ..record.mesh import MeshData
 from ..record.part import RecordPart
 from ..record.record import GrowingRecord, Record, StoredRecord
 from . import KINDS
+from .case import Case
 from .study import Study, find_study
 
 #: Keyword arguments of the Python interface and the keys of the case that they stand for.
@@ -226,4 +226,4 @@ def _find(path: str | Path) -> Study:
 
 
 def _read(path: str | Path) -> StoredRecord:
-    return StoredRecord(path, _find(path).tables)
+    return StoredRecord(path, _find(path).tables, Case)

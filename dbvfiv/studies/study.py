@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from ..case.model import Case
 from ..record.mesh import MeshData
 from ..record.record import Record
 from ..record.table import TableSpec
 from . import KINDS
+from .case import Case
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,21 @@
 """The case model: defaults, units, overrides, copies, and the texts made from the declarations."""
 
+import inspect
 import math
+import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from dbvfiv.case import Case, CaseError, load_case, make_case, parse_axis
+from dbvfiv.case import Case as PhysicsCase
+from dbvfiv.case import CaseError, make_case, parse_axis
 from dbvfiv.case.describe import walk
 from dbvfiv.case.reference import explain, page
 from dbvfiv.case.write import case_toml
+from dbvfiv.studies import KINDS
+from dbvfiv.studies.case import Case, load_case
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -19,7 +26,7 @@ def test_the_reference_case_spells_out_the_defaults():
 
 def test_the_reference_case_names_every_key():
     text = (ROOT / "cases/dbv12.toml").read_text()
-    names = {info.key.split(".")[-1] for info in walk() if not info.key.startswith("materials.NAME")}
+    names = {info.key.split(".")[-1] for info in walk(Case) if not info.key.startswith("materials.NAME")}
     assert not [name for name in names if name not in text]
 
 
@@ -152,14 +159,14 @@ def test_written_text_reads_back_as_the_same_case(tmp_path, overrides, comments)
 
 
 def test_the_reference_page_is_up_to_date():
-    assert (ROOT / "docs/case-reference.md").read_text() == page(), "run `make docs`"
+    assert (ROOT / "docs/case-reference.md").read_text() == page(Case), "run `make docs`"
 
 
 def test_every_key_is_described():
-    for info in walk():
+    for info in walk(Case):
         assert info.description.endswith("."), info.key
         assert info.allowed, info.key
-        assert explain(info.key)[0].description
+        assert explain(Case, info.key)[0].description
 
 
 def test_parameter_ranges():
@@ -206,5 +213,36 @@ def test_the_true_metric_by_its_word_or_as_truth(tmp_path):
 def test_a_start_file_that_cannot_be(name, one_sentence):
     """A name longer than the system allows ended in a traceback."""
     with pytest.raises(CaseError, match="transient.start_file is given as .* which does not exist") as caught:
-        make_case({"transient": {"start": "state", "start_file": name}})
+        make_case(Case, {"transient": {"start": "state", "start_file": name}})
     assert one_sentence(str(caught.value))
+
+
+def test_every_study_brings_its_section_and_the_physics_does_without():
+    case = Case()
+    assert list(Case.model_fields) == [*PhysicsCase.model_fields, *KINDS]
+    for kind in KINDS:
+        keys = type(getattr(case, kind))
+        assert keys.__module__ == f"dbvfiv.studies.{kind}.keys"
+        assert Case.model_fields[kind].description == inspect.getdoc(keys).splitlines()[0]
+    physics = make_case(PhysicsCase, {name: case.to_dict()[name] for name in PhysicsCase.model_fields})
+    assert physics.replace({"drive.pressure": "36 kPa"}).drive.pressure == 36e3
+    with pytest.raises(CaseError, match="^steady is not a key of the case file"):
+        make_case(PhysicsCase, {"steady": {}})
+
+
+def test_the_whole_case_travels_between_processes():
+    case = load_case(None, ["modes.count=3", "drive.pressure=7 kPa"])
+    assert pickle.loads(pickle.dumps(case)) == case
+
+
+def test_keys_are_light_to_import():
+    code = "import sys, dbvfiv.studies.case; print({'numpy', 'jax', 'scipy', 'h5py'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+
+
+def test_of_several_slips_the_first_section_is_told():
+    with pytest.raises(CaseError, match="^map.y is .*another parameter than map.x"):
+        load_case(None, ["map.x=density", "transient.step=2"])
+    with pytest.raises(CaseError, match="transient.step is 2 s; it must be at most transient.duration"):
+        load_case(None, ["transient.step=2"])

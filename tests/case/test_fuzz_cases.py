@@ -7,13 +7,14 @@ import random
 import numpy as np
 import pytest
 
-from dbvfiv.case import Case, CaseError, load_case
+from dbvfiv.case import CaseError
 from dbvfiv.case.describe import walk
 from dbvfiv.case.parameters import PARAMETERS
 from dbvfiv.case.write import case_toml
 from dbvfiv.geometry import valve_mesh
+from dbvfiv.studies.case import Case, load_case
 
-KEYS = [info.key for info in walk()]
+KEYS = [info.key for info in walk(Case)]
 NAMES = sorted({key.replace("[]", "").split(".")[-1].split("(")[0] for key in KEYS})
 LINES = case_toml(Case(), comments=False).splitlines()
 UNITS = "kPa Pa mm m cm deg rad % kg/m^3 1/s Hz N/m s ms m^2 mH2O cmH2O degC bar psi L/s m^3/h".split()

@@ -4,19 +4,20 @@ import inspect
 
 import pytest
 
-from dbvfiv.case import Case, CaseError
+from dbvfiv.case import CaseError
 from dbvfiv.case.describe import allowed_words, walk
 from dbvfiv.case.parameters import CONDITIONS, DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, listed
 from dbvfiv.case.stability_axis import parse_stability_axis
 from dbvfiv.model.analytic import PARAMETERS as RESIDUAL
 from dbvfiv.model.dynamics import Conditions
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.session import KEYWORDS
 from dbvfiv.studies.stability.place import Place
 
 
 @pytest.mark.parametrize("row", PARAMETERS.values(), ids=PARAMETERS)
 def test_every_parameter_has_its_place_in_the_case(row):
-    keys = {info.key: info for info in walk()}
+    keys = {info.key: info for info in walk(Case)}
     assert row.key in keys
     if row.swept:
         assert keys[row.key].unit == row.quantity.si

@@ -5,12 +5,13 @@ import string
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbvfiv.case import Case, CaseError, load_case, make_case
+from dbvfiv.case import CaseError, make_case
 from dbvfiv.case.describe import walk
 from dbvfiv.case.load import parse_toml
 from dbvfiv.case.write import case_toml
+from dbvfiv.studies.case import Case, load_case
 
-KEYS = [info.key.replace("[]", ".0").replace("materials.NAME(", "materials.A(") for info in walk()]
+KEYS = [info.key.replace("[]", ".0").replace("materials.NAME(", "materials.A(") for info in walk(Case)]
 KEYS = sorted({key.split("(")[0] + key.split(")")[-1] if "(" in key else key for key in KEYS})
 
 NUMBER_TEXT = st.builds(
@@ -58,7 +59,7 @@ def refused_well(action, one_sentence) -> None:
         assert one_sentence(str(error)), str(error)
     else:
         assert isinstance(case, Case)
-        assert make_case(parse_toml(case_toml(case)), check_files=False) == case
+        assert make_case(Case, parse_toml(case_toml(case)), check_files=False) == case
 
 
 @given(key=st.sampled_from(KEYS), value=JUNK)
@@ -73,7 +74,7 @@ def test_junk_overrides(key, value, one_sentence):
 
 @given(data=st.dictionaries(st.sampled_from(sorted(Case.model_fields)) | st.text(max_size=6), JUNK, max_size=4))
 def test_junk_sections(data, one_sentence):
-    refused_well(lambda: make_case(data), one_sentence)
+    refused_well(lambda: make_case(Case, data), one_sentence)
 
 
 @given(text=TOML_TEXT | LIKELY_LINES)

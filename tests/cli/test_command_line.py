@@ -9,10 +9,10 @@ import types
 import pytest
 import typer
 
-from dbvfiv.case import Case
 from dbvfiv.cli import _run
 from dbvfiv.cli._output import print_json
 from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.studies.case import Case
 
 
 def test_help_lists_every_command(command_line):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from dbvfiv.case import Case, CaseError, load_case
+from dbvfiv.case import CaseError
 from dbvfiv.case.write import case_toml
 from dbvfiv.geometry import valve_mesh
+from dbvfiv.studies.case import Case, load_case
 
 SIX_INCH = {
     "valve.duckbill_length": 0.105,

@@ -21,7 +21,7 @@ from dbvfiv.materials.library import CARD_KINDS
 
 
 def _case(**materials):
-    return make_case({"materials": materials})
+    return make_case(Case, {"materials": materials})
 
 
 def test_every_kind_of_card_has_a_law():

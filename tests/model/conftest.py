@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.case.model import Case
 from dbvfiv.model import ValveModel
+from dbvfiv.studies.case import Case
 
 SMALL = {"mesh.around": 6, "mesh.along": 12}
 

@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from dbvfiv.case import load_case
 from dbvfiv.model import ValveModel
 from dbvfiv.model.analytic import AnalyticResidual
+from dbvfiv.studies.case import load_case
 
 STEPS = {2: 1e-3, 3: 1e-2}
 

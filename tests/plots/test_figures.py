@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.case import Case
 from dbvfiv.drawing import style
 from dbvfiv.drawing.axes import log_axis
 from dbvfiv.drawing.faces import faces
 from dbvfiv.drawing.views import COLOURS, unrolled
 from dbvfiv.errors import CaseError
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.steady import published
 
 NAMES = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import BoundaryNorm
 
-from dbvfiv.case import Case
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.map import figures as map_figures
 from dbvfiv.studies.map.column import MapPlan
 from dbvfiv.studies.onset import figures as onset_figures

@@ -15,6 +15,7 @@ from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header, read_header, write_header
 from dbvfiv.shell.recovery import layer_fields
+from dbvfiv.studies.case import Case
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +95,7 @@ def test_files_of_the_case_travel_with_the_result(tmp_path, coarse_run, monkeypa
     with h5py.File(tmp_path / "h.h5", "w") as file:
         write_header(file, Header.of("steady", case))
         data.unlink()
-        again = read_header(file).rebuildable_case()
+        again = read_header(file, Case).rebuildable_case()
     path = again.materials.named["own"].path
     assert path != data and path.read_text().startswith("strain,stress")
 

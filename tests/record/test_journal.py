@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dbvfiv.case.model import Case
 from dbvfiv.errors import CaseError
 from dbvfiv.record.header import Header
 from dbvfiv.record.journal import DiskFull, Journal
 from dbvfiv.record.layout import TEXT, Column
 from dbvfiv.record.record import GrowingRecord, StoredRecord
 from dbvfiv.record.table import TableSpec
+from dbvfiv.studies.case import Case
 
 ROOT = Path(__file__).parent.parent.parent
 TABLE = TableSpec(
@@ -62,7 +62,7 @@ def start_writer(path, count=100_000):
 
 
 def check_whole(path):
-    found = StoredRecord(path, tables)
+    found = StoredRecord(path, tables, Case)
     count = found.rows("states")
     assert np.array_equal(found.column("states", "x"), np.arange(count))
     assert np.all(found.column("states", "shape") == np.arange(count)[:, None])
@@ -79,7 +79,7 @@ def test_rows_and_notes_come_back(tmp_path):
         record.warn("Look out.")
         record.fail("It did not work.")
         record.conclude(True)
-    again = StoredRecord(tmp_path / "a.h5", tables)
+    again = StoredRecord(tmp_path / "a.h5", tables, Case)
     for mine in (record, again):
         assert mine.rows("states") == 3 and mine.value("states", "why", 1) == "because of 1"
         assert mine.notes("thing")[0]["complex"] == [1, 2] and mine.notes("thing")[0]["text"] == "ü"
@@ -94,11 +94,11 @@ def test_going_on_keeps_rows_and_says_anew_what_failed(tmp_path):
         record.append("states", row(0))
         record.fail("It did not work.")
         record.conclude(False)
-    with GrowingRecord(header(), None, tables(), path, known=StoredRecord(path, tables)) as record:
+    with GrowingRecord(header(), None, tables(), path, known=StoredRecord(path, tables, Case)) as record:
         assert record.rows("states") == 1 and not record.failures
         record.append("states", row(1))
         record.conclude(True)
-    again = StoredRecord(path, tables)
+    again = StoredRecord(path, tables, Case)
     assert again.complete and not again.failures and list(again.column("states", "x")) == [0, 1]
 
 
@@ -111,7 +111,7 @@ def test_killed_writers_leave_whole_rows(tmp_path):
         writer.send_signal(signal.SIGKILL)
         writer.communicate()
         check_whole(path)
-        with GrowingRecord(header(), None, tables(), path, known=StoredRecord(path, tables)) as record:  # goes on
+        with GrowingRecord(header(), None, tables(), path, known=StoredRecord(path, tables, Case)) as record:  # goes on
             record.append("states", row(record.rows("states")))
         check_whole(path)
         assert not list(tmp_path.glob(".*"))

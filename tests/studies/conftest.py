@@ -1,6 +1,6 @@
 import pytest
 
-from dbvfiv.case import load_case
+from dbvfiv.studies.case import load_case
 from dbvfiv.studies.stability.walk import StabilityWalk
 
 COARSE = [

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-from dbvfiv.case.model import Case
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.dynamics import Conditions, dynamic_residual, linearise
 from dbvfiv.model.equilibria import LoadPath, rest_state
 from dbvfiv.observer import Observer
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.modes.run import ModesOptions, run_modes
 from eigen import SearchOptions
 

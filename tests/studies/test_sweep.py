@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from dbvfiv.case.axis import parse_axis
-from dbvfiv.case.model import Case
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.dynamics import Conditions
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.modes.run import ModesOptions, run_modes
 from dbvfiv.studies.sweep.run import SweepOptions, run_sweep
 

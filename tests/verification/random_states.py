@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dbvfiv.case.model import Case
 from dbvfiv.model import Conditions, LinearisedState, ValveModel, linearise
 from dbvfiv.model.equilibria import LoadPath
+from dbvfiv.studies.case import Case
 from eigen import CoupledPencil
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from continuation import ContinuationOptions, NewtonOptions, continue_branch
-from dbvfiv.case import load_case
+from dbvfiv.studies.case import load_case
 from dbvfiv.studies.onset.normal_form import system_of
 from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk

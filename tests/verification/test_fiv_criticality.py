@@ -9,8 +9,8 @@ and Re c1 from the third derivatives: where the rate vanishes is the cycle.
 import numpy as np
 import pytest
 
-from dbvfiv.case import load_case
 from dbvfiv.model import ValveModel
+from dbvfiv.studies.case import load_case
 from dbvfiv.studies.onset.normal_form import normal_form
 from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
 from dbvfiv.studies.transient.run import run_transient

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
 
-from dbvfiv.case.model import Case
 from dbvfiv.model import ValveModel
+from dbvfiv.studies.case import Case
 
 REFERENCE = np.array([13.51, 18.63, 24.04, 30.90])
 

@@ -5,9 +5,9 @@ mesh.
 import numpy as np
 import pytest
 
-from dbvfiv.case.model import Case
 from dbvfiv.model import Conditions, ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.studies.case import Case
 from eigen import SearchOptions, Workspace, leading_modes
 from eigen.certificate import certified_spectrum
 from eigen.transfer import TransferBasis

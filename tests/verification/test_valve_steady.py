@@ -14,9 +14,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from dbvfiv.case.model import Case
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.studies.case import Case
 from tests.shell.structures import richardson
 
 PRESSURES = (18e3, 29e3, 36e3)

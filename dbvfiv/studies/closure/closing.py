@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ...case.model import Case
 from ...errors import SolveError
 from ...model.lip import LipCentre
 from ...motion.control import ControlOptions, FixedSteps
@@ -19,6 +18,7 @@ from ...motion.start import steady_positions
 from ...motion.state import consistent_state
 from ...motion.stepper import StepFailure, StepOptions, Stepper
 from ...observer import Observer
+from ..case import Case
 from .closing_motion import ClosingMotion, ContactValve
 from .opening import FACES, measure
 from .state import QUARTERS

@@ -6,10 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ...case.model import Case
 from ...contact import ContactLaw, PlaneContact, nodal_thickness, tributary_area
 from ...model import ValveModel
 from ...motion.equations import ValveMotion
+from ..case import Case
 from .model import ROUNDING
 
 

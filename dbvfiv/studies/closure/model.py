@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...case.model import Case
 from ...contact import ContactLaw, PlaneContact, nodal_thickness, tributary_area
 from ...geometry import ValveMesh
 from ...model.build import build_shell
@@ -14,6 +13,7 @@ from ...model.pressed_shell import PressedShell
 from ...model.supports import free_unknowns
 from ...model.valve import loaded_share
 from ...shell import Shell
+from ..case import Case
 
 #: Contacting inner faces, or the supports of Th. 3.6.
 CONTACT, HELD_LIPS = "contact", "held-lips"

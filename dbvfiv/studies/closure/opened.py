@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...case.model import Case
 from ...errors import SolveError
 from ...model import ValveModel
 from ...model.equilibria import LoadPath, SteadyOptions
 from ...record.record import GrowingRecord
 from ...record.states import read_states, state_row
+from ..case import Case
 from ..load_path import go_on, way_on
 from .columns import OPENED
 

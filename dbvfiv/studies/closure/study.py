@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ...case.model import Case
 from ...errors import SolveError
 from ...record.record import GrowingRecord
 from ...record.table import printed_head, printed_row
+from ..case import Case
 from ..session import Session
 from ..study import Study
 from .closing import closing_valve, run_closing, shut_below

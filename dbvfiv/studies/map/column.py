@@ -14,8 +14,8 @@ from eigen import Column, Condition
 from eigen.columns import MISSING
 
 from ...case.axis import Axis
-from ...case.model import Case
 from ...errors import CaseError, SolveError
+from ..case import Case
 from ..stability.crossings import Sample, Scan, locate
 from ..stability.place import Place, is_surrounding
 from ..stability.walk import StabilityWalk

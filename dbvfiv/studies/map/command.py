@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from ...case.model import Case
 from ...case.parameters import listed
+from ..case import Case
 from ..request import Request, number_or_text
 from ..stability.fixed import refuse_moved
 

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...case.model import Case
 from ...errors import SolveError
 from ...runtime import mpi_size, prepare
+from ..case import Case
 from ..stability.walk import StabilityWalk
 from .column import ColumnTask, MapColumn, MapPlan, shared_place, solve_column
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ...case.model import Case
 from ...observer import Observer
 from ...record.layout import Column
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import TableSpec
+from ..case import Case
 from .checks import Check
 from .column import CELLS, MapColumn, MapPlan
 from .curves import OnsetCurve

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...case.model import Case
 from ...errors import SolveError
 from ...observer import Observer
+from ..case import Case
 from ..stability.place import check_scan
 from ..stability.walk import StabilityWalk
 from .checks import Check, check_cells

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ...case.model import Case
 from ...errors import CaseError
+from ..case import Case
 from ..request import Request, number_or_text
 
 ORDER = 25

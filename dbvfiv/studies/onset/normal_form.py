@@ -10,10 +10,10 @@ from continuation import ContinuationError
 from continuation.hopf import hopf_borders
 from continuation.normal_form import hopf_normal_form
 
-from ...case.model import Case
 from ...case.parameters import PARAMETERS
 from ...errors import SolveError
 from ...model.system import ValveSystem
+from ..case import Case
 from ..stability.place import Place, rebuilder
 from ..stability.walk import StabilityWalk
 from .point import OnsetPoint

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...case.model import Case
+from ..case import Case
 from ..stability.place import Place
 
 #: Meshes of a run: that of the case, and the coarser one for the uncertainty.

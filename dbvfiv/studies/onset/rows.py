@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from ...case.model import Case
 from ...observer import Observer
 from ...record.layout import Column
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import TableSpec
+from ..case import Case
 from ..stability.crossings import WATCHED
 from .point import OnsetPoint, OnsetSample
 

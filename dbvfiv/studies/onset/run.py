@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ...case.model import Case
 from ...errors import SolveError
 from ...observer import Observer
+from ..case import Case
 from ..stability.place import check_scan
 from ..stability.walk import StabilityWalk
 from .intervals import Interval, known_intervals

@@ -9,9 +9,9 @@ import numpy as np
 
 from eigen import Certificate
 
-from ...case.model import Case
 from ...errors import CaseError, SolveError
 from ...observer import Observer
+from ..case import Case
 from ..stability.crossings import WATCHED, Crossing, Sample, Scan, locate
 from ..stability.place import Place, is_surrounding
 from ..stability.walk import StabilityWalk

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...case.model import Case
 from ...errors import SolveError
 from ...observer import Observer
+from ..case import Case
 from ..stability.crossings import locate
 from .point import COARSE, OnsetPoint
 from .search import OnsetOptions, OnsetSearch

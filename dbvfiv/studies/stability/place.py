@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from eigen import Condition
 
 from ...case.materials import RUBBERS
-from ...case.model import Case
 from ...case.parameters import CONDITIONS, DESIGN, PARAMETERS
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ...model.dynamics import Conditions
+from ..case import Case
 
 
 @dataclass(frozen=True)

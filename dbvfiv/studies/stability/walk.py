@@ -11,12 +11,12 @@ import numpy as np
 
 from eigen import Column, ColumnSolver, SearchOptions
 
-from ...case.model import Case
 from ...errors import SolveError
 from ...model import ValveModel
 from ...model.dynamics import linearise
 from ...model.equilibria import LoadPath, SteadyOptions
 from ...observer import Observer
+from ..case import Case
 from .family import ValveFamily
 from .place import Place, rebuilder
 

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from ...case.axis import parse_axis
-from ...case.model import Case
 from ...errors import CaseError
+from ..case import Case
 from ..request import Request, number_or_text
 
 ORDER = 20

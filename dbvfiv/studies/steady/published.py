@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...case.model import Case
 from ...case.valve import Valve
+from ..case import Case
 
 _WATER = 1000.0
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ...case.model import Case
 from ...errors import SolveError
 from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_warnings
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
 from ...record.states import SUMMARY, read_states, state_row
 from ...record.table import printed_head, printed_row
+from ..case import Case
 from ..load_path import go_on, way_on
 from ..session import Session
 from ..study import Study

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...case.model import Case
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
 from ...record.states import SUMMARY
+from ..case import Case
 from ..session import Session
 from ..study import Study
 from .printed import head, point_row

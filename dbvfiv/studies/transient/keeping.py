@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ...case.model import Case
 from ...errors import CaseError
 from ...model import ValveModel
 from ...motion.options import RunOptions
 from ...motion.state import MotionState
 from ...record.record import GrowingRecord, Record
+from ..case import Case
 from .progress import Progress
 from .tables import HISTORY, RESTART, STATES, row_bytes
 

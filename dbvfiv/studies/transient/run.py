@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ...case.model import Case
 from ...errors import SolveError
 from ...model import ValveModel
 from ...model.equilibria import model_warnings
@@ -24,6 +23,7 @@ from ...motion.stepper import StepFailure, Stepper
 from ...record.header import Header
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord
+from ..case import Case
 from .assess import RunVerdict, assess, beyond_model
 from .history import Reader
 from .keeping import Keeper

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ...case.model import Case
 from ...errors import CaseError
 from ...motion.equations import ValveMotion
 from ...motion.state import MotionState, consistent_state
 from ...record.files import kind_of
 from ...record.record import Record, StoredRecord
 from ...record.states import state_table
+from ..case import Case
 from .tables import STATES, tables_of
 
 
@@ -55,9 +55,9 @@ def _read(path: Path) -> tuple[Record, bool]:
     """The record of a file, and whether its states move."""
     kind = kind_of(path)
     if kind == "transient":
-        return StoredRecord(path, tables_of), True
+        return StoredRecord(path, tables_of, Case), True
     if kind == "steady":
-        return StoredRecord(path, lambda mesh: (state_table(STATES, mesh),)), False
+        return StoredRecord(path, lambda mesh: (state_table(STATES, mesh),), Case), False
     raise CaseError(
         f"{str(path)!r} holds a result of kind {kind!r}; a run starts from a state of a steady or a transient result."
     )

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.case.model import Case
 from dbvfiv.flow import Channel
 from dbvfiv.flow.reversed import ReversibleFluid
 from dbvfiv.flow.stepping import MovingFluid
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.closure.closing import ClosingResult, ClosingSample, Turn, closing_valve, run_closing
 from dbvfiv.studies.closure.closing_motion import ContactValve
 

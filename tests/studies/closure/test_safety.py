@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.case import Case
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.closure.safety import find_safety
 from dbvfiv.studies.session import load_result
 

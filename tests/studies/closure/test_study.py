@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbvfiv.case.model import Case
 from dbvfiv.errors import SolveError
 from dbvfiv.observer import Observer
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.closure import path as closure_path
 from dbvfiv.studies.closure.energy import EnergyLedger
 from dbvfiv.studies.closure.model import closure_model

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbvfiv.case import Case
 from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.onset.run import run_onset
 from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch

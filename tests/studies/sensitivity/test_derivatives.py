@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from dbvfiv.case.model import Case
 from dbvfiv.model import Conditions, ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.sensitivity import derivatives as sensitivity
 from eigen import SearchOptions, leading_modes
 

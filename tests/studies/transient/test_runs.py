@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.case import CaseError, load_case
+from dbvfiv.case import CaseError
 from dbvfiv.errors import SolveError
 from dbvfiv.motion import stepper
 from dbvfiv.motion.drive import Drive
@@ -23,6 +23,7 @@ from dbvfiv.record.journal import Journal
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.part import RecordPart
 from dbvfiv.record.record import GrowingRecord, StoredRecord
+from dbvfiv.studies.case import Case, load_case
 from dbvfiv.studies.session import Session, load_result
 from dbvfiv.studies.transient import keeping
 from dbvfiv.studies.transient.assess import beyond_model
@@ -236,7 +237,7 @@ def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive, all_res
     for after in (1, 66):
         stopped = transient(model, output=tmp_path / "parts.h5", observer=Stop(after))
         assert not stopped.complete and len(stopped.history["time"]) == after + 1
-        known = StoredRecord(tmp_path / "parts.h5", tables_of)
+        known = StoredRecord(tmp_path / "parts.h5", tables_of, Case)
         assert rows_to_keep(known, model.case)[HISTORY] == 1 + 7 * (after // 7)
         resumed = dbvfiv.resume(tmp_path / "parts.h5")
         assert resumed.complete
@@ -262,13 +263,13 @@ def test_a_finished_run_goes_on_to_a_later_end(tmp_path, valve):
 def test_torn_restart_points_are_passed_over(tmp_path, valve, all_restart_points):
     path = tmp_path / "run.h5"
     whole = transient(valve(SHORT), output=path)
-    steps = StoredRecord(path, tables_of).column(RESTART, "steps")
+    steps = StoredRecord(path, tables_of, Case).column(RESTART, "steps")
     assert list(steps) == [0, 7, 14, 20]
     with h5py.File(path, "r+") as file:
         file["tables/restart/#"][-1] = 0  # its last row did not arrive whole
         file["tables/history/#"].resize(14, axis=0)  # nor did the rows that the one before stands upon
         file["log"].resize(0, axis=0)
-    known = StoredRecord(path, tables_of)
+    known = StoredRecord(path, tables_of, Case)
     assert rows_to_keep(known, whole.case) == {HISTORY: 8, STATES: 2, RESTART: 2}
     resumed = dbvfiv.resume(path)
     assert all(np.array_equal(resumed.history[name], whole.history[name]) for name in whole.history)
@@ -293,7 +294,7 @@ def test_a_resume_that_dies_at_once_leaves_the_file_as_it_was(tmp_path, valve, m
 def test_restart_points_take_little_of_the_file(tmp_path, valve, monkeypatch):
     changes = {"transient.duration": 0.3, "transient.restart_every": 7, "transient.step": 5e-4}
     transient(valve(changes), output=tmp_path / "run.h5")
-    record = StoredRecord(tmp_path / "run.h5", tables_of)
+    record = StoredRecord(tmp_path / "run.h5", tables_of, Case)
     sizes = {table.name: keeping.row_bytes(table) * record.rows(table.name) for table in record.tables.values()}
     first_and_last = 2 * keeping.row_bytes(record.tables[RESTART])
     assert sizes[RESTART] - first_and_last <= keeping.RESTART_SHARE * (sizes[HISTORY] + sizes[STATES])
@@ -302,7 +303,7 @@ def test_restart_points_take_little_of_the_file(tmp_path, valve, monkeypatch):
     monkeypatch.setattr(keeping, "RESTART_SECONDS", 0.0)
     monkeypatch.setattr(keeping, "RESTART_LOSS", 0.0)
     transient(valve(changes), output=tmp_path / "run.h5")
-    assert StoredRecord(tmp_path / "run.h5", tables_of).rows(RESTART) == 2 + 600 // 7
+    assert StoredRecord(tmp_path / "run.h5", tables_of, Case).rows(RESTART) == 2 + 600 // 7
 
 
 def test_a_run_that_fails_keeps_everything_and_says_where(tmp_path, valve, monkeypatch):
@@ -444,7 +445,7 @@ def test_progress_and_history_go_through_a_file_unchanged(tmp_path, valve):
     mesh = MeshData.of(model)
     with GrowingRecord(Header.of("transient", model.case), mesh, tables_of(mesh), path) as record:
         run = Runner(model, replace(RunOptions.of(model.case), duration=0.003), record).start()
-    stored = StoredRecord(path, tables_of)
+    stored = StoredRecord(path, tables_of, Case)
     again = Progress.read(stored)
     assert all(np.array_equal(v, getattr(again.state, name)) for name, v in vars(run.progress.state).items())
     left, right = ({n: v for n, v in vars(p).items() if n != "state"} for p in (again, run.progress))
@@ -504,7 +505,7 @@ def test_killed_with_signal_9_at_any_moment(tmp_path, valve):
         time.sleep(wait)
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
-        rows = rows_to_keep(StoredRecord(path, tables_of), case.case)[HISTORY]  # none if it died before the first
+        rows = rows_to_keep(StoredRecord(path, tables_of, Case), case.case)[HISTORY]  # none if it died before the first
         if rows:
             read = load_result(path)
             assert len(read.history["time"]) >= rows

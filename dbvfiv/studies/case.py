@@ -1,0 +1,84 @@
+"""The whole case: the physics, and the section that each study brings.
+
+``python -m dbvfiv.studies.case`` prints the page of all keys, ``docs/case-reference.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import create_model
+
+from ..case.load import key_path, read_case_file
+from ..case.model import Case as PhysicsCase
+from ..case.reference import page
+from ..case.section import Section, key
+from . import KINDS
+
+
+def _section(kind: str) -> tuple[type[Section], Any]:
+    """The section of a study, under the first line of its docstring."""
+    keys = import_module(f"{__package__}.{kind}.keys").Keys
+    return keys, key(keys(), (keys.__doc__ or "").partition("\n")[0])
+
+
+class _CaseOfStudies(PhysicsCase):
+    """What is asked of the whole case, and needs keys of studies."""
+
+    def steady_pressures(self) -> tuple[float, ...]:
+        """Pressures, Pa, of `steady` where none are asked for: drive.pressure if that was given, or changed later, and
+        steady.pressures was not; else steady.pressures.
+        """
+        alone = "pressure" in self.drive.model_fields_set and "pressures" not in self.steady.model_fields_set
+        return (self.drive.pressure,) if alone else self.steady.pressures
+
+    def replace(self, changes: Mapping[str, Any]) -> Self:
+        made = super().replace(changes)
+        made._replace_list_by_pressure({key_path(dotted) for dotted in changes})
+        return made
+
+    def _replace_list_by_pressure(self, changed: Collection[tuple[str, ...]]) -> None:
+        """Let a drive.pressure that was changed by itself stand before the list, see `steady_pressures`."""
+        if ("drive", "pressure") in changed and ("steady", "pressures") not in changed:
+            self.steady.model_fields_set.discard("pressures")
+
+
+Case = create_model(
+    "Case",
+    __base__=_CaseOfStudies,
+    __module__=__name__,
+    __doc__="Everything a run depends on: the physics, and a section for each study; ``Case()`` is the 12-inch valve.",
+    **{kind: _section(kind) for kind in KINDS},
+)
+
+
+def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> Case:
+    """Read and check a case file.
+
+    Parameters
+    ----------
+    path : path, optional
+        TOML file; without it the 12-inch valve of the defaults.
+    overrides : iterable of str
+        ``"drive.pressure=18 kPa"``; list elements by index from 0, ``"layers.2.angle=45"``.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    CaseError
+        One sentence: which key, in which line, what was given, what is allowed.
+    """
+    overrides = tuple(overrides)
+    case = read_case_file(Case, path, overrides)
+    case._replace_list_by_pressure({key_path(override.partition("=")[0]) for override in overrides})
+    return case
+
+
+if __name__ == "__main__":
+    print(page(Case), end="")

@@ -1,0 +1,71 @@
+"""The section closure of the case file."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import StrictBool, StrictInt
+
+from ...case.parameters import PARAMETERS
+from ...case.physics import LoadPressure
+from ...case.quantity import Length, Number, Pressure, Time
+from ...case.section import Section, key
+
+
+class Keys(Section):
+    """Back pressure on the outside, no flow."""
+
+    pressures: tuple[LoadPressure, ...] = key(
+        (7e3, 14e3, 21e3, 28e3), "Static back pressures, outside over inside.", min_length=1
+    )
+    rated_pressure: Pressure | None = key(
+        None,
+        "Back pressure that the safety factor refers to; the largest of pressures without it.",
+        **PARAMETERS["pressure"].limits,
+    )
+    supports: Literal["contact", "held-lips"] = key(
+        "contact",
+        "Inner faces touching the closing plane, or the simplification of Th. 3.6: duckbill held shut, "
+        "mid-surface of the "
+        "saddle kept from crossing the plane.",
+    )
+    start: Literal["rest", "open"] = key(
+        "rest", "From the valve at rest, or from the steady flow at open_pressure turned back."
+    )
+    open_pressure: LoadPressure = key(10e3, "Static inlet pressure of the open start.")
+    max_step: LoadPressure = key(1e3, "Largest load step; the stiffness is watched for buckling at each.")
+    contact_depth: Length = key(
+        3e-6,
+        (
+            "Depth to which the largest back pressure alone would press the faces into each other, before "
+            "multipliers push them apart."
+        ),
+        gt=0,
+        le=1e-3,
+    )
+    penetration: Length = key(1e-6, "Largest penetration that is left.", gt=0, le=1e-3)
+    shut_fraction: Number = key(
+        0.2, "A section counts as shut when less than this fraction of the lip's opening at rest is left.", ge=0, lt=1
+    )
+    eigenvalues: StrictInt = key(4, "Lowest eigenvalues of the tangent stiffness to follow.", ge=1, le=100)
+    balance_tolerance: Number = key(
+        0.0,
+        "Largest error of the energy balance over the work; load steps that miss it are halved as often as "
+        "it takes, for the balance alone. 0 reports the "
+        "balance of the load steps as they are.",
+        ge=0,
+        le=1,
+    )
+    arclength: StrictBool = key(
+        True, "Go on along the equilibrium path by arclength when load steps end at a limit point."
+    )
+    reversal_time: Time = key(
+        0.2, "Time in which the drive turns from open_pressure to as much back pressure.", gt=0, le=1e3
+    )
+    reversal_hold: Time = key(0.2, "Time for which the back pressure is then held.", ge=0, le=1e3)
+    reversal_continuity: Literal["storage", "quasi-steady"] = key(
+        "storage",
+        "Continuity law while the drive turns. Lips that meet push the fluid between them away with "
+        "storage; quasi-steady they stop it at once, and the "
+        "pressure of the incompressible fluid knows no bounds.",
+    )

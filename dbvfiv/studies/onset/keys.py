@@ -1,0 +1,39 @@
+"""The section onset of the case file."""
+
+from __future__ import annotations
+
+from pydantic import StrictBool
+
+from ...case.axis import Axis
+from ...case.parameters import listed
+from ...case.quantity import Number
+from ...case.section import Section, key
+from ...case.stability_axis import StabilityRange, parse_stability_axis
+
+
+class Keys(Section):
+    """Where a state loses stability."""
+
+    over: StabilityRange = key(
+        "density",
+        f"The parameter to move: {listed(notes=True)}; with =START:STOP:COUNT[:log] behind it for another range than "
+        "the usual one.",
+    )
+    tolerance: Number = key(1e-9, "Relative accuracy of a located onset on its mesh.", gt=0, le=1e-3)
+    normal_form: StrictBool = key(
+        True, "Also the first Lyapunov coefficient, which tells whether cycles are attracting or repelling."
+    )
+    coarse_mesh: Number = key(
+        0.5,
+        (
+            "Elements of the second mesh over those of the first, for the uncertainty by Richardson's rule; 0 "
+            "leaves it out."
+        ),
+        ge=0,
+        lt=1,
+    )
+
+    @property
+    def axis(self) -> Axis:
+        """The parsed range."""
+        return parse_stability_axis(self.over)
