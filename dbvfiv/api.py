@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, overload
 
 from .case import load_case
 from .case.model import Case
-from .case.parameters import PARAMETERS
-from .errors import CaseError, SolveError
+from .changes import Changes, change_case
+from .errors import SolveError
 from .model import ValveModel
+from .pressures import is_single, read_pressures
 from .studies.closure.result import ClosureResult
 from .studies.map.result import MapResult
 from .studies.modes.result import ModesResult
@@ -25,8 +26,6 @@ from .studies.transient.result import TransientResult
 
 if TYPE_CHECKING:
     from .observer import Observer
-
-_PRESSURE = PARAMETERS["pressure"]
 
 
 class Valve:
@@ -56,7 +55,13 @@ class Valve:
         self.name = name
 
     def __repr__(self) -> str:
-        return f"Valve({self.name!r})"
+        case, mesh, drive = self.case, self.case.mesh, self.case.drive
+        load = f"{drive.pressure / 1e3:.6g} kPa" + (f", {case.fluid.density:g} kg/m3" if drive.kind == "flow" else "")
+        return f"<Valve {self.name!r}: {mesh.around} x {mesh.along} elements, {len(case.layers)} layers, {load}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Case and name; model and states are found again when they are asked for."""
+        return {"case": self.case, "name": self.name}
 
     @cached_property
     def session(self) -> Session:
@@ -68,9 +73,9 @@ class Valve:
         """The coupled model of the case."""
         return self.session.model
 
-    def replace(self, changes: Mapping[str, Any]) -> Valve:
-        """A valve with some keys of its case changed, such as ``{"fluid.density": 10}``."""
-        return Valve(self.case.replace(changes), self.name)
+    def replace(self, changes: Changes) -> Valve:
+        """A valve with some keys of its case changed, as `load` takes them: ``{"fluid.density": 10}``."""
+        return Valve(change_case(self.case, changes), self.name)
 
     @overload
     def steady(self, pressure: float | str) -> State: ...
@@ -103,7 +108,7 @@ class Valve:
             If one pressure was asked for and not reached. Of several, `failures` of the result names those that were
             not.
         """
-        single = _is_single(pressure)
+        single = is_single(pressure)
         asked = self.case.steady_pressures() if pressure is None else [pressure] if single else pressure
         pressures = read_pressures(asked, "drive.pressure" if pressure is None else "pressure", self.case.fluid.density)
         self.model  # shared by what is asked of this valve
@@ -237,7 +242,7 @@ class Valve:
         >>> result.states[-1].closed, result.critical_pressure           # doctest: +SKIP
         >>> result.safety.factor, result.safety.limit                    # doctest: +SKIP
         """
-        asked = self.case.closure.pressures if pressure is None else [pressure] if _is_single(pressure) else pressure
+        asked = self.case.closure.pressures if pressure is None else [pressure] if is_single(pressure) else pressure
         pressures = read_pressures(asked, "pressure", self.case.fluid.density)
         session = self._ask({"closure.pressures": list(pressures)}, {})
         return session.perform("closure", output, observer, in_time=in_time, compare=compare)
@@ -345,14 +350,14 @@ class Valve:
         return self.session.replace({key: value for key, value in changes.items() if value is not None})
 
 
-def load(case: str | Path | Case | None = None, changes: Mapping[str, Any] | None = None) -> Valve:
+def load(case: str | Path | Case | None = None, changes: Changes | None = None) -> Valve:
     """A valve from a case file; the 12-inch valve without one.
 
     Parameters
     ----------
     case : path or Case, optional
-    changes : mapping, optional
-        Keys to change, such as ``{"fluid.density": "10 kg/m^3"}``.
+    changes : mapping or texts, optional
+        Keys to change, ``{"fluid.density": "10 kg/m^3"}`` or ``["fluid.density=10 kg/m^3"]``.
 
     Raises
     ------
@@ -361,46 +366,4 @@ def load(case: str | Path | Case | None = None, changes: Mapping[str, Any] | Non
     """
     name = "dbv12" if case is None else "case" if isinstance(case, Case) else Path(case).stem
     made = case if isinstance(case, Case) else load_case(case)
-    return Valve(made.replace(changes) if changes else made, name)
-
-
-def read_pressures(given: Iterable[Any], name: str, density: float | None = None) -> tuple[float, ...]:
-    """Pressures in Pa from numbers and texts with units, heads of a fluid of that density, kg/m3, included.
-
-    Raises
-    ------
-    CaseError
-        For anything that is not a pressure above zero and up to 10 MPa; `name` says in the sentence where it was given.
-    """
-    found = []
-    for value in given:
-        try:
-            pressure = _PRESSURE.quantity.parse(_number(value), density)
-        except ValueError as error:
-            raise CaseError(f"{name} is given as {value!r}, {error}; {_ALLOWED}.") from None
-        if not 0 < pressure <= _PRESSURE.high:
-            raise CaseError(f"{name} is given as {value!r}; {_ALLOWED}.")
-        found.append(pressure)
-    if not found:
-        raise CaseError(f"{name} is an empty list; it needs at least one pressure.")
-    return tuple(found)
-
-
-_ALLOWED = (
-    f"it must be a pressure greater than 0 kPa and at most {_PRESSURE.high / 1e3:g} kPa, such as '36 kPa' or 36e3 (Pa)"
-)
-
-
-def _is_single(pressure: Any) -> bool:
-    """Whether it is one pressure and not several."""
-    return isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0
-
-
-def _number(value: Any) -> Any:
-    """A number where the value is one, numpy's and text such as "36e3" included."""
-    if isinstance(value, (bool, int)):
-        return value
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        return value
+    return Valve(made if changes is None else change_case(made, changes), name)
