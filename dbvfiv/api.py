@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
+from .case.changes import Changes, change_case
 from .case.pressures import is_single, read_pressures
 from .errors import SolveError
 from .model import ValveModel
@@ -53,7 +54,13 @@ class Valve:
         self.name = name
 
     def __repr__(self) -> str:
-        return f"Valve({self.name!r})"
+        case, mesh, drive = self.case, self.case.mesh, self.case.drive
+        load = f"{drive.pressure / 1e3:.6g} kPa" + (f", {case.fluid.density:g} kg/m3" if drive.kind == "flow" else "")
+        return f"<Valve {self.name!r}: {mesh.around} x {mesh.along} elements, {len(case.layers)} layers, {load}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Case and name; model and states are found again when they are asked for."""
+        return {"case": self.case, "name": self.name}
 
     @cached_property
     def session(self) -> Session:
@@ -65,9 +72,9 @@ class Valve:
         """The coupled model of the case."""
         return self.session.model
 
-    def replace(self, changes: Mapping[str, Any]) -> Valve:
-        """A valve with some keys of its case changed, such as ``{"fluid.density": 10}``."""
-        return Valve(self.case.replace(changes), self.name)
+    def replace(self, changes: Changes) -> Valve:
+        """A valve with some keys of its case changed, as `load` takes them: ``{"fluid.density": 10}``."""
+        return Valve(change_case(self.case, changes), self.name)
 
     @overload
     def steady(self, pressure: float | str) -> State: ...
@@ -342,14 +349,14 @@ class Valve:
         return self.session.replace({key: value for key, value in changes.items() if value is not None})
 
 
-def load(case: str | Path | Case | None = None, changes: Mapping[str, Any] | None = None) -> Valve:
+def load(case: str | Path | Case | None = None, changes: Changes | None = None) -> Valve:
     """A valve from a case file; the 12-inch valve without one.
 
     Parameters
     ----------
     case : path or Case, optional
-    changes : mapping, optional
-        Keys to change, such as ``{"fluid.density": "10 kg/m^3"}``.
+    changes : mapping or texts, optional
+        Keys to change, ``{"fluid.density": "10 kg/m^3"}`` or ``["fluid.density=10 kg/m^3"]``.
 
     Raises
     ------
@@ -358,4 +365,4 @@ def load(case: str | Path | Case | None = None, changes: Mapping[str, Any] | Non
     """
     name = "dbv12" if case is None else "case" if isinstance(case, Case) else Path(case).stem
     made = case if isinstance(case, Case) else load_case(case)
-    return Valve(made.replace(changes) if changes else made, name)
+    return Valve(made if changes is None else change_case(made, changes), name)

@@ -8,8 +8,8 @@ in the list of commands. It imports nothing heavy at module level, so that
 ``command``.
 
 Failures are raised, not printed: ``run`` turns ``CaseError`` into exit status
-2, ``SolveError`` into 1 and Ctrl-C into 130, each with one sentence on
-standard error.
+2, ``SolveError`` into 1, Ctrl-C into 130 and SIGTERM into 143, each with one
+sentence on standard error.
 """
 
 from ._run import run

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import importlib
+import math
 import os
 import pkgutil
+import signal
 import sys
+import threading
+import time
 import traceback
 from collections.abc import Sequence
-from typing import Annotated
+from types import FrameType
+from typing import Annotated, Any
 
 import typer
 
@@ -66,10 +71,51 @@ def run(arguments: Sequence[str]) -> int:
     -------
     int
         Exit status: 0 done, 1 no solution or a failing machine, 2 a case or
-        an argument that cannot be used, 3 an error of the program, 130 interrupted.
+        an argument that cannot be used, 3 an error of the program, 130 interrupted, 143 terminated.
     """
-    command = typer.main.get_command(build())
+    with Ending() as ending:
+        return _outcome(arguments, ending)
+
+
+class Ending:
+    """SIGTERM as Ctrl-C while a command runs: what was found is kept.
+
+    Attributes
+    ----------
+    terminated : bool
+        Whether SIGTERM has come.
+    """
+
+    #: A signal that comes again within this time is the same one sent twice, as `timeout` and many job systems do, s.
+    SAME = 2.0
+
+    def __init__(self):
+        self.terminated = False
+        self._since = -math.inf
+        self._before: Any = None
+
+    def __enter__(self) -> Ending:
+        if threading.current_thread() is threading.main_thread():
+            before = signal.getsignal(signal.SIGTERM)
+            if before is signal.SIG_DFL:  # who ignores it, or hears it already, goes on so
+                self._before = signal.signal(signal.SIGTERM, self._hear)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._before is not None:
+            signal.signal(signal.SIGTERM, self._before)
+
+    def _hear(self, _number: int, _frame: FrameType | None) -> None:
+        self.terminated = True
+        last, self._since = self._since, time.monotonic()
+        if self._since - last > self.SAME:
+            raise KeyboardInterrupt
+
+
+def _outcome(arguments: Sequence[str], ending: Ending) -> int:
+    """Exit status of a command line; failures are told in a sentence."""
     try:
+        command = typer.main.get_command(build())
         status = command.main(list(arguments), prog_name="dbvfiv", standalone_mode=False)
         sys.stdout.flush()
         if status == 130:  # newer Typer swallows Ctrl-C
@@ -80,7 +126,8 @@ def run(arguments: Sequence[str]) -> int:
     except SolveError as error:
         return _say(str(error), 1)
     except (KeyboardInterrupt, typer.Abort):
-        return _say("Interrupted; what was finished before has been kept.", 130)
+        how, status = ("Terminated", 143) if ending.terminated else ("Interrupted", 130)
+        return _say(f"{how}; what was finished before has been kept.", status)
     except typer.Exit as leave:
         return leave.exit_code
     except _UsageProblem as problem:

@@ -1,19 +1,17 @@
-"""Opening result files, for writing and for reading; whatever is wrong with one is told in a sentence."""
+"""Opening result files, and the names that they may take; whatever is wrong with one is told in a sentence."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import sleep
-from typing import Self
 
 import h5py
 
 from ..errors import CaseError
 from .layout import LAYOUT
-from .lock import is_being_written
+from .lock import check_free, is_being_written
 
 #: A file that is being written is tried this often, s apart.
 _TRIES, _PAUSE = 40, 0.02
@@ -35,6 +33,7 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
         raise CaseError(f"{str(path)!r} is a folder and not a result file.")
     if not path.exists():
         raise CaseError(f"The result file {str(path)!r} does not exist.")
+    _refuse_empty(path)
     try:
         file = _opened(path)
     except PermissionError:
@@ -73,19 +72,15 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
             ) from error
 
 
-class KeptFile:
-    """A result file that is open while a study runs, as `_file`; leaving the context closes it."""
-
-    _file: h5py.File
-
-    def close(self) -> None:
-        self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
+def _refuse_empty(path: Path) -> None:
+    """An empty file holds the name of a run that has not begun."""
+    if path.stat().st_size:
+        return
+    if is_being_written(path):
+        raise CaseError(f"{str(path)!r} holds nothing yet, because its run is about to begin.")
+    raise CaseError(
+        f"{str(path)!r} is empty: if it is of a run, that was stopped before it began; a new run may take its name."
+    )
 
 
 def kind_of(path: str | Path) -> str:
@@ -127,94 +122,18 @@ def _marked_as_open(path: Path) -> bool:
     return len(head) == 12 and head[8] == 3 and bool(head[11] & 0b101)
 
 
-def create(path: str | Path, single_writer: bool = False) -> h5py.File:
-    """A new result file; an earlier result of the same name is replaced, any other file is left alone.
-
-    Parameters
-    ----------
-    single_writer : bool
-        Prepare the file for HDF5's single-writer mode, in which being killed never breaks it.
-
-    Raises
-    ------
-    CaseError
-    """
-    path = Path(path)
-    refuse_foreign(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = h5py.File(path, "w", libver="latest" if single_writer else None)
-    except OSError as error:
-        if "lock" in str(error):
-            raise CaseError(f"{str(path)!r} is being written by another process; choose another name.") from None
-        reason = (getattr(error, "strerror", None) or "the folder may not be written").split(" (", 1)[-1].strip("()")
-        raise CaseError(f"The result file {str(path)!r} cannot be written ({_short(reason)}).") from None
-    if not single_writer:
-        _hold_back_metadata(file)
-    return file
-
-
 def check_writable(path: str | Path) -> None:
     """Make sure that a result may take this name, before anything is computed.
 
     Raises
     ------
     CaseError
-        As `create`.
+        If it may not.
     """
     path = Path(path)
+    if not path.is_dir():
+        check_free(path)  # first: a file that is being written is a result, however it reads at this instant
     refuse_foreign(path)
-    trial = path.with_name(f".{path.name}.trial")
-    try:
-        _create_beside(trial, path).close()
-    finally:
-        if trial.parent.is_dir():
-            trial.unlink(missing_ok=True)
-
-
-@contextmanager
-def writing(path: str | Path) -> Iterator[h5py.File]:
-    """A result file that takes its name when it is complete; whoever is killed before leaves what was there.
-
-    Raises
-    ------
-    CaseError
-        As `create`.
-    """
-    path = Path(path)
-    refuse_foreign(path)
-    new = path.with_name(f".{path.name}.new")
-    try:
-        with _create_beside(new, path) as file:
-            yield file
-        os.replace(new, path)
-    finally:
-        new.unlink(missing_ok=True)
-
-
-def _create_beside(new: Path, path: Path) -> h5py.File:
-    """A file under another name, with errors that speak of the name it is to have."""
-    try:
-        return create(new)
-    except CaseError as error:
-        raise CaseError(str(error).replace(str(new), str(path))) from None
-
-
-def reopen(path: str | Path) -> h5py.File:
-    """The result file of an interrupted run, to go on writing into it.
-
-    Raises
-    ------
-    CaseError
-    """
-    try:
-        file = h5py.File(path, "r+")
-    except OSError as error:
-        raise CaseError(
-            f"The result file {str(path)!r} cannot be opened for writing ({error.strerror or error})."
-        ) from error
-    _hold_back_metadata(file)
-    return file
 
 
 def refuse_foreign(path: Path) -> None:
@@ -241,17 +160,3 @@ def _replaceable(path: Path) -> bool:
             return "dbvfiv_kind" in file.attrs
     except _BROKEN:
         return path.suffix in (".h5", ".hdf5")  # HDF5 cut short
-
-
-def _short(reason: str) -> str:
-    if "errno" in reason:
-        return reason.split("error message = ")[-1].split(",")[0].strip("'\" ")
-    return " ".join(reason.split())[:120].rstrip(".")
-
-
-def _hold_back_metadata(file: h5py.File) -> None:
-    """Let the file's structure reach the disk at flushes only, so that being killed between them does no harm."""
-    settings = file.id.get_mdc_config()
-    settings.evictions_enabled = False
-    settings.incr_mode = settings.flash_incr_mode = settings.decr_mode = 0
-    file.id.set_mdc_config(settings)

@@ -25,7 +25,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..errors import SolveError
+from ..errors import CaseError, SolveError
 from .files import refuse_foreign
 from .header import Header, write_header
 from .lock import WriterLock
@@ -72,7 +72,10 @@ class Journal:
         self.path = Path(path)
         self._tables = {table.name: table for table in tables}
         refuse_foreign(self.path)
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise CaseError(f"The result file {str(self.path)!r} cannot be written ({error.strerror}).") from None
         self._lock = WriterLock(self.path)
         self._file: h5py.File | None = None
         new = self.path.with_name(f".{self.path.name}.{os.getpid()}.new")

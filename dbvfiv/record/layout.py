@@ -59,6 +59,10 @@ class Column:
     dtype: str = "f8"
     shown: Shown | None = None
 
+    def __reduce__(self) -> tuple:
+        """For pickle; how it is printed is no data and stays behind."""
+        return Column, (self.name, self.units, self.description, self.dtype)
+
     def mark(self, dataset: h5py.Dataset) -> None:
         """Write units and description beside a dataset."""
         dataset.attrs["units"] = self.units

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 from pathlib import Path
+from time import sleep
 
 from ..errors import CaseError
+
+#: Readers that ask whether a file is being written hold it for an instant: so often a writer tries, s apart.
+_TRIES, _PAUSE = 5, 0.02
+#: What a file system says that knows no files without a name.
+_NO_NAMELESS = (errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL, errno.ENOENT)
 
 
 class WriterLock:
@@ -34,20 +41,16 @@ class WriterLock:
             try:
                 descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
             except OSError as error:
-                raise CaseError(f"The result file {str(self.path)!r} cannot be written ({error.strerror}).") from None
+                raise _unwritable(self.path, error) from None
             try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                named = os.stat(self.path)
+                _lock(descriptor, self.path)
+                if os.path.samestat(os.stat(self.path), os.fstat(descriptor)):
+                    return descriptor
             except FileNotFoundError:  # replaced or removed meanwhile
+                pass
+            except BaseException:
                 os.close(descriptor)
-                continue
-            except OSError:
-                os.close(descriptor)
-                raise CaseError(
-                    f"{str(self.path)!r} is being written by another process; wait for it or choose another name."
-                ) from None
-            if os.path.samestat(named, os.fstat(descriptor)):
-                return descriptor
+                raise
             os.close(descriptor)
 
     def move(self, new: Path) -> None:
@@ -68,6 +71,57 @@ class WriterLock:
         finally:
             os.close(self._descriptor)
             self._descriptor = -1
+
+
+def check_free(path: Path) -> None:
+    """Make sure that a result may be written under a name, and leave everything as it is.
+
+    Raises
+    ------
+    CaseError
+        If another process writes it, or the file or its folder cannot be written.
+    """
+    try:
+        if path.exists():
+            descriptor = os.open(path, os.O_RDWR)
+            try:
+                _lock(descriptor, path)
+            finally:
+                os.close(descriptor)
+        _check_folder(path.absolute().parent)
+    except OSError as error:
+        raise _unwritable(path, error) from None
+
+
+def _check_folder(folder: Path) -> None:
+    """Try a file without a name in a folder, or in the nearest that there is: nothing can stay behind of it."""
+    while not folder.exists():
+        folder = folder.parent
+    if not folder.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, f"{str(folder)!r} is not a folder")
+    try:
+        os.close(os.open(folder, os.O_TMPFILE | os.O_RDWR, 0o600))
+    except OSError as error:
+        if error.errno not in _NO_NAMELESS:
+            raise
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES)) from None
+
+
+def _lock(descriptor: int, path: Path) -> None:
+    for left in reversed(range(_TRIES)):
+        try:
+            return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if not left:
+                raise CaseError(
+                    f"{str(path)!r} is being written by another process; wait for it or choose another name."
+                ) from None
+            sleep(_PAUSE)
+
+
+def _unwritable(path: Path, error: OSError) -> CaseError:
+    return CaseError(f"The result file {str(path)!r} cannot be written ({error.strerror}).")
 
 
 def is_being_written(path: Path) -> bool:

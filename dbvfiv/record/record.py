@@ -18,6 +18,7 @@ from .files import reading
 from .header import Header, read_header
 from .journal import Journal, read_log
 from .mesh import MeshData, read_mesh
+from .shield import Shield
 from .table import TableSpec, pack_documents, read_column, read_rows
 
 
@@ -174,17 +175,19 @@ class GrowingRecord(Record, Observer):
         for c in spec.columns:
             values = np.asarray(columns[c.name], object if c.dtype == "text" else c.dtype)
             blocks[c.name] = values.reshape(len(columns[c.name]), *spec.shape(c))
-        for name, block in blocks.items():
-            self._rows[table][name].append(block)
-        if self._journal is not None:
-            self._journal.extend(table, blocks)
+        with Shield():
+            for name, block in blocks.items():
+                self._rows[table][name].append(block)
+            if self._journal is not None:
+                self._journal.extend(table, blocks)
 
     def note(self, what: str, **data: Any) -> None:
         """Keep a note: plain data, arrays included, under a kind of its own."""
         text = pack_documents([{"what": what} | data])
-        self._log.append(json.loads(text))  # as a file gives it back
-        if self._journal is not None:
-            self._journal.write_log(text)
+        with Shield():
+            self._log.append(json.loads(text))  # as a file gives it back
+            if self._journal is not None:
+                self._journal.write_log(text)
 
     def fail(self, sentence: str) -> None:
         """Keep what was not reached, and say it."""
@@ -206,6 +209,10 @@ class GrowingRecord(Record, Observer):
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What it holds, without the file and whoever watches: a copy of it writes nothing."""
+        return vars(self) | {"_journal": None, "watcher": Observer()}
 
     # -- as an observer ----
 
@@ -259,6 +266,13 @@ class StoredRecord(Record):
                     raise KeyError(f"{table.name}/{missing[0]}")
             self._count = {name: read_rows(file["tables"][name]) for name in self.tables}
             self.header = replace(read_header(file, case_model), complete=self.complete)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All of it, read from the file: a copy can be asked where there is no such file."""
+        for name, table in self.tables.items():
+            for column in table.columns:
+                self.column(name, column.name)
+        return vars(self)
 
     def rows(self, table: str) -> int:
         return self._count[table]

@@ -42,8 +42,16 @@ class StudyResult:
             self.session = session
 
     def __repr__(self) -> str:
+        held = [f"{name} {count}" for name in self.record.tables if (count := self.record.rows(name))]
         state = "complete" if self.complete else "not complete"
-        return f"<{type(self).__name__} of {self.header.name!r}, {state}>"
+        return f"<{type(self).__name__} of {self.header.name!r}, {state}: {', '.join(held) or 'nothing yet'}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Record and case, and no model, which is built again when it is asked for."""
+        derived = {
+            name for part in type(self).__mro__ for name, it in vars(part).items() if type(it) is cached_property
+        }
+        return {name: value for name, value in vars(self).items() if name == "session" or name not in derived}
 
     @cached_property
     def session(self) -> Session:

@@ -13,7 +13,7 @@ from ..model import ValveModel
 from ..model.equilibria import find_equilibrium, redescribe, rest_state
 from ..model.state import SteadyState
 from ..observer import Observer
-from ..record.files import kind_of
+from ..record.files import check_writable, kind_of
 from ..record.header import Header
 from ..record.mesh import MeshData
 from ..record.part import RecordPart
@@ -74,6 +74,10 @@ class Session:
 
     def __init__(self, case: Case, name: str = "case", start: SteadyState | None = None):
         self.case, self.name, self.start = case, name, start
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the model, which is built again when it is asked for."""
+        return {"case": self.case, "name": self.name, "start": self.start}
 
     @cached_property
     def model(self) -> ValveModel:
@@ -208,6 +212,7 @@ def resume_result(path: str | Path, observer: Observer | None = None, changes: M
     CaseError
         If the file cannot be read or there is nothing left to do.
     """
+    check_writable(path)  # what another process is about to add must not be missed
     study, known = _find(path), _read(path)
     if study.rows_to_keep is None and known.complete and not changes:
         raise CaseError(f"The {known.header.kind} run in {str(path)!r} is complete; there is nothing to resume.")

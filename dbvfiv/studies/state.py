@@ -47,6 +47,9 @@ class State(SteadyState):
         numbers = f"{self.mass_flow:.4g} kg/s, lip opening {self.lip_opening * 1e3:.4g} mm"
         return f"<State at {self.pressure / 1e3:.6g} kPa: {numbers}>"
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
     @cached_property
     def layers(self) -> LayerFields:
         """Strains and stresses of the layers."""

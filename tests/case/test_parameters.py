@@ -6,9 +6,8 @@ import pytest
 
 from dbvfiv.case import CaseError
 from dbvfiv.case.describe import allowed_words, walk
-from dbvfiv.case.parameters import CONDITIONS, DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, listed
+from dbvfiv.case.parameters import CONDITIONS, DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, SYSTEM_NAMES, listed
 from dbvfiv.case.stability_axis import parse_stability_axis
-from dbvfiv.model.analytic import PARAMETERS as RESIDUAL
 from dbvfiv.model.dynamics import Conditions
 from dbvfiv.studies.case import Case
 from dbvfiv.studies.session import KEYWORDS
@@ -55,14 +54,14 @@ def test_groups():
     assert SURROUNDINGS == ("density", "alpha", "beta", "storage")
     assert DESIGN == ("thickness", "angle", "strain")
     assert SWEPT == ("pressure", "density", "alpha", "beta")
-    assert RESIDUAL == ("inlet", "density", "alpha", "beta", "storage")
+    assert SYSTEM_NAMES == ("inlet", "density", "alpha", "beta", "storage")
     assert set(inspect.signature(Conditions).parameters) < set(SURROUNDINGS)
 
 
 def test_a_place_knows_every_parameter():
     place = Place.of(Case())
     assert [place.value(name) for name in CONDITIONS] == [18e3, 1000.0, 5.0, 0.003, 0.0]
-    assert set(place.at(angle=30).mu()) == {*RESIDUAL, "angle"}
+    assert set(place.at(angle=30).mu()) == {*SYSTEM_NAMES, "angle"}
 
 
 def test_words():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -61,8 +63,12 @@ class ColumnPool:
 
     def _close(self) -> None:
         if self._pool is not None:
+            # whatever column a worker is at, nobody waits for it; the executor's own way to end them is newer than us
+            workers = list((getattr(self._pool, "_processes", None) or {}).values())
             self._pool.shutdown(wait=False, cancel_futures=True)
             self._pool = None
+            for worker in workers:
+                worker.kill()
 
     @property
     def is_here(self) -> bool:
@@ -169,12 +175,22 @@ def _pool(plan: MapPlan, workers: int) -> Executor:
 
 
 def _start(case: dict, laws: tuple[float, ...]) -> None:
-    """Prepare a worker."""
+    """Prepare a worker; the process that shares the columns out hears Ctrl-C and SIGTERM, and ends this one."""
     global _plan, _walk
+    if multiprocessing.parent_process() is not None:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
+        threading.Thread(target=_end_with_parent, daemon=True).start()
     prepare()
     read = Case.from_dict(case)
     _plan = replace(MapPlan.of(read), laws=tuple(laws))
     _walk = StabilityWalk(read)
+
+
+def _end_with_parent() -> None:
+    """Let no worker stay behind when the process that shares the columns out was killed."""
+    multiprocessing.parent_process().join()
+    os._exit(1)
 
 
 def _solve(task: ColumnTask, state: np.ndarray | None) -> MapColumn:

@@ -64,6 +64,9 @@ class ModeShape:
     pressure: np.ndarray = field(repr=False)
     inlet_velocity: complex = field(repr=False)
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.number}: growth {self.growth_rate:+.5g} 1/s at {self.frequency:.5g} Hz>"
+
     @property
     def eigenvalue(self) -> complex:
         """1/s."""

@@ -1,0 +1,43 @@
+"""What must not be cut in two: a signal that arrives meanwhile is heard when it is done."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, TracebackType
+
+_HELD = (signal.SIGINT, signal.SIGTERM)
+
+
+class Shield:
+    """A context in which Ctrl-C and SIGTERM wait until it is left; not to be used twice at a time.
+
+    Python hears signals in its main thread alone, so elsewhere it does nothing; and nothing for signals that this
+    process ignores, or that end it without Python's help.
+    """
+
+    def __init__(self):
+        self._before: dict[int, object] = {}
+        self._heard: list[tuple[int, FrameType | None]] = []
+
+    def __enter__(self) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number in _HELD:
+            before = signal.getsignal(number)
+            if callable(before):
+                self._before[number] = before
+                signal.signal(number, self._hear)
+
+    def _hear(self, number: int, frame: FrameType | None) -> None:
+        self._heard.append((number, frame))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        before, self._before = self._before, {}
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        heard, self._heard = self._heard, []
+        for number, frame in heard[:1]:
+            before[number](number, frame)
