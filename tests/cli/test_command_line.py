@@ -103,7 +103,7 @@ def test_a_new_case_is_commented_valid_and_never_overwrites(command_line, one_se
     file = tmp_path / "new.toml"
     assert command_line("case", "--new", file, "--set", "fluid.density=1.2").status == 0
     text = file.read_text()
-    assert "# Inlet pressure" in text and 'density = "1.2 kg/m^3"' in text
+    assert "# Static pressure" in text and 'density = "1.2 kg/m^3"' in text
     assert command_line("case", file).status == 0
     again = command_line("case", "--new", file)
     assert again.status == 2 and one_sentence(again.err) and file.read_text() == text
