@@ -120,9 +120,11 @@ def compare(numbers: Path, map_file: Path) -> None:
 
 
 def _distance(point: np.ndarray, line: np.ndarray) -> float:
-    from dbvfiv.studies.map.curves import merged
-
-    return merged(np.column_stack([line, line[:, :1]]), np.append(point, 0.0)[None])[1]
+    """From a point (2,) to the nearest place of a polyline (k, 2)."""
+    start, way = line[:-1], np.diff(line, axis=0)
+    length = np.maximum(np.sum(way**2, axis=1), np.finfo(float).tiny)
+    share = np.clip(np.sum((point - start) * way, axis=1) / length, 0.0, 1.0)
+    return float(np.linalg.norm(start + share[:, None] * way - point, axis=1).min())
 
 
 def _cuts(line: np.ndarray, x: float) -> list[float]:
