@@ -51,15 +51,6 @@ class Equilibria:
     warnings: tuple[str, ...] = ()
     interrupted: bool = False
 
-    def summary(self) -> dict:
-        """Plain SI numbers for JSON."""
-        return {
-            "points": [state.summary() for state in self.states],
-            "failures": list(self.failures),
-            "warnings": list(self.warnings),
-            "interrupted": self.interrupted,
-        }
-
 
 #: Passage at the lips over that of the flange from which on a lost equilibrium is put down to it.
 _NEARLY_AS_WIDE = 0.9

@@ -12,6 +12,7 @@ from dbvfiv.model.equilibria import LoadPath, SteadyOptions, find_equilibria, mo
 from dbvfiv.model.lip import LipCentre
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.observer import Observer
+from dbvfiv.record.states import summarise
 from dbvfiv.studies.case import Case
 
 
@@ -102,7 +103,7 @@ def test_run_keeps_the_order_asked_for(model):
     result = find_equilibria(model, pressures)
     assert [state.pressure for state in result.states] == pressures
     assert not result.failures and not result.interrupted
-    points = result.summary()["points"]
+    points = [summarise(state) for state in result.states]
     assert points[0]["mass_flow"] < points[1]["mass_flow"]
     wanted = {
         "pressure",
