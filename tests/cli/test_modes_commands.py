@@ -3,12 +3,11 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 
 import pytest
 
 import dbvfiv
+from tests.child import start
 
 COARSE = ("--set", "mesh.around=8", "--set", "mesh.along=16", "--set", "damping.alpha=0")
 
@@ -127,10 +126,7 @@ def test_impossible_sweeps(command_line, one_sentence, range_):
 
 def test_ctrl_c_keeps_what_is_done(tmp_path):
     path = tmp_path / "s.h5"
-    arguments = ["sweep", *COARSE, "--density", "10", "--over", "pressure=1 kPa:50 kPa:300", "-n", "2", "-o", str(path)]
-    run = subprocess.Popen(
-        [sys.executable, "-m", "dbvfiv", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    run = start("sweep", *COARSE, "--density", 10, "--over", "pressure=1 kPa:50 kPa:300", "-n", 2, "-o", path)
     shown = [run.stdout.readline() for _ in range(5)][2:]
     os.kill(run.pid, signal.SIGINT)
     _, err = run.communicate(timeout=60)

@@ -10,6 +10,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.studies.session import Session
+from tests.child import start
 
 COARSE = ("--set", "mesh.around=8", "--set", "mesh.along=16")
 KEYS = {
@@ -138,18 +139,19 @@ def test_files_that_are_no_results(command_line, one_sentence, tmp_path, command
         assert outcome.status == 2 and outcome.out == "" and one_sentence(outcome.err), outcome.err
 
 
-@pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
-def test_stopped_from_outside(tmp_path, kill):
+@pytest.mark.parametrize(
+    "kill, status", [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -signal.SIGKILL)]
+)
+def test_stopped_from_outside(tmp_path, one_sentence, kill, status):
     path = tmp_path / "r.h5"
-    arguments = ["steady", *COARSE, "-p", "1 kPa:50 kPa:500", "-o", str(path)]
-    run = subprocess.Popen(
-        [sys.executable, "-m", "dbvfiv", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    run = start("steady", *COARSE, "-p", "1 kPa:50 kPa:500", "-o", path)
     shown = [run.stdout.readline() for _ in range(5)][2:]  # head of the table, then three states
     os.kill(run.pid, kill)
     rest, err = run.communicate(timeout=60)
-    shown += rest.splitlines()[: -1 if kill == signal.SIGINT else None]
-    assert run.returncode == (130 if kill == signal.SIGINT else -kill)
+    shown += rest.splitlines()[: -1 if status > 0 else None]
+    assert run.returncode == status
+    if status > 0:
+        assert one_sentence(err.strip().splitlines()[-1].replace("; ", ", ")) and "has been kept" in err
     assert "Traceback" not in err and "MPI" not in err and "PETSC ERROR" not in err
     kept = dbvfiv.load_result(path)
     assert len(kept.states) >= 3 and not kept.complete

@@ -1,0 +1,219 @@
+"""A process that starts studies in children, kills them at random moments, and says what their files hold.
+
+It imports everything once and starts nothing itself, so that a child can be forked from it. It reads requests from
+standard input, one JSON document a line, and answers likewise.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import sys
+import time
+import traceback
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import dbvfiv
+from dbvfiv.api import Valve
+from dbvfiv.errors import CaseError
+from dbvfiv.record.record import GrowingRecord
+from dbvfiv.studies import KINDS
+from dbvfiv.studies.study import find_study
+
+CASE = {"mesh.around": 4, "mesh.along": 6, "drive.pressure": 2e3, "fluid.density": 10}
+RUNS = {
+    "steady": lambda valve, path: valve.steady([1e3, 2e3, 3e3], output=path),
+    "modes": lambda valve, path: valve.modes(output=path),
+    "sweep": lambda valve, path: valve.sweep("density=1:1000:4:log", output=path),
+    "sensitivity": lambda valve, path: valve.sensitivity(["pressure", "thickness"], output=path),
+    "onset": lambda valve, path: valve.onset("alpha=0.1:30:3:log", output=path),
+    "map": lambda valve, path: valve.map("density=1:100:3:log", "alpha=0.1:30:3:log", output=path),
+    "transient": lambda valve, path: valve.transient("20 ms", output=path),
+    "closure": lambda valve, path: valve.closure([500, 1000, 1500], output=path),
+}
+LIMIT = 120.0
+
+
+def told(wire: int):
+    """Let every record say on a wire what it has promised to keep."""
+    for name in ("extend", "note"):
+        inner = getattr(GrowingRecord, name)
+
+        def outer(self, *given, _inner=inner, **named):
+            _inner(self, *given, **named)
+            if self._journal is not None:
+                counts = {table: self.rows(table) for table in self.tables} | {"log": len(self.log)}
+                os.write(wire, json.dumps(counts).encode() + b"\n")
+
+        setattr(GrowingRecord, name, outer)
+
+
+class Child:
+    """A study in a process of its own."""
+
+    def __init__(self, kind: str, path: Path):
+        self.lines: list[dict] = []
+        self.status: int | None = None
+        self._text = b""
+        self.began = time.monotonic()
+        self._wire, wire = os.pipe()
+        os.set_blocking(self._wire, False)
+        self.pid = os.fork()
+        if self.pid:
+            os.close(wire)
+            return
+        try:
+            told(wire)
+            dbvfiv.resume(path) if path.exists() and path.stat().st_size else RUNS[kind](dbvfiv.load(None, CASE), path)
+            os._exit(0)
+        except BaseException:
+            traceback.print_exc()
+            os._exit(1)
+
+    def listen(self) -> bool:
+        """Take in what the child has said; whether it still runs."""
+        if self.status is not None:
+            return False
+        ended, status = os.waitpid(self.pid, os.WNOHANG)
+        if ended:
+            self.status = status
+        try:
+            while text := os.read(self._wire, 65536):
+                self._text += text
+        except BlockingIOError:
+            pass
+        *whole, self._text = self._text.split(b"\n")
+        self.lines += [json.loads(line) for line in whole]
+        if not ended and time.monotonic() - self.began > LIMIT:
+            os.kill(self.pid, signal.SIGKILL)
+            raise RuntimeError("a child hangs")
+        return not ended
+
+    def kill(self, after_lines: int, after: float) -> None:
+        """Kill it some time, s, after it has said a number of lines."""
+        while len(self.lines) < after_lines and self.listen():
+            time.sleep(0.001)
+        end = time.monotonic() + after
+        while time.monotonic() < end and self.listen():
+            time.sleep(0.0005)
+        if self.listen():
+            os.kill(self.pid, signal.SIGKILL)
+            while self.listen():
+                time.sleep(0.001)
+
+
+def contents(path: Path) -> dict:
+    """What a file holds: all rows, and what is said of it."""
+    result = dbvfiv.load_result(path)
+    record = result.record
+    columns = {
+        f"{table}/{column.name}": record.column(table, column.name)
+        for table, spec in record.tables.items()
+        for column in spec.columns
+    }
+    return {
+        "counts": {table: record.rows(table) for table in record.tables} | {"log": len(record.log)},
+        "columns": columns,
+        "complete": result.complete,
+        "summary": json.dumps(result.summary(), default=str) if result.complete else "",
+    }
+
+
+def reference(kind: str, path: Path) -> dict:
+    """An uninterrupted run, and how often its file was read meanwhile."""
+    child, reads, wrong = Child(kind, path), 0, []
+    while child.listen():
+        time.sleep(0.01)
+        if not path.exists() or not path.stat().st_size:
+            continue
+        promised = dict(child.lines[-1]) if child.lines else {}
+        try:
+            found = dbvfiv.load_result(path)
+            record = found.record
+            found.header, found.warnings
+            reads += 1
+            short = [name for name in record.tables if record.rows(name) < promised.get(name, 0)]
+            wrong += [f"{name} has fewer rows than were kept" for name in short]
+        except Exception as error:
+            wrong.append(f"{type(error).__name__}: {error}")
+    if child.status:
+        wrong.append("the run failed")
+    return {"reads": reads, "wrong": wrong, "lines": len(child.lines), "seconds": time.monotonic() - child.began}
+
+
+def trial(kind: str, folder: Path, kills: int, chance: random.Random, whole: dict, about: dict) -> dict:
+    """Kill a run and its resumes, then let it end; what was lost or differs from the whole run."""
+    path, wrong, promised, done = folder / f"{kind}-{chance.random()}.h5", [], {}, 0
+    for _ in range(kills):
+        child = Child(kind, path)
+        if chance.random() < 0.5:
+            child.kill(chance.randint(0, about["lines"]), chance.uniform(0, 0.03))
+        else:
+            child.kill(0, chance.uniform(0.2, about["seconds"]))
+        if os.WIFEXITED(child.status):
+            if os.WEXITSTATUS(child.status):
+                wrong.append("the run failed")
+            break
+        done += 1
+        if not path.exists():
+            continue
+        if not path.stat().st_size:
+            try:
+                dbvfiv.load_result(path)
+            except CaseError as error:
+                if "is empty" not in str(error) or child.lines or promised:
+                    wrong.append(f"nothing is left: {error}")
+            continue
+        try:
+            found = contents(path)["counts"]
+        except Exception as error:
+            wrong.append(f"{type(error).__name__}: {error}")
+            break
+        if child.lines or find_study(kind).rows_to_keep is None:
+            promised = child.lines[-1] if child.lines else promised
+            wrong += [f"{name}: {found[name]} of {n} are left" for name, n in promised.items() if found[name] < n]
+    if not path.exists() or not path.stat().st_size or not dbvfiv.load_result(path).complete:
+        child = Child(kind, path)
+        while child.listen():
+            time.sleep(0.005)
+        if child.status:
+            return {"kills": done, "wrong": [*wrong, "the resume failed"]}
+    last = contents(path)
+    for name, values in whole["columns"].items():
+        if not same(values, last["columns"][name]):
+            wrong.append(f"{name} differs from an uninterrupted run")
+    if last["summary"] != whole["summary"]:
+        wrong.append("the summary differs from that of an uninterrupted run")
+    wrong += [f"{left.name} stays behind" for left in folder.glob(".*")]
+    return {"kills": done, "wrong": wrong}
+
+
+def same(a: np.ndarray, b: np.ndarray) -> bool:
+    return np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind in "fc")
+
+
+def answer(request: dict) -> dict:
+    """Trials of one study."""
+    kind, folder = request["kind"], Path(request["folder"])
+    chance = random.Random(request["seed"])
+    about = reference(kind, folder / f"{kind}.h5")
+    if about["wrong"]:
+        return about | {"kills": 0}
+    whole, kills = contents(folder / f"{kind}.h5"), 0
+    while kills < request["kills"]:
+        found = trial(kind, folder, request["in_a_row"], chance, whole, about)
+        kills += max(found["kills"], 1)
+        about["wrong"] += found["wrong"]
+    return about | {"kills": kills}
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")  # JAX warns of forks; it has not begun to work here
+    assert Valve and all(find_study(kind) for kind in KINDS)
+    for line in sys.stdin:
+        print(json.dumps(answer(json.loads(line))), flush=True)

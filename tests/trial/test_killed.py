@@ -1,0 +1,53 @@
+"""Runs that are killed at random moments, and files that are read while they grow."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dbvfiv.studies import KINDS
+
+
+@pytest.fixture(scope="module")
+def ask():
+    """Requests to a process that starts and kills runs."""
+    script = Path(__file__).with_name("killed_runs.py")
+    with subprocess.Popen(
+        [sys.executable, str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+
+        def call(**request):
+            process.stdin.write(json.dumps(request) + "\n")
+            process.stdin.flush()
+            return json.loads(process.stdout.readline())
+
+        yield call
+        process.stdin.close()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_killed_runs_lose_nothing_and_end_with_the_same_numbers(tmp_path, ask, kind):
+    found = ask(kind=kind, folder=str(tmp_path), kills=2, in_a_row=2, seed=KINDS.index(kind))
+    assert not found["wrong"] and found["kills"] >= 2 and found["reads"] >= 5, found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_kills(tmp_path, ask, kind):
+    """25 of each study, 200 in all."""
+    found = ask(kind=kind, folder=str(tmp_path), kills=25, in_a_row=3, seed=100 + KINDS.index(kind))
+    assert not found["wrong"] and found["kills"] >= 25, found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_reads(tmp_path, ask, kind):
+    reads, number = 0, 0
+    while reads < 500 // len(KINDS) + 1:
+        number += 1
+        (tmp_path / str(number)).mkdir()
+        found = ask(kind=kind, folder=str(tmp_path / str(number)), kills=0, in_a_row=1, seed=0)
+        assert not found["wrong"], found
+        reads += found["reads"]
