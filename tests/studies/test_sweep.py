@@ -162,7 +162,7 @@ def test_refusals(model, state, one_sentence):
 
 def test_what_is_done_is_kept_on_the_way(model, state, over_density, monkeypatch):
     """A sweep that is killed leaves the values up to the last time it was kept, with the branches of the whole."""
-    from dbvfiv.studies import sweep
+    from dbvfiv.studies.sweep import run as sweep
 
     monkeypatch.setattr(sweep, "_KEEP_AFTER", 0.0)
     monkeypatch.setattr(sweep, "_KEEPING", 1e9)

@@ -21,7 +21,7 @@ import numpy as np
 import dbvfiv
 from dbvfiv.api import Valve
 from dbvfiv.errors import CaseError
-from dbvfiv.record.record import GrowingRecord
+from dbvfiv.record.record import GrowingRecord, Record
 from dbvfiv.studies import KINDS
 from dbvfiv.studies.closure.columns import valid_rows
 from dbvfiv.studies.study import find_study
@@ -38,8 +38,8 @@ RUNS = {
     "closure": lambda valve, path: valve.closure([500, 1000, 1500], output=path),
 }
 LIMIT = 120.0
-#: Columns that count rows of other tables, those that were left out later included.
-COUNTED = ("way/path", "way/buckling")
+#: Columns that count rows of other tables, those that were left out later included, and times of the clock.
+COUNTED = ("way/path", "way/buckling", "seconds")
 
 
 def told(wire: int):
@@ -115,7 +115,7 @@ def contents(path: Path) -> dict:
     result = dbvfiv.load_result(path)
     record = result.record
     columns = {
-        f"{table}/{column.name}": record.column(table, column.name)[valid_rows(record, table)]
+        f"{table}/{column.name}": record.column(table, column.name)[last_rows(record, table)]
         for table, spec in record.tables.items()
         for column in spec.columns
         if column.name not in COUNTED
@@ -126,6 +126,12 @@ def contents(path: Path) -> dict:
         "complete": result.complete,
         "summary": json.dumps(result.summary(), default=str) if result.complete else "",
     }
+
+
+def last_rows(record: Record, table: str) -> list[int] | slice:
+    """Those of the attempt that went to its end."""
+    over = record.notes("over")
+    return slice(*over[-1]["rows"][table]) if over else valid_rows(record, table)
 
 
 def reference(kind: str, path: Path) -> dict:
