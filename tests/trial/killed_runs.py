@@ -128,8 +128,10 @@ def contents(path: Path) -> dict:
     }
 
 
-def last_rows(record: Record, table: str) -> list[int] | slice:
-    """Those of the attempt that went to its end."""
+def last_rows(record: Record, table: str) -> list[int] | np.ndarray | slice:
+    """Those of the attempt that went to its end; a restart point that was kept again at the same step once."""
+    if table == "restart":
+        return np.unique(record.column(table, "steps"), return_index=True)[1]
     over = record.notes("over")
     return slice(*over[-1]["rows"][table]) if over else valid_rows(record, table)
 
