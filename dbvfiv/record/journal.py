@@ -82,20 +82,18 @@ class Journal:
         try:
             _remove_left_over(self.path)
             self._require_room(_size_of(mesh))
-            with h5py.File(new, "w", libver="latest", locking=False) as file:
-                write_header(file, header)
-                if mesh is not None:
-                    write_mesh(file, mesh)
-                for table in self._tables.values():
-                    table.create(file.require_group("tables"))
-                log = file.create_dataset("log", (0,), "u1", maxshape=(None,), chunks=(4096,))
-                log.attrs["description"] = "JSON documents, each closed by a line feed"
-                if first is not None:
-                    self._file = file
-                    first(self)
+            file = self._file = h5py.File(new, "w", libver="latest", locking=False)
+            write_header(file, header)
+            if mesh is not None:
+                write_mesh(file, mesh)
+            for table in self._tables.values():
+                table.create(file.require_group("tables"))
+            log = file.create_dataset("log", (0,), "u1", maxshape=(None,), chunks=(4096,))
+            log.attrs["description"] = "JSON documents, each closed by a line feed"
+            if first is not None:
+                first(self)
+            file.swmr_mode = True  # before it has the name: whoever opens it then sees that it grows
             self._lock.move(new)
-            self._file = h5py.File(self.path, "r+", libver="latest", locking=False)
-            self._file.swmr_mode = True
         except BaseException:
             self.close()
             raise

@@ -23,8 +23,10 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.append(STATE, state_row(model, state))
     for row in rows_of(found)[record.rows(MODES) :]:
         record.append(MODES, row)
+    said = {note["text"] for note in record.notes("remark")}
     for sentence in found.notes:
-        record.note("remark", text=sentence)
+        if sentence not in said:
+            record.note("remark", text=sentence)
     certificate = Certificate.of(found)
     if not record.rows(COUNT):
         record.extend(COUNT, {column.name: getattr(certificate, column.name) for column in CURVE})

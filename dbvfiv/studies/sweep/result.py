@@ -140,7 +140,9 @@ class SweepResult(StudyResult):
         if self._found:
             return self._found[table]
         spec = next(spec for spec in tables_of(self.mesh) if spec.name == table)
-        return self.record.table_rows(spec)
+        rows = self.record.table_rows(spec)
+        over = self.record.notes("over")
+        return rows[slice(*over[-1]["rows"][table])] if over else rows
 
     @property
     def axis(self) -> Axis:
@@ -184,7 +186,8 @@ class SweepResult(StudyResult):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        return tuple(note["text"] for note in self.record.notes("remark"))
+        over = self.record.notes("over")
+        return tuple(over[-1]["remarks"]) if over else ()
 
     @property
     def units(self) -> str:

@@ -31,12 +31,14 @@ def run(session: Session, record: GrowingRecord) -> None:
         observer=record,
         keep=lambda part: record.note("kept", **_tables(part)),
     )
-    for table, rows in _tables(found).items():
+    tables, places = _tables(found), {}
+    record.note("kept", **tables)  # read while the rows are written
+    for table, rows in tables.items():
+        first = record.rows(table)  # those before are of an attempt that was ended
         if rows:
             record.extend(table, {name: [row[name] for row in rows] for name in rows[0]})
-    for sentence in found.notes:
-        record.note("remark", text=sentence)
-    record.note("over", certified=found.certified)
+        places[table] = [first, first + len(rows)]
+    record.note("over", certified=found.certified, remarks=list(found.notes), rows=places)
     for sentence in found.failures:
         record.note("failure", text=sentence)
     if found.interrupted:
