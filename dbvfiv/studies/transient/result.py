@@ -24,7 +24,7 @@ from .assess import assess
 from .tables import HISTORY, PROFILES, SCALARS, STATE_COLUMNS, STATES
 
 _NO_VERDICT = {
-    "verdict": None,
+    "verdict": "undecided",
     "decided": False,
     "reason": "No step was made: the run has just begun, or was ended before the first.",
     **dict.fromkeys(("amplitude", "frequency", "mean", "cycles_observed", "periodicity_error")),
