@@ -101,6 +101,13 @@ LAYERS = (
 STATE_COLUMNS = (*SUMMARY, *FIELDS)
 
 
+def layer_shapes(mesh: MeshData) -> dict[str, tuple[int, ...]]:
+    """Shape of one row of each of `LAYERS` on a mesh."""
+    size = (len(mesh.quads), len(mesh.layer_names))
+    components = {"layers/strain": (5,), "layers/stress": (5,), "layers/von_mises": (), "layers/stretch": (2,)}
+    return {name: (*size, *shape) for name, shape in components.items()}
+
+
 def state_table(name: str, mesh: MeshData, further: Iterable[Column] = (), shapes=None) -> TableSpec:
     """Table of steady states on a mesh.
 
@@ -111,15 +118,14 @@ def state_table(name: str, mesh: MeshData, further: Iterable[Column] = (), shape
     further : iterable of Column
         Columns besides, with their `shapes`.
     """
-    elements, count = len(mesh.quads), len(mesh.layer_names)
-    row_shapes = dict.fromkeys((c.name for c in FIELDS), (len(mesh.z),)) | {
-        "max_displacement_position": (3,),
-        "nodal": (len(mesh.nodes), 5),
-        "layers/strain": (elements, count, 5),
-        "layers/stress": (elements, count, 5),
-        "layers/von_mises": (elements, count),
-        "layers/stretch": (elements, count, 2),
-    }
+    row_shapes = (
+        layer_shapes(mesh)
+        | dict.fromkeys((c.name for c in FIELDS), (len(mesh.z),))
+        | {
+            "max_displacement_position": (3,),
+            "nodal": (len(mesh.nodes), 5),
+        }
+    )
     return TableSpec(name, (*STATE_COLUMNS, *LAYERS, *further), row_shapes | (shapes or {}))
 
 

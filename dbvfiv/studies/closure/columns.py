@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...record.layout import TEXT, Column, Shown
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
-from ...record.states import LAYERS, state_table
+from ...record.states import LAYERS, layer_shapes, state_table
 from ...record.table import TableSpec
 from ..load_path import WAY_ON, way_on_shapes
 
@@ -185,18 +185,14 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
 
 
 def _walk_tables(prefix: str, mesh: MeshData) -> tuple[TableSpec, ...]:
-    nodes, elements, layers = len(mesh.nodes), len(mesh.quads), len(mesh.layer_names)
-    shapes = {
+    nodes = len(mesh.nodes)
+    shapes = layer_shapes(mesh) | {
         "max_displacement_position": (3,),
         "nodal": (nodes, 5),
         "opening": (len(mesh.z),),
         "contact_pressure": (nodes,),
         "gap": (nodes,),
         "stiffness_eigenvalues": (MOST_EIGENVALUES,),
-        "layers/strain": (elements, layers, 5),
-        "layers/stress": (elements, layers, 5),
-        "layers/von_mises": (elements, layers),
-        "layers/stretch": (elements, layers, 2),
         "way/slope": (nodes, 5),
         "way/multiplier": (nodes,),
         "way/energy": (6,),

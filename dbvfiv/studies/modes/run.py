@@ -25,8 +25,6 @@ from ...model.state import SteadyState
 from ...observer import Observer
 from ..solving import solving
 
-#: Unbalanced force over pressure force above which a state is no equilibrium of its model.
-_UNBALANCED = 1e-4
 #: Structural modes in the basis behind the independent count.
 _BASIS = 24
 
