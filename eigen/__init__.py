@@ -12,6 +12,7 @@ from .options import SearchOptions
 from .pencil import CoupledPencil
 from .reduction import FamilyReduction
 from .region import Oval, SearchedRegion
+from .relaxation import Relaxation
 from .search import leading_modes
 from .spectrum import Mode, Spectrum
 from .sweep import Sweep, sweep
@@ -34,6 +35,7 @@ __all__ = [
     "Oval",
     "PencilDerivative",
     "PencilFamily",
+    "Relaxation",
     "SearchOptions",
     "SearchedRegion",
     "SingularShiftError",

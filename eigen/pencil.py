@@ -7,6 +7,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import scipy.sparse as sp
 
+from .relaxation import Relaxation
+
 FLUID_PARTS = ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")
 
 
@@ -15,7 +17,7 @@ class CoupledPencil:
     r"""Structure and fluid of a linearised coupled state.
 
     .. math::
-        (\lambda^2 M + \lambda C + K) q &= G p, \qquad y = J q \\
+        (\lambda^2 M + \lambda C + K + \sum_g \varphi_g(\lambda) K_g) q &= G p, \qquad y = J q \\
         p &= (A_0 + \lambda A_1 + \lambda^2 A_2) y + (B_0 + \lambda B_1) U \\
         0 &= (R_0 + \lambda R_1 + \lambda^2 R_2) y + (S_0 + \lambda S_1) U
 
@@ -35,6 +37,8 @@ class CoupledPencil:
     R0, R1, R2 : array, shape (b, m), optional
     S0, S1 : array, shape (b, b), optional
         The number b is read from any of the parts given.
+    relaxation : Relaxation, optional
+        What relaxes of the stiffness, phi_g and K_g; without it the pencil is quadratic.
 
     Raises
     ------
@@ -64,6 +68,7 @@ class CoupledPencil:
     R2: np.ndarray | None = None
     S0: np.ndarray | None = None
     S1: np.ndarray | None = None
+    relaxation: Relaxation | None = None
 
     def __post_init__(self):
         for name in ("M", "C", "K"):
@@ -76,6 +81,9 @@ class CoupledPencil:
             self._put(name, _real_csr(name, sp.csr_matrix(empty) if value is None else value))
         m = self.G.shape[1]
         self._check({"M": (n, n), "C": (n, n), "K": (n, n), "G": (n, m), "J": (m, n)})
+        for matrix in () if self.relaxation is None else self.relaxation.matrices:
+            if matrix.shape != (n, n):
+                raise ValueError(f"A relaxing stiffness of the pencil has shape {matrix.shape}; {(n, n)} is needed.")
         self._check_fluid()
 
     def _check_fluid(self):
@@ -123,8 +131,18 @@ class CoupledPencil:
 
     @property
     def order(self) -> int:
-        """Size of the first-order form in (q, dq/dt, U)."""
-        return 2 * self.n + self.b
+        """Size of the first-order form in (q, dq/dt, U, z), with z of each relaxation time as long as q."""
+        return 2 * self.n + self.b + self.branches * self.n
+
+    @property
+    def branches(self) -> int:
+        """Number of relaxation times."""
+        return 0 if self.relaxation is None else self.relaxation.branches
+
+    @property
+    def relaxing(self) -> tuple[sp.csr_matrix, ...]:
+        """Parts K_g of the stiffness that relax."""
+        return () if self.relaxation is None else self.relaxation.matrices
 
     def replace(self, **parts) -> CoupledPencil:
         """The same pencil with some parts exchanged; the structure is not checked again where the fluid alone is."""
@@ -157,7 +175,7 @@ class CoupledPencil:
         Returns
         -------
         structure : list of arrays, shape (n,) or (n, k)
-            Inertia, damping, stiffness, minus the coupling through y, minus that through U.
+            Inertia, damping, stiffness, minus the coupling through y, minus that through U; then what relaxes.
         fluid : list of arrays, shape (b,) or (b, k)
         """
         y = real_apply(self.J, q)
@@ -170,15 +188,17 @@ class CoupledPencil:
             -real_apply(self.G, motion),
             -real_apply(self.G, inner),
         ]
+        if self.relaxation is not None:
+            structure += [x * real_apply(m, q) for x, m in zip(self.relaxation.factors(s), self.relaxing)]
         fluid = [self.R0 @ y, s * (self.R1 @ y), s**2 * (self.R2 @ y), self.S0 @ U, s * (self.S1 @ U)]
         return structure, fluid
 
     def first_order(self) -> tuple[np.ndarray, np.ndarray]:
-        """Dense F, E with F x = lambda E x, x = (q, lambda q, U); for small pencils.
+        """Dense F, E with F x = lambda E x, x = (q, lambda q, U, z); for small pencils.
 
         Returns
         -------
-        F, E : ndarray, shape (2n + b, 2n + b)
+        F, E : ndarray, shape (order, order)
         """
         n, b = self.n, self.b
         G, J = self.G.toarray(), self.J.toarray()
@@ -196,6 +216,14 @@ class CoupledPencil:
         F[u, q] = -self.R0 @ J
         F[u, v] = -self.R1 @ J
         F[u, u] = -self.S0
+        for j in range(self.branches):
+            z = slice(2 * n + b + j * n, 2 * n + b + (j + 1) * n)
+            part = sum(x * m for x, m in zip(self.relaxation.strengths[:, j], self.relaxing)).toarray()
+            F[v, q] -= part
+            F[v, z] = part
+            F[z, q] = np.eye(n)
+            F[z, z] = -np.eye(n)
+            E[z, z] = self.relaxation.times[j] * np.eye(n)
         return F, E
 
 
@@ -211,7 +239,7 @@ def real_apply(matrix, x: np.ndarray) -> np.ndarray:
 
 
 def part_names() -> tuple[str, ...]:
-    """Names of all parts of a pencil."""
+    """Names of all parts of a pencil, the relaxation among them."""
     return tuple(f.name for f in fields(CoupledPencil))
 
 

@@ -32,11 +32,14 @@ class Conditions:
         Rayleigh mass damping, 1/s.
     beta : float
         Rayleigh stiffness damping, s.
+    loss_factor : float
+        Factor on the loss factors of all materials; zero leaves them elastic.
     """
 
     density: float
     alpha: float
     beta: float
+    loss_factor: float = 0.0
 
     @classmethod
     def of(cls, case) -> Conditions:

@@ -7,6 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ..materials.prony import Prony
+
 LINEAR, RUBBER = 0, 1
 
 
@@ -25,6 +27,8 @@ class Layer:
     shear_correction : float
         Factor on the transverse shear energy.
     name : str
+    relaxation : `dbvfiv.materials.prony.Prony`, optional
+        How it relaxes beyond its slow law; not at all without one.
     """
 
     law: object
@@ -32,6 +36,7 @@ class Layer:
     angle: float = 0.0
     shear_correction: float = 1.0
     name: str = ""
+    relaxation: Prony | None = None
 
 
 @dataclass(frozen=True)
