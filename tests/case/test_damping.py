@@ -19,7 +19,7 @@ def test_numbers_that_are_not_given_follow_from_the_model():
     damping = Case().replace(LOSS).damping
     assert (damping.alpha, damping.beta, damping.loss_factor) == (0.0, 0.0, 1.0)
     assert Case().replace(LOSS).replace({"damping.model": "rayleigh"}) == Case()
-    assert Case().replace({"damping.band": ["0.1 Hz", "1 kHz"]}).damping.branches == 5
+    assert Case().replace({"damping.band": ["0.1 Hz", "1 kHz"]}).damping.branches == 6
 
 
 def test_what_is_given_stays():

@@ -84,3 +84,14 @@ def test_what_the_model_lacks_is_nothing_to_move(command_line, one_sentence, stu
     outcome = command_line(study, *COARSE, "--set", f"damping.model={model}", *options)
     assert outcome.status == 2 and one_sentence(outcome.err), outcome.err
     assert name in outcome.err and f"damping.model = '{model}'" in outcome.err
+
+
+def test_the_worked_case(command_line):
+    """Its table is made up, and says so."""
+    outcome = command_line("damping", "cases/loss-factor.toml", "--json")
+    materials = {entry["name"]: entry for entry in json.loads(outcome.out)["materials"]}
+    assert materials["SBR"]["source"] == "tan delta measured, tan-delta.csv at 20 degC"
+    assert materials["SBR"]["damping_ratio"][-1] > 1.3 * materials["SBR"]["damping_ratio"][0]
+    assert all(entry["largest_error"] < 0.035 for entry in materials.values())
+    with open("cases/tan-delta.csv") as file:
+        assert "SYNTHETIC" in file.readline()

@@ -7,6 +7,8 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from dbvfiv.case import CaseError
 from dbvfiv.case.relaxing import SHIPPED_LOSSES
@@ -203,6 +205,43 @@ def test_a_bad_table_is_refused_in_a_sentence(tmp_path, one_sentence, text, word
         relaxation_from_case(case_of(loss_data=str(tmp_path / "t.csv")), "CR")
     assert one_sentence(str(refused.value)), refused.value
     assert str(refused.value).startswith("materials.CR.loss_data cannot be used: ") and "t.csv" in str(refused.value)
+
+
+CELL = st.one_of(
+    st.floats(allow_nan=True), st.floats(0.01, 300.0), st.sampled_from(["", "high", "-", "0,1", "1e400", "'", '"'])
+)
+TITLE = st.sampled_from(
+    ["frequency [Hz]", "f [kHz]", "omega [rad/s]", "tan delta", "eta [%]", "E' [MPa]", "E'' [Pa]", "x"]
+)
+
+
+@given(
+    titles=st.lists(TITLE | st.text(max_size=8), max_size=4),
+    rows=st.lists(st.lists(CELL, max_size=4), max_size=8),
+    separator=st.sampled_from([",", ";", "\t", " "]),
+)
+def test_random_tables_are_read_or_refused_in_a_sentence(tmp_path, one_sentence, titles, rows, separator):
+    lines = [separator.join(str(cell) for cell in row) for row in [titles, *rows]]
+    (tmp_path / "t.csv").write_text("\n".join(lines), encoding="utf-8", errors="surrogatepass")
+    for key in ("loss_data", "relaxation_data"):
+        try:
+            found = relaxation_from_case(case_of(**{key: str(tmp_path / "t.csv")}), "CR")
+        except CaseError as error:
+            assert one_sentence(str(error)), str(error)
+        else:
+            assert min(found.strengths) >= 0
+
+
+@given(
+    values=st.lists(st.floats(0.011, 1.9), min_size=2, max_size=12),
+    inner=st.lists(st.floats(1.1, 199.0), min_size=12, max_size=12, unique=True),
+)
+def test_random_tables_that_cover_the_band_give_series(tmp_path, values, inner):
+    frequency = [0.9, *sorted(inner)[: len(values) - 2], 201.0]
+    file = written(tmp_path / "t.csv", "frequency [Hz], tan delta", frequency, values)
+    found = damping_of(case_of(loss_data=file), "CR")
+    assert min(found.prony.strengths) >= 0 and np.isfinite(found.fit.error).all()
+    assert (found.prony.loss_factor(np.geomspace(1e-3, 1e5, 60)) >= 0).all()
 
 
 @pytest.mark.parametrize(
