@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from dbvfiv.case import Case
     from dbvfiv.case.relaxing import Relaxing
 
+#: Errors of a fit, rms, beyond which it says nothing of the material, and largest one that passes without a note.
+_WORST, _FAIR = 0.5, 0.1
 #: Points a decade at which a measured table is met.
 _PER_DECADE = 25
 
@@ -76,6 +78,16 @@ class MaterialDamping:
     prony: Prony
     fit: PronyFit | None = None
     data: tuple[np.ndarray, np.ndarray] | None = None
+
+    @property
+    def note(self) -> str | None:
+        """A sentence where the fit is poor."""
+        if self.fit is None or self.fit.largest_error <= _FAIR:
+            return None
+        return (
+            f"{self.name}: the series misses the {self.fit.quantity} by up to {self.fit.largest_error:.0%}; more "
+            "damping.branches or a narrower damping.band help unless the data scatter."
+        )
 
 
 @cache
@@ -139,7 +151,13 @@ def damping_of(case: Case, name: str) -> MaterialDamping:
             key=f"materials.{name}",
         )
     try:
-        return _READERS[card.ways[0]](name, card, case.damping.band, case.damping.branches)
+        found = _READERS[card.ways[0]](name, card, case.damping.band, case.damping.branches)
+        if found.fit and found.fit.rms_error > _WORST:
+            raise MaterialError(
+                f"a series of {case.damping.branches} branches misses it by {found.fit.rms_error:.0%} rms; more "
+                "damping.branches or a narrower damping.band are needed."
+            )
+        return found
     except MaterialError as error:
         key = f"materials.{name}.{card.ways[0]}"
         raise CaseError(f"{key} cannot be used: {error}", key=key) from None

@@ -120,6 +120,7 @@ class DampingReport:
             "fitted": fit.quantity if fit else None,
             "largest_error": fit.largest_error if fit else None,
             "rms_error": fit.rms_error if fit else None,
+            "note": material.note,
             "strengths": series.strengths,
             "times": series.times,
             "damping_ratio": 0.5 * series.loss_factor(frequency),
@@ -140,6 +141,7 @@ class DampingReport:
             if self.materials:
                 lines.append("For comparison, what the materials lose by their loss factors:")
         lines += ["", *_table(("material", "fit: largest", "rms", "source"), [_fit_row(m) for m in self.materials])]
+        lines += [f"Note: {m.note}" for m in self.materials if m.note]
         return [*lines, "", *self._ratio_lines(), *(self._match_lines(at) if at is not None else [])]
 
     def _ratio_lines(self) -> list[str]:

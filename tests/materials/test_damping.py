@@ -105,6 +105,17 @@ def test_a_series_is_taken_as_it_is():
     assert found.strengths == (0.1, 0.2) and found.times == (0.01, 0.5)
 
 
+def test_series_that_miss_are_told_and_those_that_say_nothing_refused(one_sentence):
+    """Two branches cannot damp that much over 2.3 decades; four do so roughly."""
+    rough = damping_of(case_of(loss_factor=2), "CR")
+    assert rough.fit.largest_error > 0.2 and one_sentence(rough.note) and "27%" in rough.note
+    assert f"Note: {rough.note}" in describe_damping(case_of(loss_factor=2)).lines()
+    assert damping_of(case_of(loss_factor=0.5), "CR").note is None
+    with pytest.raises(CaseError, match="series of 2 branches misses it by 100% rms") as refused:
+        damping_of(case_of(loss_factor=2).replace({"damping.branches": 2}), "CR")
+    assert one_sentence(str(refused.value))
+
+
 @pytest.mark.parametrize(
     "head, units, separator",
     [
@@ -239,7 +250,11 @@ def test_random_tables_are_read_or_refused_in_a_sentence(tmp_path, one_sentence,
 def test_random_tables_that_cover_the_band_give_series(tmp_path, values, inner):
     frequency = [0.9, *sorted(inner)[: len(values) - 2], 201.0]
     file = written(tmp_path / "t.csv", "frequency [Hz], tan delta", frequency, values)
-    found = damping_of(case_of(loss_data=file), "CR")
+    try:
+        found = damping_of(case_of(loss_data=file), "CR")
+    except CaseError as error:
+        assert "branches misses it by" in str(error)
+        return
     assert min(found.prony.strengths) >= 0 and np.isfinite(found.fit.error).all()
     assert (found.prony.loss_factor(np.geomspace(1e-3, 1e5, 60)) >= 0).all()
 
