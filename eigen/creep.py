@@ -19,7 +19,7 @@ def creep_edge(pencil: CoupledPencil) -> float:
     A stiffness of which all relaxes creeps at the zeros of 1 + phi_g, the slowest of them left of -1/(tau_max (1 + sum
     of strengths)).
     """
-    if pencil.relaxation is None or not pencil.relaxation.strengths.any():
+    if pencil.relaxation is None:
         return -np.inf
     relaxation = pencil.relaxation
     return float(-CLEAR / (relaxation.times.max() * (1.0 + relaxation.strengths.sum(axis=1).max())))
