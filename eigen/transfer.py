@@ -12,6 +12,7 @@ import scipy.sparse.linalg as spla
 from .condensation import Workspace
 from .factorization import MumpsFactorization, SingularShiftError, StructureMatrices
 from .pencil import FLUID_PARTS, CoupledPencil
+from .relaxation import Relaxation
 
 
 class TransferBasis:
@@ -20,7 +21,8 @@ class TransferBasis:
     The space V holds the lowest modes of (K + K^T)/2 and M, and what they leave out
     statically: K^-1 G for the forces and K^-T J^T for the motions, compressed. The pencil
     projected on V keeps its form, with k in place of n unknowns, so everything of this
-    package works on it: H(lambda) = J (lambda^2 M + lambda C + K)^-1 G, leading modes, count.
+    package works on it: H(lambda) = J (lambda^2 M + lambda C + K)^-1 G, leading modes, count; what relaxes of the
+    stiffness is projected likewise.
 
     Parameters
     ----------
@@ -36,7 +38,7 @@ class TransferBasis:
     V : ndarray, shape (n, k)
         M-orthonormal.
     structural_frequencies : ndarray
-        Hz, of the undamped symmetric structure in vacuo (an unstable one counts as zero).
+        Hz, of the undamped symmetric structure in vacuo (an unstable one counts as zero), as stiff as it is there.
 
     Examples
     --------
@@ -53,7 +55,7 @@ class TransferBasis:
         self._G, self._J, self._M = pencil.G, pencil.J, pencil.M
         self._projected: dict[int, tuple[object, np.ndarray]] = {}
         values, vectors = _lowest_modes(pencil, modes)
-        self.structural_frequencies = _frequencies(values)
+        self.structural_frequencies = _frequencies(pencil, values, vectors)
         self.V = np.zeros((pencil.n, 0))
         self._extend(vectors)
         if pencil.m and self.V.shape[1] < pencil.n:
@@ -106,7 +108,7 @@ class TransferBasis:
         room = self.V.shape[0] - self.V.shape[1]
         self.V = np.hstack([self.V, X[:, ::-1][:, :room]])
         self._projected.clear()
-        self._structure = (None, None, None), None
+        self._structure = (None, None, None, None), None
         self._reduced_G = self.V.T @ self._G
         self._reduced_J = self._J @ self.V
 
@@ -133,14 +135,25 @@ class TransferBasis:
         """
         C = self.project(pencil.C) if damping is None else damping
         matrices = (self.project(pencil.M), C, self.project(pencil.K))
-        if not all(a is b for a, b in zip(matrices, self._structure[0])):
-            self._structure = matrices, CoupledPencil(*matrices, self._reduced_G, self._reduced_J)
+        known = (*matrices, pencil.relaxation)
+        if not all(a is b for a, b in zip(known, self._structure[0])):
+            structure = CoupledPencil(
+                *matrices, self._reduced_G, self._reduced_J, relaxation=self._relaxation(pencil.relaxation)
+            )
+            self._structure = known, structure
         return self._structure[1].replace(**{name: getattr(pencil, name) for name in FLUID_PARTS})
 
     def transfer(self, pencil: CoupledPencil, s: complex) -> np.ndarray:
-        """H(s) = J (s^2 M + s C + K)^-1 G on the basis, shape (m, m)."""
+        """H(s) = J (s^2 M + s C + K)^-1 G, with what relaxes, on the basis, shape (m, m)."""
         D = s * s * self.project(pencil.M) + s * self.project(pencil.C) + self.project(pencil.K)
+        if pencil.relaxation is not None:
+            D = D + sum(x * self.project(m) for x, m in zip(pencil.relaxation.factors(s), pencil.relaxing))
         return self._reduced_J @ np.linalg.solve(D, self._reduced_G)
+
+    def _relaxation(self, relaxation: Relaxation | None) -> Relaxation | None:
+        if relaxation is None:
+            return None
+        return Relaxation([self.project(m) for m in relaxation.matrices], relaxation.strengths, relaxation.times)
 
     def lift(self, vectors: np.ndarray) -> np.ndarray:
         """Full structural vectors from reduced ones, shape (n, j)."""
@@ -148,7 +161,8 @@ class TransferBasis:
 
 
 def lowest_frequencies(pencil: CoupledPencil, count: int, workspace: Workspace | None = None) -> np.ndarray:
-    """Lowest frequencies of the undamped symmetric structure in vacuo, (K + K^T)/2 and M.
+    """Lowest frequencies of the undamped symmetric structure in vacuo, (K + K^T)/2 and M; what relaxes of the stiffness
+    counts as stiff as it is at each.
 
     Parameters
     ----------
@@ -168,11 +182,19 @@ def lowest_frequencies(pencil: CoupledPencil, count: int, workspace: Workspace |
     >>> np.round(lowest_frequencies(pencil, 2), 6)
     array([1., 2.])
     """
-    return _frequencies(_lowest_modes(pencil, count, workspace)[0])
+    return _frequencies(pencil, *_lowest_modes(pencil, count, workspace))
 
 
-def _frequencies(squares):
-    return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+def _frequencies(pencil, squares, vectors, steps: int = 4):
+    """Hz, from the squares and modes of the slow stiffness."""
+    omega = np.sqrt(np.maximum(squares, 0.0))
+    if pencil.relaxation is not None:
+        parts = np.array([np.einsum("ik,ik->k", vectors, m @ vectors) for m in pencil.relaxing])
+        for _ in range(steps):
+            stiffer = squares + (pencil.relaxation.factors(1j * omega).real * parts).sum(axis=0)
+            omega = np.sqrt(np.maximum(stiffer, 0.0))
+        omega = np.sort(omega)
+    return omega / (2 * np.pi)
 
 
 def _lowest_modes(pencil, count, workspace=None):
