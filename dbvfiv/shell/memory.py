@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import CaseError
 from .energy import FIRST_ORDER
 from .kernel_memory import advance_branches, branch_works, hold_resultants, slow_resultants
 from .section import RUBBER
@@ -69,15 +70,15 @@ class WallMemory:
 
     Raises
     ------
-    ValueError
+    CaseError
         If the shell's metric has no compiled loops.
     """
 
     def __init__(self, shell: Shell, strengths: np.ndarray, times: np.ndarray):
         if shell.metric != FIRST_ORDER:
-            raise ValueError(
-                f"The wall relaxes, which runs in time have for the {FIRST_ORDER} metric of the shell alone, not for "
-                f"{shell.metric!r}."
+            raise CaseError(
+                f"shell.metric is {shell.metric!r}, but a wall that relaxes moves in time with {FIRST_ORDER!r} alone.",
+                "shell.metric",
             )
         self.shell, self.times = shell, np.asarray(times, float)
         self._group, self._time = (x.astype(np.int64) for x in np.nonzero(strengths))
