@@ -109,5 +109,5 @@ class Trial:
             load.force,
             load.psi,
             rate,
-            None if self.wall is None else self.motion.wall.advance(old.memory, old.q, self.q, self.h, self.scheme.now),
+            None if self.wall is None else self.motion.wall.advance(old.memory, self.q, self.h, self.scheme.now),
         )

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import CaseError
 from .energy import FIRST_ORDER
-from .kernel_memory import advance_branches, branch_works, hold_resultants, slow_resultants
+from .kernel_memory import advance_branches, hold_resultants, slow_resultants
 from .section import RUBBER
 from .shell import Shell, StepWall
 
@@ -55,8 +55,9 @@ class Memory:
 class WallMemory:
     """Branches of the groups of a shell's layers.
 
-    Energies: the work that a step does against a branch is that of its resultants in the step's equations, so a balance
-    with it leaves out nothing. What the branch holds of it is half its resultants times the strains of its spring,
+    Energies: the work that a step does against a branch is that of its resultants, weighed between both ends as forces
+    are in the step's equations, over the change of strains; so is that of the slow law of linear layers. What the
+    branch holds of it is half its resultants times the strains of its spring,
     which relax as the resultants do; the rest is dissipated. For linear layers that is the energy of the spring; for
     rubber, whose branches follow the stress rather than the strain, it is a convention.
 
@@ -133,20 +134,15 @@ class WallMemory:
         hold_resultants(memory.branches, memory.slow, kept[0], by_group, out)
         return StepWall(wall, out)
 
-    def advance(self, memory: Memory, old: np.ndarray, new: np.ndarray, h: float, now: float) -> Memory:
-        """Memory after a step of h, s, from positions old (n,) to new (n,); `now` weighs the new forces in its
-        equations.
-        """
+    def advance(self, memory: Memory, q: np.ndarray, h: float, now: float) -> Memory:
+        """Memory after a step of h, s, to positions q (n,); `now` is the weight of the new forces in its equations."""
         kept, gained, _, _ = self._over(h)
-        strain, slow = self.resultants(new)
+        strain, slow = self.resultants(q)
         branches, stretch = np.empty_like(memory.branches), np.empty_like(memory.stretch)
-        stored, area = np.zeros(self.groups), self.shell.geometry.area
+        work, area = np.zeros((2, self.groups)), self.shell.geometry.area
         before = (memory.branches, memory.stretch, memory.slow, slow, memory.strain, strain)
-        advance_branches(*before, self._group, self._time, kept, gained, area, branches, stretch, stored)
-        done = np.zeros(self.groups)
-        for q, held, share in ((old, memory.branches, 1.0 - now), (new, branches, now)):
-            if share:
-                self._add_work(q, new - old, held, share, done)
+        advance_branches(*before, self._group, self._time, kept, gained, now, area, branches, stretch, work)
+        done, stored = work
         loss = memory.loss + done - (stored - memory.stored)
         return Memory(branches, stretch, memory.work + done, loss, stored, strain, slow)
 
@@ -191,15 +187,6 @@ class WallMemory:
             factors = np.where(self._owner >= 0, 1.0 + by_group[self._owner], 1.0)
             self._factors[h] = kept, gained, by_group, self.shell.section.wall(factors)
         return self._factors[h]
-
-    def _add_work(self, q, way, branches, share, work) -> None:
-        shell = self.shell
-        nodal, nodal_way = shell.dofs.expand(q), shell.dofs.expand(way)
-        directors, slopes, _ = shell.directors(nodal)
-        turned = np.einsum("nri,nr->ni", slopes, nodal_way[:, 3:])
-        _, _, _, *maps, area, _ = shell._reference
-        where = (shell.mesh.quads, shell.mesh.nodes, nodal, directors, nodal_way, turned)
-        branch_works(*where, *maps, area, branches, self._group, share, work)
 
     def _stored(self, branches, stretch) -> np.ndarray:
         each = 0.5 * np.einsum("ep,epbi,epbi->b", self.shell.geometry.area, branches, stretch[:, :, self._time])
