@@ -20,10 +20,11 @@ import scipy.sparse as sp
 from ..case.model import Case
 from ..flow import RowAreas
 from ..geometry import ValveMesh
-from ..shell import Section
+from ..shell import Section, StepWall
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_flow, build_shell
 from .linear import CoupledFactor
+from .relaxing import WallRelaxation
 from .supports import lip_stops
 
 QUARTERS = 4
@@ -79,6 +80,7 @@ class ValveModel:
         self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
         self.loaded = loaded_share(self.mesh, case)
         self.flow = build_flow(case, self.mesh)
+        self.relaxation = WallRelaxation.of(self.shell.section)
         self._stop_slots = dofs.diagonal_slots[self.stops.unknowns]
 
     # -- layout
@@ -130,12 +132,16 @@ class ValveModel:
             pressure=p,
         )
 
-    def structure(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Internal force (n,) of shell and stops and values (nnz,) of their tangent."""
-        force, data = self.shell.force_and_tangent(q)
+    def structure(self, q: np.ndarray, step: StepWall | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Internal force (n,) of shell and stops and values (nnz,) of their tangent; `step` for a wall in motion."""
+        force, data = self.shell.force_and_tangent(q, step=step)
         force[self.stops.unknowns] += self.stops.force(q)
         data[self._stop_slots] += self.stops.tangent(q)
         return force, data
+
+    def relaxing_stiffness(self, q: np.ndarray) -> tuple[sp.csr_matrix, ...]:
+        """K_g (n, n): material part of the tangent of each group of `relaxation`."""
+        return tuple(self.shell.dofs.matrix(values) for values in self.shell.relaxing_tangents(q))
 
     def pressure_force(self, nodal: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Force (n,) of station pressures p (m,), Pa, on the deformed wall."""
