@@ -259,10 +259,11 @@ def count_unstable(reduced: ReducedFamily, conditions, hints) -> _Counts:
     cells = len(conditions)
     counts = _Counts(np.zeros(cells, int), np.zeros(cells, bool), np.zeros(cells), np.full(cells, np.inf))
     bands = np.array([reduced.family.reach(c).band for c in conditions])
-    damped = np.array([c.alpha != 0 or c.beta != 0 for c in conditions])
+    damped = np.array([any(c.damping) for c in conditions])
     whole = np.flatnonzero(np.isinf(bands) & damped)
     if whole.size:
-        found = phase_counts(reduced, [conditions[i] for i in whole], [hints[i][:2] for i in whole])
+        beside = [_beside(hints[i], conditions[i]) for i in whole]
+        found = phase_counts(reduced, [conditions[i] for i in whole], beside)
         counts.number[whole], counts.certain[whole] = found.number, found.certain
     for i in np.setdiff1d(np.arange(cells), whole):
         band = None if np.isinf(bands[i]) else INSIDE * bands[i] / (2 * np.pi)
@@ -270,6 +271,12 @@ def count_unstable(reduced: ReducedFamily, conditions, hints) -> _Counts:
         counts.number[i], counts.certain[i] = found.number, found.certain
         counts.line[i], counts.band[i] = found.line, found.band
     return counts
+
+
+def _beside(hints, condition: Condition):
+    """Those hints that a count looks beside: the leading ones, and all unstable ones where they cost nothing else."""
+    number = 2 if condition.loss == 0 else max(2, int((np.asarray(hints).real > 0).sum()) + 1)
+    return hints[:number]
 
 
 def _scale(reduced: ReducedFamily) -> float:

@@ -10,9 +10,14 @@ import numpy as np
 
 from .options import SearchOptions
 from .pencil import CoupledPencil
+from .relaxation import Relaxation
 
 #: Eigenvalues closer to the limit point than this share of it are not listed.
 CLEAR = 0.8
+#: Real eigenvalues are listed among the modes down to minus this share of the slowest rate of creep.
+CREEP = 0.1
+#: Share of its decay rate that the angular frequency of a mode has at least where a stiffness creeps.
+SWING = 0.1
 
 
 class Condition(NamedTuple):
@@ -27,12 +32,20 @@ class Condition(NamedTuple):
         Damping C = alpha M + beta D, 1/s and s.
     law : hashable
         Which coupling parts.
+    loss : float
+        Factor on the loss factors of the stiffness that relaxes; zero leaves it elastic.
     """
 
     inertia: float
     alpha: float
     beta: float
     law: Hashable = 0.0
+    loss: float = 0.0
+
+    @property
+    def damping(self) -> tuple[float, float, float]:
+        """What the structure alone depends on."""
+        return self.alpha, self.beta, self.loss
 
 
 class PencilFamily(ABC):
@@ -64,6 +77,12 @@ class PencilFamily(ABC):
     def search(self, condition: Condition) -> SearchOptions:
         """What is searched in the spectrum: limit point and band."""
 
+    def relaxation(self, loss: float) -> Relaxation | None:
+        """What relaxes under a factor on the loss factors: the same matrices for every factor, in one order, and the
+        same object for the same factor; None where nothing does.
+        """
+        return None
+
     def coupling_at(self, s: complex, condition: Condition):
         """A, B, R, S (s) with the inner unknowns scaled."""
         p, z = self.parts(condition.law), s * np.sqrt(condition.inertia)
@@ -79,14 +98,32 @@ class PencilFamily(ABC):
         options = self.search(condition)
         floor = -np.inf if options.limit_point is None else CLEAR * options.limit_point
         band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
-        return Reach(floor, band)
+        relaxation = self.relaxation(condition.loss)
+        return Reach(floor, band, -np.inf if relaxation is None else -CREEP * creep(relaxation))
+
+
+def creep(relaxation: Relaxation) -> float:
+    """Least rate at which a stiffness relaxes while its motion is held by forces, 1/s.
+
+    Left of minus it stand crowds of real eigenvalues, as many as unknowns for each relaxation time; they are no modes.
+    A part that relaxes by g_j at tau_j creeps at 1 / (tau_j (1 + g_j + ...)), the more slowly the stronger.
+    """
+    return float(1.0 / (relaxation.times.max(initial=0.0) * (1.0 + relaxation.strengths.sum(axis=1).max(initial=0.0))))
 
 
 class Reach(NamedTuple):
-    """Growth rates above `floor` (1/s) and angular frequencies up to `band` (rad/s)."""
+    """Growth rates above `floor` (1/s) and angular frequencies up to `band` (rad/s).
+
+    Left of `real` (1/s) what hardly swings does not count: it creeps and is no mode.
+    """
 
     floor: float
     band: float
+    real: float = -np.inf
+
+    def moving(self, values: np.ndarray) -> np.ndarray:
+        """Eigenvalues without those that creep."""
+        return values[(values.real > self.real) | (np.abs(values.imag) > SWING * np.abs(values.real))]
 
     def leading(self, values: np.ndarray) -> np.ndarray:
         """Eigenvalues of the upper half-plane in reach, sorted by growth rate.
@@ -94,6 +131,7 @@ class Reach(NamedTuple):
         Where none lies above the floor the largest of all is given, which then is close to the limit point.
         """
         upper = values[(values.imag >= 0) & (values.imag <= self.band)]
+        upper = self.moving(upper) if np.isfinite(self.real) else upper
         kept = upper[upper.real > self.floor]
         if not kept.size and upper.size:
             kept = upper[[int(np.argmax(upper.real))]]
