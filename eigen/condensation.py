@@ -37,7 +37,7 @@ class Workspace:
         self._loaded: CoupledPencil | None = None
 
     def structure(self, pencil: CoupledPencil) -> StructureMatrices:
-        """M, C, K of the pencil on the common pattern."""
+        """M, C, K and what relaxes of the pencil on the common pattern."""
         if self._loaded is pencil:
             return self._structure
         if self._structure is not None and (self._structure.fits(pencil) or self._structure.covers(pencil)):
@@ -61,7 +61,7 @@ class Workspace:
         return ShiftedPencil(pencil, self.structure(pencil), shift, self.factored(pencil, shift))
 
     def factored(self, pencil: CoupledPencil, shift: complex):
-        """LU of the structure alone at a shift, shift^2 M + shift C + K.
+        """LU of the structure alone at a shift, shift^2 M + shift C + K and what relaxes.
 
         Raises
         ------
@@ -90,7 +90,7 @@ class ShiftedPencil:
     structure : StructureMatrices
     shift : complex
     factor : object with solve, solve_transposed
-        LU of sigma^2 M + sigma C + K.
+        LU of the structure, sigma^2 M + sigma C + K and what relaxes.
 
     Raises
     ------
@@ -170,7 +170,7 @@ class ShiftedPencil:
         probe = np.cos(1.0 + np.arange(n) ** 1.5)
         q = self.factor.solve(probe)
         p, s = self.pencil, self.shift
-        terms = [s * s * real_apply(p.M, q), s * real_apply(p.C, q), real_apply(p.K, q)]
+        terms = [s * s * real_apply(p.M, q), s * real_apply(p.C, q), real_apply(p.K, q), *p.relaxed(s, q)]
         error = np.linalg.norm(sum(terms) - probe)
         size = np.linalg.norm(probe)
         # on an eigenvalue the right-hand side is lost in a solution blown up along the eigenvector

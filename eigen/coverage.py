@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .pairs import Found
-from .region import Oval, SearchedRegion
+from .region import Oval
 
 CLEAR = 0.8  # what counts as clearly right of a limit point of eigenvalues, as a fraction of it
 DEPTH = 0.4  # growth rate over angular frequency, down to which a band is searched at most
@@ -21,11 +21,11 @@ def number_in_band(found, options) -> int:
     return int(np.sum(found.values.imag <= band_sought(options)))
 
 
-def would_do(values, shift, reach, aim, options) -> bool:
-    """Whether eigenvalues that have converged at a first shift are all that is asked for."""
+def would_do(values, oval: Oval, found, aim, options) -> bool:
+    """Whether eigenvalues that have converged in an oval are all that is asked for."""
     apart = values[apart_from_limit(values, options) & (values.imag >= -1e-11 * np.abs(values))]
-    trial = Found(apart, *(np.zeros(0),) * 4)
-    trial.ovals[shift] = Oval(shift, reach, False)
+    trial = Found(apart, *(np.zeros(0),) * 4, lowest=found.lowest, slope=found.slope)
+    trial.ovals[oval.shift] = oval
     return is_covered(trial, aim, options)
 
 
@@ -62,7 +62,7 @@ def leading_band(found, aim, options) -> tuple[float, float]:
 
 def _widest_covered(found, aim) -> tuple[float, float] | None:
     """The widest band whose leading modes the region covers, with the growth rate of the last."""
-    region = SearchedRegion(tuple(found.ovals.values()))
+    region = found.region
     tops = np.unique(found.values.imag)[::-1]
     for band in tops[:: max(1, tops.size // 60)]:
         growth = np.sort(found.values.real[found.values.imag <= band])[::-1]
@@ -80,10 +80,10 @@ def is_covered(found, aim, options) -> bool:
         return True
     growth, band = leading_band(found, aim, options)
     if options.limit_point is not None:
-        low, high = SearchedRegion(tuple(found.ovals.values())).complete_between(band)
+        low, high = found.region.complete_between(band)
         return low <= growth and high > 0
     inside = found.values.imag <= band * (1 + 1e-12)
-    low, high = SearchedRegion(tuple(found.ovals.values())).complete_between(band)
+    low, high = found.region.complete_between(band)
     if inside.sum() < aim:
         # a band may hold fewer: enough if it is searched down to strongly damped modes
         return options.max_frequency is not None and low <= -DEPTH * band and high > 0

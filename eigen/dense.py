@@ -22,15 +22,16 @@ def all_pairs(pencil: CoupledPencil, *, left: bool):
     """
     F, E, unit, row, col = _scaled(pencil)
     n = pencil.n
+    inner = slice(2 * n, 2 * n + pencil.b)
     values, right, conjugate_left = _standard(F, E, left)
     if values is None:
         values, right, conjugate_left = _general(F, E, left)
     keep = values.imag >= 0
     values, x = values[keep] * unit, right[:, keep] * col[:, None]
     if not left:
-        return values, x[:n], x[2 * n :], None, None
+        return values, x[:n], x[inner], None, None
     z = conjugate_left[:, keep] * row[:, None]
-    return values, x[:n], x[2 * n :], z[n : 2 * n], z[2 * n :]
+    return values, x[:n], x[inner], z[n : 2 * n], z[inner]
 
 
 def all_eigenvalues(pencil: CoupledPencil) -> np.ndarray:

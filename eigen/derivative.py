@@ -17,7 +17,8 @@ class PencilDerivative:
     """Derivatives of the parts of a pencil; a missing part does not depend on the parameter.
 
     M, C, K, G, J may be matrices or callables that apply the derivative to a complex vector;
-    the parts of the fluid are arrays.
+    the parts of the fluid are arrays. Of what relaxes: `strengths` (g, j), `times` (j,) and `relaxing`, one matrix or
+    callable for each K_g.
     """
 
     M: object | Callable | None = None
@@ -35,6 +36,9 @@ class PencilDerivative:
     R2: np.ndarray | None = None
     S0: np.ndarray | None = None
     S1: np.ndarray | None = None
+    strengths: np.ndarray | None = None
+    times: np.ndarray | None = None
+    relaxing: tuple | None = None
 
 
 def eigenvalue_derivative(pencil: CoupledPencil, mode: Mode, change: PencilDerivative) -> complex:
@@ -55,7 +59,7 @@ def eigenvalue_derivative(pencil: CoupledPencil, mode: Mode, change: PencilDeriv
     Raises
     ------
     ValueError
-        If the mode has no left vector or the eigenvalue is defective.
+        If the mode has no left vector, the eigenvalue is defective, or what relaxes changes in a pencil without.
 
     Examples
     --------
@@ -76,6 +80,7 @@ def eigenvalue_derivative(pencil: CoupledPencil, mode: Mode, change: PencilDeriv
     if abs(below) == 0.0:
         raise ValueError("The eigenvalue is defective; it has no derivative.")
     f, g = _changed(pencil, mode, change)
+    f = f + _relaxation_changed(pencil, mode, change)
     return complex(-(np.vdot(mode.left_q, f) + np.vdot(mode.left_u, g)) / below)
 
 
@@ -115,7 +120,31 @@ def _changed(pencil, mode, change):
     return f, g
 
 
+def _relaxation_changed(pencil, mode, change):
+    """What a change of the relaxation adds to the first row of (dT) x."""
+    if change.strengths is None and change.times is None and change.relaxing is None:
+        return 0.0
+    known, s, q = pencil.relaxation, mode.eigenvalue, mode.q
+    if known is None:
+        raise ValueError("The derivative by a relaxation needs a pencil that relaxes.")
+    factor = np.zeros(len(known.matrices), complex)
+    below = 1.0 + s * known.times
+    if change.strengths is not None:
+        factor += np.asarray(change.strengths) @ (s * known.times / below)
+    if change.times is not None:
+        factor += known.strengths @ (s * np.asarray(change.times) / below**2)
+    f = sum(x * real_apply(matrix, q) for x, matrix in zip(factor, known.matrices))
+    for x, part in zip(known.factors(s), change.relaxing or ()):
+        f = f + x * (part(q) if callable(part) else part @ q)
+    return f
+
+
 def difference(first: CoupledPencil, second: CoupledPencil, step: float) -> PencilDerivative:
-    """Derivative from two pencils a step apart."""
+    """Derivative from two pencils a step apart, whose relaxations, if any, have as many parts and times."""
     names = ("M", "C", "K", "G", "J") + FLUID_PARTS
-    return PencilDerivative(**{name: (getattr(second, name) - getattr(first, name)) / step for name in names})
+    parts = {name: (getattr(second, name) - getattr(first, name)) / step for name in names}
+    if first.relaxation is not None and second.relaxation is not None:
+        a, b = first.relaxation, second.relaxation
+        parts |= {"strengths": (b.strengths - a.strengths) / step, "times": (b.times - a.times) / step}
+        parts["relaxing"] = tuple((y - x) / step for x, y in zip(a.matrices, b.matrices))
+    return PencilDerivative(**parts)

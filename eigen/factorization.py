@@ -1,4 +1,4 @@
-"""Sparse LU of sigma^2 M + sigma C + K: MUMPS through PETSc, SuperLU where PETSc cannot.
+"""Sparse LU of sigma^2 M + sigma C + K, and what relaxes: MUMPS through PETSc, SuperLU where PETSc cannot.
 
 PETSc is built with either real or complex numbers. Real shifts always go to MUMPS. A
 complex shift goes to MUMPS where PETSc is complex and to SciPy's SuperLU where it is real:
@@ -22,7 +22,7 @@ class SingularShiftError(ArithmeticError):
 
 
 class StructureMatrices:
-    """M, C, K of pencils on one common sparsity pattern, so that sums cost no symbolic work.
+    """M, C, K and what relaxes of pencils on one common sparsity pattern, so that sums cost no symbolic work.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class StructureMatrices:
     """
 
     def __init__(self, pencil: CoupledPencil):
-        parts = (pencil.M, pencil.C, pencil.K)
+        parts = _parts(pencil)
         self._sources = None
         self.shape = pencil.M.shape
         pattern = sum(sp.csr_matrix((np.ones(p.nnz), p.indices, p.indptr), p.shape) for p in parts)
@@ -48,8 +48,11 @@ class StructureMatrices:
 
     def fits(self, pencil: CoupledPencil) -> bool:
         """Whether a pencil has the very pattern of the one this was made for."""
-        return self._sources is not None and all(
-            _same_pattern(p, *old) for p, old in zip((pencil.M, pencil.C, pencil.K), self._sources)
+        parts = _parts(pencil)
+        return (
+            self._sources is not None
+            and len(parts) == len(self._sources)
+            and all(_same_pattern(p, *old) for p, old in zip(parts, self._sources))
         )
 
     def covers(self, pencil: CoupledPencil) -> bool:
@@ -57,7 +60,7 @@ class StructureMatrices:
         if pencil.M.shape != self.shape:
             return False
         keys = _keys(self.indptr, self.indices, self.shape[1])
-        for part in (pencil.M, pencil.C, pencil.K):
+        for part in _parts(pencil):
             wanted = _keys(part.indptr, part.indices, self.shape[1])
             place = np.searchsorted(keys, wanted)
             if not (place < keys.size).all() or not np.array_equal(keys[place], wanted):
@@ -66,19 +69,23 @@ class StructureMatrices:
 
     def load(self, pencil: CoupledPencil) -> None:
         """Take the numbers of a pencil whose entries lie on the common pattern."""
-        parts = (pencil.M, pencil.C, pencil.K)
+        parts = _parts(pencil)
+        self._relaxation = pencil.relaxation
         if not self.fits(pencil):
             keys = _keys(self.indptr, self.indices, self.shape[1])
             self._places = [np.searchsorted(keys, _keys(p.indptr, p.indices, self.shape[1])) for p in parts]
             self._sources = [(p.indptr, p.indices) for p in parts]
-        self.data = np.zeros((3, self.indices.size))
+        self.data = np.zeros((len(parts), self.indices.size))
         for row, place, part in zip(self.data, self._places, parts):
             row[place] = part.data
 
     def values(self, s: complex) -> np.ndarray:
-        """Entries of s^2 M + s C + K on the common pattern; real for a real s."""
+        """Entries of s^2 M + s C + K + sum phi_g(s) K_g on the common pattern; real for a real s."""
         s = _real_if_real(s)
-        return s * s * self.data[0] + s * self.data[1] + self.data[2]
+        values = s * s * self.data[0] + s * self.data[1] + self.data[2]
+        if self._relaxation is not None:
+            values = values + self._relaxation.factors(s) @ self.data[3:]
+        return values
 
     def combine(self, m: complex, c: complex, k: complex) -> sp.csr_matrix:
         """m M + c C + k K as a matrix that shares the pattern."""
@@ -334,6 +341,10 @@ def _permutation_sign(permutation: np.ndarray) -> int:
     graph = sp.csr_matrix((np.ones(size, np.int8), (np.arange(size), permutation)), (size, size))
     cycles = sp.csgraph.connected_components(graph, directed=False, return_labels=False)
     return 1 if (size - cycles) % 2 == 0 else -1
+
+
+def _parts(pencil):
+    return (pencil.M, pencil.C, pencil.K, *pencil.relaxing)
 
 
 def _keys(indptr, indices, width):

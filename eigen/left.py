@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .compact import oscillating_pairs
 from .condensation import ShiftedPencil, Workspace
 from .factorization import SingularShiftError
 from .krylov import near_shift
@@ -20,14 +21,16 @@ def attach_left(
     k = batch.values.size
     batch.left_q = np.zeros((pencil.n, k), complex)
     batch.left_u = np.zeros((pencil.b, k), complex)
-    pairs = near_shift(
-        shifted,
-        wanted,
-        tolerance=tolerance,
-        transposed=True,
-        limit_point=limit_point,
-        enough=lambda values, _: _all_there(batch, values),
-    )
+
+    def enough(values, _reach):
+        return _all_there(batch, values)
+
+    if pencil.relaxation is not None:
+        pairs = oscillating_pairs(shifted, transposed=True, enough=enough)
+    else:
+        pairs = near_shift(
+            shifted, wanted, tolerance=tolerance, transposed=True, limit_point=limit_point, enough=enough
+        )
     found.applications += pairs.applications
     free = np.ones(pairs.eigenvalues.size, bool)
     workspace = Workspace()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .condensation import Workspace
-from .region import Oval
+from .region import Oval, SearchedRegion
 from .residual import Residuals, acceptable, balanced, derivative_times, newton, preferable
 
 SAME = 1e-6  # relative distance below which two shifts are taken to have found one eigenvalue
@@ -32,7 +32,14 @@ class Found:
     refined: int = 0
     rejected: int = 0
     limited: bool = False
+    lowest: float = 0.0
+    slope: float = np.inf
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def region(self) -> SearchedRegion:
+        """Where all were found."""
+        return SearchedRegion(tuple(self.ovals.values()), self.everything, self.lowest, self.slope)
 
     def note(self, sentence: str) -> None:
         """Add a sentence once."""

@@ -188,10 +188,15 @@ class CoupledPencil:
             -real_apply(self.G, motion),
             -real_apply(self.G, inner),
         ]
-        if self.relaxation is not None:
-            structure += [x * real_apply(m, q) for x, m in zip(self.relaxation.factors(s), self.relaxing)]
+        structure += self.relaxed(s, q)
         fluid = [self.R0 @ y, s * (self.R1 @ y), s**2 * (self.R2 @ y), self.S0 @ U, s * (self.S1 @ U)]
         return structure, fluid
+
+    def relaxed(self, s: complex, q: np.ndarray) -> list[np.ndarray]:
+        """phi_g(s) K_g q of each part of the stiffness that relaxes; shapes as in `terms`."""
+        if self.relaxation is None:
+            return []
+        return [x * real_apply(matrix, q) for x, matrix in zip(self.relaxation.factors(s), self.relaxing)]
 
     def first_order(self) -> tuple[np.ndarray, np.ndarray]:
         """Dense F, E with F x = lambda E x, x = (q, lambda q, U, z); for small pencils.

@@ -1,4 +1,4 @@
-"""Products of left and right vectors of a quadratic pencil."""
+"""Products of left and right vectors of a pencil."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ def coupling_of_modes(pencil: CoupledPencil, left_values, left_q, left_u, right_
     r"""w_i^H [T(l_i) - T(l_j)] / (l_i - l_j) x_j, the product in which modes are orthogonal.
 
     For a quadratic pencil this is w^H [(l_i + l_j) M' + C'] x with M', C' the coefficients of
-    lambda^2 and lambda of the full pencil; on the diagonal it is w^H T'(l) x.
+    lambda^2 and lambda of the full pencil; on the diagonal it is w^H T'(l) x. What relaxes adds the
+    divided differences of its factors.
 
     Returns
     -------
@@ -23,4 +24,9 @@ def coupling_of_modes(pencil: CoupledPencil, left_values, left_q, left_u, right_
     wh, Wh = left_q.conj().T, left_u.conj().T
     inertia = wh @ real_apply(p.M, right_q) - wg @ (p.A2 @ y) + Wh @ (p.R2 @ y)
     damping = wh @ real_apply(p.C, right_q) - wg @ (p.A1 @ y + p.B1 @ right_u) + Wh @ (p.R1 @ y + p.S1 @ right_u)
-    return (np.asarray(left_values)[:, None] + np.asarray(right_values)) * inertia + damping
+    first, second = np.asarray(left_values)[:, None], np.asarray(right_values)
+    table = (first + second) * inertia + damping
+    if p.relaxation is not None:
+        for quotient, matrix in zip(p.relaxation.quotients(first, second), p.relaxing):
+            table = table + quotient * (wh @ real_apply(matrix, right_q))
+    return table

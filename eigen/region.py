@@ -11,9 +11,9 @@ import numpy as np
 class Oval:
     """Where a Krylov search at one shift has found every eigenvalue.
 
-    A real shift gives a disc. A complex shift in real arithmetic gives the Cassini oval
-    |lambda - shift| |lambda - conj(shift)| <= reach^2; in complex arithmetic a disc and its
-    mirror image.
+    A real shift gives a disc; of a pencil that relaxes one that touches the real axis at the shift, given with its
+    centre shift + i reach in place of the shift, and its mirror image. A complex shift in real arithmetic gives the
+    Cassini oval |lambda - shift| |lambda - conj(shift)| <= reach^2; in complex arithmetic a disc and its mirror image.
 
     Attributes
     ----------
@@ -54,10 +54,17 @@ class SearchedRegion:
     ovals : tuple of Oval
     everything : bool
         True if all eigenvalues of the pencil were found.
+    lowest : float
+        Angular frequency, rad/s, below which `complete_between` does not look: real eigenvalues crowd there where the
+        stiffness relaxes.
+    slope : float
+        Decay over angular frequency beyond which it does not look either.
     """
 
     ovals: tuple[Oval, ...] = ()
     everything: bool = False
+    lowest: float = 0.0
+    slope: float = np.inf
 
     def contains(self, eigenvalue: complex) -> bool:
         """Whether every eigenvalue at this place would have been found."""
@@ -74,15 +81,15 @@ class SearchedRegion:
         Returns
         -------
         low, high : float
-            Every eigenvalue with low <= growth rate <= high and |frequency| <= band was
-            found. (inf, -inf) if there is no such strip. To the right of `high` only an
-            independent count can tell.
+            Every eigenvalue with low <= growth rate <= high and |frequency| <= band, within what
+            `lowest` and `slope` leave, was found. (inf, -inf) if there is no such strip. To the right of `high` only
+            an independent count can tell.
         """
         if self.everything:
             return -np.inf, np.inf
         if not self.ovals:
             return np.inf, -np.inf
-        omega = np.linspace(0.0, band, samples)
+        omega = np.linspace(self.lowest, max(band, self.lowest), samples)
         pieces = np.stack([o.interval(omega) for o in self.ovals])  # (ovals, samples, 2)
         seed = max(o.shift.real for o in self.ovals)
         low, high = np.full(samples, seed), np.full(samples, seed)
@@ -95,4 +102,6 @@ class SearchedRegion:
                 high = np.where(joins, np.maximum(high, end), high)
         if not inside.all():
             return np.inf, -np.inf
+        if np.isfinite(self.slope):
+            low = np.where(low <= -self.slope * omega, -np.inf, low)
         return float(low.max()), float(high.min())

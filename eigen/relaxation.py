@@ -78,6 +78,21 @@ class Relaxation:
         times = self.times.reshape((-1,) + (1,) * np.broadcast(a, b).ndim)
         return np.tensordot(self.strengths, times / ((1.0 + a * times) * (1.0 + b * times)), 1)
 
+    def beside(self, line: float) -> tuple[np.ndarray, Relaxation]:
+        """phi_g(line) and the relaxation in z = s - line: phi_g(s) = phi_g(line) + what relaxes with z.
+
+        Raises
+        ------
+        ValueError
+            If the line does not lie right of all poles -1/tau_j.
+        """
+        below = 1.0 + line * self.times
+        if not (below > 0).all():
+            raise ValueError(
+                f"A growth rate of {line:.6g} 1/s lies left of the creep at {-1 / self.times.max():.6g} 1/s."
+            )
+        return self.factors(line), self.replace(self.strengths / below, self.times / below)
+
     def replace(self, strengths, times=None) -> Relaxation:
         """The same matrices with other strengths and, where given, times."""
         return Relaxation(self.matrices, strengths, self.times if times is None else times)

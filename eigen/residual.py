@@ -33,6 +33,7 @@ class Residuals:
             "M": _norm(p.M),
             "C": _norm(p.C),
             "K": _norm(p.K),
+            "relaxing": [_norm(matrix) for matrix in p.relaxing],
             "A": [coupling * np.linalg.norm(a) for a in (p.A0, p.A1, p.A2)],
             "B": [_norm(p.G) * np.linalg.norm(a) for a in (p.B0, p.B1)],
         }
@@ -68,7 +69,10 @@ class Residuals:
         a = np.abs(s)
         size_q, size_u = np.linalg.norm(q, axis=0), np.linalg.norm(u, axis=0)
         n = self._norms
-        full = (a**2 * n["M"] + a * n["C"] + n["K"] + sum(a**k * x for k, x in enumerate(n["A"]))) * size_q + sum(
+        stiffness = n["K"]
+        if self.pencil.relaxation is not None:
+            stiffness = stiffness + np.array(n["relaxing"]) @ np.abs(self.pencil.relaxation.factors(s))
+        full = (a**2 * n["M"] + a * n["C"] + stiffness + sum(a**k * x for k, x in enumerate(n["A"]))) * size_q + sum(
             a**k * x for k, x in enumerate(n["B"])
         ) * size_u
         residual, backward = _ratio(left, terms), _ratio(left, full)
@@ -179,6 +183,8 @@ def derivative_times(pencil: CoupledPencil, s: complex, q, u):
         + real_apply(pencil.C, q)
         - real_apply(pencil.G, pencil.A1 @ y + 2 * s * (pencil.A2 @ y) + pencil.B1 @ u)
     )
+    if pencil.relaxation is not None:
+        f = f + sum(x * real_apply(m, q) for x, m in zip(pencil.relaxation.slopes(s), pencil.relaxing))
     g = pencil.R1 @ y + 2 * s * (pencil.R2 @ y) + pencil.S1 @ u
     return f, g
 

@@ -2,8 +2,10 @@
 
 det T(s) / det D_ref(s) with D_ref = s^2 M + s C_ref + K_ref, where M, C_ref, K_ref are
 symmetric and positive definite, so that D_ref has no zero on or right of the line (Kelvin,
-Tait, Chetaev). The ratio has no pole there and tends to a known power of s at infinity; its
-zeros right of the line are the eigenvalues counted, the structure's own among them.
+Tait, Chetaev). What relaxes of the stiffness is part of D_ref where its matrices are symmetric and
+not negative: springs and dashpots take energy out, and their poles lie left of the line. The ratio
+has no pole there and tends to a known power of s at infinity; its zeros right of
+the line are the eigenvalues counted, the structure's own among them.
 """
 
 from __future__ import annotations
@@ -68,6 +70,10 @@ class Determinant:
         # (g + z)^2 M + (g + z) C + K = z^2 M + z (C + 2 g M) + (K + g C + g^2 M)
         damping = (p.C + 2 * g * p.M).tocsr()
         stiffness = (p.K + g * p.C + g * g * p.M).tocsr()
+        slow, self._relaxation = [], None
+        if p.relaxation is not None:
+            slow, self._relaxation = p.relaxation.beside(g)
+            stiffness = (stiffness + sum(x * m for x, m in zip(slow, p.relaxing))).tocsr()
         symmetric = [((x + x.T) * 0.5).tocsr() for x in (damping, stiffness)]
         unit = abs(p.M).max()
         shifts = []
@@ -82,16 +88,22 @@ class Determinant:
                 raise ValueError("No stable reference structure was found for the count.")
         self._reference = tuple((part + shift * p.M).tocsr() for part, shift in zip(symmetric, shifts))
         difference = max(_gap(damping, self._reference[0]), _gap(stiffness, self._reference[1]))
+        if self._relaxation is not None:
+            passive = all(_is_passive(matrix, p.M) for matrix in p.relaxing)
+            difference = difference if passive else np.inf
+            self._relaxation = self._relaxation if passive else None
         self.structure_is_reference = difference < 1e-14
         if self._dense:
             self._parts = [x.toarray() for x in (p.M, p.C, p.K, *self._reference)]
+            self._relaxing = np.array([x.toarray() for x in p.relaxing]).reshape(-1, p.n, p.n)
             self._G, self._J = p.G.toarray(), p.J.toarray()
-            self._modes = _StructureModes.of(*self._parts[:3], self._G, self._J) if p.n <= _MODAL_BELOW else None
+            modal = p.n <= _MODAL_BELOW and p.relaxation is None
+            self._modes = _StructureModes.of(*self._parts[:3], self._G, self._J) if modal else None
             return
         self._structure = StructureMatrices(p)
         self._factor = SuperluFactorization(self._structure)
         if not self.structure_is_reference:
-            twin = CoupledPencil(M=p.M, C=self._reference[0], K=self._reference[1])
+            twin = CoupledPencil(M=p.M, C=self._reference[0], K=self._reference[1], relaxation=self._relaxation)
             self._twin = StructureMatrices(twin)
             self._twin_factor = SuperluFactorization(self._twin)
 
@@ -126,10 +138,13 @@ class Determinant:
     def reference_zeros(self) -> np.ndarray:
         """Eigenvalues of the reference in the upper half-plane, relative to the line.
 
-        All of them for a dense pencil; none are computed for a sparse one.
+        All of them for a dense pencil, estimated mode by mode where the stiffness relaxes; none are computed for a
+        sparse one.
         """
         if not self._dense:
             return np.zeros(0, complex)
+        if self._relaxation is not None:
+            return _relaxed_zeros(*(self._parts[i] for i in (0, 3, 4)), self._relaxing, self._relaxation)
         values = self._every_reference_zero
         return values[values.imag > 0]
 
@@ -172,12 +187,17 @@ class Determinant:
             return H, total - np.log(z[:, None] - self._every_reference_zero).sum(axis=1)
         s = (self.line + z)[:, None, None]
         M, C, K, Cr, Kr = self._parts
-        D = s * s * M + s * C + K
+        D = s * s * M + s * C + K + self._relaxed(self.pencil.relaxation, self.line + z)
         H = self._J @ np.linalg.solve(D, self._G[None].astype(complex))
         if self.structure_is_reference:
             return H, np.zeros(z.size)
+        reference = self._relaxed(self._relaxation, z)
         z = z[:, None, None]
-        return H, _log_determinant(D) - _log_determinant(z * z * M + z * Cr + Kr)
+        return H, _log_determinant(D) - _log_determinant(z * z * M + z * Cr + Kr + reference)
+
+    def _relaxed(self, relaxation, s):
+        """sum phi_g K_g at a stack of places, shape (k, n, n); zero where nothing relaxes."""
+        return 0.0 if relaxation is None else np.tensordot(relaxation.factors(s).T, self._relaxing, 1)
 
     def _sparse_structure_at(self, z):
         p, s = self.pencil, self.line + z
@@ -224,6 +244,33 @@ class _StructureModes:
 def _first_order(M, C, K):
     n = M.shape[0]
     return np.block([[np.zeros((n, n)), np.eye(n)], [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]])
+
+
+def _is_passive(matrix, mass) -> bool:
+    """Whether a relaxing stiffness is symmetric and not negative."""
+    size = abs(matrix).max() if matrix.nnz else 0.0
+    if not size:
+        return True
+    if _gap(matrix, matrix.T) > 1e-12:
+        return False
+    return is_positive_definite(matrix + 1e-9 * size / abs(mass).max() * mass)
+
+
+def _relaxed_zeros(M, C, K, relaxing, relaxation, steps: int = 12):
+    """Estimates of the oscillating zeros of a symmetric structure that relaxes, one equation for each mode."""
+    fast = np.tensordot(relaxation.strengths.sum(axis=1), relaxing, 1)
+    squares, X = la.eigh(K + fast, M)
+    damping, slow = (np.einsum("ik,ij,jk->k", X, part, X) for part in (C, K))
+    parts = np.einsum("ik,gij,jk->gk", X, relaxing, X)
+    values = 1j * np.sqrt(np.maximum(squares, 0.0))
+    for _ in range(steps):
+        stiffness = slow + (relaxation.factors(values) * parts).sum(axis=0)
+        values = (
+            -0.5 * damping
+            + 1j * np.sqrt(np.maximum((stiffness - 0.25 * damping**2).real, 0.0))
+            - 0.5 * (stiffness.imag / np.where(values.imag > 0, values.imag, 1.0))
+        )
+    return values[values.imag > 0]
 
 
 def _log_determinant(stack) -> np.ndarray:

@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from .compact import oscillating_pairs
 from .condensation import Workspace
 from .coverage import CLEAR, apart_from_limit, band_sought, is_covered, leading_band, number_in_band, would_do
+from .creep import apart_from_creep
 from .dense import all_pairs
 from .factorization import SingularShiftError, petsc_is_complex
 from .krylov import near_shift
@@ -15,8 +17,8 @@ from .left import attach_left, biorthogonalise
 from .options import SearchOptions
 from .pairs import Found, empty, merge, polish, refine, upper_half, verified
 from .pencil import CoupledPencil
-from .region import Oval, SearchedRegion
-from .shifts import next_shift, plan_shifts
+from .region import Oval
+from .shifts import SLOPE, lowest_sought, next_shift, plan_shifts
 from .spectrum import Spectrum
 
 
@@ -70,6 +72,8 @@ def leading_modes(
 
 def _search(pencil, count, options, workspace, first) -> Found:
     found = empty(pencil, options.left)
+    if pencil.relaxation is not None:
+        found.lowest, found.slope = lowest_sought(pencil, count, options, workspace), SLOPE
     aim = max(count, options.least)
     pairs = min(int(2.4 * aim) + 4, options.max_pairs)
     given = options.shifts is not None
@@ -98,16 +102,26 @@ def _search(pencil, count, options, workspace, first) -> Found:
 
 def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
     """Search near one shift and merge; returns the number of eigenvalues that converged."""
+    relaxing = pencil.relaxation is not None
 
     def enough(values, reach):
-        return not found.shifts and would_do(values, shift, reach, aim, options)
+        return (relaxing or not found.shifts) and would_do(values, _oval(shift, reach, relaxing), found, aim, options)
 
-    shift, shifted, pairs = _clear_of_eigenvalues(
-        pencil, shift, wanted, options, workspace, found, None if options.shifts else enough
-    )
+    def search(shifted):
+        if relaxing:
+            return oscillating_pairs(shifted, band=band_sought(options), enough=enough)
+        return near_shift(
+            shifted,
+            wanted,
+            tolerance=options.krylov_tolerance,
+            limit_point=options.limit_point,
+            enough=None if options.shifts else enough,
+        )
+
+    shift, shifted, pairs = _clear_of_eigenvalues(pencil, shift, workspace, found, search)
     found.shifts.append(shift)
     found.applications += pairs.applications
-    apart = apart_from_limit(pairs.eigenvalues, options)
+    apart = apart_from_limit(pairs.eigenvalues, options) & apart_from_creep(pencil, pairs.eigenvalues)
     batch = verified(
         pencil, *upper_half(pairs.eigenvalues[apart], pairs.vectors_q[:, apart], pairs.vectors_u[:, apart])
     )
@@ -116,17 +130,33 @@ def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
     if options.left:
         attach_left(pencil, shifted, batch, wanted, options.krylov_tolerance, found, options.limit_point)
     merge(found, batch)
-    paired = isinstance(shift, complex) and not petsc_is_complex()
-    mirror = np.conj(shift) if paired else shift
-    reach = min([pairs.reach * (1 + 1e-9)] + [(1 - 1e-6) * np.sqrt(abs(d - shift) * abs(d - mirror)) for d in dropped])
+    reach = min([pairs.reach * (1 + 1e-9)] + [(1 - 1e-6) * _reach_to(d, shift, relaxing) for d in dropped])
     if reach > 0:
-        found.ovals[shift] = Oval(shift, reach, paired)
+        found.ovals[shift] = _oval(shift, reach, relaxing)
     found.limited = bool(dropped.size)
     found.everything = found.everything or (pairs.exhausted and not dropped.size)
-    return pairs.eigenvalues.size
+    return 0 if relaxing else pairs.eigenvalues.size
 
 
-def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found, enough):
+def _oval(shift, reach, relaxing) -> Oval:
+    """Where all eigenvalues are known after a search at a shift."""
+    if relaxing:
+        return Oval(shift if isinstance(shift, complex) else complex(shift, reach), reach, False)
+    return Oval(shift, reach, isinstance(shift, complex) and not petsc_is_complex())
+
+
+def _reach_to(place, shift, relaxing) -> float:
+    """Reach of the oval that ends at a place."""
+    distance = abs(place - shift)
+    if relaxing:
+        # the disc that touches the real axis at the shift
+        high = abs(np.imag(place))
+        return distance if isinstance(shift, complex) else distance**2 / (2 * high) if high else np.inf
+    paired = isinstance(shift, complex) and not petsc_is_complex()
+    return np.sqrt(distance * abs(place - (np.conj(shift) if paired else shift)))
+
+
+def _clear_of_eigenvalues(pencil, shift, workspace, found, search):
     """Factor at the shift, moved aside if it sits on an eigenvalue."""
     shift = complex(shift)
     shift = shift.real if shift.imag == 0.0 else shift
@@ -137,9 +167,7 @@ def _clear_of_eigenvalues(pencil, shift, wanted, options, workspace, found, enou
             shifted = workspace.shifted(pencil, moved)
         except SingularShiftError:
             continue
-        pairs = near_shift(
-            shifted, wanted, tolerance=options.krylov_tolerance, limit_point=options.limit_point, enough=enough
-        )
+        pairs = search(shifted)
         nearest = np.abs(pairs.eigenvalues - moved).min(initial=np.inf)
         if nearest > 1e-9 * unit:
             if attempt:
@@ -154,6 +182,9 @@ def _dense(pencil, count, options, workspace) -> Found:
     """Every eigenvalue at once, verified and refined like any other."""
     values, q, u, w, W = all_pairs(pencil, left=options.left)
     found = empty(pencil, options.left)
+    if pencil.relaxation is not None:
+        apart = apart_from_creep(pencil, values)
+        values, q, u, w, W = (None if a is None else a[..., apart] for a in (values, q, u, w, W))
     batch = verified(pencil, values, q, u)
     if options.left:
         batch.left_q, batch.left_u = w, W
@@ -168,7 +199,7 @@ def _dense(pencil, count, options, workspace) -> Found:
 
 def _result(pencil, found: Found, count, options) -> Spectrum:
     """Sort, cut to the number asked for, and say what is certified."""
-    region = SearchedRegion(tuple(found.ovals.values()), found.everything)
+    region = found.region
     _, band = leading_band(found, max(count, options.least), options)
     order = _by_growth(found.values, np.flatnonzero(found.values.imag <= band * (1 + 1e-12)))
     if options.limit_point is not None:

@@ -9,11 +9,19 @@ import numpy as np
 from .coverage import leading_band
 from .factorization import SingularShiftError
 
+#: Where the stiffness relaxes: the lowest frequency searched for, over the highest, and decay over angular frequency
+#: down to which the search goes at most; slower and more strongly damped motions shade off into creep.
+LOWEST = 0.05
+SLOPE = 0.75
+
 
 def plan_shifts(pencil, count, options, workspace):
     """First shift, and whether a limit point of eigenvalues is near enough to matter."""
     if options.shifts is not None:
         return options, None
+    if pencil.relaxation is not None:
+        # all from the lowest frequency to the highest lie as high above the real axis of 1 / (lambda - shift)
+        return options, 0.9 * LOWEST**-0.5 * lowest_sought(pencil, count, options, workspace)
     first = first_shift(pencil, max(count, options.least), options, workspace)
     if options.limit_point is None:
         return options, first
@@ -21,6 +29,13 @@ def plan_shifts(pencil, count, options, workspace):
     if beside < first:
         return options, beside
     return replace(options, limit_point=None), first
+
+
+def lowest_sought(pencil, count, options, workspace) -> float:
+    """Angular frequency above which a search where the stiffness relaxes has to be complete, rad/s."""
+    if options.max_frequency is not None:
+        return LOWEST * 2 * np.pi * options.max_frequency
+    return LOWEST * first_shift(pencil, max(count, options.least), options, workspace)
 
 
 def first_shift(pencil, aim, options, workspace) -> float:
@@ -58,6 +73,8 @@ def next_shift(pencil, found, aim, options, workspace) -> complex:
 
     Where nothing converged the spectrum is dense as seen from afar, as heavy fluids make it: go closer.
     """
+    if pencil.relaxation is not None:
+        return found.shifts[0] * (2.5, 0.4)[len(found.shifts) % 2] ** ((len(found.shifts) + 1) // 2)
     if not found.values.size and all(isinstance(s, float) for s in found.shifts):
         return min(found.shifts) / 3.0
     if options.limit_point is not None:  # a larger disc hugs the line through the limit point

@@ -12,6 +12,7 @@ import scipy.sparse.linalg as spla
 from .condensation import Workspace
 from .factorization import MumpsFactorization, SingularShiftError, StructureMatrices
 from .pencil import FLUID_PARTS, CoupledPencil
+from .relaxation import Relaxation
 
 
 class TransferBasis:
@@ -20,7 +21,8 @@ class TransferBasis:
     The space V holds the lowest modes of (K + K^T)/2 and M, and what they leave out
     statically: K^-1 G for the forces and K^-T J^T for the motions, compressed. The pencil
     projected on V keeps its form, with k in place of n unknowns, so everything of this
-    package works on it: H(lambda) = J (lambda^2 M + lambda C + K)^-1 G, leading modes, count.
+    package works on it: H(lambda) = J (lambda^2 M + lambda C + K)^-1 G, leading modes, count; what relaxes of the
+    stiffness is projected likewise.
 
     Parameters
     ----------
@@ -106,7 +108,7 @@ class TransferBasis:
         room = self.V.shape[0] - self.V.shape[1]
         self.V = np.hstack([self.V, X[:, ::-1][:, :room]])
         self._projected.clear()
-        self._structure = (None, None, None), None
+        self._structure = (None, None, None, None), None
         self._reduced_G = self.V.T @ self._G
         self._reduced_J = self._J @ self.V
 
@@ -133,14 +135,25 @@ class TransferBasis:
         """
         C = self.project(pencil.C) if damping is None else damping
         matrices = (self.project(pencil.M), C, self.project(pencil.K))
-        if not all(a is b for a, b in zip(matrices, self._structure[0])):
-            self._structure = matrices, CoupledPencil(*matrices, self._reduced_G, self._reduced_J)
+        known = (*matrices, pencil.relaxation)
+        if not all(a is b for a, b in zip(known, self._structure[0])):
+            structure = CoupledPencil(
+                *matrices, self._reduced_G, self._reduced_J, relaxation=self._relaxation(pencil.relaxation)
+            )
+            self._structure = known, structure
         return self._structure[1].replace(**{name: getattr(pencil, name) for name in FLUID_PARTS})
 
     def transfer(self, pencil: CoupledPencil, s: complex) -> np.ndarray:
-        """H(s) = J (s^2 M + s C + K)^-1 G on the basis, shape (m, m)."""
+        """H(s) = J (s^2 M + s C + K)^-1 G, with what relaxes, on the basis, shape (m, m)."""
         D = s * s * self.project(pencil.M) + s * self.project(pencil.C) + self.project(pencil.K)
+        if pencil.relaxation is not None:
+            D = D + sum(x * self.project(m) for x, m in zip(pencil.relaxation.factors(s), pencil.relaxing))
         return self._reduced_J @ np.linalg.solve(D, self._reduced_G)
+
+    def _relaxation(self, relaxation: Relaxation | None) -> Relaxation | None:
+        if relaxation is None:
+            return None
+        return Relaxation([self.project(m) for m in relaxation.matrices], relaxation.strengths, relaxation.times)
 
     def lift(self, vectors: np.ndarray) -> np.ndarray:
         """Full structural vectors from reduced ones, shape (n, j)."""

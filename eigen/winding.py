@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .creep import creep_edge
 from .pencil import CoupledPencil
 from .response import Determinant
 
@@ -73,7 +74,8 @@ def unstable_count(
     Parameters
     ----------
     pencil : CoupledPencil
-        M symmetric, positive definite. Orders up to 400 are treated densely.
+        M symmetric, positive definite. Orders up to 400 are treated densely. The poles of what relaxes have to
+        lie left of the line.
     line : float, optional
         Growth rate, 1/s. Default 0; for a structure without any damping, whose eigenvalues
         may lie on the imaginary axis, a small positive value, which `Count.line` reports.
@@ -101,7 +103,7 @@ def unstable_count(
     """
     scale = scale or _typical_frequency(pencil)
     if line is None:
-        undamped = pencil.C.nnz == 0 or abs(pencil.C).max() == 0
+        undamped = (pencil.C.nnz == 0 or abs(pencil.C).max() == 0) and creep_edge(pencil) == -np.inf
         line = 1e-3 * scale if undamped else 0.0
     determinant = Determinant(pencil, line)
     dense = pencil.n <= Determinant.dense_below

@@ -1,0 +1,31 @@
+"""Creep: the crowd of real eigenvalues that relaxation brings, and what of a spectrum does not belong to it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .pencil import CoupledPencil
+
+#: What counts as clearly right of the crowd, as a fraction of its right edge.
+CLEAR = 0.8
+#: Share of the size of an eigenvalue below which its imaginary part is no oscillation: a crowd of creep that rounding
+#: has split, or a motion whose damping ratio exceeds 0.995.
+OVERDAMPED = 0.1
+
+
+def creep_edge(pencil: CoupledPencil) -> float:
+    """Growth rate right of which a real eigenvalue is clearly no creep, 1/s, negative; minus infinity without.
+
+    A stiffness of which all relaxes creeps at the zeros of 1 + phi_g, the slowest of them left of -1/(tau_max (1 + sum
+    of strengths)).
+    """
+    if pencil.relaxation is None or not pencil.relaxation.strengths.any():
+        return -np.inf
+    relaxation = pencil.relaxation
+    return float(-CLEAR / (relaxation.times.max() * (1.0 + relaxation.strengths.sum(axis=1).max())))
+
+
+def apart_from_creep(pencil: CoupledPencil, values: np.ndarray) -> np.ndarray:
+    """Which eigenvalues oscillate, or lie clearly right of the creep."""
+    values = np.asarray(values)
+    return (np.abs(values.imag) > OVERDAMPED * np.abs(values)) | (values.real > creep_edge(pencil))
