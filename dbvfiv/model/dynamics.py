@@ -5,16 +5,18 @@ state.
 
 with h the inertia quadratic in the velocities (turning directors), K_s the structure's own tangent, p the station
 pressures of the unsteady flow through the areas A(q) with rates A' = J v and A'' = J a + d2A[v, v]. The unknowns are q
-and those of the flow law, the inlet velocity U for one.
+and those of the flow law, the inlet velocity U for one. Small motions see K_s and, of layers with Maxwell branches,
+sum_g phi_g(lambda) K_g, with K_g the material part of the tangent of layers that relax alike.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from eigen import CoupledPencil
+from eigen import CoupledPencil, Relaxation
 
 from ..flow import FlowLaw, FlowMotion
 from .valve import ValveModel
@@ -108,18 +110,29 @@ class LinearisedState:
     area: np.ndarray
     _damped: dict = field(default_factory=dict, repr=False, compare=False)
 
-    def damped(self, alpha: float, beta: float) -> CoupledPencil:
-        """The pencil with damping C = alpha M + beta K_s but no fluid; the last one is kept, so a sweep over the fluid
-        reuses it.
+    @cached_property
+    def relaxing(self) -> tuple:
+        """K_g (n, n): material part of the tangent of each group of layers that relax alike."""
+        return self.model.relaxing_stiffness(self.q)
+
+    def relaxation(self, loss_factor: float) -> Relaxation | None:
+        """What relaxes of the stiffness with a factor on all loss factors; None where nothing does."""
+        return self.model.relaxation.stiffness(loss_factor, lambda: self.relaxing)
+
+    def damped(self, alpha: float, beta: float, loss_factor: float = 0.0) -> CoupledPencil:
+        """The pencil with damping C = alpha M + beta K_s and what relaxes but no fluid; the last one is kept, so a
+        sweep over the fluid reuses it.
         """
-        if (alpha, beta) not in self._damped:
+        key = (alpha, beta, loss_factor)
+        if key not in self._damped:
             self._damped.clear()
-            damping = alpha * self.mass + beta * self.structure
-            self._damped[alpha, beta] = CoupledPencil(self.mass, damping, self.stiffness, self.forces, self.slope)
-        return self._damped[alpha, beta]
+            damping, relaxation = alpha * self.mass + beta * self.structure, self.relaxation(loss_factor)
+            wall = (self.mass, damping, self.stiffness, self.forces, self.slope)
+            self._damped[key] = CoupledPencil(*wall, relaxation=relaxation)
+        return self._damped[key]
 
     def pencil(self, conditions: Conditions, fluid: bool = True, storage: float | None = None) -> CoupledPencil:
-        """Quadratic pencil of small motions.
+        """Pencil of small motions.
 
         Parameters
         ----------
@@ -130,10 +143,10 @@ class LinearisedState:
         storage : float, optional
             Blend of the continuity laws, 0 quasi-steady to 1 storage; the law's own by default.
         """
-        damped = self.damped(conditions.alpha, conditions.beta)
+        damped = self.damped(conditions.alpha, conditions.beta, conditions.loss_factor)
         flow = self.model.flow
         if not fluid or not flow.has_fluid:
-            return CoupledPencil(damped.M, damped.C, damped.K)
+            return CoupledPencil(damped.M, damped.C, damped.K, relaxation=damped.relaxation)
         if not flow.unsteady:
             _, slope = flow.steady_operator(self.area, self.inlet)
             return damped.replace(A0=slope)

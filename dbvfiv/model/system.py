@@ -5,6 +5,9 @@
 Rates of velocity enter linearly, so the mass matrix depends on the state only. Parameters: those of the flow law (inlet
 pressure, fluid density, the blend of the continuity laws), Rayleigh alpha and beta; whatever else a case holds is a
 design parameter, for which the model is built anew.
+
+With `loss_factor` among mu the wall relaxes. What u leaves out, its memory, changes neither equilibria nor their
+derivatives, and spectra hold it; motions are refused.
 """
 
 from __future__ import annotations
@@ -19,12 +22,19 @@ from continuation import OutOfDomain, Spectrum, SystemBase
 from eigen import CoupledPencil, SearchOptions, SingularShiftError, Workspace, leading_modes
 from eigen.pencil import real_apply
 
+from ..errors import SolveError
 from ..flow import FlowMotion
 from .analytic import DAMPING, AnalyticResidual
 from .valve import ValveModel
 
 #: Names that no design parameter has, whether the flow law depends on them or not.
-CONDITIONS = ("inlet", "density", "storage", *DAMPING)
+CONDITIONS = ("inlet", "density", "storage", *DAMPING, "loss_factor")
+
+
+_MEMORY = (
+    "A wall that relaxes remembers, and a state of displacements, velocities and flow does not hold its memory, so "
+    "there are equilibria and spectra with loss factors but no normal forms and no orbits."
+)
 
 
 class ValveSystem(SystemBase):
@@ -41,7 +51,8 @@ class ValveSystem(SystemBase):
     Attributes
     ----------
     parameters : tuple of str
-        Names of the flow law's parameters, then alpha and beta.
+        Names of the flow law's parameters, then alpha and beta. Equilibria do not depend on `loss_factor`, which mu may
+        hold as well.
     """
 
     constant_mass = False
@@ -129,9 +140,20 @@ class ValveSystem(SystemBase):
         _, v_rate, inner_rate = self.split(u_rate)
         return (np.zeros(n), np.zeros(n), v_rate, np.zeros_like(inner_rate), inner_rate)
 
-    def _still(self, u, mu):
+    def _require_no_memory(self, mu, moves: bool) -> None:
+        """Refuse what a state without the memory of a relaxing wall cannot tell.
+
+        Raises
+        ------
+        SolveError
+        """
+        if moves and mu.get("loss_factor", 0.0) and self.model(mu).relaxation.groups:
+            raise SolveError(_MEMORY)
+
+    def _still(self, u, mu, *directions):
         """Motion and parameters of a state at rest; others are not needed, since equilibria do not move."""
         motion, parameters = self._at(u, mu)
+        self._require_no_memory(mu, any(np.any(self.split(x)[1]) for x in directions))
         if np.any(motion[1]):
             raise OutOfDomain("The valve moves, and derivatives are taken at rest.")
         return motion, parameters
@@ -143,6 +165,7 @@ class ValveSystem(SystemBase):
         motion, parameters = self._at(u, mu)
         if not np.isfinite(u).all() or np.abs(motion[0]).max() > 2 * self._length + np.pi:
             raise OutOfDomain("The valve is displaced by more than its own length.")
+        self._require_no_memory(mu, bool(np.any(motion[1])))
         return np.concatenate([motion[1], -self._analytic(mu).value(motion, parameters)])
 
     def residual_norm(self, residual) -> float:
@@ -175,14 +198,14 @@ class ValveSystem(SystemBase):
         )
 
     def d2(self, u, mu, a, b):
-        motion, parameters = self._still(u, mu)
+        motion, parameters = self._still(u, mu, a, b)
         n = self._base.size
         return np.concatenate(
             [np.zeros(n), -self._analytic(mu).second(motion, parameters, self._static(a, n), self._static(b, n))]
         )
 
     def d3(self, u, mu, a, b, c):
-        motion, parameters = self._still(u, mu)
+        motion, parameters = self._still(u, mu, a, b, c)
         n = self._base.size
         directions = (self._static(x, n) for x in (a, b, c))
         return np.concatenate([np.zeros(n), -self._analytic(mu).third(motion, parameters, *directions)])
@@ -190,19 +213,19 @@ class ValveSystem(SystemBase):
     def d2_parameter(self, u, mu, name, a):
         if name not in self.parameters:
             return super().d2_parameter(u, mu, name, a)
-        motion, parameters = self._still(u, mu)
+        motion, parameters = self._still(u, mu, a)
         n = self._base.size
         return np.concatenate([np.zeros(n), -self._analytic(mu).mixed(motion, parameters, self._static(a, n), name)])
 
     def mass_d(self, u, mu, c, a):
-        motion, parameters = self._still(u, mu)
+        motion, parameters = self._still(u, mu, c, a)
         n = self._base.size
         return np.concatenate(
             [np.zeros(n), self._analytic(mu).second(motion, parameters, self._rates(c, n), self._static(a, n))]
         )
 
     def mass_d2(self, u, mu, c, a, b):
-        motion, parameters = self._still(u, mu)
+        motion, parameters = self._still(u, mu, c, a, b)
         n = self._base.size
         forms = self._analytic(mu).third(motion, parameters, self._rates(c, n), self._static(a, n), self._static(b, n))
         return np.concatenate([np.zeros(n), forms])
@@ -224,7 +247,9 @@ class ValveSystem(SystemBase):
 
 
 def pencil_at(model: ValveModel, q, inner, mu) -> CoupledPencil:
-    """Pencil at any state at rest, in equilibrium or not, with the flow's unknowns (l,); mu holds the parameters."""
+    """Pencil at any state at rest, in equilibrium or not, with the flow's unknowns (l,); mu holds the parameters, and
+    `loss_factor` where the wall is to relax.
+    """
     matrix = model.shell.dofs.matrix
     nodal = model.nodal(q)
     area = model.rows.areas(nodal)
@@ -235,11 +260,15 @@ def pencil_at(model: ValveModel, q, inner, mu) -> CoupledPencil:
     mass, own = matrix(model.mass(q)), matrix(structure)
     damping = mu["alpha"] * mass + mu["beta"] * own
     parts = model.flow.linearise(still, mu).parts()
-    return CoupledPencil(mass, damping, stiffness, model.station_forces(nodal), model.rows.jacobian(nodal), **parts)
+    relaxation = model.relaxation.stiffness(mu.get("loss_factor", 0.0), lambda: model.relaxing_stiffness(q))
+    wall = (mass, damping, stiffness, model.station_forces(nodal), model.rows.jacobian(nodal))
+    return CoupledPencil(*wall, relaxation=relaxation, **parts)
 
 
 class ValveLinearisation:
     """A = dF/du and B at a state at rest, as products and solves through the pencil.
+
+    Where the wall relaxes, they are those of motions so slow that it does not: there are no shifts but zero.
 
     Parameters
     ----------
@@ -316,6 +345,8 @@ class _Shifted:
     """Solves with A - shift B by elimination of v: T(shift) (q, U) on the left."""
 
     def __init__(self, linear: ValveLinearisation, shift: complex):
+        if shift and linear.pencil.branches:
+            raise SolveError(_MEMORY)
         self.linear, self.shift = linear, shift
         self._factor = _factored(linear.pencil, shift)
 

@@ -24,6 +24,7 @@ from ..shell import Section
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_flow, build_shell
 from .linear import CoupledFactor
+from .relaxing import WallRelaxation
 from .supports import lip_stops
 
 QUARTERS = 4
@@ -79,6 +80,7 @@ class ValveModel:
         self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
         self.loaded = loaded_share(self.mesh, case)
         self.flow = build_flow(case, self.mesh)
+        self.relaxation = WallRelaxation.of(self.shell.section)
         self._stop_slots = dofs.diagonal_slots[self.stops.unknowns]
 
     # -- layout
@@ -136,6 +138,10 @@ class ValveModel:
         force[self.stops.unknowns] += self.stops.force(q)
         data[self._stop_slots] += self.stops.tangent(q)
         return force, data
+
+    def relaxing_stiffness(self, q: np.ndarray) -> tuple[sp.csr_matrix, ...]:
+        """K_g (n, n): material part of the tangent of each group of `relaxation`."""
+        return tuple(self.shell.dofs.matrix(values) for values in self.shell.relaxing_tangents(q))
 
     def pressure_force(self, nodal: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Force (n,) of station pressures p (m,), Pa, on the deformed wall."""

@@ -166,11 +166,30 @@ def element_energy(kinds, metric, unknowns, element, layers):
     element, layers : dict of arrays, see `element_arrays` and `section_arrays`
     """
     strains = material_strains(local_strains(unknowns, element, layers, metric), layers)
-    density = point_energies(kinds, layers["parameters"], strains)
+    return jnp.sum(_point_volumes(metric, element, layers) * point_energies(kinds, layers["parameters"], strains))
+
+
+def _point_volumes(metric, element, layers):
+    """Volumes (4, np) that the layer points of one element stand for, m3."""
     weight = element["h"] * element["area"][:, None] * layers["weight"]
-    if metric == TRUE_METRIC:
-        weight = weight * element["mu"]
-    return jnp.sum(weight * density)
+    return weight * element["mu"] if metric == TRUE_METRIC else weight
+
+
+def material_part(kinds, metric, unknowns, element, layers):
+    """Part (20, 20) of the Hessian of `element_energy` by which strains change stresses, without that by which stresses
+    turn.
+    """
+    strains, back = jax.linearize(
+        lambda u: material_strains(local_strains(u, element, layers, metric), layers), unknowns
+    )
+    slope = jax.vmap(back)(jnp.eye(20).reshape(20, 4, 5))
+    weight = _point_volumes(metric, element, layers)
+
+    def stress(e):
+        return jax.grad(lambda x: jnp.sum(weight * point_energies(kinds, layers["parameters"], x)))(e)
+
+    change = jax.vmap(lambda direction: jax.jvp(stress, (strains,), (direction,))[1])(slope)
+    return jnp.einsum("aple,bple->ab", slope, change)
 
 
 class EnergyFunctions:
@@ -199,6 +218,12 @@ class EnergyFunctions:
     def tangent(self, unknowns):
         """(ne, 20, 20) Hessians."""
         return _hessians(self.kinds, self.metric, unknowns, self.elements, self.layers)
+
+    def material_tangent(self, unknowns, share):
+        """(ne, 20, 20): material part of the Hessians, each layer's by a factor; share (nl,)."""
+        points = len(self.kinds) // len(share)
+        layers = self.layers | {"weight": self.layers["weight"] * jnp.repeat(jnp.asarray(share), points)}
+        return _materials(self.kinds, self.metric, unknowns, self.elements, layers)
 
     def second(self, unknowns, a, b):
         """(ne, 20): second directional derivative of the force along a and b (ne, 4, 5)."""
@@ -240,6 +265,7 @@ def _along(function, *directions):
 _energies = _mapped(element_energy)
 _gradients = _mapped(lambda k, m, u, e, l: _force(k, m, u, e, l).reshape(20))
 _hessians = _mapped(lambda k, m, u, e, l: jax.jacfwd(lambda v: _force(k, m, v, e, l).reshape(20))(u).reshape(20, 20))
+_materials = _mapped(material_part)
 _second = _mapped(lambda k, m, u, a, b, e, l: _along(lambda v: _force(k, m, v, e, l).reshape(20), a, b)(u))
 _third = _mapped(lambda k, m, u, a, b, c, e, l: _along(lambda v: _force(k, m, v, e, l).reshape(20), a, b, c)(u))
 _strains = _mapped(lambda k, m, u, e, l: material_strains(local_strains(u, e, l, m), l))

@@ -83,9 +83,16 @@ def shell_force(
     points,
     constants,
     scales,
+    held,
     out,
 ):
-    """Add the internal force to out (nn, 5); unknowns q (nn, 5)."""
+    """Add the internal force to out (nn, 5); unknowns q (nn, 5).
+
+    Parameters
+    ----------
+    held : (ne, 4, 8) array or None
+        Resultants at each Gauss point on top of those of the layers.
+    """
     x = np.empty((4, 3))
     d = np.empty((4, 3))
     fx = np.empty((4, 3))
@@ -124,6 +131,9 @@ def shell_force(
                 strain,
             )
             section_stress(stiffness, points, constants, scales, thickness[el], strain, stress, e, s)
+            if held is not None:
+                for i in range(8):
+                    stress[i] += held[el, point, i]
             _covariant_stress(mq[el, point], mqk[el, point], mp[el, point], area[el, point], stress, n, m, g)
             _add_forces(point, n, m, g, basis, turn, x, d, fx, fd)
         for a in range(4):
@@ -157,6 +167,8 @@ def shell_tangent(
     points,
     constants,
     scales,
+    held,
+    geometric,
     slots,
     out,
     data,
@@ -165,6 +177,10 @@ def shell_tangent(
 
     Parameters
     ----------
+    held : (ne, 4, 8) array or None
+        Resultants at each Gauss point on top of those of the layers; they do not change with the strains.
+    geometric : bool
+        False leaves out what the resultants add to the tangent: the material part remains.
     slots : (ne, 400) int array
         Where each entry of the 20 x 20 element matrix goes in `data`; negative for constrained unknowns.
     """
@@ -231,6 +247,9 @@ def shell_tangent(
             pl = mp[el, point]
             strains(point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], ql, qkl, pl, strain)
             section_tangent(stiffness, points, constants, scales, h, strain, stress, tangent, e, s, t5)
+            if held is not None:
+                for i in range(8):
+                    stress[i] += held[el, point, i]
             weight = area[el, point]
             _covariant_stress(ql, qkl, pl, weight, stress, n, m, g)
             _add_forces(point, n, m, g, basis, turn, x, d, fx, fd)
@@ -292,6 +311,8 @@ def shell_tangent(
                     v = rows[l, i]
                     for j in range(20):
                         k[i, j] += v * product[l, j]
+            if not geometric:
+                continue
             # geometric stiffness: second derivatives of the covariant strains are scalars times the identity
             for a in range(4):
                 a0 = _SLOPE[point, a, 0]
@@ -323,17 +344,18 @@ def shell_tangent(
                         value = v * director1[nb, r, i]
                         k[5 * a + i, 5 * b + 3 + r] += value
                         k[5 * b + 3 + r, 5 * a + i] += value
-            curve0 = 0.0
-            curve1 = 0.0
-            curve2 = 0.0
-            for i in range(3):
-                curve0 += fd[a, i] * director2[na, 0, i]
-                curve1 += fd[a, i] * director2[na, 1, i]
-                curve2 += fd[a, i] * director2[na, 2, i]
-            k[5 * a + 3, 5 * a + 3] += curve0
-            k[5 * a + 4, 5 * a + 4] += curve1
-            k[5 * a + 3, 5 * a + 4] += curve2
-            k[5 * a + 4, 5 * a + 3] += curve2
+            if geometric:
+                curve0 = 0.0
+                curve1 = 0.0
+                curve2 = 0.0
+                for i in range(3):
+                    curve0 += fd[a, i] * director2[na, 0, i]
+                    curve1 += fd[a, i] * director2[na, 1, i]
+                    curve2 += fd[a, i] * director2[na, 2, i]
+                k[5 * a + 3, 5 * a + 3] += curve0
+                k[5 * a + 4, 5 * a + 4] += curve1
+                k[5 * a + 3, 5 * a + 4] += curve2
+                k[5 * a + 4, 5 * a + 3] += curve2
             for i in range(3):
                 out[na, i] += fx[a, i]
             for r in range(2):

@@ -40,6 +40,24 @@ class Layer:
 
 
 @dataclass(frozen=True)
+class RelaxingGroup:
+    """Layers of a wall that relax alike.
+
+    Attributes
+    ----------
+    name : str
+        Their materials.
+    layers : tuple of int
+        From inside to outside.
+    series : `dbvfiv.materials.prony.Prony`
+    """
+
+    name: str
+    layers: tuple[int, ...]
+    series: Prony
+
+
+@dataclass(frozen=True)
 class Section:
     """Layers, inside to outside, with Gauss points in each.
 
@@ -106,15 +124,60 @@ class Section:
         return np.array([(density * (z[1:] ** (k + 1) - z[:-1] ** (k + 1))).sum() / (k + 1) for k in range(3)])
 
     @cached_property
+    def relaxing(self) -> tuple[RelaxingGroup, ...]:
+        """Layers that relax, those with the same series together."""
+        found: dict[Prony, list[int]] = {}
+        for number, layer in enumerate(self.layers):
+            if layer.relaxation is not None and not layer.relaxation.elastic:
+                found.setdefault(layer.relaxation, []).append(number)
+        names = [layer.name or f"layer {number + 1}" for number, layer in enumerate(self.layers)]
+        return tuple(
+            RelaxingGroup(" + ".join(dict.fromkeys(names[i] for i in layers)), tuple(layers), series)
+            for series, layers in found.items()
+        )
+
+    def wall(self, factors: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """What the compiled loops take of a wall: stiffness of its linear layers and points of its rubbers.
+
+        Parameters
+        ----------
+        factors : (nl,) array, optional
+            On the stress of each layer; points of rubber without stress are left out. One by default.
+
+        Returns
+        -------
+        stiffness : (8, 8) array
+            See `linear_stiffness`.
+        points, constants, scales : (k, 2), (k, 3), (k,) arrays
+            See `rubber_points`.
+        """
+        if factors is None:
+            return (self.linear_stiffness, *self.rubber_points)
+        factor = np.repeat(np.asarray(factors, float), self.points_per_layer)
+        kept = factor[self.kinds == RUBBER]
+        points, constants, scales = self.rubber_points
+        chosen = kept != 0
+        scaled = constants[chosen] * kept[chosen, None]
+        return self._linear_stiffness(factor), points[chosen], scaled, scales[chosen]
+
+    @cached_property
     def linear_stiffness(self) -> np.ndarray:
         """(8, 8) stiffness of the linear layers for a wall of unit thickness.
 
         Rows: membrane (11, 22, 12), bending (11, 22, 12), transverse shear (13, 23). For a wall of thickness h the
         membrane and shear blocks scale with h, the coupling with h^2, the bending block with h^3.
         """
+        return self._linear_stiffness(np.ones(len(self.kinds)))
+
+    def _linear_stiffness(self, factor: np.ndarray) -> np.ndarray:
+        """That of the linear layers with a factor (np,) on the stress at each layer point."""
         total = np.zeros((8, 8))
         for (zeta, weight), kind, par, (c, s), shear in zip(
-            self.points, self.kinds, self.parameters, self.directions, self.shear_scale
+            self.points * np.stack([np.ones_like(factor), factor], axis=1),
+            self.kinds,
+            self.parameters,
+            self.directions,
+            self.shear_scale,
         ):
             if kind != LINEAR:
                 continue

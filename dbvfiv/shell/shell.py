@@ -39,10 +39,9 @@ class Shell:
         self.dofs = DofMap(free, mesh.quads)
         self.metric = metric
         self.geometry = reference_geometry(mesh)
-        points, constants, scales = section.rubber_points
         g = self.geometry
         self._reference = (g.shear0, g.metric0, g.metric1, g.q, g.qk, g.p, g.area, g.thickness)
-        self._wall = (section.linear_stiffness, points, constants, scales)
+        self._wall = section.wall()
         self._integrals = mass_integrals(g, section)
         self._frames = np.ascontiguousarray(mesh.frames)
 
@@ -73,7 +72,7 @@ class Shell:
         nodal = self.dofs.expand(q)
         d, d1, _ = self.directors(nodal)
         out = np.zeros_like(nodal)
-        shell_force(self.mesh.quads, self.mesh.nodes, nodal, d, d1, *self._reference, *self._wall, out)
+        shell_force(self.mesh.quads, self.mesh.nodes, nodal, d, d1, *self._reference, *self._wall, None, out)
         return self.dofs.restrict(out)
 
     def force_and_tangent(self, q: np.ndarray, data: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -90,20 +89,30 @@ class Shell:
         nodal = self.dofs.expand(q)
         d, d1, d2 = self.directors(nodal)
         out = np.zeros_like(nodal)
-        shell_tangent(
-            self.mesh.quads,
-            self.mesh.nodes,
-            nodal,
-            d,
-            d1,
-            d2,
-            *self._reference,
-            *self._wall,
-            self.dofs.slots,
-            out,
-            data,
-        )
+        fixed = (self.mesh.quads, self.mesh.nodes, nodal, d, d1, d2, *self._reference)
+        shell_tangent(*fixed, *self._wall, None, True, self.dofs.slots, out, data)
         return self.dofs.restrict(out), data
+
+    def relaxing_tangents(self, q: np.ndarray) -> list[np.ndarray]:
+        """Material part of the tangent, values (nnz,), of each group of `Section.relaxing`.
+
+        The part by which strains change stresses; that by which stresses turn with the wall belongs to no layer alone
+        and does not relax.
+        """
+        nodal = self.dofs.expand(q)
+        directors = self.directors(nodal)
+        found = []
+        for group in self.section.relaxing:
+            data, share = np.zeros(len(self.dofs.pattern[1])), np.zeros(len(self.section.layers))
+            share[list(group.layers)] = 1.0
+            if self.metric == FIRST_ORDER:
+                fixed = (self.mesh.quads, self.mesh.nodes, nodal, *directors, *self._reference)
+                wall, unused = self.section.wall(share), np.zeros_like(nodal)
+                shell_tangent(*fixed, *wall, None, False, self.dofs.slots, unused, data)
+            else:
+                self._scatter_matrix(np.asarray(self.energies.material_tangent(self._element_unknowns(q), share)), data)
+            found.append(data)
+        return found
 
     def mass(self, q: np.ndarray | None = None) -> np.ndarray:
         """Values (nnz,) of the consistent mass matrix at a state (at rest by default), kg and kg m2."""

@@ -1,0 +1,79 @@
+"""How a wall relaxes: groups of layers, each with a series of its own, over common relaxation times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from eigen import Relaxation
+
+from ..shell import Section
+from ..shell.section import RelaxingGroup
+
+
+@dataclass(frozen=True)
+class Branches:
+    """Maxwell branches of a wall.
+
+    Attributes
+    ----------
+    groups : tuple of str
+        Materials of the layers that relax alike.
+    strengths : (g, j) array
+        Of each group over its slow law at each of the times.
+    times : (j,) array
+        s, increasing.
+    """
+
+    groups: tuple[str, ...]
+    strengths: np.ndarray
+    times: np.ndarray
+
+    def __bool__(self) -> bool:
+        return bool(self.times.size)
+
+
+@dataclass(frozen=True)
+class WallRelaxation:
+    """What relaxes of a wall.
+
+    Attributes
+    ----------
+    groups : tuple of RelaxingGroup
+        Layers with the same series together; none where the wall is elastic.
+
+    Examples
+    --------
+    >>> WallRelaxation(()).branches(1.0).times
+    array([], dtype=float64)
+    """
+
+    groups: tuple[RelaxingGroup, ...]
+
+    @classmethod
+    def of(cls, section: Section) -> WallRelaxation:
+        """That of the layers of a section."""
+        return cls(section.relaxing)
+
+    def branches(self, loss_factor: float) -> Branches:
+        """Branches with a factor on the loss factors of all layers; a group has none at the times of others alone.
+
+        Raises
+        ------
+        MaterialError
+            If the factor is negative or not finite.
+        """
+        series = [group.series.scaled(loss_factor) for group in self.groups]
+        pairs = [(i, g, t) for i, one in enumerate(series) for g, t in zip(one.strengths, one.times) if g > 0]
+        times = np.unique([t for _, _, t in pairs])
+        strengths = np.zeros((len(self.groups), len(times)))
+        for i, g, t in pairs:
+            strengths[i, np.searchsorted(times, t)] += g
+        return Branches(tuple(group.name for group in self.groups), strengths, times)
+
+    def stiffness(self, loss_factor: float, matrices: Callable[[], Sequence]) -> Relaxation | None:
+        """What relaxes of a stiffness, None where nothing does; `matrices` gives K_g of each group when it is asked."""
+        branches = self.branches(loss_factor) if loss_factor else None
+        return Relaxation(matrices(), branches.strengths, branches.times) if branches else None
