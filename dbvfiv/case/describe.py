@@ -12,6 +12,7 @@ from typing import Any, Literal
 from pydantic.fields import FieldInfo
 
 from .axis import FORM
+from .described import description_of
 from .materials import KINDS, Materials
 from .quantity import DIMENSION, Quantity
 from .section import Section
@@ -117,6 +118,9 @@ def _bounds(limits: dict[str, Any], quantity: Quantity | None) -> str:
 
 
 def _type_words(field: FieldInfo) -> str:
+    described = description_of(field)
+    if described:
+        return described.type
     annotation, quantity = field.annotation, quantity_of(field)
     core = _strip_none(annotation)
     if core is dict or typing.get_origin(core) is dict:
@@ -135,12 +139,16 @@ def _type_words(field: FieldInfo) -> str:
 def _strip_none(annotation: Any) -> Any:
     if typing.get_origin(annotation) in (types.UnionType, typing.Union):
         rest = [a for a in typing.get_args(annotation) if a is not type(None)]
-        return rest[0] if len(rest) == 1 else annotation
+        if len(rest) == 1:
+            return getattr(rest[0], "__origin__", rest[0]) if hasattr(rest[0], "__metadata__") else rest[0]
     return annotation
 
 
 def allowed_words(field: FieldInfo) -> str:
     """What a field allows, completing "it must be ..."."""
+    described = description_of(field)
+    if described:
+        return described.allowed
     quantity = quantity_of(field)
     core, kind = _strip_none(field.annotation), _type_words(field)
     if kind == "choice":

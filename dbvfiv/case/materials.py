@@ -14,9 +14,11 @@ from pydantic import Field, StrictStr, ValidationInfo, field_validator, model_va
 
 from .existing_file import existing_file
 from .quantity import Angle, Density, Length, Modulus, Number, Percent
+from .relaxing import Relaxing
 from .section import BrokenRule, Section, key
 
 RUBBERS = ("CR", "SBR", "EPDM")
+BUILT_IN = (*RUBBERS, "fibre")
 
 
 def _density(default: Any) -> Any:
@@ -27,7 +29,7 @@ def _poisson(description: str, default: Any = ...) -> Any:
     return key(default, description, gt=-1, lt=0.5)
 
 
-class MooneyRivlin(Section):
+class MooneyRivlin(Relaxing):
     """Incompressible W = c10 (I1 - 3) + c01 (I2 - 3) + c11 (I1 - 3)(I2 - 3)."""
 
     kind: Literal["mooney-rivlin"] = key(..., "Incompressible Mooney-Rivlin rubber.")
@@ -49,7 +51,7 @@ class MooneyRivlin(Section):
         return self
 
 
-class NeoHookean(Section):
+class NeoHookean(Relaxing):
     """Incompressible W = G/2 (I1 - 3)."""
 
     kind: Literal["neo-hookean"] = key(..., "Incompressible neo-Hookean rubber.")
@@ -57,7 +59,7 @@ class NeoHookean(Section):
     density: Density = _density(...)
 
 
-class Isotropic(Section):
+class Isotropic(Relaxing):
     """Isotropic, linear between Green-Lagrange strain and second Piola-Kirchhoff stress."""
 
     kind: Literal["isotropic"] = key(..., "Linear elastic, isotropic.")
@@ -66,7 +68,7 @@ class Isotropic(Section):
     density: Density = _density(...)
 
 
-class Orthotropic(Section):
+class Orthotropic(Relaxing):
     """Orthotropic ply in plane stress; 1 lies along the fibre, 3 through the thickness."""
 
     kind: Literal["orthotropic"] = key(..., "Linear elastic ply, orthotropic.")
@@ -90,7 +92,7 @@ class Orthotropic(Section):
         return self
 
 
-class HalpinTsai(Section):
+class HalpinTsai(Relaxing):
     """Fibre ply from its constituents by the Halpin-Tsai equations (Th. 3.3; defaults of App. A)."""
 
     kind: Literal["halpin-tsai"] = key("halpin-tsai", "Fibre ply from the constants of fibre and matrix.")
@@ -103,7 +105,7 @@ class HalpinTsai(Section):
     density: Density = _density(1270.0)
 
 
-class Fit(Section):
+class Fit(Relaxing):
     """Mooney-Rivlin constants fitted to a tension test."""
 
     kind: Literal["fit"] = key(..., "Mooney-Rivlin rubber fitted to a tension test.")
@@ -117,7 +119,7 @@ class Fit(Section):
         return existing_file(path, info)
 
 
-class ShippedRubber(Section):
+class ShippedRubber(Relaxing):
     """One of the three tested rubbers at a strain level (constants of App. A)."""
 
     kind: Literal["shipped"] = key(..., "A rubber whose constants come with the program.")
@@ -126,7 +128,13 @@ class ShippedRubber(Section):
     density: Density = _density(1300.0)
 
 
-Card = MooneyRivlin | NeoHookean | Isotropic | Orthotropic | HalpinTsai | Fit | ShippedRubber
+class BuiltIn(Relaxing):
+    """One of the built-in materials as it is, relaxing in a way of its own; a table without a kind is this."""
+
+    kind: Literal["built-in"] = key("built-in", "What the material is without this table.")
+
+
+Card = MooneyRivlin | NeoHookean | Isotropic | Orthotropic | HalpinTsai | Fit | ShippedRubber | BuiltIn
 KINDS = {c.model_fields["kind"].annotation.__args__[0]: c for c in Card.__args__}
 
 
@@ -162,15 +170,43 @@ class Materials(Section):
             if name in cls.model_fields:
                 continue
             if isinstance(value, dict):
-                named[name] = value
+                before = named.get(name)
+                change = isinstance(before, dict) and "kind" not in value  # of single keys of a table that is there
+                named[name] = before | value if change else value
             else:
                 known[name] = value  # not a table: refused as an unknown key
+        for name in BUILT_IN:
+            if isinstance(named.get(name), dict):
+                named[name] = {"kind": "built-in"} | named[name]
         return known | {"named": named}
+
+    @model_validator(mode="after")
+    def _built_in_names(self) -> Materials:
+        for name, card in self.named.items():
+            if isinstance(card, BuiltIn) and name not in BUILT_IN:
+                raise BrokenRule(
+                    f"{name}.kind",
+                    "'built-in' for a name that is not",
+                    f"it must be one of {', '.join(KINDS)}, and built-in for {', '.join(BUILT_IN)} alone",
+                )
+        return self
 
     @property
     def names(self) -> tuple[str, ...]:
         """Every name a layer may use."""
-        return tuple(dict.fromkeys((*RUBBERS, "fibre", *self.named)))
+        return tuple(dict.fromkeys((*BUILT_IN, *self.named)))
+
+    def is_built_in(self, name: str) -> bool:
+        """Whether a name stands for a built-in material and not for a table that replaces it."""
+        return name in BUILT_IN and isinstance(self.named.get(name, BuiltIn()), BuiltIn)
+
+    def loss(self, name: str) -> Relaxing | None:
+        """How a material relaxes: as its table says, else the value shipped for what it is; None where neither is."""
+        card = self.named.get(name, BuiltIn())
+        if card.ways:
+            return card
+        known = name if self.is_built_in(name) else getattr(card, "rubber", None)
+        return Relaxing(loss_factor=known) if known else None
 
     def card(self, name: str) -> Card:
         """Return the card of a material; tables of the case file go before the built-in ones.
@@ -180,7 +216,7 @@ class Materials(Section):
         KeyError
             For a name that is neither built in nor in the case file.
         """
-        if name in self.named:
+        if not self.is_built_in(name) and name in self.named:
             return self.named[name]
         if name in RUBBERS:
             return ShippedRubber(kind="shipped", rubber=name, strain_level=self.strain_level)

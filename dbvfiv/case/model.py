@@ -8,9 +8,11 @@ from typing import Any, Self
 from pydantic import ValidationInfo, model_validator
 
 from . import physics
+from .damping import Damping
 from .load import make_case, put
 from .materials import DEFAULT_LAYERS, Layer, Materials
 from .parameters import PARAMETERS
+from .relaxing import SHIPPED_LOSSES
 from .section import BrokenRule, Section, key
 from .valve import Mesh, Valve
 
@@ -37,7 +39,7 @@ class Case(Section):
     )
     materials: Materials = key(Materials(), "Materials by name.")
     shell: physics.Shell = key(physics.Shell(), "Choices of the shell theory.")
-    damping: physics.Damping = key(physics.Damping(), "Rayleigh damping.")
+    damping: Damping = key(Damping(), "Rayleigh damping, or materials that relax.")
     fluid: physics.Fluid = key(physics.Fluid(), "The fluid and its conservation laws.")
     drive: physics.Drive = key(physics.Drive(), "The load.")
     supports: physics.Supports = key(physics.Supports(), "One-sided stops of the lips.")
@@ -65,6 +67,15 @@ class Case(Section):
                     f"{layer.material!r}, which is no material of this case",
                     f"it must be one of {', '.join(self.materials.names)} or a table [materials.NAME]",
                 )
+        if self.damping.relaxes:
+            for name in dict.fromkeys(layer.material for layer in self.layers):
+                if self.materials.loss(name) is None:
+                    raise BrokenRule(
+                        f"materials.{name}.loss_factor",
+                        "missing with damping.model = 'loss factor'",
+                        f"how {name} relaxes must be said by loss_factor (a number, or one of "
+                        f"{', '.join(SHIPPED_LOSSES)}), loss_data, relaxation_data or prony",
+                    )
         if len(self.layers) * self.mesh.layer_points < 2:
             raise BrokenRule(
                 "mesh.layer_points",

@@ -1,4 +1,4 @@
-"""Shell theory, damping, fluid, load and supports."""
+"""Shell theory, fluid, load and supports."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StrictBool, field_validator
 
 from .parameters import PARAMETERS
-from .quantity import Density, Number, Pressure, Rate, Stiffness, Time
+from .quantity import Density, Number, Pressure, Stiffness
 from .section import Section, key
 
 #: A pressure that loads the valve: above zero, and within what the parameter may be.
@@ -30,13 +30,6 @@ class Shell(Section):
     def _name_the_true_one(cls, given: Any) -> Any:
         """The word "true" is easily written without quotes."""
         return "true" if given is True else given
-
-
-class Damping(Section):
-    """Rayleigh damping C = alpha M + beta K."""
-
-    alpha: Rate = key(5.0, "Factor of the mass matrix.", **PARAMETERS["alpha"].limits)
-    beta: Time = key(0.003, "Factor of the structure's tangent stiffness.", **PARAMETERS["beta"].limits)
 
 
 class Fluid(Section):

@@ -7,11 +7,15 @@ from __future__ import annotations
 
 import difflib
 import re
+from dataclasses import replace
 
 from ..errors import CaseError
 from .describe import KeyInfo, walk
 from .materials import KINDS
+from .relaxing import Relaxing
 from .section import Section
+
+_ANY_KIND = "[materials.NAME] of any kind"
 
 HEAD = """# The case file, key by key
 
@@ -80,7 +84,7 @@ def _paragraph(info: KeyInfo) -> str:
 def page(model: type[Section]) -> str:
     """The whole of ``docs/case-reference.md``."""
     parts, section = [HEAD], None
-    for info in walk(model):
+    for info in _said_once(list(walk(model))):
         here = _section(info)
         if info.type == "table" and "." not in info.key:
             continue
@@ -97,12 +101,25 @@ def page(model: type[Section]) -> str:
     return "".join(parts)
 
 
+def _said_once(infos: list[KeyInfo]) -> list[KeyInfo]:
+    """Keys in order; those that every kind of material has stand once, behind the kinds."""
+    common = {info.key.rpartition(".")[2]: info for info in infos if _section(info) == _ANY_KIND}
+    own = [info for info in infos if _section(info) != _ANY_KIND]
+    behind = 1 + max(i for i, info in enumerate(own) if info.key.startswith("materials."))
+    own[behind:behind] = [replace(info, key=f"materials.NAME.{name}") for name, info in common.items()]
+    return own
+
+
 def _section(info: KeyInfo) -> str:
+    if info.key.startswith("materials.NAME") and info.key.rpartition(".")[2] in Relaxing.model_fields:
+        return _ANY_KIND
     match = re.match(r"materials\.NAME\(([a-z-]+)\)", info.key)
     return f"[materials.NAME] of kind {match[1]}" if match else f"[{re.split(r'[.[]', info.key)[0]}]"
 
 
 def _intro(section: str, model: type[Section]) -> str:
+    if section == _ANY_KIND:
+        return (Relaxing.__doc__ or "").split("\n")[0]
     match = re.fullmatch(r"\[materials\.NAME\] of kind (.*)", section)
     if match:
         return (KINDS[match[1]].__doc__ or "").split("\n")[0]

@@ -76,11 +76,12 @@ def _keys(section: Section, comments: bool) -> Iterator[str]:
         value = getattr(section, name)
         if comments:
             yield from _comment(field)
-        if value is None:
+        follows = name in getattr(section, "following", ())
+        if value is None or (follows and name == getattr(section, "meaningless", None)):
             if comments:
                 yield f'# {name} = "..."'
             continue
-        mark = "# " if name in getattr(section, "following", ()) else ""
+        mark = "# " if follows else ""
         yield f"{mark}{name} = {_value(value, field)}"
 
 

@@ -5,6 +5,14 @@ stresses and tangents follow by differentiation, in float64.
 """
 
 from dbvfiv.materials.checks import MaterialError
+from dbvfiv.materials.damping import (
+    MaterialDamping,
+    ShippedLoss,
+    damping_of,
+    relaxation_from_case,
+    shipped_loss,
+    shipped_loss_names,
+)
 from dbvfiv.materials.fit import UniaxialFit, fit_mooney_rivlin, uniaxial_stress
 from dbvfiv.materials.halpin_tsai import fibre_ply, halpin_tsai, ply_from_constituents
 from dbvfiv.materials.isotropic import IsotropicElastic
@@ -12,6 +20,8 @@ from dbvfiv.materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, PARAMETER_COUNT,
 from dbvfiv.materials.library import law_from_card, law_from_case
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
 from dbvfiv.materials.orthotropic import OrthotropicPly
+from dbvfiv.materials.prony import Prony
+from dbvfiv.materials.prony_fit import PronyFit, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
 from dbvfiv.materials.rubbers import rubber, rubber_names, strain_levels
 from dbvfiv.materials.stability import StableRange, stability_margin, stability_warning, stable_range
 from dbvfiv.materials.tension_test import TensionTest, read_tension_test
@@ -21,23 +31,35 @@ __all__ = [
     "LINEAR_ELASTIC",
     "Law",
     "MOONEY_RIVLIN",
+    "MaterialDamping",
     "MaterialError",
     "MooneyRivlin",
     "OrthotropicPly",
     "PARAMETER_COUNT",
+    "Prony",
+    "PronyFit",
+    "ShippedLoss",
     "StableRange",
     "TensionTest",
     "UniaxialFit",
+    "damping_of",
     "energy_of",
     "fibre_ply",
+    "fit_constant",
+    "fit_moduli",
     "fit_mooney_rivlin",
+    "fit_relaxation",
+    "fit_tan_delta",
     "halpin_tsai",
     "law_from_card",
     "law_from_case",
     "ply_from_constituents",
     "read_tension_test",
+    "relaxation_from_case",
     "rubber",
     "rubber_names",
+    "shipped_loss",
+    "shipped_loss_names",
     "stability_margin",
     "stability_warning",
     "stable_range",

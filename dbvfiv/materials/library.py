@@ -74,7 +74,7 @@ def law_from_case(case: Case, name: str) -> Law:
         For a name the case does not know or constants that the law refuses; ``key`` is the table.
     """
     materials = case.materials
-    if name == "fibre" and name not in materials.named:
+    if name == "fibre" and materials.is_built_in(name):
         return fibre_ply(materials.fibre_constants)
     try:
         card = materials.card(name)

@@ -6,6 +6,7 @@ from ..case.model import Case
 from ..flow import Channel, FlowLaw, UniformLoad
 from ..flow.terms import terms_of
 from ..geometry import ValveMesh, valve_mesh
+from ..materials.damping import relaxation_from_case
 from ..materials.library import law_from_case
 from ..materials.orthotropic import OrthotropicPly
 from ..shell import Layer, Section, Shell, ShellMesh
@@ -19,7 +20,8 @@ def build_section(case: Case) -> Section:
         law = law_from_case(case, layer.material)
         ply = isinstance(law, OrthotropicPly)
         factor = case.shell.shear_correction_plies if ply else case.shell.shear_correction_rubber
-        layers.append(Layer(law, layer.thickness, layer.angle, factor, layer.material))
+        relaxation = relaxation_from_case(case, layer.material)
+        layers.append(Layer(law, layer.thickness, layer.angle, factor, layer.material, relaxation))
     return Section(tuple(layers), case.mesh.layer_points)
 
 

@@ -45,7 +45,7 @@ class Conditions:
 
     @classmethod
     def of(cls, case) -> Conditions:
-        return cls(case.fluid.density, case.damping.alpha, case.damping.beta)
+        return cls(case.fluid.density, case.damping.alpha, case.damping.beta, case.damping.loss_factor)
 
 
 def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q, v, a, inner, inner_rate):

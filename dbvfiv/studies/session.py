@@ -46,12 +46,9 @@ def named_changes(given: Mapping[str, Any]) -> dict[str, Any]:
 
 def describe_surroundings(case: Case) -> dict[str, Any]:
     """Fluid and damping of a case, for JSON."""
-    return {
-        "density": case.fluid.density,
-        "continuity": case.fluid.continuity,
-        "alpha": case.damping.alpha,
-        "beta": case.damping.beta,
-    }
+    damping = {name: getattr(case.damping, name) for name in ("alpha", "beta", "loss_factor")}
+    known = {name: value for name, value in damping.items() if not case.damping.lacks(name)}
+    return {"density": case.fluid.density, "continuity": case.fluid.continuity} | known
 
 
 class Session:

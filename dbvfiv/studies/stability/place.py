@@ -24,6 +24,8 @@ class Place:
     pressure : float, Pa
     density, alpha, beta : float
         kg/m3, 1/s, s.
+    loss_factor : float
+        Factor on the loss factors of all materials.
     storage : float
         Blend of the continuity laws, 0 quasi-steady, 1 storage.
     design : dict
@@ -35,13 +37,15 @@ class Place:
     alpha: float
     beta: float
     storage: float
+    loss_factor: float = 0.0
     design: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, case: Case) -> Place:
         """The parameters of a case."""
         storage = 1.0 if case.fluid.continuity == "storage" else 0.0
-        return cls(case.drive.pressure, case.fluid.density, case.damping.alpha, case.damping.beta, storage)
+        damping = case.damping
+        return cls(case.drive.pressure, case.fluid.density, damping.alpha, damping.beta, storage, damping.loss_factor)
 
     def at(self, **values: float) -> Place:
         """With some parameters changed."""
@@ -56,7 +60,7 @@ class Place:
 
     @property
     def conditions(self) -> Conditions:
-        return Conditions(self.density, self.alpha, self.beta)
+        return Conditions(self.density, self.alpha, self.beta, self.loss_factor)
 
     def value(self, name: str) -> float:
         return float(self.design[name] if name in DESIGN else getattr(self, name))
@@ -75,7 +79,9 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
         "storage": case.fluid.continuity,
         "alpha": case.damping.alpha,
         "beta": case.damping.beta,
+        "loss_factor": case.damping.loss_factor,
     }
+    given = {name: value for name, value in given.items() if not case.damping.lacks(name)}
     return {name: value for name, value in given.items() if name not in moved}
 
 
@@ -128,10 +134,14 @@ def require_parameter(case: Case, name: str) -> None:
     Raises
     ------
     CaseError
-        For strain levels without a rubber that has them, and angles without a ply that has one.
+        For strain levels without a rubber that has them, angles without a ply that has one, and what the model of
+        damping does not have.
     """
+    lacking = case.damping.lacks(name)
+    if lacking:
+        raise CaseError(f"There is no {name} to change: {lacking}.", key=PARAMETERS[name].key)
     used = {layer.material for layer in case.layers}
-    shipped = [name for name in RUBBERS if name not in case.materials.named]
+    shipped = [name for name in RUBBERS if case.materials.is_built_in(name)]
     if name == "strain" and not used & set(shipped):
         raise CaseError(
             "There is no strain level to change, because no layer is one of the built-in rubbers "

@@ -102,9 +102,9 @@ def surroundings_of(result: SweepResult) -> str:
     if result.parameter != "density" and case.drive.kind == "flow":
         parts.append(f"{case.fluid.density:g} kg/m³")
     parts += [
-        f"{symbol} = {getattr(case.damping, key):g} {unit}"
-        for key, symbol, unit in (("alpha", "α", "1/s"), ("beta", "β", "s"))
-        if key != result.parameter
+        PARAMETERS[name].text(getattr(case.damping, name))
+        for name in ("alpha", "beta", "loss_factor")
+        if name != result.parameter and not case.damping.lacks(name)
     ]
     return ", ".join(parts)
 

@@ -13,6 +13,7 @@ from ...record.record import GrowingRecord
 from ...record.states import SUMMARY
 from ..case import Case
 from ..session import Session
+from ..stability.place import require_parameter
 from ..study import Study
 from .printed import head, point_row
 from .result import BRANCHES, CHECKS, POINTS, STATES, SweepResult, tables_of
@@ -22,6 +23,7 @@ from .run import FoundBranches, SweepOptions, SweepPoint, run_sweep
 def run(session: Session, record: GrowingRecord) -> None:
     """Modes along `sweep.over` of the case; what is done is kept every few seconds."""
     axis = session.case.sweep.axis
+    require_parameter(session.case, axis.parameter)
     state = None if axis.parameter == "pressure" else session.equilibrium(record)
     found = run_sweep(
         session.model,
