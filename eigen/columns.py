@@ -99,13 +99,13 @@ class ColumnSolver:
     """Solves families of one pattern after another."""
 
     def __init__(self):
-        self._static, self._workspace = StaticSolver(), Workspace()
+        self._static, self._stiffened, self._workspace = StaticSolver(), StaticSolver(), Workspace()
         self._last: FamilyReduction | None = None
 
     def reduction(self, family: PencilFamily) -> FamilyReduction:
         """Small models of a family; the last one is kept."""
         if self._last is None or self._last.family is not family:
-            self._last = FamilyReduction(family, self._static)
+            self._last = FamilyReduction(family, self._static, self._stiffened)
         return self._last
 
     def solve(self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False) -> Column:

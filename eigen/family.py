@@ -8,16 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .creep import OVERDAMPED, edge_of
 from .options import SearchOptions
 from .pencil import CoupledPencil
 from .relaxation import Relaxation
 
 #: Eigenvalues closer to the limit point than this share of it are not listed.
 CLEAR = 0.8
-#: Real eigenvalues are listed among the modes down to minus this share of the slowest rate of creep.
-CREEP = 0.1
-#: Share of its decay rate that the angular frequency of a mode has at least where a stiffness creeps.
-SWING = 0.1
 
 
 class Condition(NamedTuple):
@@ -98,32 +95,24 @@ class PencilFamily(ABC):
         options = self.search(condition)
         floor = -np.inf if options.limit_point is None else CLEAR * options.limit_point
         band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
-        relaxation = self.relaxation(condition.loss)
-        return Reach(floor, band, -np.inf if relaxation is None else -CREEP * creep(relaxation))
-
-
-def creep(relaxation: Relaxation) -> float:
-    """Least rate at which a stiffness relaxes while its motion is held by forces, 1/s.
-
-    Left of minus it stand crowds of real eigenvalues, as many as unknowns for each relaxation time; they are no modes.
-    A part that relaxes by g_j at tau_j creeps at 1 / (tau_j (1 + g_j + ...)), the more slowly the stronger.
-    """
-    return float(1.0 / (relaxation.times.max(initial=0.0) * (1.0 + relaxation.strengths.sum(axis=1).max(initial=0.0))))
+        return Reach(floor, band, edge_of(self.relaxation(condition.loss)))
 
 
 class Reach(NamedTuple):
     """Growth rates above `floor` (1/s) and angular frequencies up to `band` (rad/s).
 
-    Left of `real` (1/s) what hardly swings does not count: it creeps and is no mode.
+    Left of `creep` (1/s) what hardly oscillates does not count; see `eigen.creep`.
     """
 
     floor: float
     band: float
-    real: float = -np.inf
+    creep: float = -np.inf
 
     def moving(self, values: np.ndarray) -> np.ndarray:
         """Eigenvalues without those that creep."""
-        return values[(values.real > self.real) | (np.abs(values.imag) > SWING * np.abs(values.real))]
+        if self.creep == -np.inf:
+            return values
+        return values[(values.real > self.creep) | (np.abs(values.imag) > OVERDAMPED * np.abs(values))]
 
     def leading(self, values: np.ndarray) -> np.ndarray:
         """Eigenvalues of the upper half-plane in reach, sorted by growth rate.
@@ -131,7 +120,7 @@ class Reach(NamedTuple):
         Where none lies above the floor the largest of all is given, which then is close to the limit point.
         """
         upper = values[(values.imag >= 0) & (values.imag <= self.band)]
-        upper = self.moving(upper) if np.isfinite(self.real) else upper
+        upper = self.moving(upper)
         kept = upper[upper.real > self.floor]
         if not kept.size and upper.size:
             kept = upper[[int(np.argmax(upper.real))]]

@@ -34,6 +34,8 @@ COMPRESSION = 1e-4
 SNAPSHOT = 0.75
 #: Low motions that inertia corrections are made for.
 MOTIONS = 20
+#: Corrections of a vector where parts of the stiffness relax.
+CORRECTIONS = 2
 #: Lowest motions of the structure taken where a band is searched.
 LOWEST = 24
 
@@ -138,7 +140,8 @@ class ReducedFamily:
         return Reference.of(self.M, self.K, self.D, self.relaxing)
 
     @cached_property
-    def _small(self) -> SmallSpectra:
+    def small(self) -> SmallSpectra:
+        """Leading eigenvalues of what relaxes."""
         return SmallSpectra(self)
 
     def coupling(self, law) -> dict[str, np.ndarray]:
@@ -222,7 +225,7 @@ class ReducedFamily:
     def _mixed(self, conditions, relaxes) -> np.ndarray:
         """Eigenvalues where some of the cells relax."""
         parts = []
-        for group, solve in ((~relaxes, self.eigenvalues), (relaxes, self._small.leading)):
+        for group, solve in ((~relaxes, self.eigenvalues), (relaxes, self.small.leading)):
             cells = np.flatnonzero(group)
             if cells.size:
                 parts.append((cells, solve([conditions[i] for i in cells])))
@@ -235,7 +238,7 @@ class ReducedFamily:
         """Leading eigenpairs in the reach of a condition, lifted to the full unknowns; down to a share of its floor."""
         reach = self.family.reach(condition)
         if self.family.relaxation(condition.loss) is not None:
-            values = reach.leading(self._small.leading([condition])[0])
+            values = reach.leading(self.small.leading([condition])[0])
             return self._of_rational(condition, values[values.real > share * reach.floor][:most])
         floor, band = reach.floor, reach.band
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
@@ -252,7 +255,7 @@ class ReducedFamily:
     def _of_rational(self, condition, starts) -> Pairs:
         """Eigenpairs near places, lifted."""
         k = self.size
-        found = self._small.pairs(condition, starts)
+        found = self.small.pairs(condition, starts)
         right, left = found.right.T, found.left.T
         return Pairs(found.values, self.V @ right[:k], right[k:], self.V @ left[:k], left[k:])
 
@@ -286,8 +289,9 @@ class FamilyReduction:
     Parameters
     ----------
     family : PencilFamily
-    solver : StaticSolver, optional
-        Keeps the symbolic factorisation between families of one pattern.
+    solver, stiffened : StaticSolver, optional
+        Keep the symbolic factorisation between families of one pattern: of the stiffness, and of that which a typical
+        motion sees where parts of it relax.
 
     Raises
     ------
@@ -295,10 +299,11 @@ class FamilyReduction:
         If the stiffness is singular.
     """
 
-    def __init__(self, family: PencilFamily, solver: StaticSolver | None = None):
+    def __init__(self, family: PencilFamily, solver: StaticSolver | None = None, stiffened: StaticSolver | None = None):
         self.family = family
         self.solver = solver or StaticSolver()
         self.solver.factor(family)
+        self._stiffened, self._loss = stiffened or StaticSolver(), None
 
     @cached_property
     def coarse(self) -> ReducedFamily:
@@ -354,9 +359,32 @@ class FamilyReduction:
         """Right and left structural vectors after one correction of what the space leaves out, (n, k) each."""
         force, _ = self.residual(pairs.values, pairs.q, pairs.u, condition)
         back, _ = self.residual(pairs.values, pairs.w, pairs.c, condition, left=True)
+        if self.family.relaxation(condition.loss) is not None:
+            return self._corrected_stiffly(pairs, condition, force, back)
         # far from the leading modes T is nearly (1 + lambda beta) K
         scale = 1.0 / (1.0 + pairs.values * condition.beta)
         return pairs.q - self.solver.solve(force) * scale, pairs.w - self.solver.solve_transposed(back) * np.conj(scale)
+
+    def _corrected_stiffly(self, pairs: Pairs, condition: Condition, force, back):
+        """The same where parts of the stiffness relax: with the stiffness that a typical motion sees, and repeated for
+        what that differs from one mode and one part to another.
+        """
+        relaxation, small = self.family.relaxation(condition.loss), self.coarse.small
+        typical = relaxation.factors(1j * small.frequency).real
+        if self._loss != condition.loss:
+            parts = zip(typical, relaxation.matrices)
+            self._stiffened.factor(self.family, sum((x * part for x, part in parts), self.family.stiffness).tocsr())
+            self._loss = condition.loss
+        solver, share = self._stiffened, small.stiff_shares
+        scale = 1.0 + share @ typical
+        scale = scale / (1.0 + pairs.values * condition.beta + share @ relaxation.factors(pairs.values))
+        q, w = pairs.q, pairs.w
+        for repeat in range(CORRECTIONS):
+            if repeat:
+                force, _ = self.residual(pairs.values, q, pairs.u, condition)
+                back, _ = self.residual(pairs.values, w, pairs.c, condition, left=True)
+            q, w = q - solver.solve(force) * scale, w - solver.solve_transposed(back) * np.conj(scale)
+        return q, w
 
     def fine(self, first: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:
         """Second stage: a space made of the corrected leading vectors of a first one at some conditions."""

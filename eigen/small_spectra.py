@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .family import SWING
+from .creep import OVERDAMPED
 from .rational import SAME, RationalCells, Refined, Surrogate, real_roots, refined, started
 
 if TYPE_CHECKING:
@@ -44,6 +44,10 @@ class SmallSpectra:
         parts = np.einsum("ai,gab,bi->gi", motions, reduced.relaxing, motions)
         #: Share of each relaxing part in the stiffness of typical motions, (g,).
         self.shares = (parts / squares[low]).mean(axis=1) if low.size else np.ones(len(reduced.relaxing))
+        #: The same of the stiffest motions.
+        self.stiff_shares = (
+            np.array([np.trace(_relative(part, reduced.M)) for part in reduced.relaxing]) / squares.sum()
+        )
 
     def problem(self, conditions: list[Condition]) -> RationalCells:
         """The rational pencils of conditions."""
@@ -53,8 +57,7 @@ class SmallSpectra:
             [self._basis(law) for law in laws],
             np.array([laws[c.law] for c in conditions]),
             np.array([(np.sqrt(c.inertia), c.alpha, c.beta) for c in conditions]),
-            np.array([relaxation.strengths for relaxation in relaxations]),
-            relaxations[0].times,
+            *_together(relaxations),
         )
 
     def _basis(self, law) -> np.ndarray:
@@ -95,7 +98,7 @@ class SmallSpectra:
             # one after another as long as all that were found are unstable
             wanted = np.array([bool(row) and min(v.real for v in row) > 0 for row in rows])
             first += TAKEN
-        limits = [self.reduced.family.reach(c).real for c in conditions]
+        limits = [self.reduced.family.reach(c).creep for c in conditions]
         for i, value in zip(*real_roots(problem, max(limits), self._top)):
             _joined(rows[i], complex(value))
         for i in np.flatnonzero(doubtful):
@@ -132,7 +135,7 @@ class SmallSpectra:
         )
         values = np.linalg.eigvals(matrices)
         # what creeps is no start, and the real axis is searched on its own
-        swings = (values.imag > SWING * np.abs(values.real)) | ((values.imag >= 0) & (values.real > 0))
+        swings = (values.imag > OVERDAMPED * np.abs(values)) | ((values.imag >= 0) & (values.real > 0))
         growth = np.where(swings, self._estimates(problem, surrogate, np.where(swings, values, 1.0)).real, -np.inf)
         order = np.argsort(-growth, axis=1)[:, :STARTED]
         cells = np.repeat(np.arange(len(conditions)), order.shape[1])
@@ -146,6 +149,15 @@ class SmallSpectra:
         true = problem.factors(cells, values.ravel()).reshape(*values.shape, -1)
         missed = true - surrogate.level[:, None] - surrogate.slope[:, None] * values[..., None]
         return values * (1.0 + 0.5 * (missed @ self.shares) / (1.0 + true @ self.shares))
+
+
+def _together(relaxations) -> tuple[np.ndarray, np.ndarray]:
+    """Strengths (cells, g, j) over the times (j,) of all."""
+    times = np.unique(np.concatenate([relaxation.times for relaxation in relaxations]))
+    strengths = np.zeros((len(relaxations), len(relaxations[0].strengths), len(times)))
+    for own, relaxation in zip(strengths, relaxations):
+        own[:, np.searchsorted(times, relaxation.times)] = relaxation.strengths
+    return strengths, times
 
 
 def _places(cells: np.ndarray, growth: np.ndarray) -> np.ndarray:

@@ -90,14 +90,15 @@ def select_search(
     Stiffness damping orders modes by frequency until they reach the limit point -1/beta: leading modes are those of
     largest growth rate, right of it. Without it growth rates of high modes do not fall, so that "leading" has a meaning
     within a band of frequencies only: the one asked for, or one that holds as many structural frequencies in vacuo as
-    modes are wanted. A band that was asked for is respected under any damping.
+    modes are wanted. Loss factors order them by frequency too, with no limit point. A band that was asked for is
+    respected under any damping.
 
     Parameters
     ----------
     options : SearchOptions
         What was asked for.
     conditions : Conditions
-        Of which only the stiffness damping matters.
+        Of which only the stiffness damping and the loss factors matter.
     structural_frequencies : callable
         From a number to that many lowest frequencies of the undamped structure in vacuo at the state, Hz, ascending;
         fewer where there are no more. Called only where they decide. `eigen.lowest_frequencies` computes them.
@@ -120,7 +121,7 @@ def select_search(
     limit = limit_point(conditions.beta)
     if limit is not None:
         return LeadingSearch(replace(options, limit_point=limit), asked)
-    if asked is BandOrigin.ASKED:
+    if asked is BandOrigin.ASKED or conditions.loss_factor > 0:
         return LeadingSearch(options, asked)
     known = np.asarray(structural_frequencies(count), float)[:count]
     highest = float(known.max(initial=0.0))

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from eigen import Condition, CoupledPencil, PencilFamily, SearchOptions, lowest_frequencies
+from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, lowest_frequencies
 from eigen.reduction import POWERS
 
 from ...model.dynamics import Conditions, LinearisedState, fluid_parts
 from ...model.leading import select_search
 
-#: Blends of the continuity laws whose fluid is kept.
+#: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
 _KEPT = 256
 
 
 class ValveFamily(PencilFamily):
-    """Conditions are (density, alpha, beta, storage); at unit density the fluid's unknown is the inlet velocity, at
+    """Conditions are (density, alpha, beta, storage, loss factor); at unit density the fluid's unknown is the inlet velocity, at
     others that times the root of the density.
 
     Parameters
@@ -33,6 +33,7 @@ class ValveFamily(PencilFamily):
         self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
         self.forces, self.slope = linear.forces, linear.slope
         self._parts: dict[float, dict[str, np.ndarray]] = {}
+        self._relaxations: dict[float, Relaxation | None] = {}
         self._frequencies = np.zeros(0)
 
     def _lowest(self, count: int) -> np.ndarray:
@@ -44,9 +45,18 @@ class ValveFamily(PencilFamily):
 
     def search(self, condition: Condition) -> SearchOptions:
         """What is searched in the spectrum: the rule that every study follows."""
-        conditions = Conditions(condition.inertia, condition.alpha, condition.beta)
+        conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss)
         asked = SearchOptions(max_frequency=self.max_frequency)
         return select_search(asked, conditions, self._lowest, self.modes).options
+
+    def relaxation(self, loss: float) -> Relaxation | None:
+        """What relaxes with a factor on the loss factors of all materials."""
+        loss = float(loss)
+        if loss not in self._relaxations:
+            if len(self._relaxations) > _KEPT:
+                self._relaxations.clear()
+            self._relaxations[loss] = self.linear.relaxation(loss)
+        return self._relaxations[loss]
 
     def parts(self, law: float) -> dict[str, np.ndarray]:
         """A0 to S1 at density 1."""
@@ -69,5 +79,5 @@ class ValveFamily(PencilFamily):
 
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The full pencil, with the inlet velocity itself as unknown."""
-        density, alpha, beta, storage = condition
-        return self.linear.pencil(Conditions(density, alpha, beta), storage=storage)
+        density, alpha, beta, storage, loss_factor = condition
+        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor), storage=storage)
