@@ -173,7 +173,10 @@ class ColumnSolver:
             If no usable shift was found.
         """
         condition = Condition(*condition)
-        return leading_modes(family.pencil(condition), count, family.search(condition), workspace=self._workspace)
+        found = leading_modes(family.pencil(condition), count, family.search(condition), workspace=self._workspace)
+        if condition.loss == 0:
+            return found
+        return found.select(np.flatnonzero(family.reach(condition).is_mode(found.eigenvalues)))
 
     def _directly(self, reduction: FamilyReduction, conditions) -> Column:
         family, cells = reduction.family, len(conditions)

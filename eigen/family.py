@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .creep import OVERDAMPED, edge_of
+from .creep import edge_of
 from .options import SearchOptions
 from .pencil import CoupledPencil
 from .relaxation import Relaxation
+from .shifts import SLOPE
 
 #: Eigenvalues closer to the limit point than this share of it are not listed.
 CLEAR = 0.8
@@ -101,18 +102,18 @@ class PencilFamily(ABC):
 class Reach(NamedTuple):
     """Growth rates above `floor` (1/s) and angular frequencies up to `band` (rad/s).
 
-    Left of `creep` (1/s) what hardly oscillates does not count; see `eigen.creep`.
+    Left of `creep` (1/s), which is minus infinity where nothing relaxes, what hardly oscillates does not count; see
+    `eigen.creep` and `eigen.shifts`.
     """
 
     floor: float
     band: float
     creep: float = -np.inf
 
-    def moving(self, values: np.ndarray) -> np.ndarray:
-        """Eigenvalues without those that creep."""
-        if self.creep == -np.inf:
-            return values
-        return values[(values.real > self.creep) | (np.abs(values.imag) > OVERDAMPED * np.abs(values))]
+    def is_mode(self, values: np.ndarray) -> np.ndarray:
+        """Which eigenvalues are no creep: right of it, or decaying no faster than a search for modes reaches."""
+        values = np.asarray(values)
+        return (values.real > self.creep) | (-values.real <= SLOPE * np.abs(values.imag))
 
     def leading(self, values: np.ndarray) -> np.ndarray:
         """Eigenvalues of the upper half-plane in reach, sorted by growth rate.
@@ -120,7 +121,7 @@ class Reach(NamedTuple):
         Where none lies above the floor the largest of all is given, which then is close to the limit point.
         """
         upper = values[(values.imag >= 0) & (values.imag <= self.band)]
-        upper = self.moving(upper)
+        upper = upper[self.is_mode(upper)]
         kept = upper[upper.real > self.floor]
         if not kept.size and upper.size:
             kept = upper[[int(np.argmax(upper.real))]]

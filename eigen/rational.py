@@ -149,8 +149,7 @@ class Surrogate:
 
 
 def started(problem: RationalCells, surrogate: Surrogate | None, cells, values) -> Refined:
-    """Eigenvectors of surrogates, or of the pencils themselves without one, and the Rayleigh quotients that the rational
-    pencils have with them.
+    """Eigenvectors of surrogates, or of the pencils themselves without one, and their rational Rayleigh quotients.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ class SmallSpectra:
         F, E = self.reduced.pencil(condition).first_order()
         values = np.linalg.eigvals(np.linalg.solve(E, F))
         reach = self.reduced.family.reach(condition)
-        values = reach.moving(values[values.imag >= 0])
+        values = values[(values.imag >= 0) & reach.is_mode(values)]
         values = values[np.argsort(-values.real)]
         return values[: max(TAKEN, int(np.sum(values.real > 0)) + 1)]
 

@@ -15,8 +15,9 @@ _KEPT = 256
 
 
 class ValveFamily(PencilFamily):
-    """Conditions are (density, alpha, beta, storage, loss factor); at unit density the fluid's unknown is the inlet velocity, at
-    others that times the root of the density.
+    """Conditions are (density, alpha, beta, storage, loss factor).
+
+    At unit density the fluid's unknown is the inlet velocity, at others that times the root of the density.
 
     Parameters
     ----------
