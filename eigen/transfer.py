@@ -38,7 +38,7 @@ class TransferBasis:
     V : ndarray, shape (n, k)
         M-orthonormal.
     structural_frequencies : ndarray
-        Hz, of the undamped symmetric structure in vacuo (an unstable one counts as zero).
+        Hz, of the undamped symmetric structure in vacuo (an unstable one counts as zero), as stiff as it is there.
 
     Examples
     --------
@@ -55,7 +55,7 @@ class TransferBasis:
         self._G, self._J, self._M = pencil.G, pencil.J, pencil.M
         self._projected: dict[int, tuple[object, np.ndarray]] = {}
         values, vectors = _lowest_modes(pencil, modes)
-        self.structural_frequencies = _frequencies(values)
+        self.structural_frequencies = _frequencies(pencil, values, vectors)
         self.V = np.zeros((pencil.n, 0))
         self._extend(vectors)
         if pencil.m and self.V.shape[1] < pencil.n:
@@ -161,7 +161,8 @@ class TransferBasis:
 
 
 def lowest_frequencies(pencil: CoupledPencil, count: int, workspace: Workspace | None = None) -> np.ndarray:
-    """Lowest frequencies of the undamped symmetric structure in vacuo, (K + K^T)/2 and M.
+    """Lowest frequencies of the undamped symmetric structure in vacuo, (K + K^T)/2 and M; what relaxes of the stiffness
+    counts as stiff as it is at each.
 
     Parameters
     ----------
@@ -181,11 +182,19 @@ def lowest_frequencies(pencil: CoupledPencil, count: int, workspace: Workspace |
     >>> np.round(lowest_frequencies(pencil, 2), 6)
     array([1., 2.])
     """
-    return _frequencies(_lowest_modes(pencil, count, workspace)[0])
+    return _frequencies(pencil, *_lowest_modes(pencil, count, workspace))
 
 
-def _frequencies(squares):
-    return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+def _frequencies(pencil, squares, vectors, steps: int = 4):
+    """Hz, from the squares and modes of the slow stiffness."""
+    omega = np.sqrt(np.maximum(squares, 0.0))
+    if pencil.relaxation is not None:
+        parts = np.array([np.einsum("ik,ik->k", vectors, m @ vectors) for m in pencil.relaxing])
+        for _ in range(steps):
+            stiffer = squares + (pencil.relaxation.factors(1j * omega).real * parts).sum(axis=0)
+            omega = np.sqrt(np.maximum(stiffer, 0.0))
+        omega = np.sort(omega)
+    return omega / (2 * np.pi)
 
 
 def _lowest_modes(pencil, count, workspace=None):

@@ -13,6 +13,7 @@ from .response import Determinant
 
 MAX_PHASE = np.pi / 4  # largest accepted phase increment between neighbours
 MAX_LOG = 1.0  # largest accepted increment of log |f|: feels zeros beside the line
+CLOSE = 0.4  # distance of two places beside zeros that relax, over the distance of the zero from the line
 MAX_PREDICTED = 1.5  # largest increment of log f that a neighbour's slope may predict
 
 
@@ -153,7 +154,7 @@ class _Walk:
         self.smallest = 1e-9 * scale
         self.values.setdefault(0.0, 0j)  # kept as a place even where the value is lost
         steps = scale * 10.0 ** np.arange(-3, 1.01, 0.25)
-        places = list(steps)
+        places, widths = list(steps), []
         if np.isfinite(self.turn):
             places += [self.turn, *(self.turn + steps)]
         for h in hints:
@@ -162,6 +163,10 @@ class _Walk:
             width = max(abs(h.real - self.f.line), 1e-9 * abs(h))
             beside = [abs(h.imag) + offset * width for offset in (-10, -3, -1, 0, 1, 3, 10)]
             places += [omega for omega in beside if omega > 0]
+            widths += [width for omega in beside if omega > 0]
+        if self.f.pencil.relaxation is not None:
+            own = len(places) - len(widths)
+            places[own:] = _thinned(places[own:], widths)
         self._add(*places[: self.max_points // 2])
         top = max(self.values)
         settled = 0
@@ -270,6 +275,16 @@ class _Walk:
             evaluations=self.f.evaluations,
             notes=tuple(self.notes),
         )
+
+
+def _thinned(places, widths):
+    """Places that lie apart by a good part of their widths: zeros that are all well damped share theirs."""
+    kept: list[float] = []
+    for i in np.argsort(widths):
+        at = bisect_left(kept, places[i])
+        if all(abs(places[i] - w) > CLOSE * widths[i] for w in kept[max(0, at - 1) : at + 1]):
+            kept.insert(at, places[i])
+    return kept
 
 
 def _principal(angle: float) -> float:

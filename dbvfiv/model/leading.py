@@ -14,6 +14,11 @@ from .dynamics import Conditions
 
 #: Room above the highest structural frequency that a band is made for.
 ROOM = 1.05
+#: What is left out of lists of modes where materials relax.
+CREEP = (
+    "Materials with loss factors creep: after a push a part of the deflection dies out slowly, without swinging. Such "
+    "motions are not listed as modes unless they grow, or are about to."
+)
 
 
 class BandOrigin(Enum):
@@ -35,11 +40,14 @@ class LeadingSearch:
     origin : BandOrigin
     frequencies : int
         Structural frequencies in vacuo that a band of the origin STRUCTURE holds.
+    creeps : bool
+        Whether materials relax, so that creep has to be told from modes.
     """
 
     options: SearchOptions
     origin: BandOrigin
     frequencies: int = 0
+    creeps: bool = False
 
     @property
     def band(self) -> float:
@@ -56,16 +64,17 @@ class LeadingSearch:
         """What a reader of the result has to know about the band, in a sentence."""
         if self.origin is not BandOrigin.STRUCTURE:
             return None
+        why = "Loss factors damp all frequencies alike and" if self.creeps else "Without stiffness damping"
         return (
-            f"Without stiffness damping growth rates do not order the modes, so the search covers the band up "
+            f"{why} growth rates do not order the modes, so the search covers the band up "
             f"to {self.band:.4g} Hz, which holds {self.frequencies} structural frequencies in vacuo; "
             f"modes.max_frequency chooses another."
         )
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The note, if there is one, as a tuple."""
-        return () if self.note is None else (self.note,)
+        """The note, if there is one, and what a reader has to know about creep."""
+        return (() if self.note is None else (self.note,)) + ((CREEP,) if self.creeps else ())
 
 
 def limit_point(beta: float) -> float | None:
@@ -90,15 +99,14 @@ def select_search(
     Stiffness damping orders modes by frequency until they reach the limit point -1/beta: leading modes are those of
     largest growth rate, right of it. Without it growth rates of high modes do not fall, so that "leading" has a meaning
     within a band of frequencies only: the one asked for, or one that holds as many structural frequencies in vacuo as
-    modes are wanted. Loss factors order them by frequency too, with no limit point. A band that was asked for is
-    respected under any damping.
+    modes are wanted. Loss factors do not order modes either. A band that was asked for is respected under any damping.
 
     Parameters
     ----------
     options : SearchOptions
         What was asked for.
     conditions : Conditions
-        Of which only the stiffness damping and the loss factors matter.
+        Of which only the stiffness damping and the factor on the loss factors matter.
     structural_frequencies : callable
         From a number to that many lowest frequencies of the undamped structure in vacuo at the state, Hz, ascending;
         fewer where there are no more. Called only where they decide. `eigen.lowest_frequencies` computes them.
@@ -118,13 +126,14 @@ def select_search(
     -333.3333333333333
     """
     asked = BandOrigin.NONE if options.max_frequency is None else BandOrigin.ASKED
-    limit = limit_point(conditions.beta)
+    creeps = conditions.loss_factor > 0
+    limit = None if creeps else limit_point(conditions.beta)
     if limit is not None:
         return LeadingSearch(replace(options, limit_point=limit), asked)
-    if asked is BandOrigin.ASKED or conditions.loss_factor > 0:
-        return LeadingSearch(options, asked)
+    if asked is BandOrigin.ASKED:
+        return LeadingSearch(options, asked, creeps=creeps)
     known = np.asarray(structural_frequencies(count), float)[:count]
     highest = float(known.max(initial=0.0))
     if not highest > 0:
-        return LeadingSearch(options, asked)  # nothing that oscillates: any band would be arbitrary
-    return LeadingSearch(replace(options, max_frequency=ROOM * highest), BandOrigin.STRUCTURE, len(known))
+        return LeadingSearch(options, asked, creeps=creeps)  # nothing oscillates: any band would be arbitrary
+    return LeadingSearch(replace(options, max_frequency=ROOM * highest), BandOrigin.STRUCTURE, len(known), creeps)

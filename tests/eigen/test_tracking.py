@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from eigen import CoupledPencil, SearchOptions, TrackOptions, track
+from eigen import CoupledPencil, Relaxation, SearchOptions, TrackOptions, track
 from tests.systems.beam import fluid_conveying_pipe
 from tests.systems.plate_over_channel import plate_over_channel
+from tests.systems.relaxing import mode_roots
 
 
 def oscillators(p, coupling=0.0):
@@ -48,6 +49,26 @@ def test_real_modes_merge_into_a_pair_and_split_again():
     for column in (0, -1):
         slow = -zeta[column] + np.sqrt(zeta[column] ** 2 - 1)
         assert np.isclose(np.sort(branches.growth_rate[:, column])[-1], slow)
+
+
+def test_modes_along_the_strength_of_relaxation():
+    """Each mode keeps to the roots of its own equation while its damping grows from nothing to a fifth."""
+    stiffness = np.diag([1.0, 4.0, 9.0])
+    times = [10.0, 1.0, 0.1]
+
+    def pencil(p):
+        relaxation = Relaxation([stiffness], [[p, p, p]], times)
+        return CoupledPencil(M=np.eye(3), C=np.zeros((3, 3)), K=stiffness, relaxation=relaxation)
+
+    values = np.linspace(0.0, 0.4, 9)
+    branches = track(pencil, values, TrackOptions(count=3, margin=0))
+    assert branches.ids.size == 3 and branches.confidence.min() > 0.8
+    squares = np.round(np.abs(branches.eigenvalues[:, 0]) ** 2)
+    assert sorted(squares) == [1.0, 4.0, 9.0]
+    for row, square in zip(branches.eigenvalues, squares):
+        for value, p in zip(row, values):
+            roots = mode_roots(square, [p] * 3, times)
+            assert np.abs(roots - value).min() < 1e-9
 
 
 def test_cantilever_pipe_to_flutter():

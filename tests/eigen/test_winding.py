@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from eigen import CoupledPencil, SearchOptions, TransferBasis, certified_spectrum, unstable_count
+from eigen import CoupledPencil, Relaxation, SearchOptions, TransferBasis, certified_spectrum, unstable_count
 from eigen.response import Determinant
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues, random_pencil
+from tests.systems.relaxing import STRENGTHS, TIMES, relaxing_random
 
 
 def random_case(rng):
@@ -41,6 +42,65 @@ def test_counts_of_random_pencils(seed):
         assert count.distance < 0.2
         assert count.largest_increment < np.pi / 3
     assert uncertain <= 2
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_counts_where_the_stiffness_relaxes(seed):
+    rng = np.random.default_rng(100 + seed)
+    uncertain = 0
+    for _ in range(60):
+        m = int(rng.integers(0, 4))
+        pencil = relaxing_random(
+            rng,
+            int(rng.integers(1, 9)),
+            m,
+            int(rng.integers(0, 3)) if m else 0,
+            groups=int(rng.integers(1, 4)),
+            branches=int(rng.integers(1, 5)),
+            unsymmetric=rng.random() < 0.6,
+            damping=rng.choice(["general", "positive", "none", "mass"]),
+            scale=10 ** rng.uniform(-3, 1),
+        )
+        count = unstable_count(pencil)
+        if not count.certain:
+            assert count.notes
+            uncertain += 1
+            continue
+        assert count.number == int(np.sum(dense_eigenvalues(pencil).real > count.line))
+    assert uncertain <= 2
+
+
+def test_a_relaxing_stiffness_that_is_not_passive_is_no_part_of_the_reference():
+    relaxation = Relaxation([np.diag([1.0, -0.4]), [[0.0, 0.3], [-0.3, 0.0]]], [[0.5], [1.0]], [0.7])
+    pencil = CoupledPencil(np.eye(2), 0.01 * np.eye(2), np.diag([1.0, 0.3]), relaxation=relaxation)
+    count = unstable_count(pencil)
+    assert count.certain and count.number == int(np.sum(dense_eigenvalues(pencil).real > 0)) > 0
+
+
+@pytest.mark.parametrize("line", [-0.02, 0.3])
+def test_lines_beside_the_axis_where_the_stiffness_relaxes(line):
+    rng = np.random.default_rng(9)
+    for _ in range(10):
+        pencil = relaxing_random(rng, 6, 2, 1)
+        pencil = pencil.replace(relaxation=pencil.relaxation.replace(pencil.relaxation.strengths, [0.1, 1.0, 10.0]))
+        count = unstable_count(pencil, line=line)
+        assert count.certain
+        assert count.number == int(np.sum(dense_eigenvalues(pencil).real > line))
+    with pytest.raises(ValueError, match="creep"):
+        unstable_count(pencil, line=-0.2)
+
+
+@pytest.mark.parametrize("storage, density", [(False, 10.0), (True, 10.0), (True, 1000.0)])
+def test_certificate_where_the_stiffness_relaxes(storage, density, monkeypatch):
+    elastic, stiffness = plate_over_channel(5, 8, beta=0.0, storage=storage, density=density, with_parts=True)
+    pencil = elastic.replace(relaxation=Relaxation([stiffness], [STRENGTHS], TIMES))
+    monkeypatch.setattr(Determinant, "dense_below", 100)
+    result = certified_spectrum(pencil, 4, SearchOptions(max_frequency=40.0))
+    assert result.agrees, result.statement
+    values = dense_eigenvalues(pencil)
+    inside = np.abs(values.imag) <= 2 * np.pi * result.count.band
+    assert result.unstable_count == int(np.sum(values.real[inside] > result.count.line))
+    assert result.response_error < 1e-4
 
 
 @pytest.mark.parametrize("line", [-0.5, -0.1, 0.3])

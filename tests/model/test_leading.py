@@ -63,3 +63,14 @@ def test_a_structure_that_does_not_oscillate_has_no_band():
 def test_limits():
     assert limit_point(0.0) is None and limit_point(0.002) == -500.0
     assert growth_floor(0.0) == -np.inf and growth_floor(0.002) == pytest.approx(-400.0)
+
+
+@pytest.mark.parametrize("beta", [0.0, 0.004])
+def test_loss_factors_do_not_order_the_modes(beta):
+    """A band is needed whatever else damps, and creep is said."""
+    found = select_search(SearchOptions(), Conditions(10.0, 0.0, beta, 1.0), lowest, 3)
+    assert found.origin is BandOrigin.STRUCTURE and found.band == pytest.approx(1.05 * 28.0)
+    assert found.options.limit_point is None and np.isinf(found.floor)
+    assert "Loss factors" in found.note and len(found.notes) == 2 and "creep" in found.notes[1]
+    asked = select_search(SearchOptions(max_frequency=60.0), Conditions(10.0, 0.0, beta, 1.0), never, 3)
+    assert asked.band == 60.0 and asked.note is None and "creep" in asked.notes[0]
