@@ -132,7 +132,7 @@ class ColumnSolver:
         if len(conditions) < 3:
             return self._directly(reduction, conditions)
         places = _spread(conditions, snapshots)
-        banded = any(np.isfinite(family.reach(conditions[i]).band) for i in places)
+        banded = any(_is_banded(family, conditions[i]) for i in places)
         first = reduction.wide if banded else reduction.coarse
         fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
         error = _error(reduction, fine, conditions, _between(places))
@@ -181,7 +181,7 @@ class ColumnSolver:
     def _directly(self, reduction: FamilyReduction, conditions) -> Column:
         family, cells = reduction.family, len(conditions)
         spectra = [self.direct(family, c) for c in conditions]
-        banded = any(np.isfinite(family.reach(c).band) for c in conditions)
+        banded = any(_is_banded(family, c) for c in conditions)
         first = reduction.wide if banded else reduction.coarse
         counts = count_unstable(first, conditions, [s.eigenvalues[:1] for s in spectra])
         column = _blank(cells, counts)
@@ -234,10 +234,20 @@ class _Counts:
             own[cells] = other
 
 
+def _is_banded(family: PencilFamily, condition: Condition) -> bool:
+    """Whether all modes of a band are close to neutral, as they are where only it makes modes leading."""
+    return condition.loss == 0 and np.isfinite(family.reach(condition).band)
+
+
+def _counted_band(family: PencilFamily, condition: Condition) -> float:
+    """Angular frequency up to which eigenvalues are counted: all where the stiffness relaxes, which damps all."""
+    return family.reach(condition).band if family.relaxation(condition.loss) is None else np.inf
+
+
 def _uncounted(family: PencilFamily, conditions) -> _Counts:
     """What is known before anything is counted."""
     cells = len(conditions)
-    bands = np.array([family.reach(c).band for c in conditions])
+    bands = np.array([_counted_band(family, c) for c in conditions])
     band = np.where(np.isinf(bands), np.inf, INSIDE * bands / (2 * np.pi))
     return _Counts(np.full(cells, -1), np.zeros(cells, bool), np.zeros(cells), band)
 
@@ -261,7 +271,7 @@ def count_unstable(reduced: ReducedFamily, conditions, hints) -> _Counts:
     """
     cells = len(conditions)
     counts = _Counts(np.zeros(cells, int), np.zeros(cells, bool), np.zeros(cells), np.full(cells, np.inf))
-    bands = np.array([reduced.family.reach(c).band for c in conditions])
+    bands = np.array([_counted_band(reduced.family, c) for c in conditions])
     damped = np.array([any(c.damping) for c in conditions])
     whole = np.flatnonzero(np.isinf(bands) & damped)
     if whole.size:

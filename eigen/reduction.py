@@ -34,7 +34,8 @@ COMPRESSION = 1e-4
 SNAPSHOT = 0.75
 #: Low motions that inertia corrections are made for.
 MOTIONS = 20
-#: Corrections of a vector where parts of the stiffness relax.
+#: Corrections of a vector where parts of the stiffness relax: one leaves 1e-6 of an eigenvalue, two 1e-8, and more do
+#: not converge, since the inertia is left out of them.
 CORRECTIONS = 2
 #: Lowest motions of the structure taken where a band is searched.
 LOWEST = 24

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 TAKEN = 6
 #: Eigenvalues of a surrogate from which the first of these are chosen.
 STARTED = 9
+#: Room above a band for starts.
+ROOM = 1.1
 #: Growth rates of a cell that have to be right; a start that was lost below them does not matter.
 WATCHED = 2
 #: Lowest motions of the structure from which it is read how much of the stiffness relaxes.
@@ -137,9 +139,11 @@ class SmallSpectra:
         # what creeps is no start, and the real axis is searched on its own
         swings = (values.imag > OVERDAMPED * np.abs(values)) | ((values.imag >= 0) & (values.real > 0))
         growth = np.where(swings, self._estimates(problem, surrogate, np.where(swings, values, 1.0)).real, -np.inf)
+        band = np.array([self.reduced.family.reach(c).band for c in conditions])
+        growth = np.where((values.imag <= ROOM * band[:, None]) | (growth > 0), growth, -np.inf)
         order = np.argsort(-growth, axis=1)[:, :STARTED]
         cells = np.repeat(np.arange(len(conditions)), order.shape[1])
-        kept = np.take_along_axis(swings, order, 1).ravel()
+        kept = np.isfinite(np.take_along_axis(growth, order, 1)).ravel()
         picked = np.take_along_axis(values, order, 1).ravel()[kept]
         return cells[kept], started(problem, surrogate, cells[kept], picked)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, lowest_frequencies
+from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, Workspace, lowest_frequencies
 from eigen.reduction import POWERS
 
 from ...model.dynamics import Conditions, LinearisedState, fluid_parts
@@ -27,28 +29,37 @@ class ValveFamily(PencilFamily):
         structural frequencies of the state.
     modes : int
         Structural frequencies that such a band holds.
+    workspace : Workspace, optional
+        Keeps the symbolic factorisation for those between states.
     """
 
-    def __init__(self, linear: LinearisedState, max_frequency: float | None = None, modes: int = 10):
-        self.linear, self.max_frequency, self.modes = linear, max_frequency, modes
+    def __init__(
+        self,
+        linear: LinearisedState,
+        max_frequency: float | None = None,
+        modes: int = 10,
+        workspace: Workspace | None = None,
+    ):
+        self.linear, self.max_frequency, self.modes, self._workspace = linear, max_frequency, modes, workspace
         self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
         self.forces, self.slope = linear.forces, linear.slope
         self._parts: dict[float, dict[str, np.ndarray]] = {}
         self._relaxations: dict[float, Relaxation | None] = {}
         self._frequencies = np.zeros(0)
 
-    def _lowest(self, count: int) -> np.ndarray:
+    def _lowest(self, count: int, workspace: Workspace | None = None) -> np.ndarray:
         """Structural frequencies of the state."""
         if len(self._frequencies) < count:
             structure = CoupledPencil(self.mass, 0.0 * self.mass, self.stiffness)
-            self._frequencies = lowest_frequencies(structure, count)
+            self._frequencies = lowest_frequencies(structure, count, workspace)
         return self._frequencies[:count]
 
     def search(self, condition: Condition) -> SearchOptions:
         """What is searched in the spectrum: the rule that every study follows."""
         conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss)
         asked = SearchOptions(max_frequency=self.max_frequency)
-        return select_search(asked, conditions, self._lowest, self.modes).options
+        lowest = partial(self._lowest, workspace=self._workspace) if condition.loss else self._lowest
+        return select_search(asked, conditions, lowest, self.modes).options
 
     def relaxation(self, loss: float) -> Relaxation | None:
         """What relaxes with a factor on the loss factors of all materials."""

@@ -88,7 +88,7 @@ class Family(Protocol):
 
 
 class FluidFamily:
-    """One state; density, alpha or beta moves."""
+    """One state; density, alpha, beta or the factor on the loss factors moves."""
 
     def __init__(
         self, model: ValveModel, state: SteadyState, axis: Axis, conditions: Conditions, options, observer: Observer
@@ -134,6 +134,8 @@ class FluidFamily:
             linear.slope @ basis.V,
             linear.area,
         )
+        # what relaxes would be computed on the elements otherwise
+        vars(self.small)["relaxing"] = tuple(basis.project(part) for part in linear.relaxing)
 
     def _confirmed(self, value: float, basis: TransferBasis) -> bool:
         """Compare with a full solve, and enlarge the basis where it misses the tolerance; whether it was good enough
@@ -164,8 +166,10 @@ class FluidFamily:
 
     def _reduced(self, pencil: CoupledPencil, search: LeadingSearch, count: int, left: bool) -> Spectrum:
         options = search.options
+        # the linear form of what relaxes is several times as large
+        method = "dense" if pencil.relaxation is None or count >= pencil.n else "auto"
         return leading_modes(
-            pencil, count, SearchOptions(options.max_frequency, tolerance=options.tolerance, method="dense", left=left)
+            pencil, count, SearchOptions(options.max_frequency, tolerance=options.tolerance, method=method, left=left)
         )
 
     def _selected(self, value: float) -> LeadingSearch:
