@@ -63,6 +63,60 @@ class Unit(Observer):
         self.wall += perf_counter() - wall
 
 
+#: Water about an open state, pushed: smooth, so that a step takes the same work whatever damps it.
+RINGING = {
+    "drive.pressure": 6e3,
+    "fluid.density": 1000.0,
+    "damping.alpha": 0.0,
+    "transient.start": "kick",
+    "transient.kick_opening": 1e-4,
+    "transient.step": 1e-4,
+}
+BLOCK, BLOCKS = 200, 5
+
+
+def _block(model: ValveModel, first) -> tuple[float, int, object]:
+    """Processor time and residuals of a block of steps with their history and file, and the state at its end."""
+    case = model.case.replace({"transient.duration": first.time + BLOCK * 1e-4})
+    with tempfile.TemporaryDirectory() as folder:
+        mesh = MeshData.of(model)
+        path = Path(folder) / "run.h5"
+        with GrowingRecord(Header.of("transient", case), mesh, tables_of(mesh), path) as record:
+            runner = Runner(model, RunOptions.of(case), record, case)
+            start = process_time()
+            run = runner.start(first)
+            return process_time() - start, run.residuals, run.progress.state
+
+
+@benchmark("time-steps-relaxing")
+def time_steps_relaxing():
+    """Blocks of steps of the 28 x 48 valve with four Maxwell branches in each material, and of one with stiffness
+    damping, in turn; both with history and file.
+    """
+    walls = {"rayleigh": {}, "loss factor": {"damping.model": "loss factor"}}
+    models = {name: ValveModel(Case().replace(RINGING | more)) for name, more in walls.items()}
+    states, spent, residuals = {}, {name: [] for name in walls}, {}
+    for name, model in models.items():
+        warm = model.case.replace({"transient.duration": 50e-4})
+        states[name] = Runner(model, RunOptions.of(warm), case=warm).start().progress.state
+    for _ in range(BLOCKS):
+        for name, model in models.items():
+            taken, residuals[name], states[name] = _block(model, states[name])
+            spent[name].append(taken)
+    times = {name: 1e3 * np.median(values) / BLOCK for name, values in spent.items()}
+    branches = states["loss factor"].memory.branches
+    yield Row(
+        "one step of a wall that relaxes over one of a wall with stiffness damping",
+        times["loss factor"] / times["rayleigh"],
+        target=1.5,
+        note=(
+            f"processor time {times['loss factor']:.2f} and {times['rayleigh']:.2f} ms, residuals a step "
+            f"{residuals['loss factor'] / BLOCK:.2f} and {residuals['rayleigh'] / BLOCK:.2f}; {branches.shape[2]} "
+            f"branches, {branches.nbytes / 2**20:.1f} MiB"
+        ),
+    )
+
+
 @benchmark("time-steps")
 def time_steps():
     """2000 steps of 0.1 ms as `dbvfiv transient` makes them: history, verdicts and the file included."""

@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from ..case.model import Case
 from ..flow import RowAreas
 from ..geometry import ValveMesh
-from ..shell import Section
+from ..shell import Section, StepWall
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_flow, build_shell
 from .linear import CoupledFactor
@@ -132,9 +132,9 @@ class ValveModel:
             pressure=p,
         )
 
-    def structure(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Internal force (n,) of shell and stops and values (nnz,) of their tangent."""
-        force, data = self.shell.force_and_tangent(q)
+    def structure(self, q: np.ndarray, step: StepWall | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Internal force (n,) of shell and stops and values (nnz,) of their tangent; `step` for a wall in motion."""
+        force, data = self.shell.force_and_tangent(q, step=step)
         force[self.stops.unknowns] += self.stops.force(q)
         data[self._stop_slots] += self.stops.tangent(q)
         return force, data

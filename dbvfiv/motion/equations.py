@@ -14,6 +14,7 @@ import numpy as np
 from ..model import ValveModel
 from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
+from ..shell import Memory, StepWall, WallMemory
 from .kernels import inertia_force, kinetic_energy, row_motion, strain_energy
 from .terms import Load, Step, Weights
 
@@ -31,11 +32,15 @@ class ValveMotion:
     ----------
     resolution : float
         Smallest displacement that positions resolve, m.
+    wall : WallMemory or None
+        What the wall remembers; None where it is elastic.
     """
 
     def __init__(self, model: ValveModel, conditions: Conditions | None = None):
         self.model = model
         self.conditions = Conditions.of(model.case) if conditions is None else conditions
+        branches = model.relaxation.branches(self.conditions.loss_factor)
+        self.wall = WallMemory(model.shell, branches.strengths, branches.times) if branches else None
         self.moving_fluid = model.flow.unsteady
         self.fluid = model.flow.stepping(self.conditions.density) if self.moving_fluid else None
         self.size = model.size
@@ -54,14 +59,14 @@ class ValveMotion:
     # -- forces
     # ----
 
-    def internal_force(self, q: np.ndarray) -> np.ndarray:
-        """Force (n,) of shell and stops."""
-        force = self.model.shell.force(q)
+    def internal_force(self, q: np.ndarray, step: StepWall | None = None) -> np.ndarray:
+        """Force (n,) of shell and stops; `step` for a wall that relaxes."""
+        force = self.model.shell.force(q, step)
         force[self.model.stops.unknowns] += self.model.stops.force(q)
         return force
 
     def force_rate(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Rate (n,) of the internal force: K_s(q) v."""
+        """Rate (n,) of the internal force by the slow law: K_s(q) v."""
         if not np.any(v):
             return np.zeros(self.size)
         return self.model.shell.dofs.matrix(self.model.structure(q)[1]) @ v
@@ -155,7 +160,9 @@ class ValveMotion:
     # -- linear algebra
     # ----
 
-    def linearise(self, q_new, v_new, q, v, load: Load, weights: Weights, q_load=None, v_load=None) -> None:
+    def linearise(
+        self, q_new, v_new, q, v, load: Load, weights: Weights, q_load=None, v_load=None, step: StepWall | None = None
+    ) -> None:
         """Factor the iteration matrix.
 
         Parameters
@@ -166,6 +173,8 @@ class ValveMotion:
             Those that inertia is taken at.
         q_load, v_load : (n,) arrays, optional
             Those that the fluid's equations are met at, if others.
+        step : StepWall, optional
+            The wall at the end of the step, if it relaxes.
 
         Raises
         ------
@@ -174,7 +183,7 @@ class ValveMotion:
         model = self.model
         q_load, v_load = (q, v) if q_load is None else (q_load, v_load)
         nodal = model.nodal(q_load)
-        _, structure = model.structure(q_new)
+        _, structure = model.structure(q_new, step)
         values = weights.force * structure
         values += weights.inertia * model.mass(q)
         values = model.follower_stiffness(nodal, weights.load * weights.theta * load.pressure, values)
@@ -221,15 +230,16 @@ class ValveMotion:
             self._factor = CoupledFactor(pattern, model.station_forces(rest), model.rows.jacobian(rest), inner)
         return self._factor
 
-    def accelerations(self, q, v, speed: float, inlet: float) -> tuple[np.ndarray, Load]:
+    def accelerations(self, q, v, speed: float, inlet: float, memory: Memory | None = None) -> tuple[np.ndarray, Load]:
         """Accelerations (n,) that the equations ask for at positions, velocities and inlet velocity, and the fluid with
-        them.
+        them; `memory` of a wall that has not relaxed.
 
         The equations are linear in the accelerations and the rate of the inlet velocity: one solve.
         """
         model, alpha, beta = self.model, self.conditions.alpha, self.conditions.beta
         nodal = model.nodal(q)
-        forces = self.internal_force(q) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
+        wall = None if memory is None else self.wall.held(memory)
+        forces = self.internal_force(q, wall) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
         mass = model.mass(q)
         if not self.moving_fluid:
             load = self.load(q, v, q, v, self._instant(speed, np.zeros(self.stations), inlet))

@@ -135,8 +135,31 @@ def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, push:
         raise SolveError(f"Mode {push.mode} does not move the middle of the lip, so no push can be measured there.")
     shape = push.opening / lip * mode.q
     flow = float((push.opening / lip * mode.u[0]).real) if motion.moving_fluid and len(mode.u) else 0.0
-    state = consistent_state(motion, 0.0, q + shape.real, (mode.eigenvalue * shape).real, speed + flow, inlet)
-    return state, Kick(complex(mode.eigenvalue))
+    eigenvalue = complex(mode.eigenvalue)
+    return on_mode(motion, q, speed, inlet, shape, eigenvalue, flow), Kick(eigenvalue)
+
+
+def on_mode(
+    motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, shape: np.ndarray, eigenvalue: complex, flow: float
+) -> MotionState:
+    """State that moves on a mode from its first instant; a wall that relaxes remembers having done so all along.
+
+    Parameters
+    ----------
+    motion : ValveMotion
+    q : (n,) array
+        The steady state.
+    speed, inlet : float
+        Its inlet velocity, m/s, and pressure, Pa.
+    shape : (n,) complex array
+        The mode, of the size it has at this instant.
+    eigenvalue : complex, 1/s
+    flow : float
+        Change of the inlet velocity with it, m/s.
+    """
+    moved = q + shape.real
+    memory = None if motion.wall is None else motion.wall.on_mode(q, shape, eigenvalue, moved)
+    return consistent_state(motion, 0.0, moved, (eigenvalue * shape).real, speed + flow, inlet, memory)
 
 
 def _find_mode(pencil: CoupledPencil, conditions: Conditions, push: Push) -> tuple[Spectrum, int]:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..shell import Memory
+
 
 @dataclass(frozen=True)
 class MotionState:
@@ -19,11 +21,13 @@ class MotionState:
     q, v, a : (n,) arrays
         Unknowns (m, rad), velocities and accelerations.
     force, force_rate : (n,) arrays
-        Internal force F and the scheme's value of its rate.
+        Internal force F and the scheme's value of its rate; of a wall that relaxes the rate by its slow law.
     load : (n,) array
         Force G p of the fluid where the equations were last met.
     psi, psi_rate : (m,) arrays
         Integral of the flow's speed from the inlet, m2/s, and the scheme's value of its rate.
+    memory : Memory or None
+        What a wall that relaxes remembers.
     """
 
     time: float
@@ -36,23 +40,31 @@ class MotionState:
     load: np.ndarray
     psi: np.ndarray
     psi_rate: np.ndarray
+    memory: Memory | None = None
 
 
-def consistent_state(motion, time: float, q, v, speed: float, inlet: float) -> MotionState:
+def consistent_state(
+    motion, time: float, q, v, speed: float, inlet: float, memory: Memory | None = None
+) -> MotionState:
     """State at given positions, velocities and inlet velocity with the accelerations that the equations of motion ask
-    for.
+    for; a wall that relaxes has done so unless its memory is given.
     """
     q, v = np.asarray(q, float), np.asarray(v, float)
-    a, load = motion.accelerations(q, v, speed, inlet)
+    held = None
+    if motion.wall is not None:
+        memory = motion.wall.at(q) if memory is None else memory
+        held = motion.wall.held(memory)
+    a, load = motion.accelerations(q, v, speed, inlet, memory)
     return MotionState(
         float(time),
         float(load.speed[-1]),
         q,
         v,
         a,
-        motion.internal_force(q),
+        motion.internal_force(q, held),
         motion.force_rate(q, v),
         load.force,
         load.psi,
         load.psi_rate,
+        memory,
     )

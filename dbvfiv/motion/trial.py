@@ -25,6 +25,7 @@ class Trial:
     ):
         self.motion, self.scheme, self.old, self.h = motion, scheme, old, h
         s, now = scheme, scheme.now
+        self.wall = None if motion.wall is None else motion.wall.step(old.memory, h)
         theta, rate = (1.0, 1.0) if robust else (now, s.rate)
         self.kind = (h, robust, s.gamma)
         self.weights = Weights(
@@ -43,6 +44,13 @@ class Trial:
             pressure(old.time + theta * h),
         )
 
+        # stiffness damping is by the slow law, and its force is known apart only where there is some
+        rayleigh = self.wall is not None and motion.conditions.beta
+        self._slow = motion.internal_force(old.q) if rayleigh else None
+
+    def _slow_rate(self) -> np.ndarray:
+        return (self.motion.internal_force(self.q) - self._slow) / self.h
+
     def set(self, a: np.ndarray) -> None:
         """Start from new accelerations."""
         s, h, old = self.scheme, self.h, self.old
@@ -60,8 +68,8 @@ class Trial:
     def evaluate(self) -> float:
         """Set residual and forces; return the norm of the former."""
         s, now, old, motion = self.scheme, self.scheme.now, self.old, self.motion
-        self.force = motion.internal_force(self.q)
-        self.force_rate = (self.force - old.force) / self.h
+        self.force = motion.internal_force(self.q, self.wall)
+        self.force_rate = (self.force - old.force) / self.h if self._slow is None else self._slow_rate()
         self.q_mid = old.q + now * (self.q - old.q)
         self.v_mid = old.v + now * (self.v - old.v)
         self.a_mid = old.a + (1.0 - s.alpha_m) * (self.a - old.a)
@@ -77,7 +85,8 @@ class Trial:
         return float(np.linalg.norm(self.residual))
 
     def linearise(self) -> None:
-        self.motion.linearise(self.q, self.v, self.q_mid, self.v_mid, self.load, self.weights, *self.at_load)
+        moving = (self.q, self.v, self.q_mid, self.v_mid)
+        self.motion.linearise(*moving, self.load, self.weights, *self.at_load, self.wall)
 
     def allowed(self, tolerance: float, floor: float) -> float:
         """Largest correction that may be left, m; see `dbvfiv.motion.stepper.StepOptions`."""
@@ -100,4 +109,5 @@ class Trial:
             load.force,
             load.psi,
             rate,
+            None if self.wall is None else self.motion.wall.advance(old.memory, self.q, self.h, self.scheme.now),
         )

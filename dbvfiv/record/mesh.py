@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import h5py
@@ -26,6 +26,13 @@ _COLUMNS = (
     Column("layer_angles", "deg", "Angle of material axis 1 from the valve's axis"),
     Column("layer_fractions", "", "Share of each layer in the wall"),
 )
+#: There where the wall relaxes.
+_RELAXING = (
+    Column("relaxing", "", "Groups of layers that relax alike, by their materials", TEXT),
+    Column("branch_group", "", "Which of them each Maxwell branch belongs to, from 0", "i4"),
+    Column("branch_time", "s", "Its relaxation time"),
+    Column("branch_strength", "", "Its modulus over that of the slow law"),
+)
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,10 @@ class MeshData:
     layer_names : (nl,) tuple of str, inside to outside
     layer_angles : (nl,) degrees
     layer_fractions : (nl,)
+    relaxing : (g,) tuple of str
+        Groups of layers that relax alike; none where the case leaves the wall elastic.
+    branch_group, branch_time, branch_strength : (b,) arrays
+        Maxwell branches: group, relaxation time (s), and modulus over that of the slow law.
     """
 
     nodes: np.ndarray
@@ -60,11 +71,17 @@ class MeshData:
     layer_names: tuple[str, ...]
     layer_angles: np.ndarray
     layer_fractions: np.ndarray
+    relaxing: tuple[str, ...] = ()
+    branch_group: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+    branch_time: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    branch_strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, model: ValveModel) -> MeshData:
         """Mesh of a model."""
         surface, section = model.shell.mesh, model.shell.section
+        branches = model.relaxation.branches(model.case.damping.loss_factor)
+        group, time = np.nonzero(branches.strengths)
         return cls(
             nodes=model.mesh.nodes,
             quads=model.mesh.quads,
@@ -77,6 +94,10 @@ class MeshData:
             layer_names=tuple(layer.name or f"layer {i + 1}" for i, layer in enumerate(section.layers)),
             layer_angles=np.array([layer.angle for layer in section.layers], float),
             layer_fractions=np.asarray(section.fractions),
+            relaxing=branches.groups if branches else (),
+            branch_group=group.astype(np.int32),
+            branch_time=branches.times[time],
+            branch_strength=branches.strengths[group, time],
         )
 
     @property
@@ -103,9 +124,11 @@ class MeshData:
 
 def write_mesh(file: h5py.File, mesh: MeshData) -> None:
     group = file.create_group("mesh")
-    for column in _COLUMNS:
+    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ())):
         write_array(group, column, getattr(mesh, column.name))
 
 
 def read_mesh(file: h5py.File) -> MeshData:
-    return MeshData(**{column.name: read_array(file["mesh"], column) for column in _COLUMNS})
+    group = file["mesh"]
+    columns = (*_COLUMNS, *(column for column in _RELAXING if column.name in group))
+    return MeshData(**{column.name: read_array(group, column) for column in columns})

@@ -1,8 +1,20 @@
 """Layered, thick, finite-rotation four-node shell on any quadrilateral mesh."""
 
+from .memory import Memory, WallMemory
 from .mesh import ShellMesh, nodal_directors, tangent_frames
 from .section import Layer, Section
-from .shell import Shell
+from .shell import Shell, StepWall
 from .supports import DofMap
 
-__all__ = ["DofMap", "Layer", "Section", "Shell", "ShellMesh", "nodal_directors", "tangent_frames"]
+__all__ = [
+    "DofMap",
+    "Layer",
+    "Memory",
+    "Section",
+    "Shell",
+    "ShellMesh",
+    "StepWall",
+    "WallMemory",
+    "nodal_directors",
+    "tangent_frames",
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +15,22 @@ from .reference import reference_geometry, thickness_over_radius
 from .rotation import director_derivatives
 from .section import Section
 from .supports import DofMap
+
+
+@dataclass(frozen=True)
+class StepWall:
+    """A wall as one instant of a motion sees it.
+
+    Attributes
+    ----------
+    wall : tuple
+        Laws of its layers, see `Section.wall`.
+    held : (ne, 4, 8) array
+        Resultants at each Gauss point that come on top of those of the layers.
+    """
+
+    wall: tuple
+    held: np.ndarray
 
 
 class Shell:
@@ -65,18 +82,22 @@ class Shell:
         """Strain energy, J."""
         return float(np.sum(self.energies.energy(self._element_unknowns(q))))
 
-    def force(self, q: np.ndarray) -> np.ndarray:
-        """Internal force (n,): the derivative of the energy."""
+    def force(self, q: np.ndarray, step: StepWall | None = None) -> np.ndarray:
+        """Internal force (n,): the derivative of the energy, or that of another wall."""
         if self.metric != FIRST_ORDER:
             return self._scatter(np.asarray(self.energies.force(self._element_unknowns(q))))
         nodal = self.dofs.expand(q)
         d, d1, _ = self.directors(nodal)
         out = np.zeros_like(nodal)
-        shell_force(self.mesh.quads, self.mesh.nodes, nodal, d, d1, *self._reference, *self._wall, None, out)
+        wall, held = (self._wall, None) if step is None else (step.wall, step.held)
+        shell_force(self.mesh.quads, self.mesh.nodes, nodal, d, d1, *self._reference, *wall, held, out)
         return self.dofs.restrict(out)
 
-    def force_and_tangent(self, q: np.ndarray, data: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Internal force (n,) and values (nnz,) of the symmetric tangent on the pattern of `dofs`.
+    def force_and_tangent(
+        self, q: np.ndarray, data: np.ndarray | None = None, step: StepWall | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Internal force (n,) and values (nnz,) of the symmetric tangent on the pattern of `dofs`, or those of another
+        wall.
 
         `data`, if given, is added to.
         """
@@ -90,7 +111,8 @@ class Shell:
         d, d1, d2 = self.directors(nodal)
         out = np.zeros_like(nodal)
         fixed = (self.mesh.quads, self.mesh.nodes, nodal, d, d1, d2, *self._reference)
-        shell_tangent(*fixed, *self._wall, None, True, self.dofs.slots, out, data)
+        wall, held = (self._wall, None) if step is None else (step.wall, step.held)
+        shell_tangent(*fixed, *wall, held, True, self.dofs.slots, out, data)
         return self.dofs.restrict(out), data
 
     def relaxing_tangents(self, q: np.ndarray) -> list[np.ndarray]:

@@ -8,9 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from dbvfiv.model.linear import CoupledFactor
+from dbvfiv.model.relaxing import WallRelaxation
 from dbvfiv.motion.kernels import inertia_force, kinetic_energy, strain_energy
 from dbvfiv.motion.terms import Load
-from dbvfiv.shell import Shell
+from dbvfiv.shell import Shell, WallMemory
 from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
 
 NONE = np.zeros(1)
@@ -20,6 +21,7 @@ class Motion:
     """What the stepper asks of any motion without a fluid; the load is a force that the positions fix."""
 
     moving_fluid = False
+    wall = None
     resolution = 0.0
 
     def __init__(self, size: int, alpha: float = 0.0, beta: float = 0.0):
@@ -64,13 +66,13 @@ class PointMotion(Motion):
         super().__init__(1, beta=beta)
         self._force, self._stiffness, self._damping, self._slope = force, stiffness, damping, damping_slope
 
-    def internal_force(self, q):
+    def internal_force(self, q, step=None):
         return self._force(q)
 
     def inertia(self, q, v, a):
         return a + self._damping(q) * v
 
-    def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None):
+    def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None, step=None):
         now = weights.theta
         viscous = now * (weights.velocity * self._damping(q) + self._slope(q) * v)
         self._matrix = weights.inertia + viscous + weights.force * self._stiffness(q_new)
@@ -78,17 +80,19 @@ class PointMotion(Motion):
     def solve(self, force, outlet):
         return force / self._matrix, 0.0
 
-    def accelerations(self, q, v, speed, inlet):
+    def accelerations(self, q, v, speed, inlet, memory=None):
         load = self.load(q, v, q, v, SimpleNamespace(inlet=inlet))
         return -self._force(q) - self.conditions.beta * self._stiffness(q) * v - self._damping(q) * v, load
 
 
 class ShellMotion(Motion):
-    """A shell under one uniform follower pressure."""
+    """A shell under one uniform follower pressure; its layers relax if they have a series."""
 
     def __init__(self, shell: Shell, alpha: float = 0.0, beta: float = 0.0):
         super().__init__(shell.size, alpha, beta)
         self.shell = shell
+        branches = WallRelaxation.of(shell.section).branches(1.0)
+        self.wall = WallMemory(shell, branches.strengths, branches.times) if branches else None
         pattern = shell.dofs.matrix(np.ones(len(shell.dofs.pattern[1])))
         self._factor = CoupledFactor(pattern, sp.csr_matrix((shell.size, 0)), sp.csr_matrix((0, shell.size)))
         self._all = np.ones(shell.mesh.element_count)
@@ -96,8 +100,8 @@ class ShellMotion(Motion):
     def _pressure(self, pressure):
         return np.full(self.shell.mesh.node_count, pressure)
 
-    def internal_force(self, q):
-        return self.shell.force(q)
+    def internal_force(self, q, step=None):
+        return self.shell.force(q, step)
 
     def pressure_force(self, q, pressure):
         mesh, nodal = self.shell.mesh, self.shell.dofs.expand(q)
@@ -117,9 +121,9 @@ class ShellMotion(Motion):
         none = np.zeros(0)
         self._factor.refactor(values, none, none, np.zeros((0, 0)))
 
-    def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None):
+    def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None, step=None):
         shell, mesh = self.shell, self.shell.mesh
-        _, values = shell.force_and_tangent(q_new)
+        _, values = shell.force_and_tangent(q_new, step=step)
         values = weights.force * values + weights.inertia * shell.mass(q)
         pressure = weights.load * weights.theta * load.inlet
         pressure_stiffness(
@@ -137,10 +141,11 @@ class ShellMotion(Motion):
     def solve(self, force, outlet):
         return self._factor.solve(force), 0.0
 
-    def accelerations(self, q, v, speed, inlet):
+    def accelerations(self, q, v, speed, inlet, memory=None):
         load = self.load(q, v, q, v, SimpleNamespace(inlet=inlet))
         self._refactor(self.shell.mass(q))
-        return self._factor.solve(load.force - self.internal_force(q) - self.inertia(q, v, 0 * v)), load
+        force = self.internal_force(q, None if memory is None else self.wall.held(memory))
+        return self._factor.solve(load.force - force - self.inertia(q, v, 0 * v)), load
 
     def energy(self, q, v) -> float:
         """Kinetic and strain energy, J."""

@@ -56,8 +56,8 @@ class ContactValve(ValveModel):
     def residual(self, q, pressure):
         return super().residual(q, pressure) + self.contact_force(q)
 
-    def structure(self, q):
-        force, data = super().structure(q)
+    def structure(self, q, step=None):
+        force, data = super().structure(q, step)
         nodal = self.nodal(q)
         self.contact.add_force_and_tangent(force, data, nodal, *self.shell.directors(nodal), self._free)
         return force, data
@@ -66,8 +66,8 @@ class ContactValve(ValveModel):
 class ClosingMotion(ValveMotion):
     """Equations of motion of a `ContactValve`."""
 
-    def internal_force(self, q):
-        return self.model.shell.force(q) + self.model.contact_force(q)
+    def internal_force(self, q, step=None):
+        return self.model.shell.force(q, step) + self.model.contact_force(q)
 
     def energies(self, q, v):
         kinetic, strain, _ = super().energies(q, v)

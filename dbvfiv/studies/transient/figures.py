@@ -79,6 +79,8 @@ def energies(result: TransientResult) -> Figure:
         for name, label, look in curves:
             if np.any(h[name]):
                 axes.plot(t, h[name], lw=1.2, label=label, **look)
+        if result.mesh.relaxing:
+            _draw_branches(axes, result, "branch_energy" if axes is upper else "branch_loss")
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
     turned_over = float(np.abs(np.diff(h["pressure_work"])).sum())
     scale, unit = _readable(h["balance"])
@@ -96,6 +98,18 @@ def energies(result: TransientResult) -> Figure:
         axes.tick_params(labelbottom=True)
     upper.set_title(f"Energies of the wall, {title(result)}", loc="left", fontweight="bold")
     return figure
+
+
+def _draw_branches(axes, result: TransientResult, name: str) -> None:
+    """Energies of the Maxwell branches: held by all of them together, or lost in each group of layers."""
+    h, groups = result.history, result.mesh.relaxing
+    if name == "branch_energy":
+        axes.plot(h["time"], h[name].sum(axis=1), lw=1.2, color="0.45", ls="--", label="layers that\nrelax")
+        return
+    for column, group in enumerate(groups):
+        grey = f"{0.15 + 0.55 * column / max(len(groups) - 1, 1):.2f}"
+        label = f"lost in\n{group}" if len(group) < 24 else f"lost in\n{group[:21]} ..."
+        axes.plot(h["time"], h[name][:, column], lw=1.2, color=grey, ls="--", label=label)
 
 
 _STORED = (

@@ -54,7 +54,11 @@ class Reader:
         throat = int(np.argmin(area))
         out = density * load.speed[0] * float(self.motion.model.flow.open_area(area[0]))
         balance = kinetic + strain + stop - self.energy - self.work + self.dissipation
-        return {
+        memory, by_group = state.memory, {}
+        if memory is not None:
+            balance += memory.work.sum()
+            by_group = {"branch_energy": QUARTERS * memory.stored, "branch_loss": QUARTERS * memory.loss}
+        return by_group | {
             "time": state.time,
             "inlet_pressure": load.inlet,
             "mass_flow": QUARTERS * out,

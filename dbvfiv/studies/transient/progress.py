@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from ...motion.state import MotionState
 from ...record.record import Record
-from .tables import BOOKS, COUNTS, MOTION_COLUMNS, RESTART
+from ...shell import Memory, WallMemory
+from .tables import BOOKS, COUNTS, MEMORY_COLUMNS, MOTION_COLUMNS, RESTART
+
+
+def memory_row(memory: Memory) -> dict[str, Any]:
+    """What of a memory does not follow from positions."""
+    values = (memory.branches, memory.stretch, memory.work, memory.loss, memory.stored)
+    return {column.name: value for column, value in zip(MEMORY_COLUMNS, values, strict=True)}
 
 
 @dataclass
@@ -48,15 +55,21 @@ class Progress:
         """A row of the table of restart points."""
         values = {c.name: getattr(self, c.name) for c in (*COUNTS, *BOOKS)}
         values["eigenvalue"] = [self.eigenvalue.real, self.eigenvalue.imag]
-        return values | {f.name: getattr(self.state, f.name) for f in fields(MotionState)}
+        values |= {f.name: getattr(self.state, f.name) for f in fields(MotionState) if f.name != "memory"}
+        return values if self.state.memory is None else values | memory_row(self.state.memory)
 
     @classmethod
-    def read(cls, record: Record, index: int = -1) -> Progress:
-        """Undo `row` for a restart point of a record; the last one by default."""
+    def read(cls, record: Record, index: int = -1, wall: WallMemory | None = None) -> Progress:
+        """Undo `row` for a restart point of a record, the last one by default; without its memory where no wall is
+        given to hold it.
+        """
         at = range(record.rows(RESTART))[index]
         values = {c.name: record.value(RESTART, c.name, at) for c in (*COUNTS, *BOOKS, *MOTION_COLUMNS)}
         motion = {c.name: values[c.name] for c in MOTION_COLUMNS}
         state = MotionState(**{name: float(v) if np.ndim(v) == 0 else np.array(v, float) for name, v in motion.items()})
+        if wall is not None:
+            kept = [record.value(RESTART, c.name, at) for c in MEMORY_COLUMNS]
+            state = replace(state, memory=wall.at(state.q, *kept))
         return cls(
             state,
             int(values["steps"]),

@@ -21,7 +21,7 @@ from ..result import StudyResult
 from . import figures
 from .animation import animate
 from .assess import assess
-from .tables import HISTORY, PROFILES, SCALARS, STATE_COLUMNS, STATES
+from .tables import HISTORY, PROFILES, RELAXING, SCALARS, STATE_COLUMNS, STATES
 
 _NO_VERDICT = {
     "verdict": "undecided",
@@ -82,7 +82,8 @@ class TransientResult(StudyResult):
     Attributes
     ----------
     history : dict of str to array
-        Columns of `dbvfiv.studies.transient.tables.SCALARS` and `PROFILES`, one row for each step.
+        Columns of `dbvfiv.studies.transient.tables.SCALARS` and `PROFILES`, and of `RELAXING` where the wall relaxes,
+        for the groups of layers in `mesh.relaxing`; one row for each step.
     states : sequence of TransientState
         Full states, `transient.save_every` apart, and the last one.
     verdict : dict
@@ -98,7 +99,14 @@ class TransientResult(StudyResult):
 
     @cached_property
     def history(self) -> dict[str, np.ndarray]:
-        return {c.name: self.record.column(HISTORY, c.name) for c in (*SCALARS, *PROFILES)}
+        columns = (*SCALARS, *PROFILES, *(RELAXING if self.mesh.relaxing else ()))
+        return {c.name: self.record.column(HISTORY, c.name) for c in columns}
+
+    def dissipated(self) -> dict[str, float]:
+        """Energy lost since the start, J: to Rayleigh damping and, where the wall relaxes, in its groups of layers."""
+        h = self.history
+        lost = zip(self.mesh.relaxing, h["branch_loss"][-1]) if self.mesh.relaxing else ()
+        return {"Rayleigh damping": float(h["dissipation"][-1])} | {name: float(value) for name, value in lost}
 
     @cached_property
     def states(self) -> StateList:
@@ -152,6 +160,8 @@ class TransientResult(StudyResult):
                 name: float(h[name][-1])
                 for name in ("mass_flow", "lip_opening", "lip_displacement", "outlet_area", "inlet_pressure", "balance")
             }
+            if self.mesh.relaxing:
+                last["dissipated"] = self.dissipated()
         return {
             **self.verdict,
             "last": last,
@@ -201,6 +211,9 @@ class TransientResult(StudyResult):
                 f"{name.replace('_', ' '):<16}{cells}{found['cycles_observed']:>9}"
                 f"{'-' if error is None else f'{error:.2g}':>20}   {unit}, Hz"
             )
+        if self.mesh.relaxing:
+            lost = ", ".join(f"{value:.4g} J in {name}" for name, value in self.dissipated().items() if value)
+            lines += ["", f"dissipated since the start: {lost or 'nothing'}"]
         return lines
 
     @cached_property

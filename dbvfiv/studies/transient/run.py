@@ -122,7 +122,7 @@ class Runner:
 
     def resume(self) -> TransientRun:
         """Go on from the last restart point of the record, which must hold the rows up to that and no more."""
-        progress = Progress.read(self.record)
+        progress = Progress.read(self.record, wall=self.motion.wall)
         self._begin(progress.steps)
         self.control.unpack(progress.control)
         self._reader = Reader(self.motion, progress.energy, progress.work, progress.dissipation)

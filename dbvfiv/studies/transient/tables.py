@@ -31,7 +31,10 @@ SCALARS = (
     Column("pressure_work", "J", "Work of the pressure on the wall since the start"),
     Column("dissipation", "J", "Energy lost to Rayleigh damping since the start"),
     Column(
-        "balance", "J", "Energy gained since the start less work plus dissipation: what the scheme itself adds or takes"
+        "balance",
+        "J",
+        "Energy gained since the start, by Maxwell branches too, less work plus dissipation: what the scheme itself "
+        "adds or takes",
     ),
     Column("step", "s", "Length of the step"),
     Column("evaluations", "", "Residuals evaluated in the step"),
@@ -49,6 +52,11 @@ PROFILES = (
     ),
     Column("station_area", "m^2", "Flow area at each row", "f4"),
     Column("centre_line", "m", "Displacement in y of the line x = 0 at each row", "f4"),
+)
+#: One number a group of layers that relax alike and step; of the whole valve, and there where the wall relaxes.
+RELAXING = (
+    Column("branch_energy", "J", "Energy that the Maxwell branches of each group of layers hold"),
+    Column("branch_loss", "J", "Energy that they have dissipated since the start"),
 )
 #: Full states.
 STATE_COLUMNS = (
@@ -72,6 +80,14 @@ MOTION_COLUMNS = (
     Column("psi", "m^2/s", "Integral of the flow's speed from the inlet, at each row"),
     Column("psi_rate", "m^2/s^2", "The scheme's value of its rate"),
 )
+#: What a wall that relaxes remembers, in the order of the arguments of `dbvfiv.shell.memory.WallMemory.at`.
+MEMORY_COLUMNS = (
+    Column("branches", "N/m, N", "Section resultants of each Maxwell branch at the Gauss points"),
+    Column("stretch", "1, 1/m", "Section strains that the springs of each relaxation time hold there"),
+    Column("branch_work", "J", "Work done against the branches of each group of a quarter since the start"),
+    Column("branch_loss", "J", "What of it they have dissipated"),
+    Column("branch_energy", "J", "Energy that they hold"),
+)
 #: How far a run has come.
 COUNTS = (
     Column("steps", "", "Steps made", "i8"),
@@ -93,10 +109,17 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     by_row = {"station_pressure": (stations,), "station_area": (stations,)}
     motion = dict.fromkeys(("q", "v", "a", "force", "force_rate", "load"), (unknowns,))
     motion |= dict.fromkeys(("psi", "psi_rate"), (stations,)) | {"control": (4,), "eigenvalue": (2,)}
+    groups, points = len(mesh.relaxing), (len(mesh.quads), 4)
+    by_group = dict.fromkeys(("branch_work", "branch_loss", "branch_energy"), (groups,)) if groups else {}
+    if groups:
+        motion["branches"] = (*points, len(mesh.branch_time), 8)
+        motion["stretch"] = (*points, len(np.unique(mesh.branch_time)), 8)
+    history = (*SCALARS, *PROFILES, *(RELAXING if groups else ()))
+    restart = (*COUNTS, *BOOKS, *MOTION_COLUMNS, *(MEMORY_COLUMNS if groups else ()))
     return (
-        TableSpec(HISTORY, (*SCALARS, *PROFILES), by_row | {"centre_line": (stations,)}, chunk=512),
+        TableSpec(HISTORY, history, by_row | by_group | {"centre_line": (stations,)}, chunk=512),
         TableSpec(STATES, STATE_COLUMNS, by_row | {"nodal": (nodes, 5), "nodal_rate": (nodes, 5)}),
-        TableSpec(RESTART, (*COUNTS, *BOOKS, *MOTION_COLUMNS), motion),
+        TableSpec(RESTART, restart, motion | by_group),
     )
 
 

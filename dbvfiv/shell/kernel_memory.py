@@ -1,0 +1,153 @@
+"""Compiled loops of walls that relax: what each group of layers answers by its slow law, and what its branches hold.
+
+Arrays are by element and Gauss point: strains (ne, 4, 8), resultants of g groups (ne, 4, g, 8) and of b branches
+(ne, 4, b, 8), ordered as `dbvfiv.shell.kernel_section` has them. Strains are total Lagrangian, so what a branch holds
+can be integrated through the thickness once and for all.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from .kernel_rubber import FAST, rubber_stress
+from .kernel_section import linear_response, point_strain
+from .kernel_strain import bases, edge_shears, gather, strains
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def slow_resultants(
+    quads,
+    nodes,
+    q,
+    director,
+    shear0,
+    metric0,
+    metric1,
+    mq,
+    mqk,
+    mp,
+    thickness,
+    stiffness,
+    points,
+    constants,
+    scales,
+    member,
+    strain_out,
+    slow_out,
+):
+    """Fill strains (ne, 4, 8) and the slow law's resultants (ne, 4, g, 8) of each group; unknowns q (nn, 5).
+
+    Parameters
+    ----------
+    stiffness : (g, 8, 8) array
+        Of the linear layers of each group.
+    points, constants, scales : (k, 2), (k, 3), (k,) arrays
+        Of all points that carry rubber.
+    member : (k,) int array
+        The group of each of these points; negative for none.
+    """
+    x = np.empty((4, 3))
+    d = np.empty((4, 3))
+    basis = np.empty((2, 3))
+    turn = np.empty((2, 3))
+    edge = np.empty(4)
+    e = np.empty(5)
+    s = np.empty(5)
+    for el in range(quads.shape[0]):
+        gather(quads[el], nodes, q, director, x, d)
+        edge_shears(x, d, edge)
+        h = thickness[el]
+        for point in range(4):
+            bases(point, x, d, basis, turn)
+            strain = strain_out[el, point]
+            strains(
+                point,
+                basis,
+                turn,
+                edge,
+                shear0[el],
+                metric0[el, point],
+                metric1[el, point],
+                mq[el, point],
+                mqk[el, point],
+                mp[el, point],
+                strain,
+            )
+            slow = slow_out[el, point]
+            for g in range(stiffness.shape[0]):
+                linear_response(stiffness[g], h, strain, slow[g])
+            for l in range(points.shape[0]):
+                if member[l] < 0:
+                    continue
+                stress = slow[member[l]]
+                point_strain(points[l, 0], h, scales[l], strain, e)
+                rubber_stress(constants[l, 0], constants[l, 1], constants[l, 2], e, s)
+                w = points[l, 1] * h
+                t = points[l, 0] * h
+                for i in range(3):
+                    stress[i] += w * s[i]
+                    stress[3 + i] += w * t * s[i]
+                stress[6] += w * scales[l] * s[3]
+                stress[7] += w * scales[l] * s[4]
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def hold_resultants(branches, slow, kept, gained, out):
+    """Fill out (ne, 4, 8): what branches (ne, 4, b, 8) keep of theirs by factors (b,), less factors (g,) of the slow
+    law's resultants (ne, 4, g, 8).
+    """
+    for el in range(out.shape[0]):
+        for point in range(4):
+            for i in range(8):
+                out[el, point, i] = 0.0
+            for b in range(branches.shape[2]):
+                for i in range(8):
+                    out[el, point, i] += kept[b] * branches[el, point, b, i]
+            for g in range(slow.shape[2]):
+                for i in range(8):
+                    out[el, point, i] -= gained[g] * slow[el, point, g, i]
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def advance_branches(
+    branches, stretch, slow, slow_new, strain, strain_new, group, time, kept, gained, now, area, out, stretch_out, work
+):
+    """Fill branches (ne, 4, b, 8) and their stretches (ne, 4, j, 8) at the end of a step.
+
+    Parameters
+    ----------
+    group, time : (b,) int arrays
+        Group and relaxation time of each branch.
+    kept, gained : (2, max(b, j)) arrays
+        What stays of a branch, and the share of the change of resultants that it takes up; second row: of stretches.
+    now : float
+        Weight of the new resultants in the work.
+    work : (2, g) array
+        Is added to: work done against the branches of each group over the change of strains, and what they hold in the
+        end, J.
+    """
+    change = np.empty(8)
+    for el in range(slow.shape[0]):
+        for point in range(4):
+            weight = area[el, point]
+            for i in range(8):
+                change[i] = strain_new[el, point, i] - strain[el, point, i]
+            for j in range(stretch.shape[2]):
+                for i in range(8):
+                    stretch_out[el, point, j, i] = kept[1, j] * stretch[el, point, j, i] + gained[1, j] * change[i]
+            for b in range(branches.shape[2]):
+                g = group[b]
+                t = time[b]
+                stay = kept[0, b]
+                gain = gained[0, b]
+                done = 0.0
+                held = 0.0
+                for i in range(8):
+                    old = branches[el, point, b, i]
+                    value = stay * old + gain * (slow_new[el, point, g, i] - slow[el, point, g, i])
+                    out[el, point, b, i] = value
+                    done += (old + now * (value - old)) * change[i]
+                    held += value * stretch_out[el, point, t, i]
+                work[0, g] += weight * done
+                work[1, g] += 0.5 * weight * held

@@ -1,0 +1,193 @@
+"""What a wall remembers of how it was strained: Maxwell branches at every Gauss point, advanced exactly over a step.
+
+Each group of layers with one series has, beside its slow resultants S(E), branches h_j with
+
+    dh_j/dt + h_j / tau_j = g_j dS/dt
+
+Over a step h in which S changes evenly,
+
+    h_j' = exp(-h / tau_j) h_j + g_j (1 - exp(-h / tau_j)) (tau_j / h) (S' - S),
+
+so the wall answers as an elastic one whose layers are stiffer by the sum of the last factors, under resultants that do
+not depend on where the step ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import CaseError
+from .energy import FIRST_ORDER
+from .kernel_memory import advance_branches, hold_resultants, slow_resultants
+from .section import RUBBER
+from .shell import Shell, StepWall
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a wall holds at one state.
+
+    Attributes
+    ----------
+    branches : (ne, 4, b, 8) array
+        Resultants of each branch: N/m, N, N/m.
+    stretch : (ne, 4, j, 8) array
+        Section strains that the springs of branches of each relaxation time hold.
+    work, loss : (g,) arrays
+        Work done against the branches of each group since the start, and what of it they have dissipated, J.
+    stored : (g,) array
+        Energy that they hold, J.
+    strain, slow : (ne, 4, 8), (ne, 4, g, 8) arrays
+        Section strains and slow resultants of each group at the state; they follow from its positions.
+    """
+
+    branches: np.ndarray
+    stretch: np.ndarray
+    work: np.ndarray
+    loss: np.ndarray
+    stored: np.ndarray
+    strain: np.ndarray
+    slow: np.ndarray
+
+
+class WallMemory:
+    """Branches of the groups of a shell's layers.
+
+    Energies: the work that a step does against a branch is that of its resultants, weighed between both ends as forces
+    are in the step's equations, over the change of strains; so is that of the slow law of linear layers. What the
+    branch holds of it is half its resultants times the strains of its spring,
+    which relax as the resultants do; the rest is dissipated. For linear layers that is the energy of the spring; for
+    rubber, whose branches follow the stress rather than the strain, it is a convention.
+
+    Parameters
+    ----------
+    shell : Shell
+    strengths : (g, j) array
+        Of each group of `shell.section.relaxing` at each relaxation time.
+    times : (j,) array
+        s.
+
+    Raises
+    ------
+    CaseError
+        If the shell's metric has no compiled loops.
+    """
+
+    def __init__(self, shell: Shell, strengths: np.ndarray, times: np.ndarray):
+        if shell.metric != FIRST_ORDER:
+            raise CaseError(
+                f"shell.metric is {shell.metric!r}, but a wall that relaxes moves in time with {FIRST_ORDER!r} alone.",
+                "shell.metric",
+            )
+        self.shell, self.times = shell, np.asarray(times, float)
+        self._group, self._time = (x.astype(np.int64) for x in np.nonzero(strengths))
+        self._strength = np.asarray(strengths, float)[self._group, self._time]
+        section = shell.section
+        owner = np.full(len(section.layers), -1)
+        for number, group in enumerate(section.relaxing):
+            owner[list(group.layers)] = number
+        self._owner, self.groups = owner, len(section.relaxing)
+        points, constants, scales = section.rubber_points
+        member = np.repeat(owner, section.points_per_layer)[section.kinds == RUBBER]
+        stiffness = [section.wall((owner == g).astype(float))[0] for g in range(self.groups)]
+        self._walls = (np.array(stiffness), points, constants, scales, member)
+        self._factors: dict[float, tuple] = {}
+
+    @property
+    def shapes(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Shapes of branches and stretches."""
+        count = self.shell.mesh.element_count
+        return (count, 4, len(self._group), 8), (count, 4, len(self.times), 8)
+
+    def at(self, q: np.ndarray, branches=None, stretch=None, work=None, loss=None, stored=None) -> Memory:
+        """Memory at positions (n,); of a wall that has relaxed in them by default."""
+        strain, slow = self.resultants(q)
+        held, stretched = self.shapes
+        branches = np.zeros(held) if branches is None else np.reshape(branches, held)
+        stretch = np.zeros(stretched) if stretch is None else np.reshape(stretch, stretched)
+        work, loss = (np.zeros(self.groups) if x is None else np.array(x, float) for x in (work, loss))
+        stored = self._stored(branches, stretch) if stored is None else np.array(stored, float)
+        return Memory(branches, stretch, work, loss, stored, strain, slow)
+
+    def resultants(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Section strains (ne, 4, 8) and slow resultants (ne, 4, g, 8) of each group at positions (n,)."""
+        shell, count = self.shell, self.shell.mesh.element_count
+        nodal = shell.dofs.expand(q)
+        strain, slow = np.empty((count, 4, 8)), np.empty((count, 4, self.groups, 8))
+        directors, (*reference, _, thickness) = shell.directors(nodal)[0], shell._reference
+        fixed = (shell.mesh.quads, shell.mesh.nodes, nodal, directors, *reference, thickness)
+        slow_resultants(*fixed, *self._walls, strain, slow)
+        return strain, slow
+
+    def held(self, memory: Memory) -> StepWall:
+        """The wall at the state of a memory: its slow law and what its branches hold."""
+        out = np.empty_like(memory.strain)
+        hold_resultants(memory.branches, memory.slow, np.ones(len(self._group)), np.zeros(self.groups), out)
+        return StepWall(self.shell.section.wall(), out)
+
+    def step(self, memory: Memory, h: float) -> StepWall:
+        """The wall at the end of a step of h, s, from the state of a memory."""
+        kept, gained, by_group, wall = self._over(h)
+        out = np.empty_like(memory.strain)
+        hold_resultants(memory.branches, memory.slow, kept[0], by_group, out)
+        return StepWall(wall, out)
+
+    def advance(self, memory: Memory, q: np.ndarray, h: float, now: float) -> Memory:
+        """Memory after a step of h, s, to positions q (n,); `now` is the weight of the new forces in its equations."""
+        kept, gained, _, _ = self._over(h)
+        strain, slow = self.resultants(q)
+        branches, stretch = np.empty_like(memory.branches), np.empty_like(memory.stretch)
+        work, area = np.zeros((2, self.groups)), self.shell.geometry.area
+        before = (memory.branches, memory.stretch, memory.slow, slow, memory.strain, strain)
+        advance_branches(*before, self._group, self._time, kept, gained, now, area, branches, stretch, work)
+        done, stored = work
+        loss = memory.loss + done - (stored - memory.stored)
+        return Memory(branches, stretch, memory.work + done, loss, stored, strain, slow)
+
+    def on_mode(self, q: np.ndarray, shape: np.ndarray, eigenvalue: complex, moved: np.ndarray) -> Memory:
+        """Memory at positions moved (n,) on a mode about a state q (n,) in which the wall had relaxed.
+
+        Parameters
+        ----------
+        shape : (n,) complex array
+            The mode, of the size it has at this instant.
+        eigenvalue : complex, 1/s
+        """
+        strain, slow = (a + 1j * b for a, b in zip(self._slopes(q, shape.real), self._slopes(q, shape.imag)))
+        x = eigenvalue * self.times
+        share = x / (1.0 + x)
+        stretch = (share[:, None] * strain[:, :, None]).real
+        branches = ((self._strength * share[self._time])[:, None] * slow[:, :, self._group]).real
+        return self.at(moved, np.ascontiguousarray(branches), np.ascontiguousarray(stretch))
+
+    def _slopes(self, q: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of strains and slow resultants along a way, by differences over a ten thousandth of the wall."""
+        size = np.abs(way).max()
+        if size == 0.0:
+            return tuple(np.zeros_like(x) for x in self.resultants(q))
+        step = 1e-4 * float(self.shell.geometry.thickness.min()) / size
+        return tuple(
+            (b - a) / (2 * step) for a, b in zip(self.resultants(q - step * way), self.resultants(q + step * way))
+        )
+
+    def _over(self, h: float) -> tuple:
+        """What branches keep and gain over a step, what groups gain, and the wall stiffened by that."""
+        if h not in self._factors:
+            if len(self._factors) > 16:
+                self._factors.clear()
+            ratio = h / self.times
+            stay, taken = np.exp(-ratio), -np.expm1(-ratio) / ratio
+            kept, gained = (np.zeros((2, max(len(self._group), len(self.times)))) for _ in range(2))
+            kept[0, : len(self._group)], kept[1, : len(self.times)] = stay[self._time], stay
+            gained[0, : len(self._group)] = self._strength * taken[self._time]
+            gained[1, : len(self.times)] = taken
+            by_group = np.bincount(self._group, gained[0, : len(self._group)], self.groups)
+            factors = np.where(self._owner >= 0, 1.0 + by_group[self._owner], 1.0)
+            self._factors[h] = kept, gained, by_group, self.shell.section.wall(factors)
+        return self._factors[h]
+
+    def _stored(self, branches, stretch) -> np.ndarray:
+        each = 0.5 * np.einsum("ep,epbi,epbi->b", self.shell.geometry.area, branches, stretch[:, :, self._time])
+        return np.bincount(self._group, each, self.groups)

@@ -1,0 +1,122 @@
+"""Runs of a valve whose materials relax: files, resuming, energy, coupling."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.case import CaseError
+from dbvfiv.motion.equations import ValveMotion
+from dbvfiv.record.record import StoredRecord
+from dbvfiv.studies.case import Case
+from dbvfiv.studies.session import load_result
+from dbvfiv.studies.transient.keeping import rows_to_keep
+from dbvfiv.studies.transient.run import run_transient
+from dbvfiv.studies.transient.tables import HISTORY, MEMORY_COLUMNS, RELAXING, tables_of
+
+from .test_runs import SHORT, Stop, all_restart_points, transient
+
+__all__ = ["all_restart_points"]
+
+LOSSY = {"damping.model": "loss factor", "drive.pressure": 6e3, "fluid.density": 50.0}
+
+
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive, all_restart_points):
+    changes = SHORT | LOSSY | {"transient.duration": 0.03, "transient.adaptive": adaptive, "transient.step": 5e-4}
+    model = valve(changes | {"fluid.density": 1.2, "transient.local_error": 1e-5, "transient.numerical_damping": 0.1})
+    whole = transient(model, output=tmp_path / "whole.h5")
+    assert whole.complete and whole.history["branch_loss"].shape == (len(whole.history["time"]), 4)
+    for after in (1, 40):
+        stopped = transient(model, output=tmp_path / "parts.h5", observer=Stop(after))
+        assert not stopped.complete
+        known = StoredRecord(tmp_path / "parts.h5", tables_of, Case)
+        assert rows_to_keep(known, model.case)[HISTORY] == 1 + 7 * (after // 7)
+        resumed = dbvfiv.resume(tmp_path / "parts.h5")
+        for name in whole.history:
+            assert np.array_equal(resumed.history[name], whole.history[name]), name
+        assert np.array_equal(resumed.states[-1].nodal, whole.states[-1].nodal)
+
+
+def test_nothing_is_stored_where_nothing_relaxes(tmp_path, valve):
+    model = valve(SHORT | {"transient.duration": 0.005})
+    run = transient(model, output=tmp_path / "elastic.h5")
+    assert run.mesh.relaxing == () and not {c.name for c in RELAXING} & set(run.history)
+    assert run_transient(model).progress.state.memory is None
+    with h5py.File(tmp_path / "elastic.h5") as file:
+        assert "relaxing" not in file["mesh"]
+        assert not {c.name for c in MEMORY_COLUMNS} & set(file["tables/restart"])
+    assert "dissipated" not in "\n".join(run.lines())
+
+
+def test_a_loss_factor_of_zero_is_an_undamped_wall(valve):
+    fast = SHORT | {"transient.duration": 0.01, "drive.pressure": 6e3}
+    zero = run_transient(valve(fast | {"damping.model": "loss factor", "damping.loss_factor": 0.0}))
+    plain = run_transient(valve(fast | {"damping.alpha": 0.0, "damping.beta": 0.0}))
+    for name in ("lip_displacement", "mass_flow", "balance"):
+        assert np.array_equal(zero.history[name], plain.history[name])
+
+
+def test_energy_is_balanced_and_each_material_has_its_share(valve):
+    """A smooth run: the pressure rises in a tenth of a second."""
+    changes = LOSSY | {"fluid.density": 300.0, "transient.ramp": 0.1, "transient.duration": 0.1}
+    off = []
+    for step in (2e-4, 1e-4):
+        run = run_transient(valve(changes | {"transient.step": step}))
+        h = run.history
+        off.append(np.abs(h["balance"]).max() / np.abs(h["pressure_work"]).max())
+    print(f"unexplained over the work of the pressure: {off}")
+    assert off[-1] < 1e-6
+    assert off[1] < 0.3 * off[0]
+    stored, lost = h["branch_energy"][-1], h["branch_loss"][-1]
+    assert (lost > 0).all() and (stored > 0).all()
+    assert h["dissipation"][-1] == 0.0
+    gained = sum(h[name][-1] - h[name][0] for name in ("kinetic_energy", "strain_energy", "stop_energy"))
+    total = gained + stored.sum() + lost.sum()
+    assert total == pytest.approx(h["pressure_work"][-1], rel=1e-6)
+    assert lost.sum() > 1e-2 * h["pressure_work"][-1]
+
+
+def test_figures_and_words_say_what_materials_dissipate(tmp_path, valve):
+    model = valve(SHORT | LOSSY)
+    transient(model, output=tmp_path / "run.h5")
+    run = load_result(tmp_path / "run.h5")
+    assert run.mesh.relaxing == tuple(group.name for group in model.relaxation.groups)
+    lost = run.summary()["last"]["dissipated"]
+    assert set(lost) == {"Rayleigh damping", *run.mesh.relaxing}
+    assert all(f"J in {name}" in run.lines()[-1] for name in run.mesh.relaxing)
+    energies = dict(run.drawers())["energies"]()
+    drawn = [line.get_label() for axes in energies.axes for line in axes.get_lines()]
+    assert [f"lost in\n{name}" in drawn for name in run.mesh.relaxing] == [True] * len(run.mesh.relaxing)
+
+
+def test_a_valve_that_was_loaded_long_ago_stays_where_it_is(valve):
+    run = run_transient(valve(SHORT | LOSSY | {"transient.start": "steady"}))
+    assert np.ptp(run.history["lip_displacement"]) < 1e-9
+    assert np.abs(run.progress.state.memory.branches).max() < 1e-6 * np.abs(run.progress.state.memory.slow).max()
+
+
+def test_staggered_coupling_has_the_same_wall(valve):
+    changes = LOSSY | {
+        "drive.kind": "flow",
+        "fluid.density": 1000.0,
+        "transient.ramp": 0.05,
+        "transient.duration": 0.05,
+    }
+    runs = [
+        run_transient(valve(changes | {"transient.coupling": c, "transient.step": 2e-4}))
+        for c in ("monolithic", "staggered")
+    ]
+    ends = [r.history["lip_displacement"][-1] for r in runs]
+    assert not runs[1].failures and ends[1] == pytest.approx(ends[0], rel=0.05)
+    losses = [r.history["branch_loss"][-1].sum() for r in runs]
+    assert losses[1] == pytest.approx(losses[0], rel=0.1)
+
+
+def test_the_true_metric_is_refused_in_time(valve, one_sentence):
+    model = valve(LOSSY | {"shell.metric": "true", "valve.thickness_factor": 0.1})
+    with pytest.raises(CaseError) as refused:
+        ValveMotion(model)
+    assert one_sentence(str(refused.value))
