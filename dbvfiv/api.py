@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 from .case.changes import Changes, change_case
 from .case.pressures import is_single, read_pressures
 from .errors import SolveError
+from .materials.damping_report import DampingReport, describe_damping
 from .model import ValveModel
 from .studies.case import Case, load_case
 from .studies.closure.result import ClosureResult
@@ -75,6 +76,16 @@ class Valve:
     def replace(self, changes: Changes) -> Valve:
         """A valve with some keys of its case changed, as `load` takes them: ``{"fluid.density": 10}``."""
         return Valve(change_case(self.case, changes), self.name)
+
+    def damping(self) -> DampingReport:
+        """How much the wall damps by the case: materials, fits of their loss factors, damping ratio over frequency.
+
+        Raises
+        ------
+        CaseError
+            For data of a material that cannot be used.
+        """
+        return describe_damping(self.case)
 
     @overload
     def steady(self, pressure: float | str) -> State: ...

@@ -15,6 +15,8 @@ from .section import BrokenRule, Section, key
 
 _FREQUENCY = Quantity("Hz", "Hz")
 _SLOWEST, _FASTEST = 1e-6, 1e6
+#: Relaxation times that keep a constant loss factor within some 3 % (docs/damping.md), next to one more.
+_PER_DECADE = 1.25
 #: Numbers that follow from the model where they are not given: alpha 1/s, beta s, factor on the loss factors.
 _DEFAULTS = {
     "rayleigh": {"alpha": 5.0, "beta": 0.003, "loss_factor": 0.0},
@@ -89,8 +91,8 @@ class Damping(Section):
     band: Band = key((1.0, 200.0), "Frequencies over which loss factors hold: series are fitted over this band.")
     branches: StrictInt | None = key(
         None,
-        "Number of relaxation times fitted over the band; where not given one for each decade begun and one more (4 "
-        "over 1 to 200 Hz).",
+        "Number of relaxation times fitted over the band; where not given 5 for every 4 decades and one more, 4 over 1 "
+        "to 200 Hz.",
         ge=1,
         le=20,
     )
@@ -126,7 +128,9 @@ class Damping(Section):
     def _fill(self) -> Damping:
         """Numbers for the keys that were not given."""
         before = self._following  # damping is checked again when it becomes part of a case
-        numbers = _DEFAULTS[self.model] | {"branches": math.ceil(math.log10(self.band[1] / self.band[0]) - 1e-9) + 1}
+        decades = math.log10(self.band[1] / self.band[0])
+        branches = math.ceil(_PER_DECADE * decades - 1e-9) + 1
+        numbers = _DEFAULTS[self.model] | {"branches": branches}
         self._following = frozenset(name for name in numbers if getattr(self, name) is None or name in before)
         self.__dict__.update({name: numbers[name] for name in self._following})
         foreign, remedy = _FOREIGN[self.model]

@@ -23,13 +23,15 @@ HEAD = """# A case of dbvfiv: a duckbill valve, its material, the fluid and the 
 """
 
 OWN_MATERIAL = """
-# Further materials, or replacements of CR, SBR, EPDM and fibre, are tables [materials.NAME], for instance
+# Further materials, or replacements of CR, SBR, EPDM and fibre, are tables [materials.NAME], for instance (a table of
+# CR, SBR, EPDM or fibre that holds loss_factor alone leaves the material as it is)
 #
 # [materials.silicone]
 # kind = "mooney-rivlin"     # also neo-hookean, isotropic, orthotropic, halpin-tsai, fit, shipped
 # c10 = "0.3 MPa"
 # c01 = "0.1 MPa"
 # density = "1150 kg/m^3"
+# loss_factor = 0.1          # or loss_data, relaxation_data, prony; for damping.model = "loss factor"
 """
 
 

@@ -13,6 +13,7 @@ from dbvfiv.materials.damping import (
     shipped_loss,
     shipped_loss_names,
 )
+from dbvfiv.materials.damping_report import DampingReport, describe_damping, outside_band
 from dbvfiv.materials.fit import UniaxialFit, fit_mooney_rivlin, uniaxial_stress
 from dbvfiv.materials.halpin_tsai import fibre_ply, halpin_tsai, ply_from_constituents
 from dbvfiv.materials.isotropic import IsotropicElastic
@@ -27,6 +28,7 @@ from dbvfiv.materials.stability import StableRange, stability_margin, stability_
 from dbvfiv.materials.tension_test import TensionTest, read_tension_test
 
 __all__ = [
+    "DampingReport",
     "IsotropicElastic",
     "LINEAR_ELASTIC",
     "Law",
@@ -43,6 +45,7 @@ __all__ = [
     "TensionTest",
     "UniaxialFit",
     "damping_of",
+    "describe_damping",
     "energy_of",
     "fibre_ply",
     "fit_constant",
@@ -53,6 +56,7 @@ __all__ = [
     "halpin_tsai",
     "law_from_card",
     "law_from_case",
+    "outside_band",
     "ply_from_constituents",
     "read_tension_test",
     "relaxation_from_case",

@@ -18,7 +18,9 @@ from dbvfiv.materials.loss_table import read_loss_table, read_relaxation_table
 from dbvfiv.materials.prony import Prony
 from dbvfiv.materials.prony_fit import (
     PronyFit,
-    check_table,
+    checked_moduli,
+    checked_relaxation,
+    checked_tan_delta,
     fit_constant,
     fit_moduli,
     fit_relaxation,
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
     from dbvfiv.case import Case
     from dbvfiv.case.relaxing import Relaxing
 
+#: Errors of a fit, rms, beyond which it says nothing of the material, and largest one that passes without a note.
+_WORST, _FAIR = 0.5, 0.1
 #: Points a decade at which a measured table is met.
 _PER_DECADE = 25
 
@@ -74,6 +78,16 @@ class MaterialDamping:
     prony: Prony
     fit: PronyFit | None = None
     data: tuple[np.ndarray, np.ndarray] | None = None
+
+    @property
+    def note(self) -> str | None:
+        """A sentence where the fit is poor."""
+        if self.fit is None or self.fit.largest_error <= _FAIR:
+            return None
+        return (
+            f"{self.name}: the series misses the {self.fit.quantity} by up to {self.fit.largest_error:.0%}; more "
+            "damping.branches or a narrower damping.band help unless the data scatter."
+        )
 
 
 @cache
@@ -137,7 +151,13 @@ def damping_of(case: Case, name: str) -> MaterialDamping:
             key=f"materials.{name}",
         )
     try:
-        return _READERS[card.ways[0]](name, card, case.damping.band, case.damping.branches)
+        found = _READERS[card.ways[0]](name, card, case.damping.band, case.damping.branches)
+        if found.fit and found.fit.rms_error > _WORST:
+            raise MaterialError(
+                f"a series of {case.damping.branches} branches misses it by {found.fit.rms_error:.0%} rms; more "
+                "damping.branches or a narrower damping.band are needed."
+            )
+        return found
     except MaterialError as error:
         key = f"materials.{name}.{card.ways[0]}"
         raise CaseError(f"{key} cannot be used: {error}", key=key) from None
@@ -167,16 +187,15 @@ def _of_loss_table(name: str, card: Relaxing, band, branches: int) -> MaterialDa
     path = card.loss_data
     table = read_loss_table(path, card.loss_temperature)
     try:
-        frequency, tan_delta = check_table("frequency", "Hz", table.frequency, table.tan_delta)
-        _check_covers(band, frequency[0], frequency[-1])
-        at = _points(band, frequency)
         times = relaxation_times(band, branches)
         if table.storage is None:
-            fit_tan_delta(frequency, tan_delta, times)  # the table itself is to be sound, beyond the band too
+            frequency, tan_delta = checked_tan_delta(table.frequency, table.tan_delta)
+            at = _points(band, frequency)
             fit, what = fit_tan_delta(at, _between(at, frequency, tan_delta), times), "tan delta"
         else:
-            fit_moduli(frequency, table.storage, table.loss, times)
-            moduli = (_between(at, frequency, values) for values in (table.storage, table.loss))
+            frequency, storage, loss = checked_moduli(table.frequency, table.storage, table.loss)
+            at, tan_delta = _points(band, frequency), loss / storage
+            moduli = (_between(at, frequency, values) for values in (storage, loss))
             fit, what = fit_moduli(at, *moduli, times), "storage and loss modulus"
     except MaterialError as error:
         raise MaterialError(f"table {path}: {_continued(error)}") from None
@@ -188,7 +207,7 @@ def _of_relaxation(name: str, card: Relaxing, band, branches: int) -> MaterialDa
     path = card.relaxation_data
     table = read_relaxation_table(path, card.loss_temperature)
     try:
-        time, modulus = check_table("time", "s", table.time, table.modulus)
+        time, modulus = checked_relaxation(table.time, table.modulus)
         _check_covers(band, 1.0 / (2 * np.pi * time[-1]), 1.0 / (2 * np.pi * time[0]))
         fit = fit_relaxation(time, modulus, relaxation_times(band, branches))
     except MaterialError as error:
@@ -225,6 +244,7 @@ def _check_covers(band: tuple[float, float], low: float, high: float) -> None:
 
 def _points(band: tuple[float, float], measured: np.ndarray) -> np.ndarray:
     """Frequencies at which a table is met: those measured within the band, and even steps between them."""
+    _check_covers(band, measured[0], measured[-1])
     decades = np.log10(band[1] / band[0])
     even = np.geomspace(*band, max(int(_PER_DECADE * decades), 8) + 1)
     even[0], even[-1] = band

@@ -43,13 +43,14 @@ class LossTable:
     ----------
     frequency : numpy.ndarray, shape (n,)
         Hz.
-    tan_delta : numpy.ndarray, shape (n,)
+    tan_delta : numpy.ndarray, shape (n,), or None
+        None where both moduli were measured.
     storage, loss : numpy.ndarray, shape (n,), or None
         Pa; None where tan delta was measured alone.
     """
 
     frequency: np.ndarray
-    tan_delta: np.ndarray
+    tan_delta: np.ndarray | None = None
     storage: np.ndarray | None = None
     loss: np.ndarray | None = None
 
@@ -96,12 +97,7 @@ def read_loss_table(path: str | Path, temperature: float | None = None) -> LossT
         )
     if not both:
         return LossTable(frequency, columns["tan delta"])
-    storage, loss = columns["storage modulus"], columns["loss modulus"]
-    for name, values in (("storage modulus", storage), ("loss modulus", loss)):
-        if (values <= 0).any():
-            at = frequency[np.argmax(values <= 0)]
-            raise MaterialError(f"Table {path}: the {name} must be greater than 0, but at {at:g} Hz it is not.")
-    return LossTable(frequency, loss / storage, storage, loss)
+    return LossTable(frequency, storage=columns["storage modulus"], loss=columns["loss modulus"])
 
 
 def read_relaxation_table(path: str | Path, temperature: float | None = None) -> RelaxationTable:
@@ -201,4 +197,4 @@ def _steps(measured: np.ndarray) -> list[float]:
     """Means of the groups of temperatures that lie together."""
     ordered = np.sort(measured)
     groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > SAME_TEMPERATURE) + 1)
-    return [float(np.round(group.mean(), 1)) for group in groups]
+    return [float(np.round(group.mean(), 2)) for group in groups]

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import nnls
 
 from dbvfiv.materials.checks import MaterialError
+
+#: How far beyond its branches a series keeps its loss factor when it is scaled, in decades; and rounds to do so.
+_MARGIN, _ROUNDS = 0.1, 60
 
 
 @dataclass(frozen=True)
@@ -79,8 +83,8 @@ class Prony:
     def scaled(self, factor: float) -> Prony:
         """The series whose loss factor is `factor` times this one's, at the same times.
 
-        Least squares on tan delta over the frequencies of the branches and half a decade beyond, with strengths that
-        stay positive; the storage modulus follows from it, as causality demands.
+        Least squares on tan delta over the frequencies of the branches, with strengths that stay positive; the storage
+        modulus follows from it, as causality demands.
 
         Parameters
         ----------
@@ -98,12 +102,23 @@ class Prony:
             return self
         if factor == 0.0:
             return Prony((0.0,) * len(self.times), self.times)
-        times = np.array(self.times)
-        low, high = np.log10(1.0 / times.max()) - 0.5, np.log10(1.0 / times.min()) + 0.5
-        omega = np.logspace(low, high, int(20 * (high - low)) + 1)
-        target = factor * self.loss_factor(omega / (2 * np.pi))
-        x = 1j * np.multiply.outer(omega, times)
-        branch = x / (1.0 + x)
-        weight = 1.0 / self.modulus(1j * omega).real
-        matrix = (branch.imag - target[:, None] * branch.real) * weight[:, None]
-        return Prony(tuple(nnls(matrix, target * weight)[0]), self.times)
+        return _scaled(self, float(factor))
+
+
+@lru_cache(4096)  # scans over the factor ask for the same series again and again
+def _scaled(prony: Prony, factor: float) -> Prony:
+    """See `Prony.scaled`."""
+    times = np.array(prony.times)
+    low, high = np.log10(1.0 / times.max()) - _MARGIN, np.log10(1.0 / times.min()) + _MARGIN
+    omega = np.logspace(low, high, max(int(20 * (high - low)), 4 * times.size) + 1)
+    target = factor * prony.loss_factor(omega / (2 * np.pi))
+    x = 1j * np.multiply.outer(omega, times)
+    branch = x / (1.0 + x)
+    matrix = branch.imag - target[:, None] * branch.real  # times g: target where tan delta is met
+    storage = prony.modulus(1j * omega).real
+    for _ in range(_ROUNDS):
+        strengths = nnls(matrix / storage[:, None], target / storage)[0]
+        before, storage = storage, 1.0 + branch.real @ strengths
+        if np.abs(storage - before).max() <= 1e-14 * storage.max():
+            break
+    return Prony(tuple(strengths), prony.times)

@@ -136,10 +136,7 @@ def fit_tan_delta(frequency, tan_delta, times) -> PronyFit:
     MaterialError
         For tables that cannot be used.
     """
-    frequency, wanted = check_table("frequency", "Hz", frequency, tan_delta)
-    _check_loss(wanted)
-    if not (wanted > 0).all():
-        raise MaterialError("tan delta must be greater than 0 in a table; an elastic material is loss_factor = 0.")
+    frequency, wanted = checked_tan_delta(frequency, tan_delta)
     times = np.asarray(times, float)
     return _of_tan_delta(Prony(_fit_loss(frequency, wanted, times), times), frequency, wanted)
 
@@ -163,11 +160,7 @@ def fit_moduli(frequency, storage, loss, times) -> PronyFit:
     MaterialError
         For tables that cannot be used, or moduli that leave no slow modulus.
     """
-    frequency, storage = check_table("frequency", "Hz", frequency, storage)
-    _, loss = check_table("frequency", "Hz", frequency, loss)
-    _check_positive("storage modulus", frequency, "Hz", storage)
-    _check_positive("loss modulus", frequency, "Hz", loss)
-    _check_loss(loss / storage)
+    frequency, storage, loss = checked_moduli(frequency, storage, loss)
     times = np.asarray(times, float)
     branch, even = _branch(frequency, times), _even_weights(frequency)
     one = np.ones((len(frequency), 1))
@@ -200,8 +193,7 @@ def fit_relaxation(time, modulus, times) -> PronyFit:
     MaterialError
         For tables that cannot be used, or a modulus that relaxes to nothing.
     """
-    time, modulus = check_table("time", "s", time, modulus)
-    _check_positive("modulus", time, "s", modulus)
+    time, modulus = checked_relaxation(time, modulus)
     times = np.asarray(times, float)
     decay = np.exp(-np.multiply.outer(time, 1.0 / times))
     even = _even_weights(time)
@@ -212,13 +204,39 @@ def fit_relaxation(time, modulus, times) -> PronyFit:
     return PronyFit(prony, "relaxing modulus", time, fitted / modulus - 1.0)
 
 
-def check_table(name: str, unit: str, at, values) -> tuple[np.ndarray, np.ndarray]:
-    """Two columns as arrays: finite, as long as each other, the first one positive and ascending.
+def checked_tan_delta(frequency, tan_delta) -> tuple[np.ndarray, np.ndarray]:
+    """A table that `fit_tan_delta` takes, as arrays.
 
     Raises
     ------
     MaterialError
     """
+    frequency, wanted = _checked("frequency", "Hz", frequency, tan_delta)
+    _check_loss(wanted)
+    if not (wanted > 0).all():
+        raise MaterialError("tan delta must be greater than 0 in a table; an elastic material is loss_factor = 0.")
+    return frequency, wanted
+
+
+def checked_moduli(frequency, storage, loss) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A table that `fit_moduli` takes, as arrays; see `checked_tan_delta`."""
+    frequency, storage = _checked("frequency", "Hz", frequency, storage)
+    _, loss = _checked("frequency", "Hz", frequency, loss)
+    _check_positive("storage modulus", frequency, "Hz", storage)
+    _check_positive("loss modulus", frequency, "Hz", loss)
+    _check_loss(loss / storage)
+    return frequency, storage, loss
+
+
+def checked_relaxation(time, modulus) -> tuple[np.ndarray, np.ndarray]:
+    """A table that `fit_relaxation` takes, as arrays; see `checked_tan_delta`."""
+    time, modulus = _checked("time", "s", time, modulus)
+    _check_positive("modulus", time, "s", modulus)
+    return time, modulus
+
+
+def _checked(name: str, unit: str, at, values) -> tuple[np.ndarray, np.ndarray]:
+    """Two columns as arrays: finite, as long as each other, the first one positive and ascending."""
     at, values = np.asarray(at, float), np.asarray(values, float)
     if at.ndim != 1 or at.shape != values.shape:
         raise MaterialError(f"There must be one value for each {name}, but the shapes are {at.shape}, {values.shape}.")

@@ -30,6 +30,9 @@ def run(session: Session, record: GrowingRecord) -> None:
     known = parameters_of(model)
     names = asked.of or known
     for name in names:
+        lacking = session.case.damping.lacks(name)
+        if lacking:
+            raise CaseError(f"sensitivity.of names {name!r}, but {lacking}.", key="sensitivity.of")
         if name not in known:
             raise CaseError(
                 f"sensitivity.of names {name!r}, by which nothing of this valve can be differentiated; it can by "
