@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 #: Eigenvalues of a cell that are taken from the surrogate to the rational pencil.
 TAKEN = 6
 #: Eigenvalues of a surrogate from which the first of these are chosen.
-STARTED = 9
+STARTED = 12
 #: Room above a band for starts.
 ROOM = 1.1
 #: Growth rates of a cell that have to be right; a start that was lost below them does not matter.
@@ -40,7 +40,7 @@ class SmallSpectra:
         squares, motions = np.linalg.eigh(_relative(reduced.K, reduced.M))
         low = np.flatnonzero(squares > 0)[:TYPICAL]
         #: Typical angular frequency, rad/s.
-        self.frequency = float(np.sqrt(squares[low[0]])) if low.size else 1.0
+        self.frequency = float(np.exp(0.5 * np.log(squares[low]).mean())) if low.size else 1.0
         self._top = TOP * float(np.sqrt(squares[low[-1]])) if low.size else 1.0
         motions = np.linalg.solve(np.linalg.cholesky(reduced.M).T, motions[:, low])
         parts = np.einsum("ai,gab,bi->gi", motions, reduced.relaxing, motions)
@@ -96,7 +96,8 @@ class SmallSpectra:
                 if not (settled and _joined(rows[i], value))
             ]
             for i, growth in lost:
-                doubtful[i] |= growth > sorted((v.real for v in rows[i]), reverse=True)[:WATCHED][-1]
+                watched = sorted((v.real for v in rows[i]), reverse=True)[:WATCHED]
+                doubtful[i] |= len(watched) < WATCHED or growth > watched[-1]
             # one after another as long as all that were found are unstable
             wanted = np.array([bool(row) and min(v.real for v in row) > 0 for row in rows])
             first += TAKEN

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg as la
 
+from .response import relaxed_zeros
+
 if TYPE_CHECKING:
     from .reduction import ReducedFamily
 
@@ -22,7 +24,9 @@ PATTERNS = 1e-5
 #: Multiples of the lowest frequency at which patterns of the response are taken.
 SAMPLED = (0.0, 0.9, 2.0, 5.0, 20.0, 100.0, 1e3)
 #: Lowest frequencies of a structure that relaxes which every walk looks at.
-BESIDE = 12
+BESIDE = 30
+#: Decay over angular frequency up to which a structure answers fast beside a frequency of its own.
+NEAR = 0.2
 #: Share of the largest stiffness that the reference has at least.
 SOFTEST = 1e-9
 #: Responses kept of a reduced family.
@@ -65,7 +69,7 @@ class Response:
         if not np.isfinite(scale):
             scale = self.scale = float(np.abs(self.poles).min())
         self.P, self.Q = _both_patterns([self._full(1j * scale * f) for f in SAMPLED])
-        near = self.poles[(self.poles.imag > 0) & (np.abs(self.poles.real) < 0.2 * self.poles.imag)]
+        near = self.poles[(self.poles.imag > 0) & (np.abs(self.poles.real) < NEAR * self.poles.imag)]
         self.beside = near.imag
         self.top = 30.0 * float(np.abs(self.poles).max())
         self._left, self._right = self.P.T @ self._out, self._in @ self.Q
@@ -104,7 +108,9 @@ class RelaxingResponse:
         self._known: dict[float, tuple[np.ndarray, float]] = {}
         frequencies = reference.frequencies
         self.scale = float(frequencies[0])
-        self.beside = frequencies[1:BESIDE]
+        zeros = relaxed_zeros(reduced.M, self._reference[0], *self._reference[1:], self._relaxation)
+        near = np.abs(zeros.imag[np.abs(zeros.real) < NEAR * zeros.imag])
+        self.beside = np.sort(near)[:BESIDE]
         stiffest = frequencies[-1] * np.sqrt(1.0 + self._relaxation.strengths.sum(axis=1).max(initial=0.0))
         self.top = 30.0 * float(max(stiffest, beta * stiffest**2, alpha))
         motion, force = reduced.J.astype(complex), reduced.G.astype(complex)
