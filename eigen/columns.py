@@ -26,6 +26,8 @@ REDUCED, DIRECT, MISSING = 0, 1, 2
 INSIDE = 0.999
 #: Leading eigenvalues kept of a cell.
 KEPT = 8
+#: Conditions at least at which they are taken where the loss factors differ.
+LOSSES = 4
 #: Leading vectors taken at each condition: where damping orders the modes, and for a band.
 MOST, MOST_IN_BAND = 4, 12
 
@@ -131,11 +133,15 @@ class ColumnSolver:
         reduction = self.reduction(family)
         if len(conditions) < 3:
             return self._directly(reduction, conditions)
-        places = _spread(conditions, snapshots)
+        losses = [c.loss for c in conditions]
+        mixed = len(set(losses)) > 1
+        places = _spread(conditions, max(snapshots, LOSSES) if mixed else snapshots)
         banded = any(_is_banded(family, conditions[i]) for i in places)
         first = reduction.wide if banded else reduction.coarse
         fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
-        error = _error(reduction, fine, conditions, _between(places))
+        # vectors corrected in a few steps are worst where most relaxes
+        checked = [*_between(places), int(np.argmax(losses))] if mixed else _between(places)
+        error = _error(reduction, fine, conditions, checked)
         column = self._on(first, fine, conditions, error, edges)
 
         def eigenvalues(condition):

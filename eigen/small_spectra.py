@@ -141,7 +141,7 @@ class SmallSpectra:
         swings = (values.imag > OVERDAMPED * np.abs(values)) | ((values.imag >= 0) & (values.real > 0))
         growth = np.where(swings, self._estimates(problem, surrogate, np.where(swings, values, 1.0)).real, -np.inf)
         band = np.array([self.reduced.family.reach(c).band for c in conditions])
-        growth = np.where((values.imag <= ROOM * band[:, None]) | (growth > 0), growth, -np.inf)
+        growth = np.where((values.imag <= ROOM * band[:, None]) | (values.real > 0), growth, -np.inf)
         order = np.argsort(-growth, axis=1)[:, :STARTED]
         cells = np.repeat(np.arange(len(conditions)), order.shape[1])
         kept = np.isfinite(np.take_along_axis(growth, order, 1)).ravel()
