@@ -73,8 +73,10 @@ def test_maps_against_certified_spectra(lossy_case, lossy_walk, continuity, seco
         place = result.plan.place(result.plan.x.values[i], result.plan.y.values[j], result.plan.laws[0])
         family = lossy_walk.family(place)
         found = certified_spectrum(family.pencil(place.condition), 6, family.search(place.condition))
-        assert found.agrees and found.unstable_count == unstable[j, i]
-        assert growth[j, i] == pytest.approx(found.spectrum.growth_rate[0], abs=1e-6 * abs(found.spectrum.eigenvalues[0]))
+        assert found.unstable_count == found.unstable_count_independent == unstable[j, i]
+        assert growth[j, i] == pytest.approx(
+            found.spectrum.growth_rate[0], abs=1e-6 * abs(found.spectrum.eigenvalues[0])
+        )
 
 
 class _StopAfter(Observer):
@@ -88,7 +90,7 @@ class _StopAfter(Observer):
 
 
 def test_a_map_over_loss_factors_resumes_to_the_same_numbers(lossy_case, tmp_path):
-    case = lossy_case.replace({"map.x": "pressure=2000:20000:3", "map.y": "loss_factor=0.3:3:4:log", "map.curve": True})
+    case = lossy_case.replace({"map.x": "pressure=2000:20000:3", "map.y": "loss_factor=0.3:3:4:log"})
     whole, path = Valve(case, "valve").map(), tmp_path / "map.h5"
     first, second = _StopAfter(2), _StopAfter(1000)
     assert not Valve(case, "valve").map(output=path, observer=first).complete
@@ -98,7 +100,6 @@ def test_a_map_over_loss_factors_resumes_to_the_same_numbers(lossy_case, tmp_pat
     for name in ("growth_rate", "frequency", "unstable", "counted"):
         for other in (result, again):
             assert np.array_equal(other.grid(name), whole.grid(name))
-    assert [c.points() for c in again.curves] == [c.points() for c in whole.curves]
 
 
 @LAWS
@@ -108,7 +109,7 @@ def test_onset_over_the_loss_factor_is_where_bisection_finds_it(lossy_case, loss
         {
             "fluid.continuity": continuity,
             "fluid.density": density,
-            "onset.over": "loss_factor=1:4:5:log",
+            "onset.over": "loss_factor=1:4:3:log",
             "onset.coarse_mesh": 0,
             "onset.normal_form": False,
         }
@@ -121,7 +122,7 @@ def test_onset_over_the_loss_factor_is_where_bisection_finds_it(lossy_case, loss
         return lossy_walk.spectrum(Place.of(case).at(loss_factor=value)).growth_rate[0]
 
     low, high = 0.98 * point.value, 1.02 * point.value
-    for _ in range(12):
+    for _ in range(8):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if growth(middle) > 0 else (low, middle)
     assert low <= point.value <= high
@@ -129,7 +130,7 @@ def test_onset_over_the_loss_factor_is_where_bisection_finds_it(lossy_case, loss
 
 def test_a_normal_form_is_refused_in_a_sentence(lossy_case):
     case = lossy_case.replace(
-        {"onset.over": "loss_factor=1:4:3:log", "onset.coarse_mesh": 0, "fluid.continuity": "storage"}
+        {"onset.over": "loss_factor=1.5:2.5:2", "onset.coarse_mesh": 0, "fluid.continuity": "storage"}
     )
     (point,) = (p for p in run_onset(case).points if p.edge)
     assert point.criticality is None and "remembers" in point.note
