@@ -8,6 +8,11 @@ vector a step however many branches relax.
 Creep: thousands of real eigenvalues lie left of each -1/tau_j, nearer to a real shift than what oscillates. In the
 plane of theta = 1/(lambda - sigma) they stay on the real axis, inside the circle near which the oscillating ones lie;
 so these are counted by |Im theta|, and those right of the creep are taken in as they come.
+
+Measured at 6816 structural unknowns with four branches, seconds of processor for ten leading pairs: this 1.1, as much
+as a search under Rayleigh damping; SLEPc's Krylov-Schur on whole vectors by imaginary part 1.3, by magnitude none found
+in 14; SLEPc's NLEIGS, which takes only real targets in real arithmetic, none found in 8; a quadratic pencil in place of
+the rational one, its vectors corrected on the latter, 1.9, with one pair of ten lost.
 """
 
 from __future__ import annotations
@@ -43,7 +48,9 @@ class _Operator:
         self.n, self.b = p.n, p.b
         self.scale = abs(s) or 1.0
         turn = (lambda a: a.T.tocsr()) if transposed else (lambda a: a)
-        self._M, self._C = turn(p.M), turn(shifted.damping_shifted)
+        self._M = turn(p.M)
+        # sigma M + C, one product less where there is no C
+        self._C = turn(shifted.damping_shifted) if p.C.nnz else None
         self._relaxing = [turn(matrix) for matrix in p.relaxing]
         self._G, self._J = (p.J.T.tocsr(), p.G.T.tocsr()) if transposed else (p.G, p.J)
         zero = np.zeros((p.b, p.m))
@@ -68,8 +75,8 @@ class _Operator:
         """
         s = self.shifted.shift
         sums = np.vstack([c[1:2] * self.scale, c[:1], self._weights @ c[2:]])
-        v, q, *relaxed = np.asfortranarray(Q @ sums.T).T
-        f = real_apply(self._M, v) + _apply(self._C, q)
+        v, q, *relaxed = (Q @ sums.T).T.copy()
+        f = real_apply(self._M, v + s * q) if self._C is None else real_apply(self._M, v) + _apply(self._C, q)
         for matrix, x in zip(self._relaxing, relaxed):
             f += real_apply(matrix, x)
         g = self._S1 @ u[0]
@@ -80,7 +87,8 @@ class _Operator:
             f -= real_apply(self._G, motion + inner)
             g = g + self._R[1] @ yv + (self._R[0] + s * self._R[1]) @ yq
         solve = self.shifted.solve_transposed if self.transposed else self.shifted.solve
-        return solve(-f, -g)
+        q, inner = solve(-f, -g)
+        return (q, inner) if isinstance(s, complex) else (q.real, inner.real)  # a PETSc of complex numbers
 
     def rest(self, c, u, q, inner):
         """Coefficients (2 + j, r) and inner unknowns of the new vector from those (r,) of its structural part."""

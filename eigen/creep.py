@@ -25,7 +25,7 @@ def creep_edge(pencil: CoupledPencil) -> float:
 
 def edge_of(relaxation: Relaxation | None) -> float:
     """The same of what relaxes."""
-    if relaxation is None or not relaxation.strengths.any():
+    if relaxation is None:
         return -np.inf
     return float(-CLEAR / (relaxation.times.max() * (1.0 + relaxation.strengths.sum(axis=1).max())))
 

@@ -221,11 +221,7 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
             f"list of leading modes goes on from there to the {count} asked for."
         )
     elif order.size < count:
-        where = (
-            ""
-            if all_there_are or options.max_frequency is None
-            else (f" up to {options.max_frequency:.6g} Hz with a growth rate above {low:.6g} 1/s")
-        )
+        where = "" if all_there_are or options.max_frequency is None else _within(found, options, low)
         notes.append(
             f"{count} modes were asked for, {order.size} were found{where}"
             + ("; there are no more." if all_there_are or where else ".")
@@ -257,6 +253,17 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
     if not options.left:
         return spectrum
     return _with_left(pencil, spectrum, found.left_q[:, order], found.left_u[:, order])
+
+
+def _within(found, options, low) -> str:
+    """The part of a band that was searched, in words."""
+    if not found.lowest:
+        return f" up to {options.max_frequency:.6g} Hz with a growth rate above {low:.6g} 1/s"
+    growth = f"a growth rate above {low:.6g} 1/s and " if np.isfinite(low) else ""
+    return (
+        f" between {found.lowest / (2 * np.pi):.3g} and {options.max_frequency:.6g} Hz with {growth}"
+        f"a damping ratio below {found.slope / np.hypot(1.0, found.slope):.2g}"
+    )
 
 
 def _by_growth(values, chosen):

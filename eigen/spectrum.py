@@ -39,7 +39,8 @@ class Spectrum:
     status : {"complete", "incomplete"}
         "complete": as many as asked for (or all there are), and none missed in the region.
     complete_above : float
-        Growth rate down to which, within `band`, every eigenvalue is listed or was found.
+        Growth rate down to which, within `band`, every eigenvalue is listed or was found; where the stiffness
+        relaxes also within the lowest frequency and the damping that `region` names.
     complete_below : float
         Upper end of the strip searched; beyond it only the independent count can tell.
     band : float

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .creep import creep_edge
 from .pencil import CoupledPencil
 from .response import Determinant
 
@@ -104,7 +103,8 @@ def unstable_count(
     """
     scale = scale or _typical_frequency(pencil)
     if line is None:
-        undamped = (pencil.C.nnz == 0 or abs(pencil.C).max() == 0) and creep_edge(pencil) == -np.inf
+        relaxes = pencil.relaxation is not None and pencil.relaxation.strengths.any()
+        undamped = (pencil.C.nnz == 0 or abs(pencil.C).max() == 0) and not relaxes
         line = 1e-3 * scale if undamped else 0.0
     determinant = Determinant(pencil, line)
     dense = pencil.n <= Determinant.dense_below

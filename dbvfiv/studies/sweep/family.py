@@ -20,6 +20,7 @@ from eigen import (
     lowest_frequencies,
     unstable_count,
 )
+from eigen.left import biorthogonalise, left_by_inverse_iteration
 
 from ...case.axis import Axis
 from ...model import ValveModel
@@ -167,10 +168,13 @@ class FluidFamily:
     def _reduced(self, pencil: CoupledPencil, search: LeadingSearch, count: int, left: bool) -> Spectrum:
         options = search.options
         # the linear form of what relaxes is several times as large
-        method = "dense" if pencil.relaxation is None or count >= pencil.n else "auto"
-        return leading_modes(
-            pencil, count, SearchOptions(options.max_frequency, tolerance=options.tolerance, method=method, left=left)
+        relaxing = pencil.relaxation is not None and count < pencil.n
+        asked = SearchOptions(
+            options.max_frequency, tolerance=options.tolerance, method="auto" if relaxing else "dense"
         )
+        if relaxing and left:
+            return _with_left(pencil, leading_modes(pencil, count, asked))
+        return leading_modes(pencil, count, replace(asked, left=left))
 
     def _selected(self, value: float) -> LeadingSearch:
         return select_search(self.options.search, self.conditions_at(value), self._lowest, self.options.count)
@@ -280,6 +284,17 @@ class PressureFamily:
 
     def states(self, values: np.ndarray) -> tuple[SteadyState, ...]:
         return tuple(self.known[float(value)] for value in values)
+
+
+def _with_left(pencil: CoupledPencil, spectrum: Spectrum) -> Spectrum:
+    """With left vectors of a small pencil, by inverse iteration."""
+    workspace = Workspace()
+    found = [left_by_inverse_iteration(pencil, value, workspace) for value in spectrum.eigenvalues]
+    if not found:
+        return replace(spectrum, left_q=spectrum.q, left_u=spectrum.u)
+    w, W = (np.array(part).reshape(len(found), -1).T.conj() for part in zip(*found))
+    w, W, _, _ = biorthogonalise(pencil, spectrum.eigenvalues, spectrum.q, spectrum.u, w, W)
+    return replace(spectrum, left_q=w, left_u=W)
 
 
 def _farthest(values: np.ndarray, used: list[float]) -> float:
