@@ -26,6 +26,8 @@ REDUCED, DIRECT, MISSING = 0, 1, 2
 INSIDE = 0.999
 #: Leading eigenvalues kept of a cell.
 KEPT = 8
+#: Conditions at least at which they are taken where the loss factors differ.
+LOSSES = 4
 #: Leading vectors taken at each condition: where damping orders the modes, and for a band.
 MOST, MOST_IN_BAND = 4, 12
 
@@ -99,13 +101,13 @@ class ColumnSolver:
     """Solves families of one pattern after another."""
 
     def __init__(self):
-        self._static, self._workspace = StaticSolver(), Workspace()
+        self._static, self._stiffened, self._workspace = StaticSolver(), StaticSolver(), Workspace()
         self._last: FamilyReduction | None = None
 
     def reduction(self, family: PencilFamily) -> FamilyReduction:
         """Small models of a family; the last one is kept."""
         if self._last is None or self._last.family is not family:
-            self._last = FamilyReduction(family, self._static)
+            self._last = FamilyReduction(family, self._static, self._stiffened)
         return self._last
 
     def solve(self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False) -> Column:
@@ -131,11 +133,15 @@ class ColumnSolver:
         reduction = self.reduction(family)
         if len(conditions) < 3:
             return self._directly(reduction, conditions)
-        places = _spread(conditions, snapshots)
-        banded = any(np.isfinite(family.reach(conditions[i]).band) for i in places)
+        losses = [c.loss for c in conditions]
+        mixed = len(set(losses)) > 1
+        places = _spread(conditions, max(snapshots, LOSSES) if mixed else snapshots)
+        banded = any(_is_banded(family, conditions[i]) for i in places)
         first = reduction.wide if banded else reduction.coarse
         fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
-        error = _error(reduction, fine, conditions, _between(places))
+        # vectors corrected in a few steps are worst where most relaxes
+        checked = [*_between(places), int(np.argmax(losses))] if mixed else _between(places)
+        error = _error(reduction, fine, conditions, checked)
         column = self._on(first, fine, conditions, error, edges)
 
         def eigenvalues(condition):
@@ -173,12 +179,15 @@ class ColumnSolver:
             If no usable shift was found.
         """
         condition = Condition(*condition)
-        return leading_modes(family.pencil(condition), count, family.search(condition), workspace=self._workspace)
+        found = leading_modes(family.pencil(condition), count, family.search(condition), workspace=self._workspace)
+        if condition.loss == 0:
+            return found
+        return found.select(np.flatnonzero(family.reach(condition).is_mode(found.eigenvalues)))
 
     def _directly(self, reduction: FamilyReduction, conditions) -> Column:
         family, cells = reduction.family, len(conditions)
         spectra = [self.direct(family, c) for c in conditions]
-        banded = any(np.isfinite(family.reach(c).band) for c in conditions)
+        banded = any(_is_banded(family, c) for c in conditions)
         first = reduction.wide if banded else reduction.coarse
         counts = count_unstable(first, conditions, [s.eigenvalues[:1] for s in spectra])
         column = _blank(cells, counts)
@@ -231,10 +240,20 @@ class _Counts:
             own[cells] = other
 
 
+def _is_banded(family: PencilFamily, condition: Condition) -> bool:
+    """Whether all modes of a band are close to neutral, as they are where only it makes modes leading."""
+    return condition.loss == 0 and np.isfinite(family.reach(condition).band)
+
+
+def _counted_band(family: PencilFamily, condition: Condition) -> float:
+    """Angular frequency up to which eigenvalues are counted: all where the stiffness relaxes, which damps all."""
+    return family.reach(condition).band if family.relaxation(condition.loss) is None else np.inf
+
+
 def _uncounted(family: PencilFamily, conditions) -> _Counts:
     """What is known before anything is counted."""
     cells = len(conditions)
-    bands = np.array([family.reach(c).band for c in conditions])
+    bands = np.array([_counted_band(family, c) for c in conditions])
     band = np.where(np.isinf(bands), np.inf, INSIDE * bands / (2 * np.pi))
     return _Counts(np.full(cells, -1), np.zeros(cells, bool), np.zeros(cells), band)
 
@@ -258,11 +277,12 @@ def count_unstable(reduced: ReducedFamily, conditions, hints) -> _Counts:
     """
     cells = len(conditions)
     counts = _Counts(np.zeros(cells, int), np.zeros(cells, bool), np.zeros(cells), np.full(cells, np.inf))
-    bands = np.array([reduced.family.reach(c).band for c in conditions])
-    damped = np.array([c.alpha != 0 or c.beta != 0 for c in conditions])
+    bands = np.array([_counted_band(reduced.family, c) for c in conditions])
+    damped = np.array([any(c.damping) for c in conditions])
     whole = np.flatnonzero(np.isinf(bands) & damped)
     if whole.size:
-        found = phase_counts(reduced, [conditions[i] for i in whole], [hints[i][:2] for i in whole])
+        beside = [_beside(hints[i], conditions[i]) for i in whole]
+        found = phase_counts(reduced, [conditions[i] for i in whole], beside)
         counts.number[whole], counts.certain[whole] = found.number, found.certain
     for i in np.setdiff1d(np.arange(cells), whole):
         band = None if np.isinf(bands[i]) else INSIDE * bands[i] / (2 * np.pi)
@@ -270,6 +290,12 @@ def count_unstable(reduced: ReducedFamily, conditions, hints) -> _Counts:
         counts.number[i], counts.certain[i] = found.number, found.certain
         counts.line[i], counts.band[i] = found.line, found.band
     return counts
+
+
+def _beside(hints, condition: Condition):
+    """Those hints that a count looks beside: the leading ones, and all unstable ones where they cost nothing else."""
+    number = 2 if condition.loss == 0 else max(2, int((np.asarray(hints).real > 0).sum()) + 1)
+    return hints[:number]
 
 
 def _scale(reduced: ReducedFamily) -> float:

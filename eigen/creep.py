@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .pencil import CoupledPencil
+from .relaxation import Relaxation
 
 #: What counts as clearly right of the crowd, as a fraction of its right edge.
 CLEAR = 0.8
@@ -19,9 +20,13 @@ def creep_edge(pencil: CoupledPencil) -> float:
     A stiffness of which all relaxes creeps at the zeros of 1 + phi_g, the slowest of them left of -1/(tau_max (1 + sum
     of strengths)).
     """
-    if pencil.relaxation is None:
+    return edge_of(pencil.relaxation)
+
+
+def edge_of(relaxation: Relaxation | None) -> float:
+    """The same of what relaxes."""
+    if relaxation is None:
         return -np.inf
-    relaxation = pencil.relaxation
     return float(-CLEAR / (relaxation.times.max() * (1.0 + relaxation.strengths.sum(axis=1).max())))
 
 

@@ -8,8 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .creep import edge_of
 from .options import SearchOptions
 from .pencil import CoupledPencil
+from .relaxation import Relaxation
+from .shifts import SLOPE
 
 #: Eigenvalues closer to the limit point than this share of it are not listed.
 CLEAR = 0.8
@@ -27,12 +30,20 @@ class Condition(NamedTuple):
         Damping C = alpha M + beta D, 1/s and s.
     law : hashable
         Which coupling parts.
+    loss : float
+        Factor on the loss factors of the stiffness that relaxes; zero leaves it elastic.
     """
 
     inertia: float
     alpha: float
     beta: float
     law: Hashable = 0.0
+    loss: float = 0.0
+
+    @property
+    def damping(self) -> tuple[float, float, float]:
+        """What the structure alone depends on."""
+        return self.alpha, self.beta, self.loss
 
 
 class PencilFamily(ABC):
@@ -64,6 +75,12 @@ class PencilFamily(ABC):
     def search(self, condition: Condition) -> SearchOptions:
         """What is searched in the spectrum: limit point and band."""
 
+    def relaxation(self, loss: float) -> Relaxation | None:
+        """What relaxes under a factor on the loss factors: the same matrices for every factor, in one order, and the
+        same object for the same factor; None where nothing does.
+        """
+        return None
+
     def coupling_at(self, s: complex, condition: Condition):
         """A, B, R, S (s) with the inner unknowns scaled."""
         p, z = self.parts(condition.law), s * np.sqrt(condition.inertia)
@@ -79,14 +96,24 @@ class PencilFamily(ABC):
         options = self.search(condition)
         floor = -np.inf if options.limit_point is None else CLEAR * options.limit_point
         band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
-        return Reach(floor, band)
+        return Reach(floor, band, edge_of(self.relaxation(condition.loss)))
 
 
 class Reach(NamedTuple):
-    """Growth rates above `floor` (1/s) and angular frequencies up to `band` (rad/s)."""
+    """Growth rates above `floor` (1/s) and angular frequencies up to `band` (rad/s).
+
+    Left of `creep` (1/s), which is minus infinity where nothing relaxes, what hardly oscillates does not count; see
+    `eigen.creep` and `eigen.shifts`.
+    """
 
     floor: float
     band: float
+    creep: float = -np.inf
+
+    def is_mode(self, values: np.ndarray) -> np.ndarray:
+        """Which eigenvalues are no creep: right of it, or decaying no faster than a search for modes reaches."""
+        values = np.asarray(values)
+        return (values.real > self.creep) | (-values.real <= SLOPE * np.abs(values.imag))
 
     def leading(self, values: np.ndarray) -> np.ndarray:
         """Eigenvalues of the upper half-plane in reach, sorted by growth rate.
@@ -94,6 +121,7 @@ class Reach(NamedTuple):
         Where none lies above the floor the largest of all is given, which then is close to the limit point.
         """
         upper = values[(values.imag >= 0) & (values.imag <= self.band)]
+        upper = upper[self.is_mode(upper)]
         kept = upper[upper.real > self.floor]
         if not kept.size and upper.size:
             kept = upper[[int(np.argmax(upper.real))]]

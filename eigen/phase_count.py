@@ -8,6 +8,8 @@ matter; then
 is analytic right of the imaginary axis apart from unstable poles of the structure itself, and grows like s at most. Its
 phase along the imaginary axis is followed for every condition, with points added where it turns fast. No eigenvalue of
 the coupled pencil is used except as a hint where to look.
+
+The response of a structure that relaxes brings its own phase, see `eigen.structure_response`.
 """
 
 from __future__ import annotations
@@ -15,14 +17,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as la
 
 from .reduction import POWERS, ReducedFamily
+from .structure_response import RelaxingResponse, Response, response
 
 #: Largest accepted step of the phase between neighbours, rad.
 LARGEST_STEP = np.pi / 3
-#: Patterns of motion and force weaker than this are left out.
-PATTERNS = 1e-5
 #: Determinants evaluated at once, so that they stay in the processor's cache.
 CHUNK = 96
 #: Distance of the last phase from its limit that calls for higher frequencies, rad.
@@ -49,58 +49,6 @@ class PhaseCounts:
     points: int
 
 
-class Response:
-    """h(s) of a reduced family at one damping, condensed to the patterns that matter.
-
-    Parameters
-    ----------
-    reduced : ReducedFamily
-    alpha, beta : float
-    """
-
-    def __init__(self, reduced: ReducedFamily, alpha: float, beta: float):
-        k = reduced.size
-        damping = alpha * reduced.M + beta * reduced.D
-        form = np.zeros((2 * k, 2 * k))
-        form[:k, k:] = np.eye(k)
-        form[k:] = -np.linalg.solve(reduced.M, np.hstack([reduced.K, damping]))
-        self.poles, right = la.eig(form)
-        left = np.linalg.solve(
-            right, np.vstack([np.zeros_like(reduced.G), np.linalg.solve(reduced.M, reduced.G)]).astype(complex)
-        )
-        self._out, self._in = reduced.J @ right[:k], left
-        self.unstable = int(np.sum(self.poles.real > 0))
-        scale = self.scale = float(np.abs(self.poles[np.abs(self.poles.imag) > 0]).min(initial=np.inf))
-        if not np.isfinite(scale):
-            scale = self.scale = float(np.abs(self.poles).min())
-        sample = [self._full(1j * scale * f) for f in (0.0, 0.9, 2.0, 5.0, 20.0, 100.0, 1e3)]
-        sample = [x / np.abs(x).max() for x in sample]
-        P = _patterns([part for x in sample for part in (x.real, x.imag)])
-        Q = _patterns([part.T for x in sample for part in (x.real, x.imag)])
-        rank = min(P.shape[1], Q.shape[1])  # equally many, so that h has an inverse
-        self.P, self.Q = P[:, :rank], Q[:, :rank]
-        self.top = 30.0 * float(np.abs(self.poles).max())
-        self._left, self._right = self.P.T @ self._out, self._in @ self.Q
-
-    def _full(self, s: complex) -> np.ndarray:
-        return (self._out / (s - self.poles)) @ self._in
-
-    def __call__(self, omega: np.ndarray) -> np.ndarray:
-        """h(i omega), (len(omega), r, r)."""
-        weight = 1.0 / (1j * np.asarray(omega)[:, None] - self.poles)
-        return (self._left[None] * weight[:, None, :]) @ self._right
-
-    def inverse(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Inverses of h(i omega), and the phases of its determinants."""
-        h = self(omega)
-        return np.linalg.inv(h), np.angle(np.linalg.slogdet(h)[0])
-
-
-def _patterns(parts) -> np.ndarray:
-    vectors, weight, _ = np.linalg.svd(np.hstack(parts), full_matrices=False)
-    return vectors[:, weight > PATTERNS * weight[0]]
-
-
 def phase_counts(reduced: ReducedFamily, conditions, hints=None, most_points: int = 400) -> PhaseCounts:
     """Count unstable eigenvalues at several conditions.
 
@@ -115,9 +63,9 @@ def phase_counts(reduced: ReducedFamily, conditions, hints=None, most_points: in
     """
     number, certain = np.zeros(len(conditions), int), np.zeros(len(conditions), bool)
     points = 0
-    for damping in dict.fromkeys(c[1:3] for c in conditions):
-        members = [i for i, c in enumerate(conditions) if c[1:3] == damping]
-        walk = _Walk(Response(reduced, *damping), reduced, [conditions[i] for i in members])
+    for damping in dict.fromkeys(c.damping for c in conditions):
+        members = [i for i, c in enumerate(conditions) if c.damping == damping]
+        walk = _Walk(response(reduced, damping), reduced, [conditions[i] for i in members])
         walk.start([() if hints is None else hints[i] for i in members])
         walk.refine(most_points)
         number[members], certain[members] = walk.counts()
@@ -128,7 +76,7 @@ def phase_counts(reduced: ReducedFamily, conditions, hints=None, most_points: in
 class _Walk:
     """Phases along the imaginary axis for conditions of one damping, as sorted arrays per condition."""
 
-    def __init__(self, response: Response, reduced: ReducedFamily, conditions):
+    def __init__(self, response: Response | RelaxingResponse, reduced: ReducedFamily, conditions):
         self.response, self.conditions = response, conditions
         self.root = np.sqrt([c.inertia for c in conditions])
         self._known: dict[float, np.ndarray] = {}
@@ -196,10 +144,7 @@ class _Walk:
 
     def start(self, hints):
         scale = self.response.scale
-        poles = self.response.poles
-        base = [0.0, *np.geomspace(0.1 * scale, self.response.top, 17)]
-        near = poles[(poles.imag > 0) & (np.abs(poles.real) < 0.2 * poles.imag)]
-        base += list(near.imag)
+        base = [0.0, *np.geomspace(0.1 * scale, self.response.top, 17), *self.response.beside]
         cells, omega = [], []
         for i, hint in enumerate(hints):
             own = list(base)

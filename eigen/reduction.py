@@ -4,6 +4,9 @@ Two stages. The first space holds what coupling forces and motions do statically
 inertia does, K^-1 M X. The second holds the leading eigenvectors of the first at a few conditions after one correction
 with the full matrices, so that eigenvalues of forty vectors carry seven digits. With the inner unknowns scaled by
 sqrt(inertia) the parts of the coupling are powers of sqrt(inertia) times those of unit inertia.
+
+Where a stiffness relaxes its parts are projected once; `SmallSpectra` finds the leading eigenvalues of what is rational
+then, and corrections are made with the stiffness that a typical motion sees.
 """
 
 from __future__ import annotations
@@ -18,6 +21,9 @@ import scipy.sparse as sp
 from .factorization import MumpsFactorization, SingularShiftError, StructureMatrices
 from .family import Condition, PencilFamily
 from .pencil import CoupledPencil, real_apply
+from .relaxation import Relaxation
+from .small_spectra import SmallSpectra
+from .structure_response import Reference
 from .transfer import TransferBasis
 
 #: Power of sqrt(inertia) that each part of the coupling goes with.
@@ -28,6 +34,9 @@ COMPRESSION = 1e-4
 SNAPSHOT = 0.75
 #: Low motions that inertia corrections are made for.
 MOTIONS = 20
+#: Corrections of a vector where parts of the stiffness relax: one leaves 1e-6 of an eigenvalue, two 1e-8, and more do
+#: not converge, since the inertia is left out of them.
+CORRECTIONS = 2
 #: Lowest motions of the structure taken where a band is searched.
 LOWEST = 24
 
@@ -39,14 +48,15 @@ class StaticSolver:
         self._structure = None
         self._factor = None
 
-    def factor(self, family: PencilFamily) -> None:
-        """Factor K of a family; where it is singular a little inertia stands in.
+    def factor(self, family: PencilFamily, stiffness=None) -> None:
+        """Factor K of a family, or another stiffness; where it is singular a little inertia stands in.
 
         Raises
         ------
         SingularShiftError
         """
-        pencil = CoupledPencil(family.mass, sp.csr_matrix(family.mass.shape), family.stiffness)
+        stiffness = family.stiffness if stiffness is None else stiffness
+        pencil = CoupledPencil(family.mass, sp.csr_matrix(family.mass.shape), stiffness)
         if self._structure is not None and self._structure.fits(pencil):
             self._structure.load(pencil)
         else:
@@ -105,13 +115,38 @@ class ReducedFamily:
         self.G = family.forces.T.dot(V).T
         self.J = family.slope @ V
         self._coupled: dict[object, dict[str, np.ndarray]] = {}
+        #: What `eigen.phase_count` keeps of the structure's response, by damping.
+        self.responses: dict[tuple, object] = {}
 
     @property
     def size(self) -> int:
         """Number k of basis vectors."""
         return self.V.shape[1]
 
-    def _coupling(self, law) -> dict[str, np.ndarray]:
+    @cached_property
+    def relaxing(self) -> np.ndarray:
+        """V^T K_g V of what relaxes, (g, k, k)."""
+        relaxation = self.family.relaxation(1.0)
+        parts = [] if relaxation is None else [self.V.T @ (matrix @ self.V) for matrix in relaxation.matrices]
+        return np.array(parts).reshape(-1, self.size, self.size)
+
+    def relaxation(self, loss: float) -> Relaxation | None:
+        """What relaxes, on the space."""
+        full = self.family.relaxation(loss)
+        return None if full is None else Relaxation(tuple(self.relaxing), full.strengths, full.times)
+
+    @cached_property
+    def reference(self) -> Reference:
+        """Positive matrices near those of the space."""
+        return Reference.of(self.M, self.K, self.D, self.relaxing)
+
+    @cached_property
+    def small(self) -> SmallSpectra:
+        """Leading eigenvalues of what relaxes."""
+        return SmallSpectra(self)
+
+    def coupling(self, law) -> dict[str, np.ndarray]:
+        """Parts of the coupling at unit inertia between the vectors of the space."""
         if law not in self._coupled:
             if len(self._coupled) > 256:
                 self._coupled.clear()
@@ -130,27 +165,39 @@ class ReducedFamily:
         root = np.sqrt(condition.inertia)
         fluid = {name: value * root ** POWERS[name] for name, value in self.family.parts(condition.law).items()}
         return CoupledPencil(
-            self.M, condition.alpha * self.M + condition.beta * self.D, self.K, self.G, self.J, **fluid
+            self.M,
+            condition.alpha * self.M + condition.beta * self.D,
+            self.K,
+            self.G,
+            self.J,
+            **fluid,
+            relaxation=self.relaxation(condition.loss),
         )
 
-    def first_order(self, conditions) -> np.ndarray:
-        """Matrices whose eigenvalues are those of the pencils, (cells, 2k + b, 2k + b).
+    def first_order(self, conditions, stiffening=None, damping=None) -> np.ndarray:
+        """Matrices whose eigenvalues are those of the pencils without what relaxes, (cells, 2k + b, 2k + b).
 
         Parameters
         ----------
         conditions : sequence of Condition
+        stiffening, damping : (cells, k, k) arrays, optional
+            Added to the stiffness and to the damping.
         """
         k, cells = self.size, len(conditions)
-        b = self._coupling(conditions[0].law)["S0"].shape[0]
+        b = self.coupling(conditions[0].law)["S0"].shape[0]
         left, right = np.zeros((cells, k + b, k + b)), np.zeros((cells, k + b, 2 * k + b))
         for i, condition in enumerate(conditions):
-            c, root = self._coupling(condition.law), np.sqrt(condition.inertia)
+            c, root = self.coupling(condition.law), np.sqrt(condition.inertia)
             left[i] = self._leading(condition)
             right[i, :k, :k] = c["A0"] - self.K
             right[i, :k, k : 2 * k] = root * c["A1"] - condition.alpha * self.M - condition.beta * self.D
             if b:
                 right[i, :k, 2 * k :], right[i, k:, 2 * k :] = c["B0"], -c["S0"]
                 right[i, k:, :k], right[i, k:, k : 2 * k] = -c["R0"], -root * c["R1"]
+        if stiffening is not None:
+            right[:, :k, :k] -= stiffening
+        if damping is not None:
+            right[:, :k, k : 2 * k] -= damping
         out = np.zeros((cells, 2 * k + b, 2 * k + b))
         out[:, :k, k : 2 * k] = np.eye(k)
         out[:, k:] = np.linalg.solve(left, right)
@@ -158,7 +205,7 @@ class ReducedFamily:
 
     def _leading(self, condition: Condition) -> np.ndarray:
         """What multiplies the rates of velocities and inner unknowns, (k + b, k + b)."""
-        k, c, root = self.size, self._coupling(condition.law), np.sqrt(condition.inertia)
+        k, c, root = self.size, self.coupling(condition.law), np.sqrt(condition.inertia)
         b = c["S0"].shape[0]
         matrix = np.zeros((k + b, k + b))
         matrix[:k, :k] = self.M - condition.inertia * c["A2"]
@@ -168,21 +215,50 @@ class ReducedFamily:
         return matrix
 
     def eigenvalues(self, conditions) -> np.ndarray:
-        """All eigenvalues (cells, 2k + b), complex."""
+        """All eigenvalues (cells, 2k + b), complex; of cells that relax the leading ones, and NaN."""
+        conditions = list(conditions)
+        relaxes = [self.family.relaxation(c.loss) is not None for c in conditions]
+        if any(relaxes):
+            return self._mixed(conditions, np.array(relaxes))
         matrices = self.first_order(conditions)
         return np.linalg.eigvals(matrices) if len(matrices) else np.zeros((0, matrices.shape[1]), complex)
 
+    def _mixed(self, conditions, relaxes) -> np.ndarray:
+        """Eigenvalues where some of the cells relax."""
+        parts = []
+        for group, solve in ((~relaxes, self.eigenvalues), (relaxes, self.small.leading)):
+            cells = np.flatnonzero(group)
+            if cells.size:
+                parts.append((cells, solve([conditions[i] for i in cells])))
+        out = np.full((len(conditions), max(found.shape[1] for _, found in parts)), complex(np.nan, np.nan))
+        for cells, found in parts:
+            out[cells, : found.shape[1]] = found
+        return out
+
     def pairs(self, condition: Condition, most: int = 8, share: float = 1.0) -> Pairs:
         """Leading eigenpairs in the reach of a condition, lifted to the full unknowns; down to a share of its floor."""
-        floor, band = self.family.reach(condition)
+        reach = self.family.reach(condition)
+        if self.family.relaxation(condition.loss) is not None:
+            values = reach.leading(self.small.leading([condition])[0])
+            return self._of_rational(condition, values[values.real > share * reach.floor][:most])
+        floor, band = reach.floor, reach.band
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
         keep = np.flatnonzero((values.imag >= 0) & (values.imag <= band) & (values.real > share * floor))
         return self._lifted(condition, values, left, right, keep[np.argsort(-values.real[keep])][:most])
 
     def near(self, condition: Condition, eigenvalue: complex) -> Pairs:
         """The eigenpair nearest to a place."""
+        if self.family.relaxation(condition.loss) is not None:
+            return self._of_rational(condition, [eigenvalue])
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
         return self._lifted(condition, values, left, right, [int(np.argmin(np.abs(values - eigenvalue)))])
+
+    def _of_rational(self, condition, starts) -> Pairs:
+        """Eigenpairs near places, lifted."""
+        k = self.size
+        found = self.small.pairs(condition, starts)
+        right, left = found.right.T, found.left.T
+        return Pairs(found.values, self.V @ right[:k], right[k:], self.V @ left[:k], left[k:])
 
     def _lifted(self, condition, values, left, right, keep) -> Pairs:
         k = self.size
@@ -214,8 +290,9 @@ class FamilyReduction:
     Parameters
     ----------
     family : PencilFamily
-    solver : StaticSolver, optional
-        Keeps the symbolic factorisation between families of one pattern.
+    solver, stiffened : StaticSolver, optional
+        Keep the symbolic factorisation between families of one pattern: of the stiffness, and of that which a typical
+        motion sees where parts of it relax.
 
     Raises
     ------
@@ -223,10 +300,11 @@ class FamilyReduction:
         If the stiffness is singular.
     """
 
-    def __init__(self, family: PencilFamily, solver: StaticSolver | None = None):
+    def __init__(self, family: PencilFamily, solver: StaticSolver | None = None, stiffened: StaticSolver | None = None):
         self.family = family
         self.solver = solver or StaticSolver()
         self.solver.factor(family)
+        self._stiffened, self._loss = stiffened or StaticSolver(), None
 
     @cached_property
     def coarse(self) -> ReducedFamily:
@@ -260,6 +338,10 @@ class FamilyReduction:
         force = mq * (s * s + condition.alpha * s) + kq
         if condition.beta:
             force += real_apply(turn(family.damping), q) * (condition.beta * s)
+        relaxation = family.relaxation(condition.loss)
+        if relaxation is not None:
+            for factor, matrix in zip(relaxation.factors(s), relaxation.matrices):
+                force += real_apply(turn(matrix), q) * factor
         y = real_apply(family.forces.T if left else family.slope, q)
         inner = np.zeros((u.shape[0], len(values)), complex)
         pressure = np.zeros_like(y)
@@ -278,9 +360,32 @@ class FamilyReduction:
         """Right and left structural vectors after one correction of what the space leaves out, (n, k) each."""
         force, _ = self.residual(pairs.values, pairs.q, pairs.u, condition)
         back, _ = self.residual(pairs.values, pairs.w, pairs.c, condition, left=True)
+        if self.family.relaxation(condition.loss) is not None:
+            return self._corrected_stiffly(pairs, condition, force, back)
         # far from the leading modes T is nearly (1 + lambda beta) K
         scale = 1.0 / (1.0 + pairs.values * condition.beta)
         return pairs.q - self.solver.solve(force) * scale, pairs.w - self.solver.solve_transposed(back) * np.conj(scale)
+
+    def _corrected_stiffly(self, pairs: Pairs, condition: Condition, force, back):
+        """The same where parts of the stiffness relax: with the stiffness that a typical motion sees, and repeated for
+        what that differs from one mode and one part to another.
+        """
+        relaxation, small = self.family.relaxation(condition.loss), self.coarse.small
+        typical = relaxation.factors(1j * small.frequency).real
+        if self._loss != condition.loss:
+            parts = zip(typical, relaxation.matrices)
+            self._stiffened.factor(self.family, sum((x * part for x, part in parts), self.family.stiffness).tocsr())
+            self._loss = condition.loss
+        solver, share = self._stiffened, small.stiff_shares
+        scale = 1.0 + share @ typical
+        scale = scale / (1.0 + pairs.values * condition.beta + share @ relaxation.factors(pairs.values))
+        q, w = pairs.q, pairs.w
+        for repeat in range(CORRECTIONS):
+            if repeat:
+                force, _ = self.residual(pairs.values, q, pairs.u, condition)
+                back, _ = self.residual(pairs.values, w, pairs.c, condition, left=True)
+            q, w = q - solver.solve(force) * scale, w - solver.solve_transposed(back) * np.conj(scale)
+        return q, w
 
     def fine(self, first: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:
         """Second stage: a space made of the corrected leading vectors of a first one at some conditions."""

@@ -144,7 +144,7 @@ class Determinant:
         if not self._dense:
             return np.zeros(0, complex)
         if self._relaxation is not None:
-            return _relaxed_zeros(*(self._parts[i] for i in (0, 3, 4)), self._relaxing, self._relaxation)
+            return relaxed_zeros(*(self._parts[i] for i in (0, 3, 4)), self._relaxing, self._relaxation)
         values = self._every_reference_zero
         return values[values.imag > 0]
 
@@ -256,7 +256,7 @@ def _is_passive(matrix, mass) -> bool:
     return is_positive_definite(matrix + 1e-9 * size / abs(mass).max() * mass)
 
 
-def _relaxed_zeros(M, C, K, relaxing, relaxation, steps: int = 12):
+def relaxed_zeros(M, C, K, relaxing, relaxation, steps: int = 12):
     """Estimates of the oscillating zeros of a symmetric structure that relaxes, one equation for each mode."""
     fast = np.tensordot(relaxation.strengths.sum(axis=1), relaxing, 1)
     squares, X = la.eigh(K + fast, M)

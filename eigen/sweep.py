@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .condensation import Workspace
+from .creep import apart_from_creep
 from .dense import all_eigenvalues
 from .options import SearchOptions
 from .pencil import CoupledPencil
@@ -59,7 +60,7 @@ def sweep(
     max_solves: int = 8,
     workspace: Workspace | None = None,
 ) -> Sweep:
-    """Leading modes at many values of the fluid's density, or of the damping.
+    """Leading modes at many values of the fluid's density, or of the damping; what creeps is left out.
 
     Parameters
     ----------
@@ -127,8 +128,9 @@ def sweep(
             queue.append(_farthest(values, [v for v, _ in done]))
     table = np.full((values.size, count), np.nan, complex)
     for row, value in zip(table, values):
-        found = all_eigenvalues(reduced(float(value)))
-        found = found[found.imag <= band]
+        pencil = reduced(float(value))
+        found = all_eigenvalues(pencil)
+        found = found[(found.imag <= band) & apart_from_creep(pencil, found)]
         found = found[np.lexsort((found.imag, -found.real))][:count]
         row[: found.size] = found
     notes = (

@@ -34,7 +34,7 @@ class Chain(PencilFamily):
         return self._parts[law]
 
     def pencil(self, condition):
-        inertia, alpha, beta, law = condition
+        inertia, alpha, beta, law, _ = condition
         parts = {name: value * inertia ** (POWERS[name] / 2) for name, value in self.parts(law).items()}
         damping = alpha * self.mass + beta * self.damping
         return CoupledPencil(self.mass, damping, self.stiffness, self.forces, self.slope, **parts)

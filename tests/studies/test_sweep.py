@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.case.axis import parse_axis
+from dbvfiv.case.stability_axis import parse_stability_axis
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.dynamics import Conditions
@@ -173,3 +174,17 @@ def test_what_is_done_is_kept_on_the_way(model, state, over_density, monkeypatch
     part = kept[6]
     assert part.branches.eigenvalues[0] == pytest.approx(whole.branches.eigenvalues[0, :7], rel=1e-10)
     assert np.array_equal(whole.branches.eigenvalues, over_density.branches.eigenvalues, equal_nan=True)
+
+
+@pytest.mark.parametrize("over", ["density=5:50:4:log", "loss_factor=0.5:2:4:log"])
+def test_a_wall_that_relaxes_agrees_with_full_solves(over):
+    changes = {"mesh.around": 8, "mesh.along": 14, "damping.model": "loss factor", "drive.pressure": 6000}
+    model = ValveModel(Case().replace(changes))
+    state, axis = LoadPath(model).go_to(6e3), parse_stability_axis(over)
+    conditions = Conditions(10.0, 0.0, 0.0, 1.0)
+    found = run_sweep(model, axis, conditions, SweepOptions(count=3, checks=2), state=state)
+    assert found.certified
+    for column in (1, 2):
+        here = replace(conditions, **{axis.parameter: found.values[column]})
+        full = run_modes(model, state, here, ModesOptions(3))
+        assert max(nearest(found.branches, column, value) for value in full.eigenvalues) < 1e-5

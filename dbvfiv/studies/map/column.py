@@ -253,7 +253,7 @@ def shared_place(plan: MapPlan, value: float) -> Place | None:
 
 def _under(place: Place, condition: Condition) -> Place:
     """The same steady state under another condition."""
-    return place.at(**dict(zip(("density", "alpha", "beta", "storage"), condition)))
+    return place.at(**dict(zip(("density", "alpha", "beta", "storage", "loss_factor"), condition)))
 
 
 def _known(along: Axis, column: Column) -> dict[float, Sample]:

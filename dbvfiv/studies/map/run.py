@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import SolveError
+from ...materials import outside_band
 from ...observer import Observer
 from ..case import Case
 from ..stability.place import check_scan
@@ -165,6 +166,7 @@ def run_map(
             if case.map.curve:
                 warnings += doubts(plan, curves)
             warnings += _doubts(plan, ordered, checks)
+            warnings += _outside(case, ordered)
         except KeyboardInterrupt:
             interrupted = True
     for sentence in warnings:
@@ -175,6 +177,12 @@ def run_map(
 
 def _ordered(found) -> tuple[MapColumn, ...]:
     return tuple(sorted(found.values(), key=lambda column: column.value))
+
+
+def _outside(case: Case, ordered) -> list[str]:
+    """A sentence where leading modes leave the frequencies at which loss factors hold."""
+    sentence = outside_band(case, [f for c in ordered if not c.failure for f in c.cells["frequency"].ravel()])
+    return [] if sentence is None else [sentence]
 
 
 def _doubts(plan: MapPlan, ordered, checks) -> list[str]:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import SolveError
+from ...materials import outside_band
 from ...observer import Observer
 from ..case import Case
 from ..stability.place import check_scan
@@ -129,6 +130,8 @@ def run_onset(
     for p in points:
         if not p.confirmed:
             warnings.append(f"The onset at {options.parameter} = {p.value:.6g} is not confirmed: {p.note}")
+    outside = outside_band(case, [p.frequency for p in points])
+    warnings += [] if outside is None else [outside]
     for sentence in warnings:
         observer.warn(sentence)
     observer.end(interrupted)

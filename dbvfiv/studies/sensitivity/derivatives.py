@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from eigen import Mode
+from eigen import CoupledPencil, Mode, Relaxation
 from eigen.derivative import difference, eigenvalue_derivative
 
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS
@@ -150,7 +150,8 @@ def differentiate(
 
     def slope(low: float, high: float) -> complex:
         ends = (_pencil(model, q, pressure, conditions, name, v) for v in (low, high))
-        return eigenvalue_derivative(pencil, mode, difference(*ends, high - low))
+        here, *ends = _with_common_times(pencil, *ends)
+        return eigenvalue_derivative(here, mode, difference(*ends, high - low))
 
     inward = _inward(name, value, h)
     if inward == 0:
@@ -159,9 +160,29 @@ def differentiate(
     return Sensitivity(name, value, 2 * near - far)
 
 
+def _with_common_times(*pencils: CoupledPencil) -> list[CoupledPencil]:
+    """Pencils whose relaxations, if any, have the same parts and times.
+
+    A fitted series may leave out a time, and a factor of zero on the loss factors leaves none.
+    """
+    known = [pencil.relaxation for pencil in pencils if pencil.relaxation is not None]
+    if not known:
+        return list(pencils)
+    times = np.unique(np.concatenate([relaxation.times for relaxation in known]))
+
+    def common(relaxation: Relaxation | None) -> Relaxation:
+        strengths = np.zeros((len(known[0].matrices), len(times)))
+        if relaxation is None:
+            return known[0].replace(strengths, times)
+        strengths[:, np.searchsorted(times, relaxation.times)] = relaxation.strengths
+        return relaxation.replace(strengths, times)
+
+    return [replace(pencil, relaxation=common(pencil.relaxation)) for pencil in pencils]
+
+
 def _inward(name: str, value: float, h: float) -> int:
-    """+1 at the lower end of a parameter for which the model is built anew, -1 at the upper end, 0 elsewhere."""
-    if name not in DESIGN or name == "thickness":
+    """+1 at the lower end of a parameter that ends there, -1 at the upper end, 0 elsewhere."""
+    if name == "thickness" or name not in (*DESIGN, "loss_factor"):
         return 0
     row = PARAMETERS[name]
     return 1 if value - h < row.low else -1 if value + h > row.high else 0

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from eigen import Condition, CoupledPencil, PencilFamily, SearchOptions, lowest_frequencies
+from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, Workspace, lowest_frequencies
 from eigen.reduction import POWERS
 
 from ...model.dynamics import Conditions, LinearisedState, fluid_parts
 from ...model.leading import select_search
 
-#: Blends of the continuity laws whose fluid is kept.
+#: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
 _KEPT = 256
 
 
 class ValveFamily(PencilFamily):
-    """Conditions are (density, alpha, beta, storage); at unit density the fluid's unknown is the inlet velocity, at
-    others that times the root of the density.
+    """Conditions are (density, alpha, beta, storage, loss factor).
+
+    At unit density the fluid's unknown is the inlet velocity, at others that times the root of the density.
 
     Parameters
     ----------
@@ -26,27 +29,46 @@ class ValveFamily(PencilFamily):
         structural frequencies of the state.
     modes : int
         Structural frequencies that such a band holds.
+    workspace : Workspace, optional
+        Keeps the symbolic factorisation for those between states.
     """
 
-    def __init__(self, linear: LinearisedState, max_frequency: float | None = None, modes: int = 10):
-        self.linear, self.max_frequency, self.modes = linear, max_frequency, modes
+    def __init__(
+        self,
+        linear: LinearisedState,
+        max_frequency: float | None = None,
+        modes: int = 10,
+        workspace: Workspace | None = None,
+    ):
+        self.linear, self.max_frequency, self.modes, self._workspace = linear, max_frequency, modes, workspace
         self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
         self.forces, self.slope = linear.forces, linear.slope
         self._parts: dict[float, dict[str, np.ndarray]] = {}
+        self._relaxations: dict[float, Relaxation | None] = {}
         self._frequencies = np.zeros(0)
 
-    def _lowest(self, count: int) -> np.ndarray:
+    def _lowest(self, count: int, workspace: Workspace | None = None) -> np.ndarray:
         """Structural frequencies of the state."""
         if len(self._frequencies) < count:
             structure = CoupledPencil(self.mass, 0.0 * self.mass, self.stiffness)
-            self._frequencies = lowest_frequencies(structure, count)
+            self._frequencies = lowest_frequencies(structure, count, workspace)
         return self._frequencies[:count]
 
     def search(self, condition: Condition) -> SearchOptions:
         """What is searched in the spectrum: the rule that every study follows."""
-        conditions = Conditions(condition.inertia, condition.alpha, condition.beta)
+        conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss)
         asked = SearchOptions(max_frequency=self.max_frequency)
-        return select_search(asked, conditions, self._lowest, self.modes).options
+        lowest = partial(self._lowest, workspace=self._workspace) if condition.loss else self._lowest
+        return select_search(asked, conditions, lowest, self.modes).options
+
+    def relaxation(self, loss: float) -> Relaxation | None:
+        """What relaxes with a factor on the loss factors of all materials."""
+        loss = float(loss)
+        if loss not in self._relaxations:
+            if len(self._relaxations) > _KEPT:
+                self._relaxations.clear()
+            self._relaxations[loss] = self.linear.relaxation(loss)
+        return self._relaxations[loss]
 
     def parts(self, law: float) -> dict[str, np.ndarray]:
         """A0 to S1 at density 1."""
@@ -69,5 +91,5 @@ class ValveFamily(PencilFamily):
 
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The full pencil, with the inlet velocity itself as unknown."""
-        density, alpha, beta, storage = condition
-        return self.linear.pencil(Conditions(density, alpha, beta), storage=storage)
+        density, alpha, beta, storage, loss_factor = condition
+        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor), storage=storage)

@@ -55,8 +55,8 @@ class Place:
 
     @property
     def condition(self) -> Condition:
-        """(density, alpha, beta, storage)."""
-        return Condition(self.density, self.alpha, self.beta, self.storage)
+        """(density, alpha, beta, storage, loss factor)."""
+        return Condition(self.density, self.alpha, self.beta, self.storage, self.loss_factor)
 
     @property
     def conditions(self) -> Conditions:

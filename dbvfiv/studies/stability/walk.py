@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from eigen import Column, ColumnSolver, SearchOptions
+from eigen import Column, ColumnSolver, SearchOptions, Workspace
 
 from ...errors import SolveError
 from ...model import ValveModel
@@ -70,6 +70,7 @@ class StabilityWalk:
     def __init__(self, case: Case, observer: Observer | None = None, model: ValveModel | None = None):
         self.case = case
         self._recalled: list[Place] = []
+        self._workspace = Workspace()  # for structural frequencies
         self.observer = observer or Observer()
         self._rebuild = rebuilder(case)
         self._built: dict[tuple, _Built] = {}
@@ -152,7 +153,7 @@ class StabilityWalk:
         if self._last is None or self._last[0] != key:
             linear = linearise(self.built(place).model, self.equilibrium(place), place.pressure)
             modes = self.case.modes
-            self._last = (key, ValveFamily(linear, modes.max_frequency, modes.count))
+            self._last = (key, ValveFamily(linear, modes.max_frequency, modes.count, self._workspace))
         return self._last[1]
 
     def search(self, place: Place) -> SearchOptions:

@@ -20,6 +20,7 @@ from eigen import (
     lowest_frequencies,
     unstable_count,
 )
+from eigen.left import biorthogonalise, left_by_inverse_iteration
 
 from ...case.axis import Axis
 from ...model import ValveModel
@@ -88,7 +89,7 @@ class Family(Protocol):
 
 
 class FluidFamily:
-    """One state; density, alpha or beta moves."""
+    """One state; density, alpha, beta or the factor on the loss factors moves."""
 
     def __init__(
         self, model: ValveModel, state: SteadyState, axis: Axis, conditions: Conditions, options, observer: Observer
@@ -134,6 +135,8 @@ class FluidFamily:
             linear.slope @ basis.V,
             linear.area,
         )
+        # what relaxes would be computed on the elements otherwise
+        vars(self.small)["relaxing"] = tuple(basis.project(part) for part in linear.relaxing)
 
     def _confirmed(self, value: float, basis: TransferBasis) -> bool:
         """Compare with a full solve, and enlarge the basis where it misses the tolerance; whether it was good enough
@@ -164,9 +167,14 @@ class FluidFamily:
 
     def _reduced(self, pencil: CoupledPencil, search: LeadingSearch, count: int, left: bool) -> Spectrum:
         options = search.options
-        return leading_modes(
-            pencil, count, SearchOptions(options.max_frequency, tolerance=options.tolerance, method="dense", left=left)
+        # the linear form of what relaxes is several times as large
+        relaxing = pencil.relaxation is not None and count < pencil.n
+        asked = SearchOptions(
+            options.max_frequency, tolerance=options.tolerance, method="auto" if relaxing else "dense"
         )
+        if relaxing and left:
+            return _with_left(pencil, leading_modes(pencil, count, asked))
+        return leading_modes(pencil, count, replace(asked, left=left))
 
     def _selected(self, value: float) -> LeadingSearch:
         return select_search(self.options.search, self.conditions_at(value), self._lowest, self.options.count)
@@ -276,6 +284,17 @@ class PressureFamily:
 
     def states(self, values: np.ndarray) -> tuple[SteadyState, ...]:
         return tuple(self.known[float(value)] for value in values)
+
+
+def _with_left(pencil: CoupledPencil, spectrum: Spectrum) -> Spectrum:
+    """With left vectors of a small pencil, by inverse iteration."""
+    workspace = Workspace()
+    found = [left_by_inverse_iteration(pencil, value, workspace) for value in spectrum.eigenvalues]
+    if not found:
+        return replace(spectrum, left_q=spectrum.q, left_u=spectrum.u)
+    w, W = (np.array(part).reshape(len(found), -1).T.conj() for part in zip(*found))
+    w, W, _, _ = biorthogonalise(pencil, spectrum.eigenvalues, spectrum.q, spectrum.u, w, W)
+    return replace(spectrum, left_q=w, left_u=W)
 
 
 def _farthest(values: np.ndarray, used: list[float]) -> float:

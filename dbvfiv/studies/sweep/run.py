@@ -12,6 +12,7 @@ from eigen import Branches, SearchOptions, Spectrum, TrackOptions, track
 
 from ...case.axis import Axis
 from ...errors import CaseError, SolveError
+from ...materials import outside_band
 from ...model import ValveModel
 from ...model.dynamics import Conditions
 from ...model.equilibria import require_equilibrium
@@ -181,10 +182,20 @@ def run_sweep(
         failures = (str(error),)
         observer.warn(str(error))
     result = run.result(interrupted, failures)
-    for note in result.notes:
+    for note in (*result.notes, *_outside(model, result)):
         observer.warn(note)
     observer.end(interrupted)
     return result
+
+
+def _outside(model: ValveModel, result: FoundBranches) -> tuple[str, ...]:
+    """A sentence where leading modes leave the frequencies at which loss factors hold."""
+    growth = np.where(np.isfinite(result.branches.growth_rate), result.branches.growth_rate, -np.inf)
+    if not growth.size:
+        return ()
+    leading = result.branches.frequency[np.argmax(growth, axis=0), np.arange(growth.shape[1])]
+    sentence = outside_band(model.case, leading)
+    return () if sentence is None else (sentence,)
 
 
 class _Run:

@@ -53,6 +53,36 @@ def test_derivative_is_that_of_the_eigenvalue(valve, name):
     )
 
 
+LOSSY = Conditions(10.0, 1.0, 0.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def lossy_valve():
+    changes = {"mesh.around": 8, "mesh.along": 14, "damping.model": "loss factor"}
+    model = ValveModel(Case().replace(changes))
+    q = find_equilibria(model, [6e3]).states[0].q
+    options = SearchOptions(max_frequency=100.0, left=True)
+    return model, q, leading_modes(linearise(model, q, 6e3).pencil(LOSSY), 2, options).mode(0)
+
+
+@pytest.mark.parametrize("name", ["loss_factor", "pressure", "density", "thickness", "layer 2 c10", "layer 3 angle"])
+def test_derivative_of_a_wall_that_relaxes_is_that_of_the_eigenvalue(lossy_valve, name):
+    """Through the change that the equilibrium makes to what relaxes, too."""
+    model, q, mode = lossy_valve
+    (found,) = sensitivity.eigenvalue_sensitivities(model, q, 6e3, LOSSY, mode, [name])
+    h = 1e-3 * abs(found.value)
+
+    def eigenvalue(value):
+        pencil = sensitivity._pencil(model, q, 6e3, LOSSY, name, value)
+        values = leading_modes(pencil, 4, SearchOptions(max_frequency=100.0)).eigenvalues
+        return values[np.argmin(abs(values - mode.eigenvalue))]
+
+    direct = (eigenvalue(found.value + h) - eigenvalue(found.value - h)) / (2 * h)
+    assert found.derivative == pytest.approx(direct, rel=2e-4, abs=2e-5 * abs(mode.eigenvalue) / abs(found.value))
+    assert {"loss_factor", "alpha"} <= set(sensitivity.parameters_of(model))
+    assert "beta" not in sensitivity.parameters_of(model)
+
+
 def test_at_the_end_of_its_range_a_parameter_is_stepped_inward(valve):
     """The strain level of 10 %, below which no rubber was tested."""
     model, q, mode = valve

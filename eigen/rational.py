@@ -1,0 +1,269 @@
+r"""Eigenvalues of many small pencils whose stiffness relaxes.
+
+The exact linear form is several times as large as the pencil. Instead a real quadratic surrogate, :math:`\varphi_g(s)
+\approx a_g + b_g s` matched at a typical frequency, gives places to start from, and two-sided Rayleigh quotient
+iteration (Ruhe 1973; Schreiber 2008) takes them to eigenvalues of the rational problem, all cells at once. Real
+eigenvalues near zero or right of it, which the surrogate may miss because it is too stiff there, are bracketed by the
+sign of the determinant. Cells in which two starts met are solved by the exact linear form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Pairs of a cell and a place evaluated at once, so that they stay in the processor's cache.
+CHUNK = 128
+#: Steps of an iteration at most.
+STEPS = 12
+#: Steps for a scalar Rayleigh quotient.
+SCALAR = 6
+#: Relative change at which an iteration ends; its error falls with the third power.
+SETTLED = 1e-5
+#: Relative distance below which two eigenvalues are one.
+SAME = 1e-7
+#: Relative distance an eigenvalue may lie from its start.
+REACH = 0.6
+#: Places on the real axis at which the sign of the determinant is looked at, and halvings between two of them.
+REAL, HALVINGS = 12, 45
+
+
+@dataclass(frozen=True, eq=False)
+class RationalCells:
+    r"""Pencils :math:`\sum_i c_i(s) B_i + \sum_g \varphi_g(s) K_g`.
+
+    The c_i are 1, s and s^2 of the structure, and 1, z and z^2 of a coupling with z = s sqrt(inertia).
+
+    Attributes
+    ----------
+    bases : list of (6 + g, n, n) real arrays
+        K, M, D, the three parts of a coupling in its powers of z, and the K_g, all of them bordered to one order.
+    law : (cells,) int array
+        Which of the bases.
+    given : (cells, 3) array
+        Root of the inertia, alpha, beta.
+    strengths : (cells, g, j) array
+    times : (j,) array
+    """
+
+    bases: list[np.ndarray]
+    law: np.ndarray
+    given: np.ndarray
+    strengths: np.ndarray
+    times: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Order n of each pencil."""
+        return self.bases[0].shape[1]
+
+    @property
+    def number(self) -> int:
+        """Number of cells."""
+        return len(self.law)
+
+    def factors(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """phi_g(s) of pairs of a cell and a place, (p, g)."""
+        x = s[:, None] * self.times
+        return np.einsum("pgj,pj->pg", self.strengths[cells], x / (1.0 + x))
+
+    def slopes(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Derivatives of the factors, (p, g)."""
+        return np.einsum("pgj,pj->pg", self.strengths[cells], self.times / (1.0 + s[:, None] * self.times) ** 2)
+
+    def weights(self, cells: np.ndarray, s: np.ndarray, factors: np.ndarray | None = None) -> np.ndarray:
+        """What the bases are multiplied by in T(s), (p, 6 + g); with other factors phi_g where given."""
+        root, alpha, beta = self.given[cells].T
+        factors = self.factors(cells, s) if factors is None else factors
+        z = s * root
+        return np.column_stack([np.ones_like(s), s * (s + alpha), s * beta, np.ones_like(s), z, z * z, factors])
+
+    def weight_slopes(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """The same in T'(s)."""
+        root, alpha, beta = self.given[cells].T
+        zero = np.zeros_like(s)
+        return np.column_stack(
+            [zero, 2 * s + alpha, beta + zero, zero, root + zero, 2 * s * root**2, self.slopes(cells, s)]
+        )
+
+    def combined(self, cells: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Sums of the bases with weights, (p, n, n); real for real weights."""
+        n = self.size
+        out = np.empty((len(cells), n, n), weights.dtype)
+        for law in np.unique(self.law[cells]):
+            mine = self.law[cells] == law
+            flat = self.bases[law].reshape(weights.shape[1], -1)
+            if np.iscomplexobj(weights):
+                # one product of real matrices, whose rows are real and imaginary parts in turn
+                both = np.ascontiguousarray(weights[mine].T).view(float).T @ flat
+                out[mine] = (both[0::2] + 1j * both[1::2]).reshape(-1, n, n)
+            else:
+                out[mine] = (weights[mine] @ flat).reshape(-1, n, n)
+        return out
+
+    def at(self, cells: np.ndarray, s: np.ndarray, factors: np.ndarray | None = None) -> np.ndarray:
+        """T(s) of pairs of a cell and a place, (p, n, n); with other factors phi_g where given."""
+        return self.combined(cells, self.weights(cells, s, factors))
+
+    def slope(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """T'(s), (p, n, n)."""
+        return self.combined(cells, self.weight_slopes(cells, s))
+
+    def signs(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Sign of det T at real places."""
+        found = np.empty(len(cells))
+        for i in range(0, len(cells), CHUNK):
+            some = slice(i, i + CHUNK)
+            found[some] = np.linalg.slogdet(self.at(cells[some], s[some]))[0]
+        return found
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Eigenvalues (p,) with right and left vectors (p, n), and whether the iteration settled near its start."""
+
+    values: np.ndarray
+    right: np.ndarray
+    left: np.ndarray
+    settled: np.ndarray | None
+
+    def __getitem__(self, some) -> Refined:
+        settled = None if self.settled is None else self.settled[some]
+        return Refined(self.values[some], self.right[some], self.left[some], settled)
+
+
+@dataclass(frozen=True)
+class Surrogate:
+    """Real quadratic stand-in phi_g(s) ~ a_g + b_g s of each cell, (cells, g) each."""
+
+    level: np.ndarray
+    slope: np.ndarray
+
+    @classmethod
+    def at(cls, problem: RationalCells, frequency: float) -> Surrogate:
+        """Matched at an angular frequency, rad/s."""
+        cells = np.arange(len(problem.strengths))
+        factors = problem.factors(cells, np.full(len(cells), 1j * frequency))
+        return cls(factors.real, factors.imag / frequency)
+
+
+def started(problem: RationalCells, surrogate: Surrogate | None, cells, values) -> Refined:
+    """Eigenvectors of surrogates, or of the pencils themselves without one, and their rational Rayleigh quotients.
+
+    Parameters
+    ----------
+    problem : RationalCells
+    surrogate : Surrogate or None
+    cells : (p,) int array
+    values : (p,) complex array
+        Eigenvalues of the surrogates, or of the pencils.
+    """
+    cells, values = np.asarray(cells, int), np.asarray(values, complex)
+    n = problem.size
+    # without a preferred direction, and the same for every cell
+    probe = np.random.default_rng(7).standard_normal((2, n)) + 0j
+    out = Refined(values.copy(), np.empty((len(values), n), complex), np.empty((len(values), n), complex), None)
+    for first in range(0, len(values), CHUNK):
+        some = slice(first, first + CHUNK)
+        i, s = cells[some], values[some] * (1.0 + 1e-7)
+        factors = None if surrogate is None else surrogate.level[i] + surrogate.slope[i] * s[:, None]
+        matrix = problem.at(i, s, factors)
+        x = np.linalg.solve(matrix, np.broadcast_to(probe[0][:, None], (len(i), n, 1)))
+        y = np.linalg.solve(matrix.conj().swapaxes(1, 2), np.broadcast_to(probe[1][:, None], (len(i), n, 1)))
+        x, y = (v[:, :, 0] / np.linalg.norm(v, axis=1) for v in (x, y))
+        out.right[some], out.left[some] = x, y
+        out.values[some] = _quotient(problem, i, values[some], x, y)
+    return out
+
+
+def _quotient(problem: RationalCells, cells, s, x, y) -> np.ndarray:
+    """Zero of y^H T(s) x near s."""
+    projected = np.empty((len(cells), len(problem.bases[0])), complex)
+    for law in np.unique(problem.law[cells]):
+        mine = problem.law[cells] == law
+        for i, basis in enumerate(problem.bases[law]):
+            projected[mine, i] = ((y[mine].conj() @ basis) * x[mine]).sum(axis=1)
+    for _ in range(SCALAR):
+        value = (problem.weights(cells, s) * projected).sum(axis=1)
+        slope = (problem.weight_slopes(cells, s) * projected).sum(axis=1)
+        with np.errstate(all="ignore"):
+            change = value / slope
+        s = s - np.where(np.isfinite(change) & (np.abs(change) < REACH * np.abs(s)), change, 0.0)
+    return s
+
+
+def refined(problem: RationalCells, cells, start: Refined) -> Refined:
+    """Eigenpairs near those to start from.
+
+    Parameters
+    ----------
+    problem : RationalCells
+    cells : (p,) int array
+    start : Refined
+    """
+    cells = np.asarray(cells, int)
+    found = Refined(start.values.copy(), start.right.copy(), start.left.copy(), np.zeros(len(cells), bool))
+    for first in range(0, len(cells), CHUNK):
+        active = np.arange(first, min(first + CHUNK, len(cells)))
+        for _ in range(STEPS):
+            if not active.size:
+                break
+            active = active[~_stepped(problem, cells, found, active)]
+    near = np.abs(found.values - start.values) <= REACH * np.abs(start.values) + 1e-300
+    return Refined(found.values, found.right, found.left, found.settled & near)
+
+
+def _stepped(problem: RationalCells, cells, found: Refined, active) -> np.ndarray:
+    """One step of the iterations that are still going; which of them have ended."""
+    s = found.values[active]
+    s = np.where(np.abs(s) > 0, s, 1e-12)
+    matrix, slope = problem.at(cells[active], s), problem.slope(cells[active], s)
+    right = np.matmul(slope, found.right[active][..., None])
+    left = np.matmul(slope.conj().swapaxes(1, 2), found.left[active][..., None])
+    try:
+        x = np.linalg.solve(matrix, right)
+        y = np.linalg.solve(matrix.conj().swapaxes(1, 2), left)
+    except np.linalg.LinAlgError:  # an exact eigenvalue: a little beside it
+        found.values[active] = s * (1.0 + 1e-10)
+        return np.zeros(len(active), bool)
+    size = np.linalg.norm(x, axis=1, keepdims=True)
+    x, right, y = x / size, right / size, y / np.linalg.norm(y, axis=1, keepdims=True)
+    yh = y.conj().swapaxes(1, 2)
+    with np.errstate(all="ignore"):
+        change = (np.matmul(yh, right) / np.matmul(yh, np.matmul(slope, x)))[:, 0, 0]
+    lost = ~np.isfinite(change)
+    change[lost] = 0.0
+    found.values[active] = s - change
+    found.right[active], found.left[active] = x[:, :, 0], y[:, :, 0]
+    done = ~lost & (np.abs(change) <= SETTLED * np.abs(s))
+    found.settled[active] = done
+    return done | lost
+
+
+def real_roots(problem: RationalCells, low: float, top: float) -> tuple[np.ndarray, np.ndarray]:
+    """Real eigenvalues between `low` and `top`: cells and values.
+
+    They are looked for where the determinant has other signs at the two ends; of an even number of them only those
+    that the surrogate shows are known, and an independent count sees the others.
+
+    Parameters
+    ----------
+    low : float
+        Not positive.
+    top : float
+        Positive.
+    """
+    ends = [problem.signs(np.arange(problem.number), np.full(problem.number, end)) for end in (low, top)]
+    odd = np.flatnonzero(ends[0] * ends[1] < 0)
+    slowest = 1.0 / problem.times.max()
+    grid = np.concatenate([[low, 0.1 * low] if low < 0 else [], [0.0], np.geomspace(0.1 * slowest, top, REAL)])
+    cells, places = np.repeat(odd, len(grid)), np.tile(grid, len(odd))
+    signs = problem.signs(cells, places).reshape(len(odd), len(grid))
+    rows, gaps = np.nonzero(signs[:, :-1] * signs[:, 1:] < 0)
+    a, b, sign, rows = grid[gaps], grid[gaps + 1], signs[rows, gaps], odd[rows]
+    for _ in range(HALVINGS if rows.size else 0):
+        middle = np.where((a > 0) & (b > 4 * a), np.sqrt(np.abs(a * b)), 0.5 * (a + b))
+        same = problem.signs(rows, middle) == sign
+        a, b = np.where(same, middle, a), np.where(same, b, middle)
+    return rows, 0.5 * (a + b)

@@ -1,0 +1,191 @@
+"""Leading eigenvalues of a reduced family whose stiffness relaxes, for many conditions at once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .creep import OVERDAMPED
+from .rational import SAME, RationalCells, Refined, Surrogate, real_roots, refined, started
+
+if TYPE_CHECKING:
+    from .family import Condition
+    from .reduction import ReducedFamily
+
+#: Eigenvalues of a cell that are taken from the surrogate to the rational pencil.
+TAKEN = 6
+#: Eigenvalues of a surrogate from which the first of these are chosen.
+STARTED = 12
+#: Room above a band for starts.
+ROOM = 1.1
+#: Growth rates of a cell that have to be right; a start that was lost below them does not matter.
+WATCHED = 2
+#: Lowest motions of the structure from which it is read how much of the stiffness relaxes.
+TYPICAL = 8
+#: Real eigenvalues are looked for up to this many times the highest frequency of typical motions.
+TOP = 3.0
+
+
+class SmallSpectra:
+    """Eigenvalues of the pencils of a reduced family that relax.
+
+    Parameters
+    ----------
+    reduced : ReducedFamily
+    """
+
+    def __init__(self, reduced: ReducedFamily):
+        self.reduced = reduced
+        squares, motions = np.linalg.eigh(_relative(reduced.K, reduced.M))
+        low = np.flatnonzero(squares > 0)[:TYPICAL]
+        #: Typical angular frequency, rad/s.
+        self.frequency = float(np.exp(0.5 * np.log(squares[low]).mean())) if low.size else 1.0
+        self._top = TOP * float(np.sqrt(squares[low[-1]])) if low.size else 1.0
+        motions = np.linalg.solve(np.linalg.cholesky(reduced.M).T, motions[:, low])
+        parts = np.einsum("ai,gab,bi->gi", motions, reduced.relaxing, motions)
+        #: Share of each relaxing part in the stiffness of typical motions, (g,).
+        self.shares = (parts / squares[low]).mean(axis=1) if low.size else np.ones(len(reduced.relaxing))
+        #: The same of the stiffest motions.
+        self.stiff_shares = (
+            np.array([np.trace(_relative(part, reduced.M)) for part in reduced.relaxing]) / squares.sum()
+        )
+
+    def problem(self, conditions: list[Condition]) -> RationalCells:
+        """The rational pencils of conditions."""
+        laws = {law: i for i, law in enumerate(dict.fromkeys(c.law for c in conditions))}
+        relaxations = [self.reduced.family.relaxation(c.loss) for c in conditions]
+        return RationalCells(
+            [self._basis(law) for law in laws],
+            np.array([laws[c.law] for c in conditions]),
+            np.array([(np.sqrt(c.inertia), c.alpha, c.beta) for c in conditions]),
+            *_together(relaxations),
+        )
+
+    def _basis(self, law) -> np.ndarray:
+        """Bordered matrices of `RationalCells` under one law."""
+        reduced, k = self.reduced, self.reduced.size
+        c = reduced.coupling(law)
+        n = k + c["S0"].shape[0]
+        basis = np.zeros((6 + len(reduced.relaxing), n, n))
+        basis[:3, :k, :k] = reduced.K, reduced.M, reduced.D
+        for power in range(3):
+            basis[3 + power, :k, :k] = -c[f"A{power}"]
+            basis[3 + power, k:, :k] = c[f"R{power}"]
+            if power < 2:
+                basis[3 + power, :k, k:], basis[3 + power, k:, k:] = -c[f"B{power}"], c[f"S{power}"]
+        basis[6:, :k, :k] = reduced.relaxing
+        return basis
+
+    def leading(self, conditions: list[Condition]) -> np.ndarray:
+        """Leading eigenvalues with their conjugates, (cells, w) complex; NaN where there are fewer."""
+        problem = self.problem(conditions)
+        rows: list[list[complex]] = [[] for _ in conditions]
+        doubtful = np.zeros(len(conditions), bool)
+        cells, start = self._starts(conditions, problem)
+        place = _places(cells, start.values.real)  # rank in its cell, by growth rate
+        first, wanted = 0, np.ones(len(conditions), bool)
+        while wanted.any():
+            taken = np.flatnonzero((place >= first) & (place < first + TAKEN) & wanted[cells])
+            if not taken.size:
+                break
+            found = refined(problem, cells[taken], start[taken])
+            lost = [
+                (i, begun.real)
+                for i, value, settled, begun in zip(cells[taken], found.values, found.settled, start.values[taken])
+                if not (settled and _joined(rows[i], value))
+            ]
+            for i, growth in lost:
+                watched = sorted((v.real for v in rows[i]), reverse=True)[:WATCHED]
+                doubtful[i] |= len(watched) < WATCHED or growth > watched[-1]
+            # one after another as long as all that were found are unstable
+            wanted = np.array([bool(row) and min(v.real for v in row) > 0 for row in rows])
+            first += TAKEN
+        limits = [self.reduced.family.reach(c).creep for c in conditions]
+        for i, value in zip(*real_roots(problem, max(limits), self._top)):
+            _joined(rows[i], complex(value))
+        for i in np.flatnonzero(doubtful):
+            rows[i] = list(self._exactly(conditions[i]))
+        out = np.full((len(conditions), 2 * max(map(len, rows), default=0)), complex(np.nan, np.nan))
+        for line, row in zip(out, rows):
+            values = np.array(row, complex)
+            values = np.concatenate([values, values[values.imag > 0].conj()])
+            line[: values.size] = values
+        return out
+
+    def pairs(self, condition: Condition, values) -> Refined:
+        """Eigenpairs of one pencil at eigenvalues, or near places close to them."""
+        values = np.asarray(values, complex)
+        problem, cells = self.problem([condition]), np.zeros(len(values), int)
+        return refined(problem, cells, started(problem, None, cells, values))
+
+    def _exactly(self, condition: Condition) -> np.ndarray:
+        """Leading eigenvalues by the exact linear form."""
+        F, E = self.reduced.pencil(condition).first_order()
+        values = np.linalg.eigvals(np.linalg.solve(E, F))
+        reach = self.reduced.family.reach(condition)
+        values = values[(values.imag >= 0) & reach.is_mode(values)]
+        values = values[np.argsort(-values.real)]
+        return values[: max(TAKEN, int(np.sum(values.real > 0)) + 1)]
+
+    def _starts(self, conditions, problem: RationalCells) -> tuple[np.ndarray, Refined]:
+        """Cells, and pairs to start from in the upper half-plane."""
+        surrogate = Surrogate.at(problem, self.frequency)
+        flat = self.reduced.relaxing.reshape(len(self.reduced.relaxing), -1)
+        shape = (-1, self.reduced.size, self.reduced.size)
+        matrices = self.reduced.first_order(
+            conditions, (surrogate.level @ flat).reshape(shape), (surrogate.slope @ flat).reshape(shape)
+        )
+        values = np.linalg.eigvals(matrices)
+        # what creeps is no start, and the real axis is searched on its own
+        swings = (values.imag > OVERDAMPED * np.abs(values)) | ((values.imag >= 0) & (values.real > 0))
+        growth = np.where(swings, self._estimates(problem, surrogate, np.where(swings, values, 1.0)).real, -np.inf)
+        band = np.array([self.reduced.family.reach(c).band for c in conditions])
+        growth = np.where((values.imag <= ROOM * band[:, None]) | (values.real > 0), growth, -np.inf)
+        order = np.argsort(-growth, axis=1)[:, :STARTED]
+        cells = np.repeat(np.arange(len(conditions)), order.shape[1])
+        kept = np.isfinite(np.take_along_axis(growth, order, 1)).ravel()
+        picked = np.take_along_axis(values, order, 1).ravel()[kept]
+        return cells[kept], started(problem, surrogate, cells[kept], picked)
+
+    def _estimates(self, problem, surrogate, values) -> np.ndarray:
+        """Eigenvalues of surrogates corrected by the share that relaxes of typical motions."""
+        cells = np.repeat(np.arange(len(values)), values.shape[1])
+        true = problem.factors(cells, values.ravel()).reshape(*values.shape, -1)
+        missed = true - surrogate.level[:, None] - surrogate.slope[:, None] * values[..., None]
+        return values * (1.0 + 0.5 * (missed @ self.shares) / (1.0 + true @ self.shares))
+
+
+def _together(relaxations) -> tuple[np.ndarray, np.ndarray]:
+    """Strengths (cells, g, j) over the times (j,) of all."""
+    times = np.unique(np.concatenate([relaxation.times for relaxation in relaxations]))
+    strengths = np.zeros((len(relaxations), len(relaxations[0].strengths), len(times)))
+    for own, relaxation in zip(strengths, relaxations):
+        own[:, np.searchsorted(times, relaxation.times)] = relaxation.strengths
+    return strengths, times
+
+
+def _places(cells: np.ndarray, growth: np.ndarray) -> np.ndarray:
+    """Rank of each within its cell, the fastest growing first."""
+    order = np.lexsort((-growth, cells))
+    sorted_cells = cells[order]
+    begins = np.searchsorted(sorted_cells, sorted_cells)
+    out = np.empty(len(cells), int)
+    out[order] = np.arange(len(cells)) - begins
+    return out
+
+
+def _joined(row: list[complex], value: complex) -> bool:
+    """Put an eigenvalue among others of its cell, conjugates counting once; False if it was there before."""
+    value = complex(value.real, abs(value.imag))
+    if any(abs(value - other) <= SAME * abs(other) for other in row):
+        return False
+    row.append(value)
+    return True
+
+
+def _relative(stiffness: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """L^-1 sym(K) L^-T with M = L L^T."""
+    root = np.linalg.cholesky(mass)
+    half = np.linalg.solve(root, 0.5 * (stiffness + stiffness.T))
+    return np.linalg.solve(root, half.T)

@@ -1,0 +1,202 @@
+"""The response h(i omega) = J (s^2 M + s C + K)^-1 G of the structure of a reduced family, for counts of eigenvalues.
+
+A structure that does not relax is known by its poles. For one that does they are too many: h(i omega) is solved for at
+frequencies that neighbouring cells share, and its phase is put relative to a symmetric structure that relaxes alike,
+s^2 M + s C + K + sum phi_g(s) K_g with all of them positive. That one is passive and has no zero right of the axis, so
+the zeros of the structure itself are counted along.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.linalg as la
+
+from .response import relaxed_zeros
+
+if TYPE_CHECKING:
+    from .reduction import ReducedFamily
+
+#: Patterns of motion and force weaker than this are left out.
+PATTERNS = 1e-5
+#: Multiples of the lowest frequency at which patterns of the response are taken.
+SAMPLED = (0.0, 0.9, 2.0, 5.0, 20.0, 100.0, 1e3)
+#: Lowest frequencies of a structure that relaxes which every walk looks at.
+BESIDE = 30
+#: Decay over angular frequency up to which a structure answers fast beside a frequency of its own.
+NEAR = 0.2
+#: Share of the largest stiffness that the reference has at least.
+SOFTEST = 1e-9
+#: Responses kept of a reduced family.
+KEPT = 8
+
+
+class Response:
+    """h(s) of a reduced family at one damping, condensed to the patterns that matter.
+
+    Parameters
+    ----------
+    reduced : ReducedFamily
+    alpha, beta : float
+
+    Attributes
+    ----------
+    P, Q : (m, r) arrays
+        Patterns of motion and of force.
+    scale, top : float
+        Lowest angular frequency of the structure and one beyond its highest, rad/s.
+    beside : array
+        Frequencies at which the structure answers fast.
+    unstable : int
+        Unstable poles of the structure that the phase does not count.
+    """
+
+    def __init__(self, reduced: ReducedFamily, alpha: float, beta: float):
+        k = reduced.size
+        damping = alpha * reduced.M + beta * reduced.D
+        form = np.zeros((2 * k, 2 * k))
+        form[:k, k:] = np.eye(k)
+        form[k:] = -np.linalg.solve(reduced.M, np.hstack([reduced.K, damping]))
+        self.poles, right = la.eig(form)
+        left = np.linalg.solve(
+            right, np.vstack([np.zeros_like(reduced.G), np.linalg.solve(reduced.M, reduced.G)]).astype(complex)
+        )
+        self._out, self._in = reduced.J @ right[:k], left
+        self.unstable = int(np.sum(self.poles.real > 0))
+        scale = self.scale = float(np.abs(self.poles[np.abs(self.poles.imag) > 0]).min(initial=np.inf))
+        if not np.isfinite(scale):
+            scale = self.scale = float(np.abs(self.poles).min())
+        self.P, self.Q = _both_patterns([self._full(1j * scale * f) for f in SAMPLED])
+        near = self.poles[(self.poles.imag > 0) & (np.abs(self.poles.real) < NEAR * self.poles.imag)]
+        self.beside = near.imag
+        self.top = 30.0 * float(np.abs(self.poles).max())
+        self._left, self._right = self.P.T @ self._out, self._in @ self.Q
+
+    def _full(self, s: complex) -> np.ndarray:
+        return (self._out / (s - self.poles)) @ self._in
+
+    def __call__(self, omega: np.ndarray) -> np.ndarray:
+        """h(i omega), (len(omega), r, r)."""
+        weight = 1.0 / (1j * np.asarray(omega)[:, None] - self.poles)
+        return (self._left[None] * weight[:, None, :]) @ self._right
+
+    def inverse(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Inverses of h(i omega), and the phases of its determinants."""
+        h = self(omega)
+        return np.linalg.inv(h), np.angle(np.linalg.slogdet(h)[0])
+
+
+class RelaxingResponse:
+    """The same of a structure that relaxes; phases are those relative to a passive structure, see the module.
+
+    Parameters
+    ----------
+    reduced : ReducedFamily
+    alpha, beta, loss : float
+    """
+
+    unstable = 0
+
+    def __init__(self, reduced: ReducedFamily, alpha: float, beta: float, loss: float):
+        self._mass, self._stiffness = reduced.M, reduced.K
+        self._damping = alpha * reduced.M + beta * reduced.D
+        self._relaxing, self._relaxation = reduced.relaxing, reduced.family.relaxation(loss)
+        reference = reduced.reference
+        self._reference = alpha * reduced.M + beta * reference.damping, reference.stiffness, reference.relaxing
+        self._known: dict[float, tuple[np.ndarray, float]] = {}
+        frequencies = reference.frequencies
+        self.scale = float(frequencies[0])
+        zeros = relaxed_zeros(reduced.M, self._reference[0], *self._reference[1:], self._relaxation)
+        near = np.abs(zeros.imag[np.abs(zeros.real) < NEAR * zeros.imag])
+        self.beside = np.sort(near)[:BESIDE]
+        stiffest = frequencies[-1] * np.sqrt(1.0 + self._relaxation.strengths.sum(axis=1).max(initial=0.0))
+        self.top = 30.0 * float(max(stiffest, beta * stiffest**2, alpha))
+        motion, force = reduced.J.astype(complex), reduced.G.astype(complex)
+        omega = self.scale * np.array(SAMPLED)
+        self.P, self.Q = _both_patterns(motion @ self._solved(self._at(omega), force))
+        self._out, self._in = self.P.T @ motion, force @ self.Q
+
+    def _at(self, omega: np.ndarray, reference: bool = False) -> np.ndarray:
+        """Dynamic stiffness at i omega, (len(omega), k, k)."""
+        damping, stiffness, relaxing = (
+            self._reference if reference else (self._damping, self._stiffness, self._relaxing)
+        )
+        factors = self._relaxation.factors(1j * omega).T
+        flat = relaxing.reshape(len(relaxing), -1)
+        w = omega[:, None, None]
+        out = np.empty((len(omega), *stiffness.shape), complex)
+        out.real = stiffness - w**2 * self._mass + (factors.real @ flat).reshape(out.shape)
+        out.imag = w * damping + (factors.imag @ flat).reshape(out.shape)
+        return out
+
+    @staticmethod
+    def _solved(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
+        return np.linalg.solve(matrices, np.broadcast_to(right, (len(matrices), *right.shape)))
+
+    def inverse(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Inverses of h(i omega), and the phases of its determinant times that of the structure over the reference's;
+        kept for the next call.
+        """
+        new = np.array([w for w in omega if w not in self._known], float)
+        if new.size:
+            matrices = self._at(new)
+            h = self._out @ self._solved(matrices, self._in)
+            signs = [np.linalg.slogdet(x)[0] for x in (h, matrices, self._at(new, reference=True))]
+            phase = np.angle(signs[0] * signs[1] * signs[2].conj())
+            self._known.update(zip(new, zip(np.linalg.inv(h), phase)))
+        inverses, phases = zip(*(self._known[w] for w in omega))
+        return np.array(inverses), np.array(phases)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Positive matrices near those of a reduced family, and the angular frequencies they have."""
+
+    stiffness: np.ndarray
+    damping: np.ndarray
+    relaxing: np.ndarray
+    frequencies: np.ndarray
+
+    @classmethod
+    def of(cls, M, K, D, relaxing) -> Reference:
+        """From matrices on a space."""
+        root = np.linalg.cholesky(M)
+
+        def positive(matrix, least):
+            half = np.linalg.solve(root, 0.5 * (matrix + matrix.T))
+            weight, turn = np.linalg.eigh(np.linalg.solve(root, half.T))
+            weight = np.maximum(weight, least * np.abs(weight).max(initial=0.0))
+            turn = root @ turn
+            return (turn * weight) @ turn.T, np.sqrt(weight)
+
+        stiffness, frequencies = positive(K, SOFTEST)
+        parts = np.array([positive(part, 0.0)[0] for part in relaxing]).reshape(relaxing.shape)
+        return cls(stiffness, positive(D, 0.0)[0], parts, frequencies)
+
+
+def response(reduced: ReducedFamily, damping: tuple[float, float, float]) -> Response | RelaxingResponse:
+    """The response at one damping; the last ones are kept."""
+    known = reduced.responses
+    if damping not in known:
+        if len(known) > KEPT:
+            known.clear()
+        alpha, beta, loss = damping
+        relaxes = reduced.family.relaxation(loss) is not None
+        known[damping] = RelaxingResponse(reduced, *damping) if relaxes else Response(reduced, alpha, beta)
+    return known[damping]
+
+
+def _both_patterns(responses) -> tuple[np.ndarray, np.ndarray]:
+    """Patterns of motion and of force, equally many, so that h has an inverse."""
+    sample = [x / np.abs(x).max() for x in responses]
+    P = _patterns([part for x in sample for part in (x.real, x.imag)])
+    Q = _patterns([part.T for x in sample for part in (x.real, x.imag)])
+    rank = min(P.shape[1], Q.shape[1])
+    return P[:, :rank], Q[:, :rank]
+
+
+def _patterns(parts) -> np.ndarray:
+    vectors, weight, _ = np.linalg.svd(np.hstack(parts), full_matrices=False)
+    return vectors[:, weight > PATTERNS * weight[0]]

@@ -1,0 +1,141 @@
+"""Families whose stiffness relaxes: small models and counts against dense eigenvalues of the exact linear form."""
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from eigen import ColumnSolver, Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions
+from eigen.phase_count import phase_counts
+from eigen.reduction import POWERS, FamilyReduction, ReducedFamily
+
+SIZE, GROUPS, TIMES = 12, 2, 3
+
+
+class RelaxingFamily(PencilFamily):
+    """A random structure of which two thirds relax, with a coupling of three forces and one inner unknown."""
+
+    def __init__(self, seed: int, coupling: float = 0.1):
+        rng = np.random.default_rng(seed)
+        normal = lambda *shape: rng.standard_normal(shape)  # noqa: E731
+        root = normal(SIZE, SIZE)
+        self.mass = sp.csr_matrix(root @ root.T / SIZE + np.eye(SIZE))
+        parts = []
+        for _ in range(GROUPS + 1):
+            turn = np.linalg.qr(normal(SIZE, SIZE))[0]
+            parts.append(rng.uniform(0.2, 1.0) * (turn * 10 ** rng.uniform(-1, 2, SIZE)) @ turn.T)
+        self.damping = sp.csr_matrix(sum(parts))
+        self.stiffness = sp.csr_matrix(sum(parts) + 0.05 * normal(SIZE, SIZE))
+        self.relaxing = [sp.csr_matrix(part) for part in parts[1:]]
+        self.strengths, self.times = rng.uniform(0, 0.5, (GROUPS, TIMES)), 10 ** rng.uniform(-2, 1.5, TIMES)
+        self.forces, self.slope = sp.csr_matrix(normal(SIZE, 3)), sp.csr_matrix(normal(3, SIZE))
+        shapes = {"A": (3, 3), "B": (3, 1), "R": (1, 3), "S": (1, 1)}
+        quasi_steady = {name: coupling * normal(*shapes[name[0]]) for name in POWERS} | {
+            "A2": np.zeros((3, 3)),
+            "R2": np.zeros((1, 3)),
+            "S0": np.ones((1, 1)),
+            "S1": np.full((1, 1), 0.3),
+        }
+        added = normal(3, 3)
+        self._parts = {0.0: quasi_steady, 1.0: quasi_steady | {"A2": -0.1 * added @ added.T}}
+        self._known: dict[float, Relaxation] = {}
+
+    def relaxation(self, loss):
+        if loss and loss not in self._known:
+            # a time that some factors leave out
+            kept = slice(None) if loss < 1.0 else slice(1, None)
+            self._known[loss] = Relaxation(self.relaxing, loss * self.strengths[:, kept], self.times[kept])
+        return self._known[loss] if loss else None
+
+    def parts(self, law):
+        return self._parts[law]
+
+    def pencil(self, condition):
+        inertia, alpha, beta, law, loss = condition
+        parts = {name: value * inertia ** (POWERS[name] / 2) for name, value in self.parts(law).items()}
+        damping = alpha * self.mass + beta * self.damping
+        structure = (self.mass, damping, self.stiffness, self.forces, self.slope)
+        return CoupledPencil(*structure, **parts, relaxation=self.relaxation(loss))
+
+    def search(self, condition):
+        return SearchOptions()
+
+
+def random_conditions(seed: int, number: int) -> list[Condition]:
+    rng = np.random.default_rng(seed)
+    return [
+        Condition(
+            10 ** rng.uniform(-2, 0.5),
+            rng.uniform(0, 0.1) * rng.integers(2),
+            10 ** rng.uniform(-3, -1) * rng.integers(2),
+            float(rng.integers(2)),
+            rng.uniform(0.05, 1.5),
+        )
+        for _ in range(number)
+    ]
+
+
+def dense(family, condition) -> np.ndarray:
+    values = la.eigvals(*family.pencil(condition).first_order())
+    return values[np.isfinite(values)]
+
+
+@pytest.mark.parametrize("seed", range(15))
+def test_growth_and_counts_are_those_of_the_exact_linear_form(seed):
+    family, conditions = RelaxingFamily(seed), random_conditions(seed, 20)
+    reduced = ReducedFamily(family, np.eye(SIZE))
+    found = reduced.eigenvalues(conditions)
+    leading = [family.reach(c).leading(row) for c, row in zip(conditions, found)]
+    counts = phase_counts(reduced, conditions, leading)
+    for condition, row, own, number, certain in zip(conditions, found, leading, counts.number, counts.certain):
+        values = dense(family, condition)
+        true = family.reach(condition).leading(values)
+        unstable = int((values.real > 0).sum())
+        assert certain and number == unstable
+        if int((row.real > 0).sum()) == unstable:  # else the counts disagree, and the cell is solved in full
+            assert abs(own[0].real - true[0].real) <= 1e-8 * abs(true[0])
+        else:
+            assert unstable > 4
+    assert len({int((row.real > 0).sum()) for row in found}) > 1
+
+
+def test_columns_carry_certificates_whatever_relaxes():
+    """Elastic cells and cells of several factors in one column."""
+    family = RelaxingFamily(3)
+    conditions = [Condition(0.3, 0.02, 0.0, 1.0, loss) for loss in (0.0, 0.2, 0.7, 1.2)]
+    column = ColumnSolver().solve(family, conditions)
+    assert column.certified.all()
+    for i, condition in enumerate(conditions):
+        values = dense(family, condition)
+        leading = family.reach(condition).leading(values)[0]
+        assert column.growth_rate[i] == pytest.approx(leading.real, abs=1e-6 * abs(leading))
+        assert column.unstable[i] == column.counted[i] == (values.real > 0).sum()
+
+
+def test_correction_is_that_of_newton_on_the_full_pencil():
+    family, condition = RelaxingFamily(5), Condition(0.3, 0.0, 0.0, 0.0, 0.4)
+    reduction = FamilyReduction(family)
+    some = np.linalg.qr(np.random.default_rng(0).standard_normal((SIZE, SIZE)))[0][:, :-1]
+    pairs = ReducedFamily(family, some).pairs(condition, 1)
+    better = pairs.values + reduction.correction(pairs, condition)
+    values = dense(family, condition)
+    exact = values[np.argmin(np.abs(values - better[0]))]
+    assert abs(better[0] - exact) <= 0.2 * abs(pairs.values[0] - exact)
+
+
+def test_divergence_that_the_surrogate_does_not_see():
+    """Soft while it creeps, stiff while it moves: one real eigenvalue right of zero, slower than the relaxation."""
+    family = RelaxingFamily(1, coupling=0.0)
+    parts = dict(family.parts(0.0))
+    unit = (family.slope @ np.linalg.solve(family.stiffness.toarray(), family.forces.toarray()))[0, 0]
+    parts["A0"] = np.diag([1.05 / unit, 0.0, 0.0])
+    family._parts = {0.0: parts}
+    condition = Condition(1.0, 0.1, 0.0, 0.0, 1.4)
+    reduced = ReducedFamily(family, np.eye(SIZE))
+    values = dense(family, condition)
+    (slow,) = values[values.real > 0]
+    found = reduced.eigenvalues([condition])[0]
+    (own,) = found[found.real > 0]
+    assert slow.imag == 0 and slow.real * family.times.max() < 1
+    assert own == pytest.approx(slow, rel=1e-8)
+    assert phase_counts(reduced, [condition]).number[0] == 1

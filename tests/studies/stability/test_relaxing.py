@@ -1,0 +1,136 @@
+"""Stability of a coarse valve with loss factors: columns, maps, onsets and what they rest on against full pencils."""
+
+import numpy as np
+import pytest
+
+from dbvfiv import resume
+from dbvfiv.api import Valve
+from dbvfiv.observer import Observer
+from dbvfiv.studies.case import load_case
+from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.onset.run import run_onset
+from dbvfiv.studies.session import load_result
+from dbvfiv.studies.stability.place import Place
+from dbvfiv.studies.stability.walk import StabilityWalk
+from eigen import certified_spectrum
+
+LAWS = pytest.mark.parametrize("continuity", ["quasi-steady", "storage"])
+
+
+@pytest.fixture(scope="module")
+def lossy_case():
+    return load_case(
+        None,
+        [
+            "mesh.around=8",
+            "mesh.along=14",
+            "damping.model='loss factor'",
+            "fluid.density=20",
+            "drive.pressure=6000",
+            "map.workers=1",
+            "map.refine=0",
+            "map.curve=false",
+            "map.checks=4",
+        ],
+    )
+
+
+@pytest.fixture(scope="module")
+def lossy_walk(lossy_case):
+    return StabilityWalk(lossy_case)
+
+
+@pytest.mark.parametrize("parameter, values", [("density", (1.0, 1000.0)), ("loss_factor", (0.25, 3.0))])
+@pytest.mark.parametrize("storage", [0.0, 1.0], ids=["quasi-steady", "storage"])
+def test_cells_agree_with_the_full_pencil(lossy_case, lossy_walk, parameter, values, storage):
+    base = Place.of(lossy_case).at(storage=storage)
+    places = [base.at(**{parameter: value}) for value in np.geomspace(*values, 9)]
+    column = lossy_walk.column(places)
+    assert column.certified.all() and (column.how == 0).sum() > 6
+    for i in range(0, 9, 2):
+        full = lossy_walk.spectrum(places[i])
+        found = complex(column.growth_rate[i], 2 * np.pi * column.frequency[i])
+        assert abs(found - full.eigenvalues[0]) < 1e-6 * abs(full.eigenvalues[0])
+        assert column.unstable[i] == column.counted[i] == full.unstable_count
+
+
+def test_an_elastic_wall_is_one_without_loss_factors(lossy_case, lossy_walk):
+    """At a factor of zero on them, beside cells that relax."""
+    base = Place.of(lossy_case)
+    elastic = lossy_walk.spectrum(base.at(loss_factor=0.0)).eigenvalues[0]
+    barely = lossy_walk.spectrum(base.at(loss_factor=1e-4)).eigenvalues[0]
+    assert barely == pytest.approx(elastic, rel=1e-3)
+
+
+@LAWS
+@pytest.mark.parametrize("second", ["density=1:1000:4:log", "loss_factor=0.3:3:4:log"])
+def test_maps_against_certified_spectra(lossy_case, lossy_walk, continuity, second):
+    case = lossy_case.replace({"fluid.continuity": continuity, "map.x": "pressure=2000:20000:2", "map.y": second})
+    result = run_map(case, walk=lossy_walk.apart())
+    assert result.grid("certified").all() and all(check.agrees for check in result.checks)
+    growth, unstable = result.grid("growth_rate")[0], result.grid("unstable")[0]
+    for i, j in ((0, 0), (1, 3)):
+        place = result.plan.place(result.plan.x.values[i], result.plan.y.values[j], result.plan.laws[0])
+        family = lossy_walk.family(place)
+        found = certified_spectrum(family.pencil(place.condition), 6, family.search(place.condition))
+        assert found.unstable_count == found.unstable_count_independent == unstable[j, i]
+        assert growth[j, i] == pytest.approx(
+            found.spectrum.growth_rate[0], abs=1e-6 * abs(found.spectrum.eigenvalues[0])
+        )
+
+
+class _StopAfter(Observer):
+    def __init__(self, number):
+        self.seen, self._number = [], number
+
+    def item(self, column):
+        self.seen.append(column.value)
+        if len(self.seen) == self._number:
+            raise KeyboardInterrupt
+
+
+def test_a_map_over_loss_factors_resumes_to_the_same_numbers(lossy_case, tmp_path):
+    case = lossy_case.replace({"map.x": "pressure=2000:20000:3", "map.y": "loss_factor=0.3:3:4:log"})
+    whole, path = Valve(case, "valve").map(), tmp_path / "map.h5"
+    first, second = _StopAfter(2), _StopAfter(1000)
+    assert not Valve(case, "valve").map(output=path, observer=first).complete
+    result = resume(path, observer=second)
+    assert result.complete and not set(first.seen) & set(second.seen)
+    again = load_result(path)
+    for name in ("growth_rate", "frequency", "unstable", "counted"):
+        for other in (result, again):
+            assert np.array_equal(other.grid(name), whole.grid(name))
+
+
+@LAWS
+def test_onset_over_the_loss_factor_is_where_bisection_finds_it(lossy_case, lossy_walk, continuity):
+    density = 300.0 if continuity == "quasi-steady" else 20.0
+    case = lossy_case.replace(
+        {
+            "fluid.continuity": continuity,
+            "fluid.density": density,
+            "onset.over": "loss_factor=1:4:3:log",
+            "onset.coarse_mesh": 0,
+            "onset.normal_form": False,
+        }
+    )
+    result = run_onset(case)
+    (point,) = (p for p in result.points if p.edge)
+    assert point.confirmed and not point.gains and abs(point.growth_rate) < 1e-6
+
+    def growth(value):
+        return lossy_walk.spectrum(Place.of(case).at(loss_factor=value)).growth_rate[0]
+
+    low, high = 0.98 * point.value, 1.02 * point.value
+    for _ in range(8):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if growth(middle) > 0 else (low, middle)
+    assert low <= point.value <= high
+
+
+def test_a_normal_form_is_refused_in_a_sentence(lossy_case):
+    case = lossy_case.replace(
+        {"onset.over": "loss_factor=1.5:2.5:2", "onset.coarse_mesh": 0, "fluid.continuity": "storage"}
+    )
+    (point,) = (p for p in run_onset(case).points if p.edge)
+    assert point.criticality is None and "remembers" in point.note
