@@ -79,7 +79,7 @@ def test_criticality_and_uncertainty(coarse_case):
 
 def test_a_place_changes_what_it_is_told(coarse_case):
     place = Place.of(coarse_case).at(density=3.0, thickness=0.9)
-    assert place.condition == (3.0, 0.0, 0.003, 0.0) and place.design == {"thickness": 0.9}
+    assert place.condition == (3.0, 0.0, 0.003, 0.0, 0.0) and place.design == {"thickness": 0.9}
     assert place.mu()["inlet"] == 6000.0 and place.mu()["thickness"] == 0.9
 
 
