@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .pencil import FLUID_PARTS, CoupledPencil, real_apply
+from .pencil import FLUID_PARTS, CoupledPencil, FluidParts, real_apply
 from .products import coupling_of_modes
 from .spectrum import Mode
 
 
-@dataclass(frozen=True)
-class PencilDerivative:
+@dataclass(frozen=True, eq=False)
+class PencilDerivative(FluidParts):
     """Derivatives of the parts of a pencil; a missing part does not depend on the parameter.
 
     M, C, K, G, J may be matrices or callables that apply the derivative to a complex vector;
@@ -26,16 +26,6 @@ class PencilDerivative:
     K: object | Callable | None = None
     G: object | Callable | None = None
     J: object | Callable | None = None
-    A0: np.ndarray | None = None
-    A1: np.ndarray | None = None
-    A2: np.ndarray | None = None
-    B0: np.ndarray | None = None
-    B1: np.ndarray | None = None
-    R0: np.ndarray | None = None
-    R1: np.ndarray | None = None
-    R2: np.ndarray | None = None
-    S0: np.ndarray | None = None
-    S1: np.ndarray | None = None
     strengths: np.ndarray | None = None
     times: np.ndarray | None = None
     relaxing: tuple | None = None

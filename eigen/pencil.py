@@ -12,8 +12,24 @@ from .relaxation import Relaxation
 FLUID_PARTS = ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FluidParts:
+    """Parts of the coupling of a pencil, see `CoupledPencil`; a missing one is zero."""
+
+    A0: np.ndarray | None = None
+    A1: np.ndarray | None = None
+    A2: np.ndarray | None = None
+    B0: np.ndarray | None = None
+    B1: np.ndarray | None = None
+    R0: np.ndarray | None = None
+    R1: np.ndarray | None = None
+    R2: np.ndarray | None = None
+    S0: np.ndarray | None = None
+    S1: np.ndarray | None = None
+
+
 @dataclass(frozen=True, eq=False)
-class CoupledPencil:
+class CoupledPencil(FluidParts):
     r"""Structure and fluid of a linearised coupled state.
 
     .. math::
@@ -58,16 +74,6 @@ class CoupledPencil:
     K: sp.csr_matrix
     G: sp.csr_matrix | None = None
     J: sp.csr_matrix | None = None
-    A0: np.ndarray | None = None
-    A1: np.ndarray | None = None
-    A2: np.ndarray | None = None
-    B0: np.ndarray | None = None
-    B1: np.ndarray | None = None
-    R0: np.ndarray | None = None
-    R1: np.ndarray | None = None
-    R2: np.ndarray | None = None
-    S0: np.ndarray | None = None
-    S1: np.ndarray | None = None
     relaxation: Relaxation | None = None
 
     def __post_init__(self):

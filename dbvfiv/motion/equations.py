@@ -275,7 +275,7 @@ class ValveMotion:
         d, d1, _ = shell.directors(nodal)
         kinetic = kinetic_energy(self._quads, self._integrals, d1, self.model.nodal(v))
         if shell.metric == "first-order":
-            strain = strain_energy(self._quads, shell.mesh.nodes, nodal, d, *shell._reference, *shell._wall)
+            strain = strain_energy(self._quads, shell.mesh.nodes, nodal, d, shell._reference, shell._wall)
         else:
             strain = shell.energy(q)
         return float(kinetic), float(strain), self.model.stops.energy(q)

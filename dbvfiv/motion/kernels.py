@@ -7,7 +7,7 @@ import numpy as np
 
 from ..shell.kernel_rubber import FAST
 from ..shell.kernel_section import linear_response, point_strain
-from ..shell.kernel_strain import bases, edge_shears, gather, strains
+from ..shell.kernel_strain import edge_shears, gather, strains_at
 
 
 @numba.njit(cache=True, fastmath=FAST)
@@ -117,20 +117,12 @@ def strain_energy(
     nodes,
     displacement,
     director,
-    shear0,
-    metric0,
-    metric1,
-    mq,
-    mqk,
-    mp,
-    area,
-    thickness,
-    stiffness,
-    points,
-    constants,
-    scales,
+    reference,
+    wall,
 ):
     """Strain energy, J; arguments as `dbvfiv.shell.kernel.shell_force` has them."""
+    area, thickness = reference[6:]
+    stiffness, points, constants, scales = wall
     x = np.empty((4, 3))
     d = np.empty((4, 3))
     basis = np.empty((2, 3))
@@ -145,20 +137,7 @@ def strain_energy(
         edge_shears(x, d, edge)
         h = thickness[el]
         for point in range(4):
-            bases(point, x, d, basis, turn)
-            strains(
-                point,
-                basis,
-                turn,
-                edge,
-                shear0[el],
-                metric0[el, point],
-                metric1[el, point],
-                mq[el, point],
-                mqk[el, point],
-                mp[el, point],
-                strain,
-            )
+            strains_at(el, point, x, d, edge, reference, basis, turn, strain)
             linear_response(stiffness, h, strain, stress)
             density = 0.0
             for i in range(8):

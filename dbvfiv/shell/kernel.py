@@ -15,7 +15,7 @@ import numpy as np
 
 from .kernel_rubber import FAST
 from .kernel_section import section_stress, section_tangent
-from .kernel_strain import bases, edge_shears, gather, strains
+from .kernel_strain import edge_shears, gather, strains_at
 from .reference import SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE
 
 _SLOPE = np.ascontiguousarray(SLOPE)
@@ -71,18 +71,8 @@ def shell_force(
     q,
     director,
     director1,
-    shear0,
-    metric0,
-    metric1,
-    mq,
-    mqk,
-    mp,
-    area,
-    thickness,
-    stiffness,
-    points,
-    constants,
-    scales,
+    reference,
+    wall,
     held,
     out,
 ):
@@ -90,9 +80,15 @@ def shell_force(
 
     Parameters
     ----------
+    reference : tuple of arrays
+        The undeformed elements, as `dbvfiv.shell.shell.Shell` holds them.
+    wall : tuple of arrays
+        Linear stiffness, points, constants and shear scales, see `dbvfiv.shell.section.Section.wall`.
     held : (ne, 4, 8) array or None
         Resultants at each Gauss point on top of those of the layers.
     """
+    mq, mqk, mp, area, thickness = reference[3:]
+    stiffness, points, constants, scales = wall
     x = np.empty((4, 3))
     d = np.empty((4, 3))
     fx = np.empty((4, 3))
@@ -116,20 +112,7 @@ def shell_force(
                 fx[a, i] = 0.0
                 fd[a, i] = 0.0
         for point in range(4):
-            bases(point, x, d, basis, turn)
-            strains(
-                point,
-                basis,
-                turn,
-                edge,
-                shear0[el],
-                metric0[el, point],
-                metric1[el, point],
-                mq[el, point],
-                mqk[el, point],
-                mp[el, point],
-                strain,
-            )
+            strains_at(el, point, x, d, edge, reference, basis, turn, strain)
             section_stress(stiffness, points, constants, scales, thickness[el], strain, stress, e, s)
             if held is not None:
                 for i in range(8):
@@ -155,18 +138,8 @@ def shell_tangent(
     director,
     director1,
     director2,
-    shear0,
-    metric0,
-    metric1,
-    mq,
-    mqk,
-    mp,
-    area,
-    thickness,
-    stiffness,
-    points,
-    constants,
-    scales,
+    reference,
+    wall,
     held,
     geometric,
     slots,
@@ -184,6 +157,8 @@ def shell_tangent(
     slots : (ne, 400) int array
         Where each entry of the 20 x 20 element matrix goes in `data`; negative for constrained unknowns.
     """
+    mq, mqk, mp, area, thickness = reference[3:]
+    stiffness, points, constants, scales = wall
     x = np.empty((4, 3))
     d = np.empty((4, 3))
     fx = np.empty((4, 3))
@@ -241,11 +216,10 @@ def shell_tangent(
                 shear_rows[ed, 5 * a + 3 + r] = ta
                 shear_rows[ed, 5 * b + 3 + r] = tb
         for point in range(4):
-            bases(point, x, d, basis, turn)
             ql = mq[el, point]
             qkl = mqk[el, point]
             pl = mp[el, point]
-            strains(point, basis, turn, edge, shear0[el], metric0[el, point], metric1[el, point], ql, qkl, pl, strain)
+            strains_at(el, point, x, d, edge, reference, basis, turn, strain)
             section_tangent(stiffness, points, constants, scales, h, strain, stress, tangent, e, s, t5)
             if held is not None:
                 for i in range(8):

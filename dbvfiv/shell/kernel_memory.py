@@ -12,7 +12,7 @@ import numpy as np
 
 from .kernel_rubber import FAST, rubber_stress
 from .kernel_section import linear_response, point_strain
-from .kernel_strain import bases, edge_shears, gather, strains
+from .kernel_strain import edge_shears, gather, strains_at
 
 
 @numba.njit(cache=True, fastmath=FAST)
@@ -21,13 +21,7 @@ def slow_resultants(
     nodes,
     q,
     director,
-    shear0,
-    metric0,
-    metric1,
-    mq,
-    mqk,
-    mp,
-    thickness,
+    reference,
     stiffness,
     points,
     constants,
@@ -47,6 +41,7 @@ def slow_resultants(
     member : (k,) int array
         The group of each of these points; negative for none.
     """
+    thickness = reference[7]
     x = np.empty((4, 3))
     d = np.empty((4, 3))
     basis = np.empty((2, 3))
@@ -59,21 +54,8 @@ def slow_resultants(
         edge_shears(x, d, edge)
         h = thickness[el]
         for point in range(4):
-            bases(point, x, d, basis, turn)
             strain = strain_out[el, point]
-            strains(
-                point,
-                basis,
-                turn,
-                edge,
-                shear0[el],
-                metric0[el, point],
-                metric1[el, point],
-                mq[el, point],
-                mqk[el, point],
-                mp[el, point],
-                strain,
-            )
+            strains_at(el, point, x, d, edge, reference, basis, turn, strain)
             slow = slow_out[el, point]
             for g in range(stiffness.shape[0]):
                 linear_response(stiffness[g], h, strain, slow[g])

@@ -12,8 +12,10 @@ FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def rubber_stress(c10, c01, c11, e, s):
-    """Fill the stress s (5,) for strains e (5,)."""
+def _deformation(c10, c01, c11, e):
+    """Right Cauchy-Green components, C33 and its gradient with respect to C11, C22, C12, C13, C23, and the derivatives
+    of the energy by both invariants.
+    """
     a = 1 + 2 * e[0]
     b = 1 + 2 * e[1]
     c = e[2]
@@ -27,12 +29,19 @@ def rubber_stress(c10, c01, c11, e, s):
     i2 = (det - 1) + (a + b) * h - g * g - k * k - 2
     w1 = c10 + c11 * i2
     w2 = c01 + c11 * i1
-    sum_ab = a + b
     h0 = (k * k - h * b) * inv
     h1 = (g * g - h * a) * inv
     h2 = 2 * (h * c - g * k) * inv
     h3 = 2 * (b * g - c * k) * inv
     h4 = 2 * (a * k - c * g) * inv
+    return a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def rubber_stress(c10, c01, c11, e, s):
+    """Fill the stress s (5,) for strains e (5,)."""
+    a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2 = _deformation(c10, c01, c11, e)
+    sum_ab = a + b
     s[0] = 2 * (w1 * (1 + h0) + w2 * (b + h + sum_ab * h0))
     s[1] = 2 * (w1 * (1 + h1) + w2 * (a + h + sum_ab * h1))
     s[2] = w1 * h2 + w2 * (sum_ab * h2 - 2 * c)
@@ -43,26 +52,8 @@ def rubber_stress(c10, c01, c11, e, s):
 @numba.njit(fastmath=FAST, inline="always")
 def rubber_tangent(c10, c01, c11, e, s, t):
     """Fill stress s (5,) and the upper triangle of the tangent t (5, 5) for strains e (5,)."""
-    a = 1 + 2 * e[0]
-    b = 1 + 2 * e[1]
-    c = e[2]
-    g = e[3]
-    k = e[4]
-    det = a * b - c * c
-    inv = 1 / det
-    n = b * g * g - 2 * c * g * k + a * k * k
-    h = (1 + n) * inv
-    i1 = (a + b - 2) + (h - 1)
-    i2 = (det - 1) + (a + b) * h - g * g - k * k - 2
-    w1 = c10 + c11 * i2
-    w2 = c01 + c11 * i1
+    a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2 = _deformation(c10, c01, c11, e)
     r = a + b
-    # gradients of C33 (h), det and n with respect to C11, C22, C12, C13, C23
-    h0 = (k * k - h * b) * inv
-    h1 = (g * g - h * a) * inv
-    h2 = 2 * (h * c - g * k) * inv
-    h3 = 2 * (b * g - c * k) * inv
-    h4 = 2 * (a * k - c * g) * inv
     d2 = -2 * c
     p0 = 1 + h0
     p1 = 1 + h1

@@ -72,3 +72,23 @@ def strains(point, basis, turn, edge, shear0, metric0, metric1, q, qk, p, strain
     g1 = _EDGE_WEIGHTS[point, 2] * (edge[2] - shear0[2]) + _EDGE_WEIGHTS[point, 3] * (edge[3] - shear0[3])
     strain[6] = p[0, 0] * g0 + p[0, 1] * g1
     strain[7] = p[1, 0] * g0 + p[1, 1] * g1
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def strains_at(el, point, x, d, edge, reference, basis, turn, strain):
+    """Bases and section strains at one point of an element; `reference` as `dbvfiv.shell.shell.Shell` holds it."""
+    shear0, metric0, metric1, q, qk, p = reference[:6]
+    bases(point, x, d, basis, turn)
+    strains(
+        point,
+        basis,
+        turn,
+        edge,
+        shear0[el],
+        metric0[el, point],
+        metric1[el, point],
+        q[el, point],
+        qk[el, point],
+        p[el, point],
+        strain,
+    )

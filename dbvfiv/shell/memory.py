@@ -119,8 +119,7 @@ class WallMemory:
         shell, count = self.shell, self.shell.mesh.element_count
         nodal = shell.dofs.expand(q)
         strain, slow = np.empty((count, 4, 8)), np.empty((count, 4, self.groups, 8))
-        directors, (*reference, _, thickness) = shell.directors(nodal)[0], shell._reference
-        fixed = (shell.mesh.quads, shell.mesh.nodes, nodal, directors, *reference, thickness)
+        fixed = (shell.mesh.quads, shell.mesh.nodes, nodal, shell.directors(nodal)[0], shell._reference)
         slow_resultants(*fixed, *self._walls, strain, slow)
         return strain, slow
 

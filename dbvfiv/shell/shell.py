@@ -90,7 +90,7 @@ class Shell:
         d, d1, _ = self.directors(nodal)
         out = np.zeros_like(nodal)
         wall, held = (self._wall, None) if step is None else (step.wall, step.held)
-        shell_force(self.mesh.quads, self.mesh.nodes, nodal, d, d1, *self._reference, *wall, held, out)
+        shell_force(self.mesh.quads, self.mesh.nodes, nodal, d, d1, self._reference, wall, held, out)
         return self.dofs.restrict(out)
 
     def force_and_tangent(
@@ -110,9 +110,9 @@ class Shell:
         nodal = self.dofs.expand(q)
         d, d1, d2 = self.directors(nodal)
         out = np.zeros_like(nodal)
-        fixed = (self.mesh.quads, self.mesh.nodes, nodal, d, d1, d2, *self._reference)
+        fixed = (self.mesh.quads, self.mesh.nodes, nodal, d, d1, d2, self._reference)
         wall, held = (self._wall, None) if step is None else (step.wall, step.held)
-        shell_tangent(*fixed, *wall, held, True, self.dofs.slots, out, data)
+        shell_tangent(*fixed, wall, held, True, self.dofs.slots, out, data)
         return self.dofs.restrict(out), data
 
     def relaxing_tangents(self, q: np.ndarray) -> list[np.ndarray]:
@@ -128,9 +128,9 @@ class Shell:
             data, share = np.zeros(len(self.dofs.pattern[1])), np.zeros(len(self.section.layers))
             share[list(group.layers)] = 1.0
             if self.metric == FIRST_ORDER:
-                fixed = (self.mesh.quads, self.mesh.nodes, nodal, *directors, *self._reference)
+                fixed = (self.mesh.quads, self.mesh.nodes, nodal, *directors, self._reference)
                 wall, unused = self.section.wall(share), np.zeros_like(nodal)
-                shell_tangent(*fixed, *wall, None, False, self.dofs.slots, unused, data)
+                shell_tangent(*fixed, wall, None, False, self.dofs.slots, unused, data)
             else:
                 self._scatter_matrix(np.asarray(self.energies.material_tangent(self._element_unknowns(q), share)), data)
             found.append(data)
