@@ -64,6 +64,21 @@ def _add_forces(point, n, m, g, basis, turn, x, d, fx, fd):
             fd[b, i] += along
 
 
+@numba.njit(inline="always")
+def _workspace():
+    """Positions, directors and forces on both (4, 3), bases (2, 3), shears (4,), strains and resultants (8,)."""
+    x = np.empty((4, 3))
+    d = np.empty((4, 3))
+    fx = np.empty((4, 3))
+    fd = np.empty((4, 3))
+    basis = np.empty((2, 3))
+    turn = np.empty((2, 3))
+    edge = np.empty(4)
+    strain = np.empty(8)
+    stress = np.empty(8)
+    return x, d, fx, fd, basis, turn, edge, strain, stress
+
+
 @numba.njit(cache=True, fastmath=FAST)
 def shell_force(
     quads,
@@ -89,15 +104,7 @@ def shell_force(
     """
     mq, mqk, mp, area, thickness = reference[3:]
     stiffness, points, constants, scales = wall
-    x = np.empty((4, 3))
-    d = np.empty((4, 3))
-    fx = np.empty((4, 3))
-    fd = np.empty((4, 3))
-    basis = np.empty((2, 3))
-    turn = np.empty((2, 3))
-    edge = np.empty(4)
-    strain = np.empty(8)
-    stress = np.empty(8)
+    x, d, fx, fd, basis, turn, edge, strain, stress = _workspace()
     e = np.empty(5)
     s = np.empty(5)
     n = np.empty(3)
@@ -159,15 +166,7 @@ def shell_tangent(
     """
     mq, mqk, mp, area, thickness = reference[3:]
     stiffness, points, constants, scales = wall
-    x = np.empty((4, 3))
-    d = np.empty((4, 3))
-    fx = np.empty((4, 3))
-    fd = np.empty((4, 3))
-    basis = np.empty((2, 3))
-    turn = np.empty((2, 3))
-    edge = np.empty(4)
-    strain = np.empty(8)
-    stress = np.empty(8)
+    x, d, fx, fd, basis, turn, edge, strain, stress = _workspace()
     tangent = np.empty((8, 8))
     e = np.empty(5)
     s = np.empty(5)
