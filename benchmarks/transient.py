@@ -63,7 +63,7 @@ class Unit(Observer):
         self.wall += perf_counter() - wall
 
 
-#: Water about an open state, pushed: smooth, so that a step takes the same work whatever damps it.
+#: Water about an open state, pushed along a slow mode: smooth, so that a step takes the same work whatever damps it.
 RINGING = {
     "drive.pressure": 6e3,
     "fluid.density": 1000.0,
@@ -71,6 +71,7 @@ RINGING = {
     "transient.start": "kick",
     "transient.kick_opening": 1e-4,
     "transient.step": 1e-4,
+    "modes.max_frequency": 40.0,
 }
 BLOCK, BLOCKS = 200, 5
 

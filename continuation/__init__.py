@@ -22,6 +22,8 @@ Examples
 True
 """
 
+from importlib import import_module
+
 from continuation.branch import Branch, CurvePoint, SpecialPoint
 from continuation.branches import continue_branch, resume, switch_branch
 from continuation.curves import continue_fold, continue_hopf, resume_curve
@@ -81,7 +83,5 @@ __all__ = [
 def __getattr__(name):
     # JAX takes long to import and not every system is written in it.
     if name == "JaxSystem":
-        from continuation.jax_system import JaxSystem
-
-        return JaxSystem
+        return import_module("continuation.jax_system").JaxSystem
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

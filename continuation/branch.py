@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from continuation import storage
+from continuation.plots import plot_branch
 
 
 @dataclass
@@ -192,12 +193,10 @@ class Branch:
     @classmethod
     def load(cls, path: str | Path) -> Branch:
         """Read what `save` wrote."""
-        return storage.load(Path(path))
+        return storage.load(Path(path), cls, CurvePoint, SpecialPoint)
 
     def plot(self, observable=None, ax=None):
         """Branch diagram; see `continuation.plots.plot_branch`."""
-        from continuation.plots import plot_branch
-
         return plot_branch(self, observable, ax)
 
 

@@ -16,6 +16,7 @@ from continuation.multilinear import Derivatives
 
 
 def unit_last(size, dtype=float):
+    """Last unit vector (size,)."""
     e = np.zeros(size, dtype)
     e[-1] = 1.0
     return e
@@ -124,6 +125,8 @@ class BogdanovTakensCondition(FoldCondition):
 
 
 class BogdanovTakensValue(FoldValue):
+    """Condition of a double zero eigenvalue: a fold whose left and right null vectors are orthogonal."""
+
     d_extra = np.zeros((2, 0))
 
     def __init__(self, condition, derivatives, linear):

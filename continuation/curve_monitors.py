@@ -27,6 +27,7 @@ def solve_bogdanov_takens(tracer, z, v, w):
 
 
 def bogdanov_takens_special(tracer, result, tangent, index):
+    """Special point of a fold curve where the zero eigenvalue is double."""
     value = result.local.condition
     here = Here(result.z, tangent, result.local)
     v = value.v / np.linalg.norm(value.v)

@@ -72,16 +72,14 @@ def _write(file, branch) -> None:
             item[f"vectors/{name}"] = vector
 
 
-def load(path: Path):
-    """Read a `Branch`.
+def load(path: Path, make_branch, make_point, make_special):
+    """Read a `Branch`, made of the types that are given.
 
     Raises
     ------
     ValueError
         The file is not one of these, or of an unknown format.
     """
-    from continuation.branch import Branch, CurvePoint, SpecialPoint
-
     with h5py.File(path, "r") as file:
         if file.attrs.get("format") != FORMAT:
             raise ValueError(f"{path} is not a branch file of format {FORMAT}.")
@@ -95,7 +93,7 @@ def load(path: Path):
         for i in range(len(data["z"])):
             values = data["eigenvalues"][i]
             points.append(
-                CurvePoint(
+                make_point(
                     data["z"][i],
                     data["tangent"][i],
                     float(data["step"][i]),
@@ -111,7 +109,7 @@ def load(path: Path):
             own = json.loads(item.attrs["header"])
             vectors = {name: v[()] for name, v in item.get("vectors", {}).items()}
             special.append(
-                SpecialPoint(
+                make_special(
                     own["kind"],
                     own["index"],
                     item["u"][()],
@@ -125,7 +123,7 @@ def load(path: Path):
                 )
             )
         restart = {name: item[()] for name, item in file.get("restart", {}).items()}
-    return Branch(
+    return make_branch(
         header["kind"],
         header["size"],
         tuple(header["names"]),

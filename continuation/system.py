@@ -8,57 +8,14 @@ products, solves and directional derivatives; never for a dense matrix of the fu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from continuation.errors import DerivativeMissing
+from continuation.spectra import Spectrum, spectrum_of
 
 Parameters = Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Spectrum:
-    """Some eigenvalues of ``A x = lambda B x``.
-
-    Attributes
-    ----------
-    values : ndarray, complex, shape (m,)
-        Eigenvalues; of a conjugate pair both, or either one.
-    vectors : ndarray, complex, shape (n, m)
-        Right eigenvectors, in columns.
-    converged : ndarray of bool, shape (m,)
-        Which pairs met the tolerance; the others are never used.
-    iterations : int
-        Work done, for the record.
-    """
-
-    values: np.ndarray
-    vectors: np.ndarray
-    converged: np.ndarray
-    iterations: int = 0
-
-    def upper_half(self, tolerance: float = 1e-9) -> tuple[np.ndarray, np.ndarray]:
-        """Converged values with non-negative imaginary part, one of each pair, by growth rate."""
-        keep = np.asarray(self.converged, bool) & np.isfinite(self.values)
-        values = np.asarray(self.values, complex)[keep]
-        vectors = np.asarray(self.vectors, complex)[:, keep]
-        flip = values.imag < 0
-        values = np.where(flip, values.conj(), values)
-        vectors = np.where(flip, vectors.conj(), vectors)
-        # Solvers leave rounding in the imaginary part of a real eigenvalue.
-        scale = np.maximum(np.abs(values), tolerance)
-        values = np.where(np.abs(values.imag) <= tolerance * scale, values.real, values)
-        order = np.argsort(-values.real, kind="stable")
-        values, vectors, flip = values[order], vectors[:, order], flip[order]
-        chosen: list[int] = []
-        for i, value in enumerate(values):
-            # Only a value that came from the lower half can be the partner of an upper one.
-            partner = any(abs(value - values[j]) <= 1e-6 * max(1.0, abs(value)) and flip[i] != flip[j] for j in chosen)
-            if value.imag == 0.0 or not partner:
-                chosen.append(i)
-        return values[chosen], vectors[:, chosen]
 
 
 @runtime_checkable
@@ -210,6 +167,4 @@ class SystemBase:
         return np.zeros(self.size)
 
     def spectrum(self, u, mu, count, near=None):
-        from continuation.spectra import spectrum_of
-
         return spectrum_of(self.linear(u, mu), count, near)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sys
 
+from .cli import run
+
 
 def main() -> None:
     """Run the command line and leave with its exit status."""
-    from .cli import run
-
     sys.exit(run(sys.argv[1:]))
 
 

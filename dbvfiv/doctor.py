@@ -128,9 +128,7 @@ def _petsc(problems: list[Problem]) -> dict[str, Any]:
 
 
 def _reference_blas() -> str:
-    """ "reference" if the loaded libblas is the plain one, "optimised" otherwise, "unknown" where the system does not
-    tell.
-    """
+    """Tell "reference" if the loaded libblas is the plain one, "optimised" if another, "unknown" where nothing says."""
     try:
         with open("/proc/self/maps") as maps:
             loaded = {line.split()[-1] for line in maps if "libblas" in line}

@@ -106,6 +106,9 @@ def certified_spectrum(
     model, scale, hints = pencil, None, []
     if not small:
         basis = basis or TransferBasis(pencil)
+        if pencil.relaxation is not None:
+            # shapes of modes change with the moduli along the frequency, which a basis of one frequency misses
+            basis = basis.enlarged(spectrum.q)
         reduced = basis.reduced(pencil)
         scale = 2 * np.pi * (float(basis.structural_frequencies[0]) or 1.0)
         if exact:

@@ -2,7 +2,7 @@
 
 det T(s) / det D_ref(s) with D_ref = s^2 M + s C_ref + K_ref, where M, C_ref, K_ref are
 symmetric and positive definite, so that D_ref has no zero on or right of the line (Kelvin,
-Tait, Chetaev). What relaxes of the stiffness is part of D_ref where its matrices are symmetric and
+Tait, Chetaev). What relaxes of the stiffness is part of D_ref with the part of its matrices that is
 not negative: springs and dashpots take energy out, and their poles lie left of the line. The ratio
 has no pole there and tends to a known power of s at infinity; its zeros right of
 the line are the eigenvalues counted, the structure's own among them.
@@ -19,6 +19,7 @@ import scipy.sparse as sp
 from .condensation import condensed_matrix
 from .factorization import SingularShiftError, StructureMatrices, SuperluFactorization, is_positive_definite, superlu
 from .pencil import CoupledPencil, real_apply
+from .relaxation import Relaxation
 
 #: Numbers at most in one stack of dense matrices.
 _STACK = 1_000_000
@@ -89,13 +90,18 @@ class Determinant:
         self._reference = tuple((part + shift * p.M).tocsr() for part, shift in zip(symmetric, shifts))
         difference = max(_gap(damping, self._reference[0]), _gap(stiffness, self._reference[1]))
         if self._relaxation is not None:
-            passive = all(_is_passive(matrix, p.M) for matrix in p.relaxing)
-            difference = difference if passive else np.inf
-            self._relaxation = self._relaxation if passive else None
+            parts = [_passive_part(matrix, p.M, self._dense) for matrix in p.relaxing]
+            if not all(a is b for a, b in zip(parts, p.relaxing)):
+                difference = np.inf
+                if not self._dense:  # what is left out would have damped
+                    unit = np.sqrt(np.median(np.abs(stiffness.diagonal())) / np.median(p.M.diagonal()))
+                    self._reference = (self._reference[0] + 0.05 * unit * p.M).tocsr(), self._reference[1]
+            self._relaxation = Relaxation(parts, self._relaxation.strengths, self._relaxation.times)
         self.structure_is_reference = difference < 1e-14
         if self._dense:
             self._parts = [x.toarray() for x in (p.M, p.C, p.K, *self._reference)]
-            self._relaxing = np.array([x.toarray() for x in p.relaxing]).reshape(-1, p.n, p.n)
+            self._relaxing = _stacked(p.relaxation)
+            self._reference_relaxing = _stacked(self._relaxation)
             self._G, self._J = p.G.toarray(), p.J.toarray()
             modal = p.n <= _MODAL_BELOW and p.relaxation is None
             self._modes = _StructureModes.of(*self._parts[:3], self._G, self._J) if modal else None
@@ -144,7 +150,7 @@ class Determinant:
         if not self._dense:
             return np.zeros(0, complex)
         if self._relaxation is not None:
-            return relaxed_zeros(*(self._parts[i] for i in (0, 3, 4)), self._relaxing, self._relaxation)
+            return relaxed_zeros(*(self._parts[i] for i in (0, 3, 4)), self._reference_relaxing, self._relaxation)
         values = self._every_reference_zero
         return values[values.imag > 0]
 
@@ -187,17 +193,13 @@ class Determinant:
             return H, total - np.log(z[:, None] - self._every_reference_zero).sum(axis=1)
         s = (self.line + z)[:, None, None]
         M, C, K, Cr, Kr = self._parts
-        D = s * s * M + s * C + K + self._relaxed(self.pencil.relaxation, self.line + z)
+        D = s * s * M + s * C + K + _relaxed(self.pencil.relaxation, self._relaxing, self.line + z)
         H = self._J @ np.linalg.solve(D, self._G[None].astype(complex))
         if self.structure_is_reference:
             return H, np.zeros(z.size)
-        reference = self._relaxed(self._relaxation, z)
+        reference = _relaxed(self._relaxation, self._reference_relaxing, z)
         z = z[:, None, None]
         return H, _log_determinant(D) - _log_determinant(z * z * M + z * Cr + Kr + reference)
-
-    def _relaxed(self, relaxation, s):
-        """sum phi_g K_g at a stack of places, shape (k, n, n); zero where nothing relaxes."""
-        return 0.0 if relaxation is None else np.tensordot(relaxation.factors(s).T, self._relaxing, 1)
 
     def _sparse_structure_at(self, z):
         p, s = self.pencil, self.line + z
@@ -246,14 +248,27 @@ def _first_order(M, C, K):
     return np.block([[np.zeros((n, n)), np.eye(n)], [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]])
 
 
-def _is_passive(matrix, mass) -> bool:
-    """Whether a relaxing stiffness is symmetric and not negative."""
+def _stacked(relaxation):
+    """Matrices of a relaxation, shape (g, n, n)."""
+    return None if relaxation is None else np.array([m.toarray() for m in relaxation.matrices])
+
+
+def _relaxed(relaxation, matrices, s):
+    """sum phi_g K_g at a stack of places, shape (k, n, n); zero where nothing relaxes."""
+    return 0.0 if relaxation is None else np.tensordot(relaxation.factors(s).T, matrices, 1)
+
+
+def _passive_part(matrix, mass, dense):
+    """A relaxing stiffness itself where it is symmetric and not negative, else its part that is; none if sparse."""
     size = abs(matrix).max() if matrix.nnz else 0.0
     if not size:
-        return True
-    if _gap(matrix, matrix.T) > 1e-12:
-        return False
-    return is_positive_definite(matrix + 1e-9 * size / abs(mass).max() * mass)
+        return matrix
+    if _gap(matrix, matrix.T) < 1e-12 and is_positive_definite(matrix + 1e-9 * size / abs(mass).max() * mass):
+        return matrix
+    if not dense:
+        return 0.0 * matrix
+    values, vectors = la.eigh(0.5 * (matrix + matrix.T).toarray())
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T
 
 
 def relaxed_zeros(M, C, K, relaxing, relaxation, steps: int = 12):

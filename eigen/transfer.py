@@ -14,6 +14,9 @@ from .factorization import MumpsFactorization, SingularShiftError, StructureMatr
 from .pencil import FLUID_PARTS, CoupledPencil
 from .relaxation import Relaxation
 
+#: Frequency at which a stiffness that relaxes is taken for a basis, over the lowest one.
+TYPICAL = 3.0
+
 
 class TransferBasis:
     r"""Structural modes and static corrections of one state.
@@ -21,8 +24,8 @@ class TransferBasis:
     The space V holds the lowest modes of (K + K^T)/2 and M, and what they leave out
     statically: K^-1 G for the forces and K^-T J^T for the motions, compressed. The pencil
     projected on V keeps its form, with k in place of n unknowns, so everything of this
-    package works on it: H(lambda) = J (lambda^2 M + lambda C + K)^-1 G, leading modes, count; what relaxes of the
-    stiffness is projected likewise.
+    package works on it: H(lambda) = J (lambda^2 M + lambda C + K)^-1 G, leading modes, count. What relaxes of the
+    stiffness is projected likewise; modes and corrections are those of the stiffness at a typical frequency.
 
     Parameters
     ----------
@@ -54,12 +57,13 @@ class TransferBasis:
     def __init__(self, pencil: CoupledPencil, *, modes: int = 24, compression: float = 1e-7):
         self._G, self._J, self._M = pencil.G, pencil.J, pencil.M
         self._projected: dict[int, tuple[object, np.ndarray]] = {}
-        values, vectors = _lowest_modes(pencil, modes)
+        typical = _at_typical_frequency(pencil)
+        values, vectors = _lowest_modes(typical, modes)
         self.structural_frequencies = _frequencies(pencil, values, vectors)
         self.V = np.zeros((pencil.n, 0))
         self._extend(vectors)
         if pencil.m and self.V.shape[1] < pencil.n:
-            self._extend(self._static_corrections(pencil, values), compression)
+            self._extend(self._static_corrections(typical, values), compression)
 
     @property
     def size(self) -> int:
@@ -182,16 +186,28 @@ def lowest_frequencies(pencil: CoupledPencil, count: int, workspace: Workspace |
     >>> np.round(lowest_frequencies(pencil, 2), 6)
     array([1., 2.])
     """
-    return _frequencies(pencil, *_lowest_modes(pencil, count, workspace))
+    return _frequencies(pencil, *_lowest_modes(_at_typical_frequency(pencil, workspace), count, workspace))
+
+
+def _at_typical_frequency(pencil, workspace=None):
+    """The elastic pencil as stiff as one that relaxes is at some frequency of its lower modes; others as they are."""
+    relaxation = pencil.relaxation
+    if relaxation is None:
+        return pencil
+    elastic = pencil.replace(relaxation=None)
+    square = float(_lowest_modes(elastic, 1, workspace)[0][0])
+    omega = TYPICAL * np.sqrt(square) if square > 0 else float(np.exp(-np.log(relaxation.times).mean()))
+    stiffer = sum(x * m for x, m in zip(relaxation.factors(1j * omega).real, relaxation.matrices))
+    return elastic.replace(K=(pencil.K + stiffer).tocsr())
 
 
 def _frequencies(pencil, squares, vectors, steps: int = 4):
-    """Hz, from the squares and modes of the slow stiffness."""
+    """Hz, from squares and modes; each with its own stiffness where that relaxes."""
     omega = np.sqrt(np.maximum(squares, 0.0))
     if pencil.relaxation is not None:
-        parts = np.array([np.einsum("ik,ik->k", vectors, m @ vectors) for m in pencil.relaxing])
+        slow, *parts = (np.einsum("ik,ik->k", vectors, m @ vectors) for m in (pencil.K, *pencil.relaxing))
         for _ in range(steps):
-            stiffer = squares + (pencil.relaxation.factors(1j * omega).real * parts).sum(axis=0)
+            stiffer = slow + (pencil.relaxation.factors(1j * omega).real * np.array(parts)).sum(axis=0)
             omega = np.sqrt(np.maximum(stiffer, 0.0))
         omega = np.sort(omega)
     return omega / (2 * np.pi)

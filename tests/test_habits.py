@@ -1,5 +1,6 @@
 """Formatting and checks that every file keeps."""
 
+import ast
 import subprocess
 import sys
 import tomllib
@@ -46,3 +47,15 @@ def test_modules_and_lines_are_short():
     for package in ("dbvfiv", "eigen", "continuation"):
         for path in (ROOT / package).rglob("*.py"):
             assert len(path.read_text().splitlines()) <= 400, f"{path} has more than 400 lines"
+
+
+def test_own_modules_are_imported_at_the_top():
+    """Inside functions only libraries that are slow to import may be."""
+    for package in ("dbvfiv", "eigen", "continuation"):
+        for path in (ROOT / package).rglob("*.py"):
+            functions = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.FunctionDef)]
+            imports = [n for f in functions for n in ast.walk(f) if isinstance(n, ast.ImportFrom)]
+            for found in imports:
+                name = found.module or ""
+                own = found.level or name.split(".")[0] in ("dbvfiv", "eigen", "continuation")
+                assert not own, f"{path}:{found.lineno} imports {name} inside a function"

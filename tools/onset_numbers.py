@@ -27,6 +27,7 @@ LAWS = ("quasi-steady", "storage")
 
 
 def main(path: Path) -> None:
+    """Write the onsets that tests pin."""
     case = load_case(None, [f"mesh.around={MESH[0]}", f"mesh.along={MESH[1]}", "damping.alpha=0", "damping.beta=0.003"])
     walk = StabilityWalk(case)
     done = json.loads(path.read_text()) if path.exists() else {}

@@ -1,24 +1,20 @@
-"""The arguments that commands share, and how a case is taken from them."""
+"""The arguments that commands share."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from ..errors import CaseError
-
-if TYPE_CHECKING:
-    from ..studies.case import Case
+from ._later import action
 
 
 def _writable(path: Path | None) -> Path | None:
     """Refuse a name that cannot be written before anything is computed."""
     if path is not None:
-        from ..record.files import check_writable
-
-        check_writable(path)
+        action("files").check_writable(path)
     return path
 
 
@@ -43,15 +39,3 @@ Output = Annotated[
 PlotFolder = Annotated[
     Path | None, typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.", callback=_folder)
 ]
-
-
-def read_case(path: Path | None, overrides: list[str] | None) -> Case:
-    """Load the case a command was given.
-
-    Raises
-    ------
-    CaseError
-    """
-    from ..studies.case import load_case
-
-    return load_case(path, overrides or ())

@@ -17,6 +17,7 @@ from typing import Annotated, Any
 
 import typer
 
+from .. import __version__
 from ..errors import CaseError, SolveError
 from ._study import make_command, study_commands
 
@@ -26,8 +27,6 @@ _UsageProblem = typer.BadParameter.__mro__[2]
 
 def _version(show: bool) -> None:
     if show:
-        from .. import __version__
-
         print(f"dbvfiv {__version__}")
         raise typer.Exit()
 

@@ -9,11 +9,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, get_type_hints
 
-from ..errors import SolveError
 from ..studies import KINDS
-from ._options import AsJson, CaseFile, Output, Override, PlotFolder, read_case
-from ._output import print_json, print_places
-from ._progress import Progress
+from ._later import action
+from ._options import AsJson, CaseFile, Output, Override, PlotFolder
 
 #: What a command of a study may take from what all share.
 _SHARED = ("case", "plots")
@@ -34,21 +32,11 @@ def make_command(kind: str, module: ModuleType) -> Callable[..., None]:
     def command(
         case_file: Path | None, output: Path | None, plots: Path | None, overrides, as_json: bool, **given: Any
     ) -> None:
-        case = read_case(case_file, overrides)
+        act = action("study")
+        case = act.read_case(case_file, overrides)
         shared = {"case": case, "plots": plots}
         request = module.command(**{name: shared[name] for name in taken}, **given)
-        changes = {key: value for key, value in request.changes.items() if value is not None}
-        choices = {name: value for name, value in request.choices.items() if value is not None}
-        # what is heavy to import is loaded when a case has been read
-        from ..studies.session import Session
-        from ..studies.study import find_study
-
-        session = Session(case.replace(changes) if changes else case, case_file.stem if case_file else "dbv12")
-        session.mesh  # a case that gives no model is told before a table begins
-        live = None if as_json else find_study(kind).live
-        progress = Progress(quiet=as_json, row=live and live(session.case))
-        result = session.perform(kind, output, progress, **choices)
-        report(result, output, plots, as_json, further=request.further, printed=live is not None)
+        act.perform(kind, case, request, case_file.stem if case_file else "dbv12", output, plots, as_json)
 
     shared_last = (("output", Output, None), ("plots", PlotFolder, None), ("overrides", Override, None))
     parameters = [
@@ -65,45 +53,3 @@ def make_command(kind: str, module: ModuleType) -> Callable[..., None]:
 
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-
-
-def report(
-    result: Any,
-    output: Path | None,
-    plots: Path | None,
-    as_json: bool,
-    further: Callable[[Any], list[Path]] | None = None,
-    printed: bool = False,
-) -> None:
-    """Print a result, draw it, and leave with the exit status it deserves.
-
-    Parameters
-    ----------
-    result : StudyResult
-    further : callable, optional
-        Writes further files.
-    printed : bool
-        Whether its table was printed row by row already.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If the run was interrupted.
-    SolveError
-        If something was not reached.
-    """
-    figures = result.plot(plots) if plots is not None and result.drawable else []
-    figures += further(result) if further else []
-    if as_json:
-        places = {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]}
-        print_json(result.summary() | places)
-    else:
-        lines = result.remarks() if printed else result.lines()
-        if lines:
-            print("\n".join(lines))
-        print_places(output, figures, plots)
-    if result.interrupted:
-        raise KeyboardInterrupt
-    shortfall = result.shortfall()
-    if shortfall is not None:
-        raise SolveError(f"{shortfall}.")  # why was said when it happened

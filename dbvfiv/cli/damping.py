@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from ._options import AsJson, CaseFile, Override, PlotFolder, read_case
-from ._output import print_json, print_places
+from ._later import action
+from ._options import AsJson, CaseFile, Override, PlotFolder
 
 ORDER = 12
 
@@ -28,20 +28,4 @@ def command(
 
     dbvfiv damping my.toml --set damping.model="loss factor" --at 5,40 --plots figures
     """
-    case = read_case(case_file, overrides)
-    from ..materials.damping_report import describe_damping, read_frequencies
-
-    frequencies = None if at is None else read_frequencies(at)
-    report = describe_damping(case)
-    figures = []
-    if plots is not None:
-        from ..drawing.damping import damping_figure
-        from ..drawing.files import draw_figures, write_figures
-
-        drawn = draw_figures({"damping": lambda: damping_figure(report)}, (), "damping of the case")
-        figures = write_figures(drawn, plots)
-    if as_json:
-        print_json(report.summary(frequencies) | {"figures": [str(figure) for figure in figures]})
-        return
-    print("\n".join(report.lines(frequencies)))
-    print_places(None, figures, plots)
+    action("damping").tell(case_file, overrides, at, plots, as_json)

@@ -2,41 +2,12 @@
 
 from __future__ import annotations
 
-import typer
-
+from ._later import action
 from ._options import AsJson
-from ._output import print_json
 
 ORDER = 90
 
 
 def command(as_json: AsJson = False) -> None:
     """Say what was found on this machine, what is missing, and the command that mends it."""
-    from ..doctor import examine
-
-    report = examine()
-    if as_json:
-        print_json(report.to_dict())
-    else:
-        print("\n".join(_lines(report)))
-    if not report.healthy:
-        raise typer.Exit(1)
-
-
-def _lines(report) -> list[str]:
-    petsc = report.petsc
-    rows = [
-        ("dbvfiv", report.dbvfiv),
-        ("Python", f"{report.python} ({report.executable})"),
-        ("platform", f"{report.platform}, {report.cores} cores"),
-        ("PETSc", f"{petsc['petsc'] or 'missing'}, {petsc['scalar'] or 'unknown'} scalars"),
-        ("SLEPc", petsc["slepc"] or "missing"),
-        ("direct solvers", ", ".join(petsc["solvers"]) or "none"),
-        *((name, version or "missing") for name, version in report.packages.items()),
-        ("cache", f"{report.cache['folder']} ({report.cache['bytes'] / 1e6:.1f} MB)"),
-    ]
-    lines = [f"{name:<16}{value}" for name, value in rows]
-    for problem in report.problems:
-        lines.append(f"{'missing' if problem.fatal else 'note':<16}{problem.what} Remedy: {problem.remedy}")
-    lines.append("Everything that is needed is here." if report.healthy else "Something that is needed is missing.")
-    return lines
+    action("doctor").tell(as_json)

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ._later import action
 from ._options import AsJson, ResultFile
-from ._output import print_json
 
 ORDER = 55
 
@@ -43,13 +43,4 @@ def command(
     is the number of the mode: mode_real, mode_imag and mode_amplitude come with the displacement of the steady state;
     --mode N writes one cycle of that mode instead.
     """
-    from ..studies.session import load_result
-
-    result = load_result(file)
-    choices = {} if mode is None else {"mode": mode}
-    beside = file.with_suffix(".vtkhdf") if mode is None else file.with_name(f"{file.stem}-mode{mode}.vtkhdf")
-    written = result.export(output if output is not None else beside, quarter, deformed, **choices)
-    if as_json:
-        print_json({"written": str(written)})
-    else:
-        print(f"Wrote {written}.")
+    action("export").export(file, output, quarter, deformed, mode, as_json)

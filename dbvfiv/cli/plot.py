@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from ._later import action
 from ._options import AsJson, ResultFile
-from ._output import print_json
 
 ORDER = 50
 
@@ -52,39 +51,4 @@ def command(
     as_json: AsJson = False,
 ) -> None:
     """Draw the figures of a result file; those of one state show the highest pressure unless --pressure is given."""
-    from ..studies.session import load_result
-
-    choices = {}
-    if pressure is not None:
-        from ..case.pressures import read_pressures
-
-        choices["pressure"] = read_pressures([pressure], "--pressure")[0]
-    if mode is not None:
-        choices["mode"] = mode
-    result = load_result(file)
-    films = [_film(result, file, folder, number) for number in animate or ()]  # misuse shows before anything is drawn
-    written = result.plot(folder, format.value, only=only or (), **choices)
-    written += [make() for make in films]
-    if as_json:
-        print_json({"written": [str(path) for path in written]})
-    else:
-        print("\n".join(f"Wrote {path}." for path in written))
-
-
-def _film(result, file: Path, folder: Path, number: int) -> Callable[[], Path]:
-    """What writes the film that ``--animate`` asks of a result."""
-    from ..errors import CaseError
-    from ..studies.transient.animation import cycles_to_animate
-
-    if result.kind == "modes":
-        result.mode(number)
-        return lambda: result.animate(folder / f"mode-{number}.gif", number)
-    if result.kind == "transient":
-        result.require_steps()
-        duration = cycles_to_animate(result, number)
-        frames = min(48 * number, 240)
-        name = f"last-{number}-cycles.gif" if number > 1 else "last-cycle.gif" if result.cycle else "run.gif"
-        return lambda: result.animate(folder / name, frames=frames, duration=duration)
-    raise CaseError(
-        f"The {result.kind} result {str(file)!r} does not move; --animate takes results of modes and transient."
-    )
+    action("plot").plot(file, folder, format.value, only or (), pressure, mode, animate or (), as_json)

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ._later import action
 from ._options import AsJson
-from ._output import print_json
 
 ORDER = 47
 
@@ -60,15 +60,6 @@ def command(
 
     dbvfiv verdict pressure.csv --column 2 --plots figures
     """
-    from ._record import Reading, judge_file
-
-    reading = Reading(columns or (), time, rate, time_unit, skip_bad, since)
-    found = judge_file(file, reading, steady, closed_below)
-    figures = [each.draw(plots) for each in found] if plots is not None else []
-    if as_json:
-        print_json({"signals": [each.summary() for each in found]})
-        return
-    for each in found:
-        print("\n".join(each.lines()))
-    for figure in figures:
-        print(f"Wrote {figure}.")
+    act = action("verdict")
+    reading = act.Reading(columns or (), time, rate, time_unit, skip_bad, since)
+    act.tell(file, reading, steady, closed_below, plots, as_json)

@@ -40,6 +40,7 @@ def draw_skin(axes, corners: np.ndarray, colours: np.ndarray, zoom: float) -> No
 
 
 def frame(axes, points: np.ndarray) -> None:
+    """Fit three-dimensional axes to points (k, 3), all directions to one scale."""
     low, high = points.min(axis=0), points.max(axis=0)
     for set_limits, a, b in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high):
         set_limits(a, b)

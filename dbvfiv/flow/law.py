@@ -63,7 +63,9 @@ class FlowParameter:
 
 @dataclass(frozen=True)
 class FluidOperators:
-    """Linearised flow: with a the area and u the inner disturbances,
+    """Linearised flow.
+
+    With a the area and u the inner disturbances,
 
     p = (A0 + lambda A1 + lambda^2 A2) a + (B0 + lambda B1) u
     0 = (R0 + lambda R1 + lambda^2 R2) a + (S0 + lambda S1) u

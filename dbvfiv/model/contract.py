@@ -5,7 +5,9 @@ Three contracts, each the least that its users ask for:
 - `EquilibriumModel` serves Newton's method and load steps: residual, exact tangent and its factors at rest.
 - `MotionForms` serves normal forms and sensitivities: the residual in motion and its multilinear forms.
 - `continuation.System` serves branches, bifurcations and orbits. `dbvfiv.model.system.ValveSystem` makes it from the
-  two above, as a test problem with two unknowns does by hand.
+  two above, as a test problem with two unknowns does by hand. Parameters may hold `loss_factor`, a factor on the loss
+  factors of all materials: spectra know it, equilibria do not depend on it, and what would need the memory of a wall
+  that relaxes is refused.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..case.quantity import head_of
 from ..errors import SolveError
+from .hydraulics import Hydraulics, hydraulics_of
 from .lip import LipCentre
 from .valve import QUARTERS, ValveModel
 
@@ -75,6 +76,14 @@ class SteadyState:
     residual: float
     rounding: float
     reason: str
+
+    @property
+    def hydraulics(self) -> Hydraulics | None:
+        """Heads, loss and coefficients; None where nothing flows."""
+        if not self.volume_flow > 0:
+            return None
+        density = self.mass_flow / self.volume_flow
+        return hydraulics_of(self.pressure, density, self.volume_flow, float(self.station_velocity[-1]))
 
 
 def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution) -> SteadyState:

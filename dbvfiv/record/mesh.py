@@ -123,12 +123,14 @@ class MeshData:
 
 
 def write_mesh(file: h5py.File, mesh: MeshData) -> None:
+    """Write a mesh into a result file."""
     group = file.create_group("mesh")
     for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ())):
         write_array(group, column, getattr(mesh, column.name))
 
 
 def read_mesh(file: h5py.File) -> MeshData:
+    """Read the mesh of a result file."""
     group = file["mesh"]
     columns = (*_COLUMNS, *(column for column in _RELAXING if column.name in group))
     return MeshData(**{column.name: read_array(group, column) for column in columns})

@@ -150,4 +150,5 @@ def read_states(record: Record, table: str) -> list[SteadyState]:
 def summarise(state: SteadyState) -> dict[str, Any]:
     """Plain SI numbers of a state for JSON."""
     values = {c.name: getattr(state, c.name) for c in SUMMARY}
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+    found = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+    return found | ({} if state.hydraulics is None else {"hydraulics": state.hydraulics.summary()})

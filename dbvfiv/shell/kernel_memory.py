@@ -92,28 +92,51 @@ def slow_resultants(
                 stress[7] += w * scales[l] * s[4]
 
 
-@numba.njit(cache=True, fastmath=FAST)
+# a function of its own without fast arithmetic, so that it has the same digits wherever it is called
+@numba.njit
+def _hold(branches, slow, kept, gained, out):
+    for i in range(8):
+        out[i] = 0.0
+    for b in range(branches.shape[0]):
+        for i in range(8):
+            out[i] += kept[b] * branches[b, i]
+    for g in range(slow.shape[0]):
+        for i in range(8):
+            out[i] -= gained[g] * slow[g, i]
+
+
+@numba.njit(cache=True)
 def hold_resultants(branches, slow, kept, gained, out):
     """Fill out (ne, 4, 8): what branches (ne, 4, b, 8) keep of theirs by factors (b,), less factors (g,) of the slow
     law's resultants (ne, 4, g, 8).
     """
     for el in range(out.shape[0]):
         for point in range(4):
-            for i in range(8):
-                out[el, point, i] = 0.0
-            for b in range(branches.shape[2]):
-                for i in range(8):
-                    out[el, point, i] += kept[b] * branches[el, point, b, i]
-            for g in range(slow.shape[2]):
-                for i in range(8):
-                    out[el, point, i] -= gained[g] * slow[el, point, g, i]
+            _hold(branches[el, point], slow[el, point], kept, gained, out[el, point])
 
 
 @numba.njit(cache=True, fastmath=FAST)
 def advance_branches(
-    branches, stretch, slow, slow_new, strain, strain_new, group, time, kept, gained, now, area, out, stretch_out, work
+    branches,
+    stretch,
+    slow,
+    slow_new,
+    strain,
+    strain_new,
+    group,
+    time,
+    kept,
+    gained,
+    gained_by_group,
+    now,
+    area,
+    out,
+    stretch_out,
+    held_out,
+    work,
 ):
-    """Fill branches (ne, 4, b, 8) and their stretches (ne, 4, j, 8) at the end of a step.
+    """Fill branches (ne, 4, b, 8) and their stretches (ne, 4, j, 8) at the end of a step, and what `hold_resultants`
+    would give at the end of another step of the same length (ne, 4, 8).
 
     Parameters
     ----------
@@ -151,3 +174,4 @@ def advance_branches(
                     held += value * stretch_out[el, point, t, i]
                 work[0, g] += weight * done
                 work[1, g] += 0.5 * weight * held
+            _hold(out[el, point], slow_new[el, point], kept[0], gained_by_group, held_out[el, point])

@@ -13,6 +13,7 @@ from .kernel_rubber import FAST, rubber_stress, rubber_tangent
 
 @numba.njit(fastmath=FAST, inline="always")
 def linear_response(stiffness, h, strain, stress):
+    """Resultants (8,) of the linear layers of a wall of thickness h; `stiffness` is that of unit thickness."""
     h2 = h * h
     h3 = h2 * h
     for i in range(3):
@@ -29,6 +30,7 @@ def linear_response(stiffness, h, strain, stress):
 
 @numba.njit(fastmath=FAST, inline="always")
 def point_strain(zeta, h, scale, strain, e):
+    """Strains e (5,) at the height zeta h; `scale` is that of the transverse shear."""
     t = zeta * h
     for i in range(3):
         e[i] = strain[i] + t * strain[3 + i]
@@ -38,6 +40,7 @@ def point_strain(zeta, h, scale, strain, e):
 
 @numba.njit(fastmath=FAST, inline="always")
 def section_stress(stiffness, points, constants, scales, h, strain, stress, e, s):
+    """Resultants (8,) of all layers; e and s are workspace (5,)."""
     linear_response(stiffness, h, strain, stress)
     for l in range(points.shape[0]):
         point_strain(points[l, 0], h, scales[l], strain, e)
@@ -53,6 +56,7 @@ def section_stress(stiffness, points, constants, scales, h, strain, stress, e, s
 
 @numba.njit(fastmath=FAST, inline="always")
 def section_tangent(stiffness, points, constants, scales, h, strain, stress, tangent, e, s, t5):
+    """Resultants (8,) of all layers and their derivative (8, 8) by the strains; e, s, t5 are workspace."""
     linear_response(stiffness, h, strain, stress)
     h2 = h * h
     h3 = h2 * h

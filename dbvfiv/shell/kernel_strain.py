@@ -15,6 +15,7 @@ _EDGE_WEIGHTS = np.ascontiguousarray(SHEAR_WEIGHTS)
 
 @numba.njit(fastmath=FAST, inline="always")
 def gather(quad, nodes, displacement, director, x, d):
+    """Positions x and directors d (4, 3) of the nodes of an element."""
     for a in range(4):
         n = quad[a]
         for i in range(3):
@@ -38,6 +39,7 @@ def bases(point, x, d, basis, turn):
 
 @numba.njit(fastmath=FAST, inline="always")
 def edge_shears(x, d, edge):
+    """Covariant transverse shears (4,) at the middles of the edges (MITC4)."""
     for g in range(4):
         a = _EDGES[g, 0]
         b = _EDGES[g, 1]

@@ -41,6 +41,8 @@ class Memory:
         Energy that they hold, J.
     strain, slow : (ne, 4, 8), (ne, 4, g, 8) arrays
         Section strains and slow resultants of each group at the state; they follow from its positions.
+    ahead : tuple of float and array, optional
+        What a step of some length, s, needs of it (ne, 4, 8), where that is known.
     """
 
     branches: np.ndarray
@@ -50,6 +52,7 @@ class Memory:
     stored: np.ndarray
     strain: np.ndarray
     slow: np.ndarray
+    ahead: tuple[float, np.ndarray] | None = None
 
 
 class WallMemory:
@@ -129,22 +132,25 @@ class WallMemory:
 
     def step(self, memory: Memory, h: float) -> StepWall:
         """The wall at the end of a step of h, s, from the state of a memory."""
-        kept, gained, by_group, wall = self._over(h)
+        kept, _, by_group, wall = self._over(h)
+        if memory.ahead is not None and memory.ahead[0] == h:
+            return StepWall(wall, memory.ahead[1])
         out = np.empty_like(memory.strain)
         hold_resultants(memory.branches, memory.slow, kept[0], by_group, out)
         return StepWall(wall, out)
 
     def advance(self, memory: Memory, q: np.ndarray, h: float, now: float) -> Memory:
         """Memory after a step of h, s, to positions q (n,); `now` is the weight of the new forces in its equations."""
-        kept, gained, _, _ = self._over(h)
+        kept, gained, by_group, _ = self._over(h)
         strain, slow = self.resultants(q)
         branches, stretch = np.empty_like(memory.branches), np.empty_like(memory.stretch)
-        work, area = np.zeros((2, self.groups)), self.shell.geometry.area
+        work, area, ahead = np.zeros((2, self.groups)), self.shell.geometry.area, np.empty_like(strain)
         before = (memory.branches, memory.stretch, memory.slow, slow, memory.strain, strain)
-        advance_branches(*before, self._group, self._time, kept, gained, now, area, branches, stretch, work)
+        over = (self._group, self._time, kept, gained, by_group, now, area)
+        advance_branches(*before, *over, branches, stretch, ahead, work)
         done, stored = work
         loss = memory.loss + done - (stored - memory.stored)
-        return Memory(branches, stretch, memory.work + done, loss, stored, strain, slow)
+        return Memory(branches, stretch, memory.work + done, loss, stored, strain, slow, (h, ahead))
 
     def on_mode(self, q: np.ndarray, shape: np.ndarray, eigenvalue: complex, moved: np.ndarray) -> Memory:
         """Memory at positions moved (n,) on a mode about a state q (n,) in which the wall had relaxed.

@@ -229,7 +229,7 @@ def _period(series: Series) -> tuple[float, float]:
 
 
 def _direction(cycles: Cycles, options: JudgeOptions) -> str:
-    """ "growing", "decaying", "settling" or "" from nested ends of the sequence of amplitudes."""
+    """Tell "growing", "decaying", "settling" or "" from nested ends of the sequence of amplitudes."""
     spread, count = cycles.spread, len(cycles)
     if count < options.cycles:
         found = trend_of(spread)

@@ -45,12 +45,12 @@ class Series:
 
     @property
     def duration(self) -> float:
-        """s"""
+        """Length, s."""
         return self.step * (len(self.values) - 1)
 
     @property
     def end(self) -> float:
-        """s"""
+        """Time of the last value, s."""
         return self.start + self.duration
 
     def last(self, duration: float) -> Series:

@@ -148,7 +148,9 @@ def test_stopped_from_outside(tmp_path, one_sentence, kill, status):
     shown = [run.stdout.readline() for _ in range(5)][2:]  # head of the table, then three states
     os.kill(run.pid, kill)
     rest, err = run.communicate(timeout=60)
-    shown += rest.splitlines()[: -1 if status > 0 else None]
+    rows = rest.splitlines()[: -1 if status > 0 else None]
+    # what is read off the states follows them
+    shown += rows[: next((i for i, line in enumerate(rows) if "total head" in line), None)]
     assert run.returncode == status
     if status > 0:
         assert one_sentence(err.strip().splitlines()[-1].replace("; ", ", ")) and "has been kept" in err

@@ -146,6 +146,12 @@ def test_creep_is_no_mode_but_divergence_is():
                 assert np.abs(values - value).min() < 1e-8 * abs(value)
 
 
+def test_a_note_says_where_was_searched():
+    modes = leading_modes(relaxing_plate(4, 7), 30, SearchOptions(max_frequency=20.0, method="krylov"))
+    assert len(modes) < 30 and modes.status == "incomplete"
+    assert any("between 1 and 20 Hz" in note and "damping ratio below 0.6" in note for note in modes.notes)
+
+
 @pytest.mark.parametrize("storage, density", [(False, 10.0), (True, 10.0), (True, 1000.0)])
 def test_a_large_plate_against_newton_from_a_small_model(storage, density):
     pencil = relaxing_plate(14, 24, storage=storage, density=density)

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from eigen import CoupledPencil, Relaxation, SearchOptions, TransferBasis, certified_spectrum, unstable_count
+from eigen.certificate import response_error
 from eigen.response import Determinant
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues, random_pencil
@@ -70,11 +72,14 @@ def test_counts_where_the_stiffness_relaxes(seed):
     assert uncertain <= 2
 
 
-def test_a_relaxing_stiffness_that_is_not_passive_is_no_part_of_the_reference():
+@pytest.mark.parametrize("dense_below", [400, 0])
+def test_of_a_relaxing_stiffness_that_is_not_passive_a_part_makes_the_reference(dense_below, monkeypatch):
+    monkeypatch.setattr(Determinant, "dense_below", dense_below)
     relaxation = Relaxation([np.diag([1.0, -0.4]), [[0.0, 0.3], [-0.3, 0.0]]], [[0.5], [1.0]], [0.7])
-    pencil = CoupledPencil(np.eye(2), 0.01 * np.eye(2), np.diag([1.0, 0.3]), relaxation=relaxation)
-    count = unstable_count(pencil)
-    assert count.certain and count.number == int(np.sum(dense_eigenvalues(pencil).real > 0)) > 0
+    for damping in (0.0, 0.01):
+        pencil = CoupledPencil(np.eye(2), damping * np.eye(2), np.diag([1.0, 0.3]), relaxation=relaxation)
+        count = unstable_count(pencil)
+        assert count.certain and count.number == int(np.sum(dense_eigenvalues(pencil).real > count.line)) > 0
 
 
 @pytest.mark.parametrize("line", [-0.02, 0.3])
@@ -101,6 +106,21 @@ def test_certificate_where_the_stiffness_relaxes(storage, density, monkeypatch):
     inside = np.abs(values.imag) <= 2 * np.pi * result.count.band
     assert result.unstable_count == int(np.sum(values.real[inside] > result.count.line))
     assert result.response_error < 1e-4
+
+
+def test_a_basis_for_materials_that_relax_unlike_each_other():
+    """Shapes of modes change along the frequency where one half of the plate stiffens and the other hardly does."""
+    elastic, stiffness = plate_over_channel(7, 14, beta=0.0, with_parts=True)
+    weight = np.sqrt(np.linspace(0.0, 1.0, elastic.n))
+    halves = [sp.diags(w) @ stiffness @ sp.diags(w) for w in (weight, np.sqrt(1 - weight**2))]
+    pencil = elastic.replace(relaxation=Relaxation(halves, [[0.4] * 4, [0.03] * 4], TIMES))
+    result = certified_spectrum(pencil, 4, SearchOptions(max_frequency=40.0), check_points=4)
+    assert pencil.n > Determinant.dense_below
+    assert result.agrees, result.statement
+    assert result.response_error < 1e-4
+    plain = TransferBasis(pencil)
+    for frequency in (5.0, 15.0, 30.0):
+        assert response_error(pencil, plain, [frequency]) < 0.05
 
 
 @pytest.mark.parametrize("line", [-0.5, -0.1, 0.3])

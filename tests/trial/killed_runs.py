@@ -174,6 +174,8 @@ def trial(kind: str, folder: Path, kills: int, chance: random.Random, whole: dic
         done += 1
         if not path.exists():
             continue
+        if path.stat().st_size and dbvfiv.load_result(path).complete:
+            break  # killed between its last word and its end: nothing is left to resume
         if not path.stat().st_size:
             try:
                 dbvfiv.load_result(path)

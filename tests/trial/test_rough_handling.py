@@ -154,7 +154,7 @@ def small_disk(tmp_path):
 
 
 #: Runs whose files outgrow what is left on that disk.
-FILLING = {
+FILLING: dict[str, tuple[str, ...]] = {
     "steady": ("-p", "1 kPa:30 kPa:400"),
     "closure": ("--set", f"closure.pressures={list(range(20, 3000, 5))}"),
     "transient": ("--set", "transient.duration=50", "--set", "transient.save_every=1 ms"),
@@ -174,3 +174,27 @@ def test_a_full_disk(small_disk, one_sentence, kind):
     kept = dbvfiv.load_result(path)
     assert not kept.complete and any(kept.record.rows(table) for table in kept.record.tables)
     assert kept.lines()
+
+
+#: Runs that find a disk full when they are about to keep what they found; how much of it another file takes, KB.
+FULL = {
+    "modes": ((), 1580),
+    "sensitivity": (("--of", "density"), 1580),
+    "sweep": (("--over", "density=1:1000:400:log"), 1580),
+    "map": (("--x", "density=1:1000:4:log", "--y", "alpha=0.1:30:4:log", "--workers", "1"), 1580),
+}
+
+
+@pytest.mark.parametrize("kind", FULL)
+def test_no_room_for_what_was_found(small_disk, one_sentence, kind):
+    (further, taken), path = FULL[kind], small_disk / "r.h5"
+    with open(small_disk / "other", "wb") as other:
+        other.write(bytes(taken * 1024))
+    mesh = ("--set", "mesh.around=6", "--set", "mesh.along=10", "--set", "drive.pressure=2 kPa")
+    run = start(kind, *mesh, *further, "-o", path)
+    _, err = run.communicate(timeout=300)
+    last = err.strip().splitlines()[-1]
+    assert run.returncode == 1 and "no room" in last and one_sentence(last.replace("; ", ", ")), err
+    kept = dbvfiv.load_result(path)
+    assert not kept.complete and kept.lines() and kept.summary() is not None
+    kept.plot(small_disk.parent / "figures") if kept.drawable else None

@@ -98,7 +98,7 @@ class ClosureResult(StudyResult):
 
     @property
     def supports(self) -> str:
-        """ "contact" or "held-lips"."""
+        """Either "contact" or "held-lips"."""
         return self._setting.get("supports", self.record.header.case.closure.supports)
 
     @property

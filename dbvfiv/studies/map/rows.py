@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import CaseError
 from ...observer import Observer
 from ...record.layout import Column
 from ...record.mesh import MeshData
@@ -145,6 +146,26 @@ def read_columns(record: Record, plan: MapPlan) -> list[MapColumn]:
             )
         )
     return found
+
+
+def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
+    """Rows that a map goes on from: cells and onsets of a column that was cut off before its own row are left out.
+
+    Raises
+    ------
+    CaseError
+        If the map is complete.
+    """
+    if known.complete:
+        raise CaseError(f"The map run in {str(known.path)!r} is complete; there is nothing to resume.")
+    count = known.rows(COLUMNS)
+    if not count:
+        return {CELL_ROWS: 0, ONSETS: 0}
+    plan = MapPlan.of(case)
+    first, onset, onsets = (
+        known.value(COLUMNS, name, count - 1) for name in ("first_cell", "first_onset", "onset_count")
+    )
+    return {CELL_ROWS: int(first) + len(plan.laws) * len(plan.along.values), ONSETS: int(onset) + int(onsets)}
 
 
 def keep_curves(record: GrowingRecord, curves: Iterable[OnsetCurve]) -> None:

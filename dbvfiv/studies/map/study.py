@@ -9,7 +9,7 @@ from ..stability.walk import StabilityWalk
 from ..study import Study
 from .column import MapPlan
 from .result import MapResult
-from .rows import KeepColumns, keep_checks, keep_curves, known_columns, tables_of
+from .rows import KeepColumns, keep_checks, keep_curves, known_columns, rows_to_keep, tables_of
 from .run import run_map
 
 
@@ -35,4 +35,4 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     keep_curves(record, found.curves)
 
 
-STUDY = Study("map", tables_of, run, MapResult)
+STUDY = Study("map", tables_of, run, MapResult, rows_to_keep=rows_to_keep)

@@ -80,6 +80,7 @@ def conditions(result: ModesResult) -> str:
 
 
 def in_vacuo(result: ModesResult) -> bool:
+    """Whether the fluid was left out of the modes."""
     return result.case.modes.in_vacuo or result.case.drive.kind != "flow"
 
 

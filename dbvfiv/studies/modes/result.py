@@ -46,7 +46,7 @@ class ModesResult(StudyResult):
     modes : tuple of ModeShape
     state : State
         The equilibrium they belong to.
-    certificate : Certificate
+    certificate : Certificate or None
     stable : bool or None
     notes : tuple of str
         What the search and its certificate have to say.
@@ -65,10 +65,10 @@ class ModesResult(StudyResult):
         return tuple(ModeShape(number=i + 1, **row) for i, row in enumerate(self.record.table_rows(table)))
 
     @cached_property
-    def certificate(self) -> Certificate:
-        return Certificate.read(
-            self.record.notes("certificate")[-1], *(self.record.column(COUNT, c.name) for c in CURVE)
-        )
+    def certificate(self) -> Certificate | None:
+        """None if the run ended before it had one."""
+        notes = self.record.notes("certificate")
+        return Certificate.read(notes[-1], *(self.record.column(COUNT, c.name) for c in CURVE)) if notes else None
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -76,7 +76,7 @@ class ModesResult(StudyResult):
 
     @property
     def stable(self) -> bool | None:
-        return self.certificate.stable
+        return None if self.certificate is None else self.certificate.stable
 
     @cached_property
     def state(self) -> State:
@@ -98,6 +98,8 @@ class ModesResult(StudyResult):
         return self.modes[number - 1]
 
     def summary(self) -> dict[str, Any]:
+        if self.certificate is None:
+            return {"state": None, "modes": [], "stable": None, "warnings": list(self.warnings)}
         return {
             "state": self.state.summary() | describe_surroundings(self.case) | {"in_vacuo": self.case.modes.in_vacuo},
             "modes": [mode.summary() for mode in self.modes],
@@ -110,6 +112,8 @@ class ModesResult(StudyResult):
         }
 
     def lines(self) -> list[str]:
+        if self.certificate is None:
+            return ["The run ended before its modes were found."]
         rows = [
             f"{m.number:6d}{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:16.4f}{m.residual:11.1e}"
             for m in self.modes
@@ -122,6 +126,8 @@ class ModesResult(StudyResult):
 
     def drawers(self, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
         """Eigenvalues, shapes, centre lines and the independent count; of one mode alone if it is named."""
+        if self.certificate is None:
+            return
         yield from plane.draw(self)
         yield from shapes.draw(self, mode)
         yield from centre_line.draw(self, mode)

@@ -144,7 +144,7 @@ class OnsetPoint:
 
     @property
     def kind(self) -> str:
-        """ "Hopf" or "divergence"."""
+        """Either "Hopf" or "divergence"."""
         return "Hopf" if self.frequency > 0 else "divergence"
 
     @property

@@ -133,7 +133,7 @@ class SensitivityResult(StudyResult):
 
     def lines(self) -> list[str]:
         if not self.record.notes(MODE):
-            return []
+            return ["The run ended before its mode was found."]
         mode = f"mode {self.number}, {self.growth_rate:.4f} 1/s at {self.frequency:.4f} Hz"
         return [
             f"At {describe_fixed(self.case)}: {mode}.",

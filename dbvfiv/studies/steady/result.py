@@ -19,7 +19,7 @@ from ...record.whole_valve import WholeValve
 from ..load_path import WAY_ON, way_on_shapes
 from ..result import StudyResult
 from ..state import State, gather_states, states_of
-from . import discharge, passage, shapes
+from . import discharge, hydraulics, passage, shapes
 
 STATES = "states"
 
@@ -61,10 +61,10 @@ class SteadyResult(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        return [*printed_head(SUMMARY), *(printed_row(SUMMARY, state) for state in self.states)]
+        return [*printed_head(SUMMARY), *(printed_row(SUMMARY, state) for state in self.states), *self.remarks()]
 
     def remarks(self) -> list[str]:
-        return []
+        return hydraulics.lines(self.states)
 
     def shortfall(self) -> str | None:
         if not self.failures:

@@ -125,8 +125,8 @@ def run_sweep(
 ) -> FoundBranches:
     """Follow the leading modes along a parameter.
 
-    Over density, damping or loss factors the state stays, so modes are found on a basis that is certified against full solves;
-    over pressure every value has its own equilibrium, found from the nearest one known, and its own full solve. An
+    Over density and damping the state stays, so modes are found on a basis that is certified against full solves; over
+    pressure every value has its own equilibrium, found from the nearest one known, and its own full solve. An
     interrupt, or a pressure that is not reached, ends the sweep and keeps what was found.
 
     Parameters

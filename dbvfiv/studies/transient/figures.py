@@ -32,6 +32,7 @@ def draw(result: TransientResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
 
 
 def title(result: TransientResult) -> str:
+    """Name of the case, its last pressure, its fluid."""
     case = result.case
     fluid = f", {case.fluid.density:g} kg/m³, {case.fluid.continuity}" if case.drive.kind == "flow" else ""
     return f"{result.header.name}: {static(float(result.history['inlet_pressure'][-1]))}{fluid}"

@@ -19,6 +19,8 @@ from .tables import STATES, tables_of
 def stored_state(motion: ValveMotion, case: Case, inlet: float) -> MotionState:
     """State `transient.start_state` of `transient.start_file`, a steady or a transient result on the same mesh.
 
+    A wall that relaxes starts without stress in its branches: states do not hold what it remembered.
+
     Parameters
     ----------
     motion : ValveMotion

@@ -10,12 +10,13 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..drawing.signal import save_signal
-from ..errors import CaseError
-from ..studies.session import load_result
-from ..verdict import JudgeOptions, Series, Verdict, in_steps, judge, spectrum
-from ..verdict.table import Table, read_table
-from ..verdict.units import seconds_in
+from ...drawing.signal import save_signal
+from ...errors import CaseError
+from ...studies.session import load_result
+from ...verdict import JudgeOptions, Series, Verdict, in_steps, judge, spectrum
+from ...verdict.table import Table, read_table
+from ...verdict.units import seconds_in
+from .._output import print_json
 
 
 @dataclass(frozen=True)
@@ -226,3 +227,18 @@ def _numbers(verdict: Verdict) -> list[tuple[str, float]]:
         ("periodicity error", verdict.periodicity_error),
         ("noise, rms", verdict.noise),
     ]
+
+
+def tell(
+    file: Path, reading: Reading, steady: float, closed_below: float | None, plots: Path | None, as_json: bool
+) -> None:
+    """Judge the signals of a file, draw them where asked to, and print what they do."""
+    found = judge_file(file, reading, steady, closed_below)
+    figures = [each.draw(plots) for each in found] if plots is not None else []
+    if as_json:
+        print_json({"signals": [each.summary() for each in found]})
+        return
+    for each in found:
+        print("\n".join(each.lines()))
+    for figure in figures:
+        print(f"Wrote {figure}.")
