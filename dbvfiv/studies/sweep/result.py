@@ -113,7 +113,7 @@ class SweepResult(StudyResult):
     Attributes
     ----------
     parameter : str
-        "pressure", "density", "alpha" or "beta".
+        "pressure", "density", "alpha", "beta" or "loss_factor".
     values : (p,) SI
         Those done.
     branches : tuple of Branch

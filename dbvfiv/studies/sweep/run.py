@@ -125,8 +125,8 @@ def run_sweep(
 ) -> FoundBranches:
     """Follow the leading modes along a parameter.
 
-    Over density, alpha or beta the state stays, so modes are found on a basis that is certified against full solves;
-    over pressure every value has its own equilibrium, found from the nearest one known, and its own full solve. An
+    Over density and damping the state stays, so modes are found on a basis that is certified against full solves; over
+    pressure every value has its own equilibrium, found from the nearest one known, and its own full solve. An
     interrupt, or a pressure that is not reached, ends the sweep and keeps what was found.
 
     Parameters
@@ -140,7 +140,7 @@ def run_sweep(
     observer : Observer, optional
         Gets a `SweepPoint` for every value.
     state : SteadyState, optional
-        Equilibrium for density, alpha or beta; needed for those.
+        Equilibrium for whatever leaves it as it is; needed there.
     keep : callable, optional
         Gets what is done so far, marked as interrupted, every few seconds, so that a sweep that is killed is not lost.
 
@@ -163,7 +163,7 @@ def run_sweep(
         family: Family = PressureFamily(model, conditions, options, observer)
     else:
         if state is None:
-            raise ValueError("A sweep over density, alpha or beta needs the state at which it is made.")
+            raise ValueError("A sweep over density or damping needs the state at which it is made.")
         require_equilibrium(model, state)
         family = FluidFamily(model, state, axis, conditions, options, observer)
     observer.begin(f"sweep over {axis.parameter}", len(axis.values))
