@@ -54,9 +54,7 @@ def test_the_rough_pipe_is_the_end_of_colebrooks_law():
 
 @pytest.mark.parametrize("reservoir", [True, False])
 def test_flow_that_runs_back(reservoir):
-    """Into a reservoir it loses the head of its jet, so that the pressure at the flange is that of the losses; the total
-    head falls towards the far end either way.
-    """
+    """Into a reservoir it loses the head of its jet; the total head falls towards the far end either way."""
     quarter = 0.012
     diameter = 1.2 * diameter_of(quarter)
     line = Line(10.0, diameter, 0.02, 0.0, 0.5, reservoir)

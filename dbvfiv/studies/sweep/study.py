@@ -27,8 +27,8 @@ def run(session: Session, record: GrowingRecord) -> None:
     require_parameter(session.case, axis.parameter)
     if axis.parameter != "pressure" and not is_surrounding(session.case, axis.parameter):
         raise CaseError(
-            f"sweep.over ranges over {axis.parameter}, but friction in the line moves the steady state with it (onset and "
-            "map follow that); give upstream.loss in place of friction, or another parameter."
+            f"sweep.over ranges over {axis.parameter}, but friction in the line moves the steady state with it (onset "
+            "and map follow that); give upstream.loss in place of friction, or another parameter."
         )
     state = None if axis.parameter == "pressure" else session.equilibrium(record)
     found = run_sweep(
