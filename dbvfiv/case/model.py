@@ -14,6 +14,7 @@ from .materials import DEFAULT_LAYERS, Layer, Materials
 from .parameters import PARAMETERS
 from .relaxing import SHIPPED_LOSSES
 from .section import BrokenRule, Section, key
+from .upstream import Upstream
 from .valve import Mesh, Valve
 
 
@@ -42,6 +43,7 @@ class Case(Section):
     damping: Damping = key(Damping(), "Rayleigh damping, or materials that relax.")
     fluid: physics.Fluid = key(physics.Fluid(), "The fluid and its conservation laws.")
     drive: physics.Drive = key(physics.Drive(), "The load.")
+    upstream: Upstream = key(Upstream(), "The line in front of the valve.")
     supports: physics.Supports = key(physics.Supports(), "One-sided stops of the lips.")
 
     @model_validator(mode="before")
@@ -86,7 +88,25 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
+        self.upstream.check_roughness(2 * (self.valve.flange_radius - self.valve.flange_wall_deduction))
         return self
+
+    @property
+    def has_line(self) -> bool:
+        """Whether fluid comes through a pipe in front of the valve."""
+        return self.drive.kind == "flow" and self.upstream.length > 0
+
+    @property
+    def continuity(self) -> str:
+        """The continuity law in words; empty where none is needed: without flow, and in the steady law."""
+        return f"{self.fluid.continuity} continuity" if self.drive.kind == "flow" and self.fluid.unsteady else ""
+
+    @property
+    def pressure_at(self) -> str:
+        """Where drive.pressure is, as words behind its number: "static", "in the reservoir"."""
+        if not self.has_line:
+            return "static"
+        return "in the reservoir" if self.drive.at == "reservoir" else "static at the far end of the line"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""

@@ -43,6 +43,8 @@ class Parameter:
         Whether the usual range has logarithmic steps.
     moves_equilibrium : bool
         Whether the steady state changes with it. Those that do not are surroundings: the linearised structure stays.
+        The length of a line with friction does change it, although it stands among those: see
+        `dbvfiv.studies.stability.place.is_surrounding`.
     design : bool
         Whether the model is built anew for each value.
     swept : bool
@@ -179,6 +181,21 @@ _TABLE = (
         high=1.0,
         system_name="storage",
         note="blend of the continuity laws, 0 quasi-steady to 1 storage",
+    ),
+    Parameter(
+        name="pipe_length",
+        key="upstream.length",
+        quantity=Quantity("m", "m"),
+        title="Length of the pipe upstream",
+        usual=(0.5, 100.0, 41),
+        symbol="L",
+        shown_unit="m",
+        high=1e5,
+        low_included=False,
+        log=True,
+        swept=True,
+        system_name="pipe_length",
+        note="of the line upstream",
     ),
     Parameter(
         name="thickness",

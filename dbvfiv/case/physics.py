@@ -54,9 +54,17 @@ class Drive(Section):
     )
     pressure: Pressure = key(
         18e3,
-        "Static pressure at the flange over that of the surroundings (flow), or the pressure on the wall (uniform).",
+        "Static pressure at the flange over that of the surroundings (flow), or the pressure on the wall (uniform). "
+        "With a line upstream it is the pressure at its far end: see drive.at.",
         ge=0,
         le=PARAMETERS["pressure"].high,
+    )
+    at: Literal["reservoir", "line"] = key(
+        "reservoir",
+        "What drive.pressure is with a line upstream: that of a reservoir at rest at its far end, a total pressure "
+        "from which the velocity head at the flange and all losses go off (reservoir), or the static pressure in the "
+        "line at its far end, as a gauge there has it; without losses, in a line as wide as the inlet, it is that at "
+        "the flange (line). Without a line it says nothing.",
     )
     side: Literal["inside", "outside"] = key("inside", "Which side of the wall a uniform pressure acts on.")
     unloaded_edge: Number = key(

@@ -13,7 +13,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from .axes import colour_bar, headline
 from .faces import ValveSkin
-from .style import new_figure, static
+from .style import driven, new_figure
 from .views import COLOURS, frame, shaded
 
 if TYPE_CHECKING:
@@ -46,7 +46,8 @@ def deformed(state: State) -> Figure:
     x, y, z = (1e3 * value for value in state.max_displacement_position)
     headline(
         figure,
-        f"Deformed valve at {static(state.pressure)}: largest displacement {state.max_displacement * 1e3:.1f} mm\n"
+        f"Deformed valve at {driven(state.results.case, state.pressure)}: "
+        f"largest displacement {state.max_displacement * 1e3:.1f} mm\n"
         f"at (x, y, z) = ({x:.0f}, ±{abs(y):.0f}, {z:.0f}) mm",
     )
     return figure

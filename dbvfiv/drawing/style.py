@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -10,6 +11,9 @@ import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+
+from ..case.model import Case
+from ..case.parameters import PARAMETERS
 
 #: Colours of things that recur.
 COMPUTED, PUBLISHED, REST, ACCENT = "#1f4e79", "#c0392b", "#8c8c8c", "#d98200"
@@ -87,9 +91,26 @@ def kilopascals(pressure: float) -> str:
     return f"{pressure / 1e3:.4g} kPa"
 
 
-def static(pressure: float) -> str:
-    """An inlet pressure as it stands in titles: what the program is given is static."""
-    return f"{kilopascals(pressure)} static"
+def driven(case: Case, pressure: float) -> str:
+    """A pressure that drives the flow as it stands in titles, with the place where it is."""
+    return f"{kilopascals(pressure)} {case.pressure_at}"
+
+
+def pressure_name(case: Case) -> str:
+    """The same as the name of an axis or legend, without a number."""
+    if not case.has_line:
+        return PARAMETERS["pressure"].title
+    return "Pressure in the reservoir" if case.drive.at == "reservoir" else "Static pressure at the far end"
+
+
+def pressure_heading(case: Case) -> str:
+    """The same over a narrow legend."""
+    return textwrap.fill(pressure_name(case).lower(), 15)
+
+
+def parameter_label(case: Case, name: str) -> str:
+    """Title, symbol and unit of a parameter, for an axis."""
+    return f"{pressure_name(case)}, kPa" if name == "pressure" else PARAMETERS[name].label
 
 
 def some_of(states: list, count: int = 8) -> list:

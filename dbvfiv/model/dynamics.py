@@ -36,16 +36,20 @@ class Conditions:
         Rayleigh stiffness damping, s.
     loss_factor : float
         Factor on the loss factors of all materials; zero leaves them elastic.
+    pipe_length : float, optional
+        Of the line in front, m; the case's own where it is not given, and of no effect without a line.
     """
 
     density: float
     alpha: float
     beta: float
     loss_factor: float = 0.0
+    pipe_length: float | None = None
 
     @classmethod
     def of(cls, case) -> Conditions:
-        return cls(case.fluid.density, case.damping.alpha, case.damping.beta, case.damping.loss_factor)
+        length = case.upstream.length if case.has_line else None
+        return cls(case.fluid.density, case.damping.alpha, case.damping.beta, case.damping.loss_factor, length)
 
 
 def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q, v, a, inner, inner_rate):
@@ -150,15 +154,21 @@ class LinearisedState:
         if not flow.unsteady:
             _, slope = flow.steady_operator(self.area, self.inlet)
             return damped.replace(A0=slope)
-        return damped.replace(**fluid_parts(flow, self.area, self.inlet, conditions.density, storage))
+        parts = fluid_parts(flow, self.area, self.inlet, conditions.density, storage, conditions.pipe_length)
+        return damped.replace(**parts)
 
 
 def fluid_parts(
-    flow: FlowLaw, area: np.ndarray, inlet: float, density: float, storage: float | None = None, inner=None
+    flow: FlowLaw,
+    area: np.ndarray,
+    inlet: float,
+    density: float,
+    storage: float | None = None,
+    pipe_length: float | None = None,
 ) -> dict[str, np.ndarray]:
-    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow or at given inner unknowns (l,)."""
-    given = {"inlet": inlet, "density": density} | ({} if storage is None else {"storage": storage})
-    return flow.linearise_still(area, given, inner).parts()
+    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow."""
+    given = {"inlet": inlet, "density": density, "storage": storage, "pipe_length": pipe_length}
+    return flow.linearise_still(area, {name: value for name, value in given.items() if value is not None}).parts()
 
 
 def linearise(model: ValveModel, q: np.ndarray, inlet: float) -> LinearisedState:

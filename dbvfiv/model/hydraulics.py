@@ -30,6 +30,10 @@ class Hydraulics:
         Flow of water at a static pressure of 1 bar at the flange (IEC 60534-1), at this opening.
     cv : float, US gallons a minute
         The same at 1 psi.
+    line_loss : float, m
+        Head lost by friction and fittings of a line in front; 0 without one.
+    supply_head : float, m
+        Total head at the far end of the line, or at the flange without one.
     """
 
     flange_velocity: float
@@ -39,13 +43,17 @@ class Hydraulics:
     discharge_coefficient: float
     kv: float
     cv: float
+    line_loss: float
+    supply_head: float
 
     def summary(self) -> dict[str, float]:
         """Plain numbers, SI but for kv and cv."""
         return asdict(self)
 
 
-def hydraulics_of(pressure: float, density: float, volume_flow: float, flange_velocity: float) -> Hydraulics:
+def hydraulics_of(
+    pressure: float, density: float, volume_flow: float, flange_velocity: float, line_loss: float = 0.0
+) -> Hydraulics:
     """Hydraulics of a flow into free surroundings.
 
     Parameters
@@ -55,6 +63,7 @@ def hydraulics_of(pressure: float, density: float, volume_flow: float, flange_ve
     density : float, kg/m3
     volume_flow : float, m3/s
     flange_velocity : float, m/s
+    line_loss : float, m
 
     Examples
     --------
@@ -74,4 +83,6 @@ def hydraulics_of(pressure: float, density: float, volume_flow: float, flange_ve
         discharge_coefficient=flange_velocity / math.sqrt(2 * GRAVITY * total) if flows else 0.0,
         kv=kv,
         cv=CV_OVER_KV * kv,
+        line_loss=line_loss,
+        supply_head=total + line_loss,
     )

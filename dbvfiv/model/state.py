@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case.quantity import head_of
+from ..case.quantity import GRAVITY, head_of
 from ..errors import SolveError
 from .hydraulics import Hydraulics, hydraulics_of
 from .lip import LipCentre
@@ -21,9 +21,13 @@ class SteadyState:
     Attributes
     ----------
     pressure : float, Pa
-        At the flange; of a uniform load, on the wall.
+        At the flange; with a line in front at its far end, in the reservoir or static; of a uniform load, on the wall.
     head : float, m
         The same as a head of the fluid.
+    flange_pressure : float, Pa
+        At the flange, whatever is in front of it.
+    line_loss : float, m
+        Head lost in a line in front; 0 without one.
     q : (n,) array
         Free displacements (m) and rotations (rad).
     nodal : (nn, 5) array
@@ -56,6 +60,8 @@ class SteadyState:
 
     pressure: float
     head: float
+    flange_pressure: float
+    line_loss: float
     q: np.ndarray
     nodal: np.ndarray
     mass_flow: float
@@ -83,7 +89,8 @@ class SteadyState:
         if not self.volume_flow > 0:
             return None
         density = self.mass_flow / self.volume_flow
-        return hydraulics_of(self.pressure, density, self.volume_flow, float(self.station_velocity[-1]))
+        velocity = float(self.station_velocity[-1])
+        return hydraulics_of(self.flange_pressure, density, self.volume_flow, velocity, self.line_loss)
 
 
 def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution) -> SteadyState:
@@ -109,9 +116,13 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     where = int(np.argmax(displacement))
     lip = LipCentre(model.mesh, model.shell)
     mass_flow = model.mass_flow(area, pressure)
+    station_pressure = model.flow.steady_pressure(area, pressure)
+    line = model.line
     return SteadyState(
         pressure=float(pressure),
         head=head_of(pressure, density),
+        flange_pressure=float(pressure if line is None else station_pressure[-1]),
+        line_loss=0.0 if line is None else line.lost_head(float(area[-1]), velocity) / GRAVITY,
         q=np.asarray(q),
         nodal=nodal,
         mass_flow=mass_flow,
@@ -124,7 +135,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
         lip_displacement=lip.displacement(q),
         station_area=area,
         station_velocity=speeds,
-        station_pressure=model.flow.steady_pressure(area, pressure),
+        station_pressure=station_pressure,
         stops=model.stops.touching(q),
         **solution,
     )

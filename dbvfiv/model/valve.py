@@ -19,6 +19,7 @@ import scipy.sparse as sp
 
 from ..case.model import Case
 from ..flow import RowAreas
+from ..flow.terms.line import Line
 from ..geometry import ValveMesh
 from ..shell import Section, StepWall
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
@@ -90,6 +91,12 @@ class ValveModel:
     def size(self) -> int:
         """Number of unknowns n."""
         return self.shell.size
+
+    @property
+    def line(self) -> Line | None:
+        """The pipe in front of the valve, if there is one."""
+        terms = getattr(self.flow, "terms", ())
+        return next((term for term in terms if isinstance(term, Line)), None)
 
     @property
     def stations(self) -> int:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
+from ..case.model import Case
 from ..model import ValveModel
 from ..model.state import SteadyState
 from ..shell.recovery import layer_fields
@@ -18,10 +20,12 @@ SUMMARY = (
     Column(
         "pressure",
         "Pa",
-        "Static pressure at the flange, over that of the surroundings",
+        "Static pressure at the flange over that of the surroundings; with a line in front that at its far end",
         shown=Shown("pressure", "static kPa", 10, lambda s: f"{s.pressure / 1e3:.6g}"),
     ),
     Column("head", "m", "The same as a head of the fluid", shown=Shown("head", "m", 8, lambda s: f"{s.head:.4g}")),
+    Column("flange_pressure", "Pa", "Static pressure at the flange"),
+    Column("line_loss", "m", "Head lost in a line in front of the valve"),
     Column(
         "mass_flow",
         "kg/s",
@@ -84,6 +88,20 @@ SUMMARY = (
     Column("rounding", "", "Relative residual that rounding alone explains"),
     Column("reason", "", "Why the iteration ended", TEXT),
 )
+
+
+def shown_summary(case: Case) -> tuple[Column, ...]:
+    """`SUMMARY` as it is printed: with a line in front, pressures at both of its ends."""
+    if not case.has_line:
+        return SUMMARY
+    there = "reservoir" if case.drive.at == "reservoir" else "far end"
+    shown = {
+        "pressure": Shown(there, "kPa" if there == "reservoir" else "static kPa", 10, SUMMARY[0].shown.write),
+        "flange_pressure": Shown("at the flange", "static kPa", 13, lambda s: f"{s.flange_pressure / 1e3:.6g}"),
+    }
+    return tuple(replace(column, shown=shown.get(column.name, column.shown)) for column in SUMMARY)
+
+
 #: Fields of a state.
 FIELDS = (
     Column("nodal", "m, rad", "Displacements ux uy uz and two rotations of each node"),

@@ -38,10 +38,10 @@ STATES = [
 
 
 def three_routes(
-    law: str, pressure: float, density: float, mesh=(8, 12), steps=(50, 100), periods: float = 1.25
+    law: str, pressure: float, density: float, mesh=(8, 12), steps=(50, 100), periods: float = 1.25, further=None
 ) -> dict:
     """Eigenvalues of the leading oscillating mode by the three ways, the last by steps per period and in the limit of
-    small ones.
+    small ones; `further` holds other keys of the case.
     """
     changes = {
         "mesh.around": mesh[0],
@@ -53,7 +53,7 @@ def three_routes(
         "damping.beta": BETA,
         "transient.start": "kick",
         "transient.kick_opening": PUSH,
-    }
+    } | (further or {})
     valve = dbvfiv.load(changes=changes)
     model = valve.model
     full = next(m for m in valve.modes(count=8).modes if m.frequency > 0)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigen import Column, Condition
+from eigen import Column
 from eigen.columns import MISSING
 
 from ...case.axis import Axis
@@ -81,7 +81,7 @@ class MapPlan:
     @property
     def transposed(self) -> bool:
         """Whether columns run along x: where only y changes the steady state."""
-        return is_surrounding(self.x.parameter) and not is_surrounding(self.y.parameter)
+        return is_surrounding(self.case, self.x.parameter) and not is_surrounding(self.case, self.y.parameter)
 
     @property
     def across(self) -> Axis:
@@ -216,11 +216,11 @@ def _law(
 ) -> tuple[Column, list[tuple[float, ...]]]:
     along = plan.along
     places = [plan.place(value, other, law) for other in along.values]
-    if not is_surrounding(along.parameter):
+    if not is_surrounding(plan.case, along.parameter):
         return _state_by_state(plan, walk.apart(), places)
     column = walk.column(places, edges=edges)
-    sample = column.eigenvalues or (lambda condition: walk.column([_under(places[0], condition)]).leading[0])
-    cell = column.cell or (lambda condition: walk.column([_under(places[0], condition)]))
+    sample = column.eigenvalues or (lambda condition: walk.column([places[0].under(condition)]).leading[0])
+    cell = column.cell or (lambda condition: walk.column([places[0].under(condition)]))
     scan = Scan(
         lambda other: sample(plan.place(value, other, law).condition),
         along.log,
@@ -246,14 +246,9 @@ def _law(
 
 def shared_place(plan: MapPlan, value: float) -> Place | None:
     """Where the steady state of a column lies; None if its cells have states of their own."""
-    if not is_surrounding(plan.along.parameter):
+    if not is_surrounding(plan.case, plan.along.parameter):
         return None
     return plan.place(value, plan.along.values[0], plan.laws[0])
-
-
-def _under(place: Place, condition: Condition) -> Place:
-    """The same steady state under another condition."""
-    return place.at(**dict(zip(("density", "alpha", "beta", "storage", "loss_factor"), condition)))
 
 
 def _known(along: Axis, column: Column) -> dict[float, Sample]:

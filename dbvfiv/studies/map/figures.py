@@ -13,7 +13,7 @@ from scipy.ndimage import distance_transform_edt, label
 
 from ...case.parameters import PARAMETERS
 from ...drawing.axes import HALO, colour_bar, headline, limits, log_axis
-from ...drawing.style import MOTION, SIGNED, new_figure
+from ...drawing.style import MOTION, SIGNED, new_figure, parameter_label
 from ..stability.place import describe_fixed
 
 if TYPE_CHECKING:
@@ -84,9 +84,9 @@ def _panels(result: MapResult):
     panels = np.atleast_1d(figure.subplots(1, count, sharex=True, sharey=True))
     for number, (law, axes) in enumerate(zip(result.plan.laws, panels)):
         axes.grid(False)
-        axes.set_xlabel(PARAMETERS[result.plan.x.parameter].label)
+        axes.set_xlabel(parameter_label(result.case, result.plan.x.parameter))
         if number == 0:
-            axes.set_ylabel(PARAMETERS[result.plan.y.parameter].label)
+            axes.set_ylabel(parameter_label(result.case, result.plan.y.parameter))
         if "storage" not in (result.plan.x.parameter, result.plan.y.parameter):
             axes.set_title(_TITLES.get(law, f"Blend of the continuity laws {law:g}"), loc="left")
         for place, axis in ((axes.xaxis, result.plan.x), (axes.yaxis, result.plan.y)):

@@ -121,11 +121,11 @@ class Certificate:
         names = cls.__dataclass_fields__.keys() - {"frequency", "phase"}
         return cls(**{name: note[name] for name in names}, frequency=frequency, phase=phase)
 
-    @property
-    def verdict(self) -> str:
-        """One sentence for people."""
+    def verdict(self, continuity: str = "") -> str:
+        """One sentence for people, with the continuity law in words if there is one."""
         word = {True: "Stable", False: "Unstable", None: "Undecided"}[self.stable]
-        return f"{word}: {self.statement[0].lower()}{self.statement[1:]}"
+        under = f" under {continuity}" if continuity else ""
+        return f"{word}{under}: {self.statement[0].lower()}{self.statement[1:]}"
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON, without the curve."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing.style import DANGER, STABLE, UNSTABLE, new_figure, static
+from ...drawing.style import DANGER, STABLE, UNSTABLE, driven, new_figure
 
 if TYPE_CHECKING:
     from .result import ModesResult
@@ -68,13 +68,13 @@ def eigenvalues(result: ModesResult) -> Figure:
     axes.set_xlabel("Growth rate, 1/s")
     axes.set_ylabel("Frequency, Hz")
     axes.set_title(f"Leading modes {conditions(result)}", loc="left", fontweight="bold", pad=15)
-    figure.supxlabel(result.certificate.verdict, x=0.01, ha="left", fontsize=9)
+    figure.supxlabel(result.verdict, x=0.01, ha="left", fontsize=9)
     return figure
 
 
 def conditions(result: ModesResult) -> str:
     """Pressure and fluid as they stand in titles."""
-    where = "at rest" if result.state.pressure == 0 else f"at {static(result.state.pressure)}"
+    where = "at rest" if result.state.pressure == 0 else f"at {driven(result.case, result.state.pressure)}"
     fluid = "in vacuo" if in_vacuo(result) else f"{result.case.fluid.density:g} kg/m³"
     return f"{where}, {fluid}"
 

@@ -78,6 +78,11 @@ class ModesResult(StudyResult):
     def stable(self) -> bool | None:
         return None if self.certificate is None else self.certificate.stable
 
+    @property
+    def verdict(self) -> str:
+        """One sentence for people, which names the continuity law."""
+        return self.certificate.verdict("" if self.case.modes.in_vacuo else self.case.continuity)
+
     @cached_property
     def state(self) -> State:
         """The equilibrium, with its layers and figures."""
@@ -118,7 +123,7 @@ class ModesResult(StudyResult):
             f"{m.number:6d}{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:16.4f}{m.residual:11.1e}"
             for m in self.modes
         ]
-        return [*HEAD, *rows, "", self.certificate.verdict, *(f"Note: {note}" for note in self.notes)]
+        return [*HEAD, *rows, "", self.verdict, *(f"Note: {note}" for note in self.notes)]
 
     def steps(self, valve: WholeValve, mode: int | None = None, phases: int = 24) -> Sequence[Step]:
         """The modes one after the other, or one cycle of one of them; see `dbvfiv.studies.modes.steps`."""

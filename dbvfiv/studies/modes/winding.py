@@ -48,9 +48,7 @@ def winding(result: ModesResult) -> Figure:
     axes.set_ylabel("Winding of the determinant, half turns")
     axes.set_title(f"Independent count {conditions(result)}", loc="left", fontweight="bold", pad=6 + 11 * levels)
     beginning = f" The curve begins at {start:g}, half the degree of the determinant." if start else ""
-    figure.supxlabel(
-        f"{certificate.verdict}\nNumbers: modes found by the search.{beginning}", x=0.01, ha="left", fontsize=9
-    )
+    figure.supxlabel(f"{result.verdict}\nNumbers: modes found by the search.{beginning}", x=0.01, ha="left", fontsize=9)
     return figure
 
 

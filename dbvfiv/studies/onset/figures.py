@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
 from ...drawing.axes import HALO, limits, log_axis
-from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure
+from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure, parameter_label
 from ..stability.place import describe_fixed
 from .intervals import Interval
 
@@ -42,7 +42,7 @@ def onset(result: OnsetResult) -> Figure:
     top.set_ylabel("Growth rate, 1/s")
     bottom.set_ylabel("Frequency, Hz")
     bottom.set_ylim(bottom=0)
-    bottom.set_xlabel(PARAMETERS[axis.parameter].label)
+    bottom.set_xlabel(parameter_label(result.case, axis.parameter))
     top.set_title(_title(result), loc="left", fontweight="bold")
     figure.legend(loc="outside lower center", ncols=3)
     for axes in (top, bottom):

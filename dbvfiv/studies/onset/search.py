@@ -140,7 +140,7 @@ class OnsetSearch:
         """Leading eigenvalues and their certificate: on a small model where the steady state stays the same, with the
         full pencil elsewhere.
         """
-        if not is_surrounding(self.options.parameter):
+        if not is_surrounding(self.case, self.options.parameter):
             return self.walk.column([place])
         if self._column is None:
             ends = np.array(self.options.values)
@@ -206,7 +206,7 @@ class OnsetSearch:
         parameter = self.options.parameter
         value = locate(self.scan, crossing, self.options.tolerance)
         expected = complex(self.scan.at(value).eigenvalues[crossing.index])
-        if is_surrounding(parameter):
+        if is_surrounding(self.case, parameter):
             value = self._polished(value, crossing, expected)
         place = self.place(value)
         mode = self.critical(place, expected)

@@ -20,7 +20,7 @@ from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS
 from ...errors import CaseError, SolveError
 from ...model import Conditions, ValveModel, linearise
 from ...model.newton import EquilibriumSolver, NewtonOptions
-from ..stability.place import redesigned, require_parameter
+from ..stability.place import is_surrounding, redesigned, require_parameter
 
 #: Parameters of the surroundings that a pencil takes.
 _OF_PENCIL = tuple(name for name in SURROUNDINGS if name in {field.name for field in fields(Conditions)})
@@ -197,7 +197,8 @@ def _value(model, pressure, conditions, name) -> float:
     if name == "pressure":
         return pressure
     if name in _OF_PENCIL:
-        return getattr(conditions, name)
+        value = getattr(conditions, name)
+        return model.case.upstream.length if value is None else value
     if name == "storage":
         return 1.0 if model.case.fluid.continuity == "storage" else 0.0
     if name == "thickness":
@@ -213,14 +214,15 @@ def _value(model, pressure, conditions, name) -> float:
 
 def _pencil(model, q, pressure, conditions, name, value):
     """Pencil at the steady state with one parameter changed."""
-    if name in _OF_PENCIL:
+    if name in _OF_PENCIL and is_surrounding(model.case, name):
         return linearise(model, q, pressure).pencil(replace(conditions, **{name: value}))
     if name == "storage":
         return linearise(model, q, pressure).pencil(conditions, storage=value)
     changed = model
     if name == "pressure":
         pressure = value
-    elif name in DESIGN:
+    elif name in DESIGN or name in _OF_PENCIL:
+        conditions = replace(conditions, **({} if name in DESIGN else {name: value}))
         changed = ValveModel(redesigned(model.case, {name: value}))
     else:
         changed = ValveModel(model.case, _section(model.shell.section, name, value))

@@ -17,7 +17,8 @@ _KEPT = 256
 
 
 class ValveFamily(PencilFamily):
-    """Conditions are (density, alpha, beta, storage, loss factor).
+    """Conditions are (density, alpha, beta, law, loss factor); the law is the blend of the continuity laws, and with a
+    line in front (blend, length of the line in m).
 
     At unit density the fluid's unknown is the inlet velocity, at others that times the root of the density.
 
@@ -43,7 +44,7 @@ class ValveFamily(PencilFamily):
         self.linear, self.max_frequency, self.modes, self._workspace = linear, max_frequency, modes, workspace
         self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
         self.forces, self.slope = linear.forces, linear.slope
-        self._parts: dict[float, dict[str, np.ndarray]] = {}
+        self._parts: dict[object, dict[str, np.ndarray]] = {}
         self._relaxations: dict[float, Relaxation | None] = {}
         self._frequencies = np.zeros(0)
 
@@ -70,19 +71,18 @@ class ValveFamily(PencilFamily):
             self._relaxations[loss] = self.linear.relaxation(loss)
         return self._relaxations[loss]
 
-    def parts(self, law: float) -> dict[str, np.ndarray]:
+    def parts(self, law: float | tuple[float, float]) -> dict[str, np.ndarray]:
         """A0 to S1 at density 1."""
-        law = float(law)
         if law not in self._parts:
             if len(self._parts) > _KEPT:
                 self._parts.clear()
             self._parts[law] = self._computed(law)
         return self._parts[law]
 
-    def _computed(self, storage: float) -> dict[str, np.ndarray]:
+    def _computed(self, law: float | tuple[float, float]) -> dict[str, np.ndarray]:
         linear, flow, m = self.linear, self.linear.model.flow, len(self.linear.area)
         if flow.has_fluid and flow.unsteady:
-            return fluid_parts(flow, linear.area, linear.inlet, 1.0, storage)
+            return fluid_parts(flow, linear.area, linear.inlet, 1.0, *law_parts(law))
         zero = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
         parts = {name: np.zeros(zero[name[0]]) for name in POWERS}
         if flow.has_fluid:
@@ -91,5 +91,11 @@ class ValveFamily(PencilFamily):
 
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The full pencil, with the inlet velocity itself as unknown."""
-        density, alpha, beta, storage, loss_factor = condition
-        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor), storage=storage)
+        density, alpha, beta, law, loss_factor = condition
+        storage, pipe_length = law_parts(law)
+        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, pipe_length), storage=storage)
+
+
+def law_parts(law: float | tuple[float, float]) -> tuple[float, float | None]:
+    """Blend of the continuity laws and length of the line, None without one, of a condition's law."""
+    return law if isinstance(law, tuple) else (float(law), None)

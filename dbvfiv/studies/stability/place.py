@@ -13,6 +13,7 @@ from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ...model.dynamics import Conditions
 from ..case import Case
+from .family import law_parts
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class Place:
         Factor on the loss factors of all materials.
     storage : float
         Blend of the continuity laws, 0 quasi-steady, 1 storage.
+    pipe_length : float, m
+        Of the line in front; 0 without one.
     design : dict
         Values of those parameters of the design (`dbvfiv.case.parameters.DESIGN`) that are not the case's own.
     """
@@ -38,6 +41,7 @@ class Place:
     beta: float
     storage: float
     loss_factor: float = 0.0
+    pipe_length: float = 0.0
     design: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
@@ -45,7 +49,15 @@ class Place:
         """The parameters of a case."""
         storage = 1.0 if case.fluid.continuity == "storage" else 0.0
         damping = case.damping
-        return cls(case.drive.pressure, case.fluid.density, damping.alpha, damping.beta, storage, damping.loss_factor)
+        return cls(
+            case.drive.pressure,
+            case.fluid.density,
+            damping.alpha,
+            damping.beta,
+            storage,
+            damping.loss_factor,
+            case.upstream.length if case.has_line else 0.0,
+        )
 
     def at(self, **values: float) -> Place:
         """With some parameters changed."""
@@ -55,12 +67,27 @@ class Place:
 
     @property
     def condition(self) -> Condition:
-        """(density, alpha, beta, storage, loss factor)."""
-        return Condition(self.density, self.alpha, self.beta, self.storage, self.loss_factor)
+        """(density, alpha, beta, law, loss factor), the law as `dbvfiv.studies.stability.family.ValveFamily` has it."""
+        law = (self.storage, self.pipe_length) if self.pipe_length else self.storage
+        return Condition(self.density, self.alpha, self.beta, law, self.loss_factor)
+
+    def under(self, condition: Condition) -> Place:
+        """The same steady state under another condition."""
+        density, alpha, beta, law, loss_factor = condition
+        storage, length = law_parts(law)
+        return self.at(
+            density=density,
+            alpha=alpha,
+            beta=beta,
+            storage=storage,
+            loss_factor=loss_factor,
+            pipe_length=length or 0.0,
+        )
 
     @property
     def conditions(self) -> Conditions:
-        return Conditions(self.density, self.alpha, self.beta, self.loss_factor)
+        """What surrounds the structure there."""
+        return Conditions(self.density, self.alpha, self.beta, self.loss_factor, self.pipe_length or None)
 
     def value(self, name: str) -> float:
         return float(self.design[name] if name in DESIGN else getattr(self, name))
@@ -81,6 +108,8 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
         "beta": case.damping.beta,
         "loss_factor": case.damping.loss_factor,
     }
+    if case.has_line:
+        given["pipe_length"] = case.upstream.length
     given = {name: value for name, value in given.items() if not case.damping.lacks(name)}
     return {name: value for name, value in given.items() if name not in moved}
 
@@ -90,13 +119,15 @@ def describe_fixed(case: Case, *moved: str) -> str:
     words = []
     for name, value in fixed_conditions(case, *moved).items():
         text = value if isinstance(value, str) else PARAMETERS[name].text(value)
-        words.append(f"{text} static" if name == "pressure" else text)
+        words.append(f"{text} {case.pressure_at}" if name == "pressure" else text)
     return ", ".join(words)
 
 
-def is_surrounding(name: str) -> bool:
-    """Whether a parameter leaves the linearised structure as it is."""
-    return PARAMETERS[name].surrounding
+def is_surrounding(case: Case, name: str) -> bool:
+    """Whether a parameter leaves the steady state and the linearised structure of a case as they are; the length of a
+    line does where it has no friction.
+    """
+    return PARAMETERS[name].surrounding and not (name == "pipe_length" and case.upstream.has_friction)
 
 
 def check_flow(case: Case) -> None:
@@ -134,9 +165,15 @@ def require_parameter(case: Case, name: str) -> None:
     Raises
     ------
     CaseError
-        For strain levels without a rubber that has them, angles without a ply that has one, and what the model of
-        damping does not have.
+        For strain levels without a rubber that has them, angles without a ply that has one, the length of a line that
+        is not there, and what the model of damping does not have.
     """
+    if name == "pipe_length" and not case.has_line:
+        raise CaseError(
+            "There is no pipe_length to change: the valve has no line in front; give upstream.length (drive.pressure "
+            "is then that at its far end, see drive.at).",
+            key=PARAMETERS[name].key,
+        )
     lacking = case.damping.lacks(name)
     if lacking:
         raise CaseError(f"There is no {name} to change: {lacking}.", key=PARAMETERS[name].key)
@@ -153,7 +190,7 @@ def require_parameter(case: Case, name: str) -> None:
 
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
-    level (0.1 for 10 %).
+    level (0.1 for 10 %), length of the line (m) where the steady state depends on it.
 
     Raises
     ------
@@ -161,6 +198,8 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
         For values that the case does not allow.
     """
     changes: dict[str, object] = {}
+    if "pipe_length" in design:
+        changes["upstream.length"] = design["pipe_length"]
     if "thickness" in design:
         changes["valve.thickness_factor"] = case.valve.thickness_factor * design["thickness"]
     if "strain" in design:

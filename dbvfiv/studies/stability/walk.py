@@ -18,7 +18,7 @@ from ...model.equilibria import LoadPath, SteadyOptions
 from ...observer import Observer
 from ..case import Case
 from .family import ValveFamily
-from .place import Place, rebuilder
+from .place import Place, is_surrounding, rebuilder
 
 #: Steps over the last one up to which a cubic is trusted ahead of it.
 REACH = 2.0
@@ -73,6 +73,7 @@ class StabilityWalk:
         self._workspace = Workspace()  # for structural frequencies
         self.observer = observer or Observer()
         self._rebuild = rebuilder(case)
+        self._line_moves = case.has_line and not is_surrounding(case, "pipe_length")
         self._built: dict[tuple, _Built] = {}
         self._last: tuple[tuple, ValveFamily] | None = None
         if model is not None:
@@ -82,13 +83,20 @@ class StabilityWalk:
         path = LoadPath(model, SteadyOptions.of(self.case))
         return _Built(model, path, ColumnSolver(), {})
 
+    def _key(self, place: Place) -> tuple:
+        """What a model has to be built anew for: the design, and the length of a line that moves the steady state."""
+        design = dict(place.design)
+        if self._line_moves and place.pipe_length != self.case.upstream.length:
+            design["pipe_length"] = place.pipe_length
+        return tuple(sorted(design.items()))
+
     def built(self, place: Place) -> _Built:
         """Model and path of the design of a place."""
-        key = tuple(sorted(place.design.items()))
+        key = self._key(place)
         if key not in self._built:
             if len(self._built) > 4:
                 self._built = dict(list(self._built.items())[-2:])
-            self._built[key] = self._new(self._rebuild(place.design))
+            self._built[key] = self._new(self._rebuild(dict(key)))
         return self._built[key]
 
     def equilibrium(self, place: Place) -> np.ndarray:
@@ -110,7 +118,7 @@ class StabilityWalk:
         The next new state is reached from where that run stood, with the same digits: states that were recalled are
         found again before it, and not at all if none follows.
         """
-        if not place.design:  # states of other designs are found from rest each
+        if not self._key(place):  # states of other designs are found from rest each
             self._recalled.append(place)
 
     def give(self, place: Place, q: np.ndarray) -> None:
@@ -149,7 +157,7 @@ class StabilityWalk:
         ------
         SolveError
         """
-        key = (place.pressure, tuple(sorted(place.design.items())))
+        key = (place.pressure, self._key(place))
         if self._last is None or self._last[0] != key:
             linear = linearise(self.built(place).model, self.equilibrium(place), place.pressure)
             modes = self.case.modes

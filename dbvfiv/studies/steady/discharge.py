@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, new_figure
+from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, new_figure, parameter_label
 from . import published
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def ordered(result: SteadyResult) -> list[State]:
 def head_discharge(result: SteadyResult) -> Figure:
     """Static inlet pressure over mass flow (compare Fig. 7-4 of the thesis)."""
     states = ordered(result)
-    figure, axes = _axes("Mass flow, kg/s", "Static inlet pressure, kPa")
+    figure, axes = _axes("Mass flow, kg/s", parameter_label(result.case, "pressure"))
     axes.plot(
         [s.mass_flow for s in states], [s.pressure / 1e3 for s in states], "o-", color=COMPUTED, label=_name(result)
     )
@@ -65,7 +65,7 @@ def area_discharge(result: SteadyResult) -> Figure:
 def jet_velocity(result: SteadyResult) -> Figure:
     """Jet velocity over pressure (compare Fig. 7-7 of the thesis)."""
     states = ordered(result)
-    figure, axes = _axes("Static inlet pressure, kPa", "Velocity, m/s")
+    figure, axes = _axes(parameter_label(result.case, "pressure"), "Velocity, m/s")
     p = np.array([s.pressure for s in states])
     axes.plot(
         p / 1e3, [s.outlet_velocity for s in states], "o-", color=COMPUTED, label=f"jet at the lip, {_name(result)}"
@@ -86,7 +86,7 @@ def jet_velocity(result: SteadyResult) -> Figure:
 def deflection(result: SteadyResult) -> Figure:
     """Clear lip opening, between the inner faces, and largest displacement over pressure."""
     states = ordered(result)
-    figure, axes = _axes("Static inlet pressure, kPa", "Opening, displacement, mm")
+    figure, axes = _axes(parameter_label(result.case, "pressure"), "Opening, displacement, mm")
     p = [s.pressure / 1e3 for s in states]
     axes.plot(
         p,

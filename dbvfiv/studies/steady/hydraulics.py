@@ -6,12 +6,18 @@ from collections.abc import Sequence
 
 from ...record.layout import Column, Shown
 from ...record.table import printed_head, printed_row
+from ..case import Case
 from ..state import State
 
-_COLUMNS = tuple(
+#: Of the line in front; where there is one.
+_LINE = (
+    Column("supply_head", "", "", shown=Shown("supply", "m", 8, lambda s: f"{s.hydraulics.supply_head:.4g}")),
+    Column("line_loss", "", "", shown=Shown("line loss", "m", 9, lambda s: f"{s.hydraulics.line_loss:.4g}")),
+)
+_VALVE = tuple(
     Column(name, "", "", shown=shown)
     for name, shown in (
-        ("pressure", Shown("pressure", "static kPa", 10, lambda s: f"{s.pressure / 1e3:.6g}")),
+        ("pressure", Shown("pressure", "static kPa", 10, lambda s: f"{s.flange_pressure / 1e3:.6g}")),
         ("total_head", Shown("total head", "m", 10, lambda s: f"{s.hydraulics.total_head:.4g}")),
         ("head_loss", Shown("loss", "m", 8, lambda s: f"{s.hydraulics.head_loss:.4g}")),
         ("flange_velocity", Shown("at the flange", "m/s", 13, lambda s: f"{s.hydraulics.flange_velocity:.4g}")),
@@ -23,10 +29,16 @@ _COLUMNS = tuple(
 )
 
 
-def lines(states: Sequence[State]) -> list[str]:
+def lines(case: Case, states: Sequence[State]) -> list[str]:
     """Table of the states that flow, and what it supposes."""
     flowing = [state for state in states if state.hydraulics is not None]
     if not flowing:
         return []
-    rows = [printed_row(_COLUMNS, state) for state in flowing]
-    return [*printed_head(_COLUMNS), *rows, "Free discharge: the energy of the jet is lost, nothing is recovered."]
+    columns = (*_LINE, *_VALVE) if case.has_line else _VALVE
+    rows = [printed_row(columns, state) for state in flowing]
+    said = ["Free discharge: the energy of the jet is lost, nothing is recovered."]
+    if case.has_line:
+        said.insert(
+            0, "Supply: total head at the far end of the line; what follows the line loss is of the valve alone."
+        )
+    return [*printed_head(columns), *rows, *said]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from ...drawing.style import kilopascals, new_figure, pressure_colours, some_of
+from ...drawing.style import kilopascals, new_figure, pressure_colours, pressure_heading, some_of
 from ...drawing.views import mark_pieces
 from .discharge import ordered
 
@@ -44,5 +44,5 @@ def passage(result: SteadyResult) -> Figure:
     mark_pieces(result, *panels)
     panels[0].set_title("Along the passage (lip left, inlet right)", loc="left", fontweight="bold")
     panels[-1].set_xlabel("Distance from the lip z, mm")
-    panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="static inlet\npressure")
+    panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=pressure_heading(result.case))
     return figure

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from ...drawing import deformed, layers
 from ...record.fields import layer_field_names, motion
 from ...record.mesh import MeshData
-from ...record.states import SUMMARY, state_table
+from ...record.states import shown_summary, state_table
 from ...record.table import TableSpec, printed_head, printed_row
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
@@ -61,10 +61,11 @@ class SteadyResult(StudyResult):
         }
 
     def lines(self) -> list[str]:
-        return [*printed_head(SUMMARY), *(printed_row(SUMMARY, state) for state in self.states), *self.remarks()]
+        columns = shown_summary(self.case)
+        return [*printed_head(columns), *(printed_row(columns, state) for state in self.states), *self.remarks()]
 
     def remarks(self) -> list[str]:
-        return hydraulics.lines(self.states)
+        return hydraulics.lines(self.case, self.states)
 
     def shortfall(self) -> str | None:
         if not self.failures:

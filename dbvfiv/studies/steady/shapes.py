@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...drawing.faces import faces
-from ...drawing.style import REST, kilopascals, new_figure, pressure_colours, some_of
+from ...drawing.style import REST, kilopascals, new_figure, pressure_colours, pressure_heading, pressure_name, some_of
 from ...drawing.views import mark_pieces
 from .discharge import ordered
 
@@ -40,7 +40,7 @@ def lip_shapes(result: SteadyResult) -> Figure:
     axes.set_xlabel("x, mm")
     axes.set_ylabel("y, mm")
     axes.set_title("Lips at the outlet, inner faces", loc="left", fontweight="bold")
-    figure.legend(loc="outside lower center", ncols=5, title="static inlet pressure")
+    figure.legend(loc="outside lower center", ncols=5, title=pressure_name(result.case).lower())
     return figure
 
 
@@ -67,7 +67,7 @@ def centre_line(result: SteadyResult) -> Figure:
     lower.set_xlabel("Distance from the lip z, mm")
     upper.set_title("Inner (thick) and outer face at x = 0", loc="left", fontweight="bold")
     lower.set_title("Side edge, y = 0", loc="left", fontweight="bold")
-    upper.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title="static inlet\npressure")
+    upper.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title=pressure_heading(result.case))
     return figure
 
 

@@ -8,7 +8,7 @@ from ...errors import SolveError
 from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_warnings
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
-from ...record.states import SUMMARY, read_states, state_row
+from ...record.states import read_states, shown_summary, state_row
 from ...record.table import printed_head, printed_row
 from ..case import Case
 from ..load_path import go_on, way_on
@@ -48,12 +48,13 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
             record.warn(sentence)
 
 
-def print_live(_case: Case) -> Callable[[SteadyState], str]:
+def print_live(case: Case) -> Callable[[SteadyState], str]:
     """Lines of the table as states are found."""
-    head = [*printed_head(SUMMARY)]
+    columns = shown_summary(case)
+    head = [*printed_head(columns)]
 
     def write(state: SteadyState) -> str:
-        lines = [*head, printed_row(SUMMARY, state)]
+        lines = [*head, printed_row(columns, state)]
         head.clear()
         return "\n".join(lines)
 

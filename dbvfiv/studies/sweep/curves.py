@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from ...case.parameters import PARAMETERS
 from ...drawing.axes import HALO, limits, log_axis
-from ...drawing.style import DANGER, UNSTABLE, branch_looks, new_figure, static
+from ...drawing.style import DANGER, UNSTABLE, branch_looks, driven, new_figure
 
 if TYPE_CHECKING:
     from .result import Branch, Crossing, SweepResult
@@ -98,7 +98,7 @@ def surroundings_of(result: SweepResult) -> str:
     case = result.case
     parts = []
     if result.parameter != "pressure":
-        parts.append(static(result.points[0]["pressure"]))
+        parts.append(driven(case, result.points[0]["pressure"]))
     if result.parameter != "density" and case.drive.kind == "flow":
         parts.append(f"{case.fluid.density:g} kg/m³")
     parts += [

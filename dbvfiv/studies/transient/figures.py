@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...drawing.axes import colour_bar, headline
-from ...drawing.style import ACCENT, COMPUTED, MAGNITUDE, REST, new_figure, phase_looks, static
+from ...drawing.style import ACCENT, COMPUTED, MAGNITUDE, REST, driven, new_figure, phase_looks
 from ...verdict import Series, in_steps, spectrum
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def title(result: TransientResult) -> str:
     """Name of the case, its last pressure, its fluid."""
     case = result.case
     fluid = f", {case.fluid.density:g} kg/m³, {case.fluid.continuity}" if case.drive.kind == "flow" else ""
-    return f"{result.header.name}: {static(float(result.history['inlet_pressure'][-1]))}{fluid}"
+    return f"{result.header.name}: {driven(case, float(result.history['inlet_pressure'][-1]))}{fluid}"
 
 
 def history(result: TransientResult) -> Figure:

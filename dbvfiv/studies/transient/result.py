@@ -181,12 +181,13 @@ class TransientResult(StudyResult):
 
     def lines(self) -> list[str]:
         verdict, h = self.verdict, self.history
+        under = f", {self.case.continuity}" if self.case.continuity else ""
         if not self.begun:
             return [verdict["reason"]]
         lines = [
             (
                 f"{verdict['verdict']}{'' if verdict['decided'] else ' (not certain)'} after "
-                f"{verdict['time']:.4g} s and {verdict['steps']} steps"
+                f"{verdict['time']:.4g} s and {verdict['steps']} steps{under}"
             ),
             verdict["reason"],
             "",

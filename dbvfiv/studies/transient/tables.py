@@ -13,7 +13,7 @@ HISTORY, STATES, RESTART = "history", "states", "restart"
 #: One number a step; of the whole valve.
 SCALARS = (
     Column("time", "s", "Time"),
-    Column("inlet_pressure", "Pa", "Static pressure at the flange"),
+    Column("inlet_pressure", "Pa", "Static pressure at the flange; with a line in front the pressure at its far end"),
     Column("mass_flow", "kg/s", "Mass flow leaving at the lip"),
     Column("inlet_mass_flow", "kg/s", "Mass flow entering at the flange"),
     Column("outlet_area", "m^2", "Flow area at the lip; below zero where the lips cross"),

@@ -1,0 +1,131 @@
+"""Studies of a valve behind a pipe: steady heads, modes, and sweeps, onsets, maps and sensitivities over its length."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.case import CaseError
+from dbvfiv.case.quantity import GRAVITY
+from dbvfiv.studies.stability.place import Place, is_surrounding
+from dbvfiv.studies.stability.walk import StabilityWalk
+
+SMALL = {"mesh.around": 6, "mesh.along": 8}
+LINE = {"upstream.length": 20.0, "upstream.diameter": "300 mm", "upstream.loss": 1.5}
+FRICTION = LINE | {"upstream.friction": 0.02}
+LIGHT = {"fluid.density": 10.0, "drive.pressure": "6 kPa", "damping.alpha": 0.0}
+
+
+def load(*keys):
+    changes = dict(SMALL)
+    for some in keys:
+        changes |= some
+    return dbvfiv.load(None, changes)
+
+
+@pytest.mark.parametrize("at", ["reservoir", "line"])
+def test_heads_along_the_line(at):
+    state = load(FRICTION, {"drive.at": at}).steady(pressure="18 kPa")
+    found, pipe = state.hydraulics, 0.25 * np.pi * 0.3**2
+    speed = state.volume_flow / pipe
+    lost = (0.02 * 20.0 / 0.3 + 1.5) * speed**2 / (2 * GRAVITY)
+    assert state.line_loss == pytest.approx(lost, rel=1e-6)
+    far = 18e3 / (1000.0 * GRAVITY) + (0.0 if at == "reservoir" else speed**2 / (2 * GRAVITY))
+    assert found.supply_head == pytest.approx(far, rel=1e-6)
+    assert found.total_head == pytest.approx(far - lost, rel=1e-6)
+    assert state.flange_pressure == pytest.approx(state.station_pressure[-1], rel=1e-12)
+    # the valve itself is that of its pressure at the flange
+    alone = load().steady(pressure=state.flange_pressure)
+    assert alone.mass_flow == pytest.approx(state.mass_flow, rel=1e-6)
+    assert alone.hydraulics.kv == pytest.approx(found.kv, rel=1e-6)
+
+
+def test_without_losses_a_gauge_at_the_far_end_shows_the_pressure_at_the_flange():
+    bare = load().steady(pressure="18 kPa")
+    behind = load({"upstream.length": 20.0, "drive.at": "line"}).steady(pressure="18 kPa")
+    assert behind.mass_flow == pytest.approx(bare.mass_flow, rel=1e-9) and behind.line_loss == 0.0
+
+
+def test_equilibria_do_not_depend_on_density():
+    water, light = (load(FRICTION, {"fluid.density": rho}).steady(pressure="18 kPa") for rho in (1000.0, 2.0))
+    assert light.lip_opening == pytest.approx(water.lip_opening, rel=1e-9)
+    assert light.flange_pressure == pytest.approx(water.flange_pressure, rel=1e-9)
+
+
+def test_printed_pressures_say_where_they_are(command_line):
+    options = [f"--set={key}={value}" for key, value in (SMALL | FRICTION).items()]
+    out = command_line("steady", *options, "-p", "18 kPa").out
+    assert "reservoir" in out and "at the flange" in out and "line loss" in out and "Supply" in out
+    out = command_line("steady", *options, "--set=drive.at=line", "-p", "18 kPa").out
+    assert "far end" in out
+    out = command_line("steady", *(f"--set={key}={value}" for key, value in SMALL.items()), "-p", "18 kPa").out
+    assert "reservoir" not in out and "line loss" not in out
+
+
+def test_verdicts_name_the_continuity_law(command_line):
+    options = [f"--set={key}={value}" for key, value in (SMALL | LIGHT | LINE).items()]
+    for law in ("quasi-steady", "storage"):
+        out = command_line("modes", *options, f"--set=fluid.continuity={law}").out
+        assert f"table under {law} continuity: " in out
+    assert "continuity" not in command_line("modes", *options, "--in-vacuo").out
+
+
+def test_modes_over_the_length_are_those_of_each_length():
+    found = load(LIGHT, LINE).sweep("pipe_length=1:50:5:log")
+    assert found.certified
+    for i, value in enumerate(found.values):
+        leading = load(LIGHT, LINE, {"upstream.length": float(value)}).modes(count=4).modes[0]
+        growth = max(b.growth_rate[i] for b in found.branches if np.isfinite(b.growth_rate[i]))
+        assert growth == pytest.approx(leading.growth_rate, rel=1e-6)
+
+
+def test_friction_moves_the_steady_state_with_the_length():
+    with pytest.raises(CaseError, match=r"sweep\.over.*pipe_length.*friction"):
+        load(LIGHT, FRICTION).sweep("pipe_length=1:50:5:log")
+    case = load(LIGHT, FRICTION).case
+    assert not is_surrounding(case, "pipe_length") and is_surrounding(load(LIGHT, LINE).case, "pipe_length")
+    walk, place = StabilityWalk(case), Place.of(case)
+    for length in (2.0, 80.0):
+        valve = load(LIGHT, FRICTION, {"upstream.length": length})
+        there = place.at(pipe_length=length)
+        state = valve.steady(pressure="6 kPa")
+        assert walk.equilibrium(there) == pytest.approx(state.q, rel=1e-6, abs=1e-9)
+        leading = valve.modes(count=4).modes[0]
+        assert walk.spectrum(there, 4).eigenvalues[0].real == pytest.approx(leading.growth_rate, rel=1e-6)
+
+
+def test_onset_over_the_length_whether_or_not_the_steady_state_is_found_anew():
+    keys = {"drive.pressure": 2e3, "fluid.density": 100.0, "damping.alpha": 0.0, "damping.beta": 1e-3}
+    keys |= {"onset.coarse_mesh": 0}
+    found = [load(LINE, keys, more).onset("pipe_length=60:400:3:log") for more in ({}, {"upstream.friction": 1e-9})]
+    ((one,), (other,)) = (result.points for result in found)
+    assert one["confirmed"] and other["confirmed"] and one["criticality"] == other["criticality"] is not None
+    assert one["value"] == pytest.approx(other["value"], rel=1e-5)
+    assert one["crossing_speed"] == pytest.approx(other["crossing_speed"], rel=1e-3)
+    modes = load(LINE, keys, {"upstream.length": one["value"]}).modes(count=4).modes
+    assert min(abs(mode.growth_rate) for mode in modes) < 1e-5
+
+
+def test_map_over_the_length(tmp_path):
+    axes = {"map.x": "pressure=1 kPa:6 kPa:3:log", "map.y": "pipe_length=5:100:3:log"}
+    found = load(LIGHT, LINE, axes).map()
+    assert not found.failures and found.grid("certified").all()
+    (growth,) = found.grid("growth_rate")
+    leading = load(LIGHT, LINE, {"upstream.length": 100.0, "drive.pressure": 6e3}).modes(count=4).modes[0]
+    assert growth[-1, -1] == pytest.approx(leading.growth_rate, rel=1e-6)
+
+
+def test_sensitivity_to_the_length():
+    for line in (LINE, FRICTION):
+        (found,) = load(LIGHT, line).steady(pressure="6 kPa").sensitivity("pipe_length").sensitivities
+        low, high = (
+            load(LIGHT, line, {"upstream.length": 20.0 + step}).modes(count=4).modes[0].growth_rate
+            for step in (-0.02, 0.02)
+        )
+        assert found.growth_rate == pytest.approx((high - low) / 0.04, rel=1e-3)
+
+
+def test_a_case_without_a_line_has_no_length_to_change():
+    with pytest.raises(CaseError, match="no pipe_length to change.*upstream.length"):
+        load(LIGHT).onset("pipe_length=1:50:5:log")
