@@ -2,10 +2,10 @@
 
 det T(s) / det D_ref(s) with D_ref = s^2 M + s C_ref + K_ref, where M, C_ref, K_ref are
 symmetric and positive definite, so that D_ref has no zero on or right of the line (Kelvin,
-Tait, Chetaev). What relaxes of the stiffness is part of D_ref where its matrices are symmetric and
-not negative: springs and dashpots take energy out, and their poles lie left of the line. The ratio
-has no pole there and tends to a known power of s at infinity; its zeros right of
-the line are the eigenvalues counted, the structure's own among them.
+Tait, Chetaev). What relaxes of the stiffness is part of D_ref, with a multiple of M added where its
+matrices are not symmetric and not negative: springs and dashpots take energy out, and their poles
+lie left of the line. The ratio has no pole there and tends to a known power of s at infinity; its
+zeros right of the line are the eigenvalues counted, the structure's own among them.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import scipy.sparse as sp
 from .condensation import condensed_matrix
 from .factorization import SingularShiftError, StructureMatrices, SuperluFactorization, is_positive_definite, superlu
 from .pencil import CoupledPencil, real_apply
+from .relaxation import Relaxation
 
 #: Numbers at most in one stack of dense matrices.
 _STACK = 1_000_000
@@ -89,13 +90,16 @@ class Determinant:
         self._reference = tuple((part + shift * p.M).tocsr() for part, shift in zip(symmetric, shifts))
         difference = max(_gap(damping, self._reference[0]), _gap(stiffness, self._reference[1]))
         if self._relaxation is not None:
-            passive = all(_is_passive(matrix, p.M) for matrix in p.relaxing)
-            difference = difference if passive else np.inf
-            self._relaxation = self._relaxation if passive else None
+            passive = [_passive(matrix, p.M) for matrix in p.relaxing]
+            if any(a is not b for a, b in zip(passive, p.relaxing)):
+                difference = np.inf
+                self._relaxation = Relaxation(passive, self._relaxation.strengths, self._relaxation.times)
         self.structure_is_reference = difference < 1e-14
         if self._dense:
             self._parts = [x.toarray() for x in (p.M, p.C, p.K, *self._reference)]
-            self._relaxing = np.array([x.toarray() for x in p.relaxing]).reshape(-1, p.n, p.n)
+            self._relaxing = _stacked(p.relaxing, p.n)
+            reference = () if self._relaxation is None else self._relaxation.matrices
+            self._reference_relaxing = self._relaxing if self.structure_is_reference else _stacked(reference, p.n)
             self._G, self._J = p.G.toarray(), p.J.toarray()
             modal = p.n <= _MODAL_BELOW and p.relaxation is None
             self._modes = _StructureModes.of(*self._parts[:3], self._G, self._J) if modal else None
@@ -144,7 +148,7 @@ class Determinant:
         if not self._dense:
             return np.zeros(0, complex)
         if self._relaxation is not None:
-            return relaxed_zeros(*(self._parts[i] for i in (0, 3, 4)), self._relaxing, self._relaxation)
+            return relaxed_zeros(*(self._parts[i] for i in (0, 3, 4)), self._reference_relaxing, self._relaxation)
         values = self._every_reference_zero
         return values[values.imag > 0]
 
@@ -187,17 +191,13 @@ class Determinant:
             return H, total - np.log(z[:, None] - self._every_reference_zero).sum(axis=1)
         s = (self.line + z)[:, None, None]
         M, C, K, Cr, Kr = self._parts
-        D = s * s * M + s * C + K + self._relaxed(self.pencil.relaxation, self.line + z)
+        D = s * s * M + s * C + K + _relaxed(self.pencil.relaxation, self._relaxing, self.line + z)
         H = self._J @ np.linalg.solve(D, self._G[None].astype(complex))
         if self.structure_is_reference:
             return H, np.zeros(z.size)
-        reference = self._relaxed(self._relaxation, z)
+        reference = _relaxed(self._relaxation, self._reference_relaxing, z)
         z = z[:, None, None]
         return H, _log_determinant(D) - _log_determinant(z * z * M + z * Cr + Kr + reference)
-
-    def _relaxed(self, relaxation, s):
-        """sum phi_g K_g at a stack of places, shape (k, n, n); zero where nothing relaxes."""
-        return 0.0 if relaxation is None else np.tensordot(relaxation.factors(s).T, self._relaxing, 1)
 
     def _sparse_structure_at(self, z):
         p, s = self.pencil, self.line + z
@@ -246,14 +246,31 @@ def _first_order(M, C, K):
     return np.block([[np.zeros((n, n)), np.eye(n)], [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]])
 
 
-def _is_passive(matrix, mass) -> bool:
-    """Whether a relaxing stiffness is symmetric and not negative."""
-    size = abs(matrix).max() if matrix.nnz else 0.0
+def _passive(matrix, mass):
+    """A relaxing stiffness, or where it is not symmetric or gives energy away one near it that does neither.
+
+    Without it the reference of a wall that has no other damping would have its zeros on the line.
+    """
+    size = abs(matrix).max() / abs(mass).max() if matrix.nnz else 0.0
     if not size:
-        return True
-    if _gap(matrix, matrix.T) > 1e-12:
-        return False
-    return is_positive_definite(matrix + 1e-9 * size / abs(mass).max() * mass)
+        return matrix
+    symmetric = _gap(matrix, matrix.T) <= 1e-12
+    if symmetric and is_positive_definite(matrix + 1e-9 * size * mass):
+        return matrix
+    other = matrix if symmetric else ((matrix + matrix.T) * 0.5).tocsr()
+    for shift in size * 10.0 ** np.arange(-8, 5):
+        if is_positive_definite(other + shift * mass):
+            return (other + shift * mass).tocsr()
+    raise ValueError("No stable reference structure was found for the count.")
+
+
+def _stacked(matrices, n):
+    return np.array([x.toarray() for x in matrices]).reshape(-1, n, n)
+
+
+def _relaxed(relaxation, matrices, s):
+    """sum phi_g K_g at a stack of places, shape (k, n, n); zero where nothing relaxes."""
+    return 0.0 if relaxation is None else np.tensordot(relaxation.factors(s).T, matrices, 1)
 
 
 def relaxed_zeros(M, C, K, relaxing, relaxation, steps: int = 12):
