@@ -233,9 +233,8 @@ def test_a_relaxing_part_that_is_not_positive_is_counted_without_other_damping()
         part -= (np.linalg.eigvalsh(part)[0] + 0.05) * np.eye(10)  # lowest eigenvalue -0.05
         turn = np.zeros((10, 10))
         turn[0, 1], turn[1, 0] = push, -push
-        pencil = CoupledPencil(
-            np.eye(10), np.zeros((10, 10)), stiffness + turn, relaxation=Relaxation([part], [[0.3, 0.2]], [1.0, 0.05])
-        )
+        relaxation = Relaxation([1e6 * part], [[0.3, 0.2]], [1e-3, 5e-5])  # frequencies as of a valve, not of one
+        pencil = CoupledPencil(np.eye(10), np.zeros((10, 10)), 1e6 * (stiffness + turn), relaxation=relaxation)
         count = unstable_count(pencil)
         assert count.certain, count.notes
         assert count.number == int(np.sum(dense_eigenvalues(pencil).real > 0))
