@@ -20,6 +20,12 @@ from .winding import Count, unstable_count
 
 #: Largest accepted error of log det of the reduced basis behind a count.
 TRUSTED = 0.1
+#: Finer bases tried at most where the first one leaves a count open.
+FINER = 3
+#: Size below which directions of exact responses are left out of a finer basis, relative to the largest.
+DISTINCT = 1e-4
+#: Multiples of it, modulo one, fill an interval evenly and never repeat.
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 @dataclass(frozen=True)
@@ -96,19 +102,46 @@ def certified_spectrum(
     check_points : int
         Frequencies at which the basis is compared with the full pencil.
 
+    Notes
+    -----
+    Where the basis leaves the count open, it is made finer by the vectors of the spectrum, then by exact responses at
+    the frequencies of the check before, and compared at other frequencies each time.
+
     Returns
     -------
     CertifiedSpectrum
     """
     workspace = workspace or Workspace()
     spectrum = leading_modes(pencil, count, options, workspace=workspace)
-    small = pencil.n <= Determinant.dense_below
-    model, scale, hints = pencil, None, []
-    if not small:
+    if pencil.n > Determinant.dense_below:
         basis = basis or TransferBasis(pencil)
-        if pencil.relaxation is not None:
-            # shapes of modes change with the moduli along the frequency, which a basis of one frequency misses
-            basis = basis.enlarged(spectrum.q)
+    else:
+        basis = None
+    asked = pencil, options, workspace, exact, check_points
+    found, basis = _judged(*asked, spectrum, basis)
+    for finer in range(1, FINER + 1):
+        if found.agrees or exact or basis is None:
+            break
+        basis = _finer(pencil, basis, found, finer, check_points)
+        if basis.size > Determinant.dense_below:
+            break
+        found, basis = _judged(*asked, found.spectrum, basis, finer)
+    return found
+
+
+def _finer(pencil, basis, found, finer, number) -> TransferBasis:
+    """A basis that answers better than the one that left a count open."""
+    spectrum = found.spectrum
+    if finer == 1 and len(spectrum):  # a mode that is all but neutral has to be met to a fraction of its growth rate
+        return basis.enlarged(*(q for q in (spectrum.q, spectrum.left_q) if q is not None))
+    checked = _checks(spectrum, found.count, number, finer - 1, basis)
+    return basis.enlarged(*responses(pencil, checked), compression=DISTINCT)
+
+
+def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, finer=0):
+    """A spectrum beside a count, and the basis of the count; both may grow by what the count points to."""
+    model, scale, hints = pencil, None, []
+    if basis is not None:
         reduced = basis.reduced(pencil)
         scale = 2 * np.pi * (float(basis.structural_frequencies[0]) or 1.0)
         if exact:
@@ -146,13 +179,12 @@ def certified_spectrum(
             )
     listed = listed_unstable(spectrum, winding)
     error = None
-    if not small and not exact:
-        error = response_error(pencil, basis, _checks(spectrum, winding, check_points))
+    if model is not pencil:
+        error = response_error(pencil, basis, _checks(spectrum, winding, check_points, finer, basis))
     trusted = winding.certain and (error is None or error < TRUSTED)
     agrees = trusted and winding.number == listed
-    return CertifiedSpectrum(
-        spectrum, winding, agrees, listed, winding.number, error, _statement(spectrum, winding, listed, agrees, error)
-    )
+    statement = _statement(spectrum, winding, listed, agrees, error)
+    return CertifiedSpectrum(spectrum, winding, agrees, listed, winding.number, error, statement), basis
 
 
 def listed_unstable(spectrum: Spectrum, count: Count) -> int:
@@ -177,10 +209,28 @@ def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> 
     return worst
 
 
-def _checks(spectrum, winding, number):
-    """Frequencies to compare at: those of the leading modes, where the count is decided."""
-    frequencies = [f for f in spectrum.frequency if 0 < f <= winding.band][:number]
-    return frequencies or list(winding.frequencies[1:2])
+def responses(pencil: CoupledPencil, frequencies) -> list[np.ndarray]:
+    """Responses of the full structure to all forces, and of its transpose to all motions, at i 2 pi f; (n, m) each."""
+    structure = StructureMatrices(pencil)
+    factor, found = SuperluFactorization(structure), []
+    for f in frequencies:
+        factor.refactor(structure.values(2j * np.pi * float(f)).astype(complex))
+        found.append(factor.solve(pencil.G.toarray().astype(complex)))
+        found.append(factor.solve_transposed(pencil.J.toarray().T.astype(complex)))
+    return found
+
+
+def _checks(spectrum, winding, number, finer, basis):
+    """Frequencies to compare at: those of the leading modes, where the count is decided; for a finer basis, which is
+    made for those, others each time from somewhat below the list to somewhat above it.
+    """
+    listed = [f for f in spectrum.frequency if 0 < f <= winding.band]
+    if not finer:
+        return listed[:number] or list(winding.frequencies[1:2])
+    listed = listed or list(basis.structural_frequencies[basis.structural_frequencies > 0]) or winding.frequencies[1:2]
+    low, high = 0.7 * min(listed), min(1.4 * max(listed), winding.band)
+    places = (np.arange((finer - 1) * number, finer * number) + 1) * GOLDEN % 1.0
+    return list(low * (high / low) ** places)
 
 
 def _statement(spectrum, winding, listed, agrees, error):

@@ -2,10 +2,10 @@
 
 det T(s) / det D_ref(s) with D_ref = s^2 M + s C_ref + K_ref, where M, C_ref, K_ref are
 symmetric and positive definite, so that D_ref has no zero on or right of the line (Kelvin,
-Tait, Chetaev). What relaxes of the stiffness is part of D_ref with the part of its matrices that is
-not negative: springs and dashpots take energy out, and their poles lie left of the line. The ratio
-has no pole there and tends to a known power of s at infinity; its zeros right of
-the line are the eigenvalues counted, the structure's own among them.
+Tait, Chetaev). What relaxes of the stiffness is part of D_ref, with a multiple of M added where its
+matrices are not symmetric and not negative: springs and dashpots take energy out, and their poles
+lie left of the line. The ratio has no pole there and tends to a known power of s at infinity; its
+zeros right of the line are the eigenvalues counted, the structure's own among them.
 """
 
 from __future__ import annotations
@@ -90,18 +90,16 @@ class Determinant:
         self._reference = tuple((part + shift * p.M).tocsr() for part, shift in zip(symmetric, shifts))
         difference = max(_gap(damping, self._reference[0]), _gap(stiffness, self._reference[1]))
         if self._relaxation is not None:
-            parts = [_passive_part(matrix, p.M, self._dense) for matrix in p.relaxing]
-            if not all(a is b for a, b in zip(parts, p.relaxing)):
+            passive = [_passive(matrix, p.M) for matrix in p.relaxing]
+            if any(a is not b for a, b in zip(passive, p.relaxing)):
                 difference = np.inf
-                if not self._dense:  # what is left out would have damped
-                    unit = np.sqrt(np.median(np.abs(stiffness.diagonal())) / np.median(p.M.diagonal()))
-                    self._reference = (self._reference[0] + 0.05 * unit * p.M).tocsr(), self._reference[1]
-            self._relaxation = Relaxation(parts, self._relaxation.strengths, self._relaxation.times)
+                self._relaxation = Relaxation(passive, self._relaxation.strengths, self._relaxation.times)
         self.structure_is_reference = difference < 1e-14
         if self._dense:
             self._parts = [x.toarray() for x in (p.M, p.C, p.K, *self._reference)]
-            self._relaxing = _stacked(p.relaxation)
-            self._reference_relaxing = _stacked(self._relaxation)
+            self._relaxing = _stacked(p.relaxing, p.n)
+            reference = () if self._relaxation is None else self._relaxation.matrices
+            self._reference_relaxing = self._relaxing if self.structure_is_reference else _stacked(reference, p.n)
             self._G, self._J = p.G.toarray(), p.J.toarray()
             modal = p.n <= _MODAL_BELOW and p.relaxation is None
             self._modes = _StructureModes.of(*self._parts[:3], self._G, self._J) if modal else None
@@ -248,27 +246,31 @@ def _first_order(M, C, K):
     return np.block([[np.zeros((n, n)), np.eye(n)], [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]])
 
 
-def _stacked(relaxation):
-    """Matrices of a relaxation, shape (g, n, n)."""
-    return None if relaxation is None else np.array([m.toarray() for m in relaxation.matrices])
+def _passive(matrix, mass):
+    """A relaxing stiffness, or where it is not symmetric or gives energy away one near it that does neither.
+
+    Without it the reference of a wall that has no other damping would have its zeros on the line.
+    """
+    size = abs(matrix).max() / abs(mass).max() if matrix.nnz else 0.0
+    if not size:
+        return matrix
+    symmetric = _gap(matrix, matrix.T) <= 1e-12
+    if symmetric and is_positive_definite(matrix + 1e-9 * size * mass):
+        return matrix
+    other = matrix if symmetric else ((matrix + matrix.T) * 0.5).tocsr()
+    for shift in size * 10.0 ** np.arange(-8, 5):
+        if is_positive_definite(other + shift * mass):
+            return (other + shift * mass).tocsr()
+    raise ValueError("No stable reference structure was found for the count.")
+
+
+def _stacked(matrices, n):
+    return np.array([x.toarray() for x in matrices]).reshape(-1, n, n)
 
 
 def _relaxed(relaxation, matrices, s):
     """sum phi_g K_g at a stack of places, shape (k, n, n); zero where nothing relaxes."""
     return 0.0 if relaxation is None else np.tensordot(relaxation.factors(s).T, matrices, 1)
-
-
-def _passive_part(matrix, mass, dense):
-    """A relaxing stiffness itself where it is symmetric and not negative, else its part that is; none if sparse."""
-    size = abs(matrix).max() if matrix.nnz else 0.0
-    if not size:
-        return matrix
-    if _gap(matrix, matrix.T) < 1e-12 and is_positive_definite(matrix + 1e-9 * size / abs(mass).max() * mass):
-        return matrix
-    if not dense:
-        return 0.0 * matrix
-    values, vectors = la.eigh(0.5 * (matrix + matrix.T).toarray())
-    return (vectors * np.maximum(values, 0.0)) @ vectors.T
 
 
 def relaxed_zeros(M, C, K, relaxing, relaxation, steps: int = 12):

@@ -241,3 +241,20 @@ def test_an_eigenvalue_at_zero_is_said_and_ends_the_refinement():
     assert not count.certain
     assert count.evaluations < 500
     assert any("on the line" in note for note in count.notes)
+
+
+def test_a_relaxing_part_that_is_not_positive_is_counted_without_other_damping():
+    """The reference has to be damped all the same, or its zeros lie on the line."""
+    rng = np.random.default_rng(5)
+    stiffness = np.diag(np.linspace(1.0, 8.0, 10) ** 2)
+    for push in (0.0, 0.5, 3.0):
+        root = rng.standard_normal((10, 10))
+        part = 0.1 * root @ root.T
+        part -= (np.linalg.eigvalsh(part)[0] + 0.05) * np.eye(10)  # lowest eigenvalue -0.05
+        turn = np.zeros((10, 10))
+        turn[0, 1], turn[1, 0] = push, -push
+        relaxation = Relaxation([1e6 * part], [[0.3, 0.2]], [1e-3, 5e-5])  # frequencies as of a valve, not of one
+        pencil = CoupledPencil(np.eye(10), np.zeros((10, 10)), 1e6 * (stiffness + turn), relaxation=relaxation)
+        count = unstable_count(pencil)
+        assert count.certain, count.notes
+        assert count.number == int(np.sum(dense_eigenvalues(pencil).real > 0))

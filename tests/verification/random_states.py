@@ -6,14 +6,18 @@ Equilibria depend on the pressure alone, so a few dozen pressures carry thousand
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dbvfiv.materials import Prony, fit_constant
 from dbvfiv.model import Conditions, LinearisedState, ValveModel, linearise
 from dbvfiv.model.equilibria import LoadPath
+from dbvfiv.model.relaxing import WallRelaxation
 from dbvfiv.studies.case import Case
-from eigen import CoupledPencil
+from eigen import CoupledPencil, Relaxation
+
+LARGEST_LOSS = 2.0
 
 
 @dataclass(frozen=True)
@@ -28,22 +32,27 @@ class RandomState:
     conditions : Conditions
     storage : float
         Blend of the continuity laws, 0 quasi-steady to 1 storage.
+    relaxation : Relaxation or None
+        What relaxes of the wall, where it is not as the model of the steady state has it.
     """
 
     number: int
     linear: LinearisedState
     conditions: Conditions
     storage: float
+    relaxation: Relaxation | None = None
 
     @property
     def pencil(self) -> CoupledPencil:
-        return self.linear.pencil(self.conditions, storage=self.storage)
+        elastic = replace(self.conditions, loss_factor=0.0)
+        pencil = self.linear.pencil(elastic, storage=self.storage)
+        return pencil if self.relaxation is None else pencil.replace(relaxation=self.relaxation)
 
     def __str__(self) -> str:
-        c = self.conditions
+        c, branches = self.conditions, 0 if self.relaxation is None else self.relaxation.branches
         return (
             f"state {self.number}: {self.linear.inlet:.5g} Pa, {c.density:.4g} kg/m3, alpha {c.alpha:.4g} 1/s, "
-            f"beta {c.beta:.4g} s, storage {self.storage:.3g}"
+            f"beta {c.beta:.4g} s, storage {self.storage:.3g}, loss factor {c.loss_factor:.3g} with {branches} times"
         )
 
 
@@ -79,3 +88,34 @@ def random_states(states: list[LinearisedState], number: int, seed: int) -> Iter
         )
         storage = 0.0 if kind[2] < 0.3 else 1.0 if kind[2] < 0.65 else float(blend)
         yield RandomState(i, states[int(place * len(states))], conditions, storage)
+
+
+def relaxing_states(states: list[LinearisedState], number: int, seed: int) -> Iterator[RandomState]:
+    """States with random conditions whose materials relax, each by a series of its own.
+
+    Densities, alpha and laws as in `random_states`, without beta. Of the materials some are elastic, most have a
+    constant loss factor up to 0.5, fitted over a common random band of 1 to 3 decades by 2 to 6 branches, and some
+    have times of their own. The factor on all of them is 0, 1 or any up to 3, as far as no loss factor exceeds 2.
+    """
+    rng = np.random.default_rng([seed, 3])
+    for state in random_states(states, number, seed):
+        low = 10.0 ** rng.uniform(-1, 1.3)
+        band, branches = (low, low * 10.0 ** rng.uniform(1, 3)), int(rng.integers(2, 7))
+        groups = state.linear.model.relaxation.groups
+        groups = tuple(replace(group, series=_random_series(rng, band, branches)) for group in groups)
+        kind, factor = rng.random(), rng.uniform(0, 3)
+        wanted = 0.0 if kind < 0.05 else 1.0 if kind < 0.35 else factor
+        at = np.geomspace(1e-4, 1e6, 400)
+        factor = min(wanted, LARGEST_LOSS / max(group.series.loss_factor(at).max() for group in groups))
+        relaxation = WallRelaxation(groups).stiffness(factor, lambda: state.linear.relaxing)
+        conditions = replace(state.conditions, beta=0.0, loss_factor=factor)
+        yield replace(state, conditions=conditions, relaxation=relaxation)
+
+
+def _random_series(rng, band: tuple[float, float], branches: int) -> Prony:
+    """Elastic, of a constant loss factor over a band, or with any strengths and times."""
+    kind, loss, own = rng.random(), rng.uniform(0, 0.5), int(rng.integers(1, 4))
+    strengths, times = 10.0 ** rng.uniform(-2, 0.5, own), 10.0 ** rng.uniform(-5, 1, own)
+    if kind < 0.1:
+        return Prony((0.0,), (1.0,))
+    return fit_constant(loss, band, branches).prony if kind < 0.8 else Prony(tuple(strengths), tuple(times))

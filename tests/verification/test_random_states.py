@@ -10,10 +10,17 @@ import numpy as np
 import pytest
 
 from dbvfiv.model import select_search
-from eigen import CertifiedSpectrum, SearchOptions, TransferBasis, certified_spectrum
+from eigen import CertifiedSpectrum, SearchOptions, TransferBasis, certified_spectrum, unstable_count
+from eigen.creep import apart_from_creep
 from eigen.dense import all_eigenvalues
 from eigen.residual import acceptable
-from tests.verification.random_states import RandomState, linearised_states, random_pressures, random_states
+from tests.verification.random_states import (
+    RandomState,
+    linearised_states,
+    random_pressures,
+    random_states,
+    relaxing_states,
+)
 
 COUNT = 10
 
@@ -40,8 +47,22 @@ def examined(around: int, along: int, number: int, seed: int, pressures: int) ->
     return out
 
 
-def judge(results: list[Examined], exact_every: int) -> None:
-    """Everything that is asked of a sample."""
+def examined_relaxing(around: int, along: int, number: int, seed: int, pressures: int) -> list[Examined]:
+    """The same of walls that relax, each with a basis of its own."""
+    changes = {"damping.model": "loss factor"}
+    states = linearised_states(around, along, random_pressures(pressures, seed), **changes)
+    out = []
+    for state in relaxing_states(states, number, seed):
+        pencil = state.pencil
+        basis = TransferBasis(pencil)
+        lowest = basis.structural_frequencies
+        search = select_search(SearchOptions(), state.conditions, lambda n, known=lowest: known[:n], COUNT)
+        out.append(Examined(state, certified_spectrum(pencil, COUNT, search.options, basis=basis)))
+    return out
+
+
+def judge(results: list[Examined], exact_every: int, exact=None) -> None:
+    """Everything that is asked of a sample; `exact` holds some of them against another solution."""
     work = np.array([r.certified.spectrum.applications for r in results])
     points = np.array([r.certified.count.evaluations for r in results])
     open_ends = [r for r in results if not r.certified.agrees]
@@ -62,7 +83,7 @@ def judge(results: list[Examined], exact_every: int) -> None:
         # strong damping may leave no mode right of the limit point, which is said
         assert len(spectrum) or (spectrum.notes and r.certified.agrees and not r.certified.unstable_count), str(r.state)
     for r in results[::exact_every]:
-        against_all_eigenvalues(r)
+        (exact or against_all_eigenvalues)(r)
 
 
 def against_all_eigenvalues(result: Examined) -> None:
@@ -81,6 +102,22 @@ def against_all_eigenvalues(result: Examined) -> None:
         assert result.certified.unstable_count == np.where(there.imag > 0, 2, 1).sum(), str(result.state)
 
 
+def against_all_that_relaxes(result: Examined) -> None:
+    """The same where real eigenvalues crowd: what is listed exists, and nothing that was looked for is missing."""
+    pencil, (spectrum, count) = result.state.pencil, (result.certified.spectrum, result.certified.count)
+    every = all_eigenvalues(pencil)
+    for value in spectrum.eigenvalues:
+        assert np.abs(every - value).min() < 1e-6 * abs(value), str(result.state)
+    seen = apart_from_creep(pencil, every) & (every.imag <= 2 * np.pi * spectrum.band)
+    seen &= (every.imag >= spectrum.region.lowest) & (-every.real <= spectrum.region.slope * every.imag)
+    last = spectrum.growth_rate[-1] if len(spectrum) >= spectrum.asked else -np.inf
+    seen &= every.real > max(last, spectrum.complete_above) + 1e-6 * np.abs(every)
+    for value in every[seen]:
+        assert np.abs(spectrum.eigenvalues - value).min() < 1e-6 * abs(value), f"{result.state}: {value} is missing"
+    there = every[(every.real > count.line) & (every.imag <= 2 * np.pi * count.band)]
+    assert result.certified.unstable_count_independent == np.where(there.imag > 0, 2, 1).sum(), str(result.state)
+
+
 def test_three_hundred_random_states():
     judge(examined(8, 14, 300, seed=0, pressures=20), exact_every=60)
 
@@ -91,3 +128,28 @@ def test_three_hundred_random_states():
 )
 def test_many_random_states(around, along, number, seed):
     judge(examined(around, along, number, seed, pressures=60), exact_every=200)
+
+
+def against_the_full_pencil(result: Examined) -> None:
+    """The number of unstable modes by the argument principle on the full pencil, without a basis."""
+    spectrum, count = result.certified.spectrum, result.certified.count
+    band = count.band if np.isfinite(count.band) else None
+    full = unstable_count(result.state.pencil, band=band, line=count.line, hints=spectrum.eigenvalues, max_points=1500)
+    assert full.certain, f"{result.state}: {full.notes}"
+    assert full.number == result.certified.unstable_count_independent, str(result.state)
+
+
+def test_a_hundred_random_states_that_relax():
+    judge(examined_relaxing(8, 14, 100, seed=0, pressures=12), exact_every=25, exact=against_the_full_pencil)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("around", "along", "number", "seed"), [(8, 14, 1400, 11), (11, 19, 350, 12), (14, 24, 250, 13)]
+)
+def test_many_random_states_that_relax(around, along, number, seed):
+    results = examined_relaxing(around, along, number, seed, pressures=60)
+    judge(results, exact_every=50, exact=against_the_full_pencil)
+    few = [r for r in results if r.state.pencil.branches in (2, 3)]  # dense solutions of a few thousand unknowns
+    for r in few[:: max(1, len(few) // 5)] if around == 8 else ():
+        against_all_that_relaxes(r)
