@@ -148,18 +148,10 @@ def hopf_normal_form(system, u, mu, omega, q, p, parameter: str | None = None) -
     def third(a, sa, b, sb, c, sc):
         return d.d3(a, b, c) - d.mass_d2(sa * a, b, c) - d.mass_d2(sb * b, a, c) - d.mass_d2(sc * c, a, b)
 
-    conj = q.conj()
-    h20 = -linear.shifted(2 * s).solve(second(q, s, q, s))
-    h11 = -linear.solve(second(q, s, conj, -s).real)
-    terms = (
-        second(q, s, h11.astype(complex), 0.0),
-        0.5 * second(conj, -s, h20, 2 * s),
-        0.5 * third(q, s, q, s, conj, -s),
-    )
-    parts = [complex(np.vdot(p, term)) for term in terms]
-    c1 = sum(parts)
-    size = sum(map(abs, parts))
-    cancellation = abs(c1.real) / size if size > 0 else 0.0
+    def solve(shift, rhs):
+        return linear.shifted(shift).solve(rhs) if shift else linear.solve(rhs)
+
+    c1, h20, h11, cancellation = cubic_coefficient(second, third, solve, q, p, s)
     crossing = None
     if parameter is not None:
         du = -linear.solve(system.d_parameter(u, mu, parameter))
@@ -178,6 +170,41 @@ def hopf_normal_form(system, u, mu, omega, q, p, parameter: str | None = None) -
         crossing,
         cancellation,
     )
+
+
+def cubic_coefficient(second, third, solve, q, p, s):
+    """Cubic coefficient at a Hopf point from what a system makes of motions ``a exp(sa t)``.
+
+    Parameters
+    ----------
+    second, third : callable
+        Forms ``second(a, sa, b, sb)`` and ``third(a, sa, b, sb, c, sc)`` of ``L(s) a + N = 0``.
+    solve : callable
+        ``solve(s, rhs)``, the solution with ``L(s)``; real for ``s = 0``.
+    q, p : ndarray, complex, shape (n,)
+        ``L(s) q = 0``, ``p* L(s) = 0``, ``p* L'(s) q = -1``.
+    s : complex
+        ``i omega``.
+
+    Returns
+    -------
+    c1 : complex
+    h20, h11 : ndarray, shape (n,)
+    cancellation : float
+        See `HopfNormalForm`.
+    """
+    conj = q.conj()
+    h20 = -solve(2 * s, second(q, s, q, s))
+    h11 = -solve(0.0, second(q, s, conj, -s).real)
+    terms = (
+        second(q, s, h11.astype(complex), 0.0),
+        0.5 * second(conj, -s, h20, 2 * s),
+        0.5 * third(q, s, q, s, conj, -s),
+    )
+    parts = [complex(np.vdot(p, term)) for term in terms]
+    c1 = sum(parts)
+    size = sum(map(abs, parts))
+    return c1, h20, h11, abs(c1.real) / size if size > 0 else 0.0
 
 
 def fold_coefficient(system, u, mu, v, w) -> float:

@@ -106,6 +106,12 @@ class AnalyticResidual:
         )
         return out
 
+    def remainder_form(self, motion, parameters, *directions) -> np.ndarray:
+        """Directional derivative (n + l,), along two or three motions, of all but the structure's own force."""
+        self._check_at_rest(motion)
+        motion, parameters = self._shaped(motion), self._given(parameters)
+        return np.array(_form_of_remainder(motion, parameters, tuple(map(self._shaped, directions)), self._arrays))
+
     def parameter_slope(self, motion, parameters, name: str) -> np.ndarray:
         """Derivative (n + l,) with respect to a parameter, at v = 0."""
         self._check_at_rest(motion)

@@ -7,7 +7,8 @@ pressure, fluid density, the blend of the continuity laws), Rayleigh alpha and b
 design parameter, for which the model is built anew.
 
 With `loss_factor` among mu the wall relaxes. What u leaves out, its memory, changes neither equilibria nor their
-derivatives, and spectra hold it; motions are refused.
+derivatives, and spectra hold it; motions are refused, and `memory_forms` has the forms of motions that grow at given
+rates.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ CONDITIONS = ("inlet", "density", "storage", "pipe_length", *DAMPING, "loss_fact
 
 _MEMORY = (
     "A wall that relaxes remembers, and a state of displacements, velocities and flow does not hold its memory, so "
-    "there are equilibria and spectra with loss factors but no normal forms and no orbits."
+    "there are equilibria, spectra and normal forms of onsets with loss factors but no orbits."
 )
 
 
@@ -328,7 +329,7 @@ class ValveLinearisation:
         return self._zero().solve_transpose(rhs)
 
 
-def _factored(pencil: CoupledPencil, shift: complex):
+def factored(pencil: CoupledPencil, shift: complex):
     """LU at a shift, a hair beside it where an eigenvalue sits on it to rounding: products use the exact shift, so
     bordered solves refine themselves.
     """
@@ -348,7 +349,7 @@ class _Shifted:
         if shift and linear.pencil.branches:
             raise SolveError(_MEMORY)
         self.linear, self.shift = linear, shift
-        self._factor = _factored(linear.pencil, shift)
+        self._factor = factored(linear.pencil, shift)
 
     def matvec(self, x):
         return self.linear.matvec(x) - self.shift * self.linear.mass_matvec(x)

@@ -87,8 +87,17 @@ def local_strains(unknowns, element, layers, metric):
     ----------
     unknowns : (4, 5) displacements and rotations of the nodes
     """
+    return strains_of_shape(*shape(unknowns, element), element, layers, metric)
+
+
+def shape(unknowns, element):
+    """Positions and directors (4, 3) of the nodes."""
     d = jax.vmap(director)(unknowns[:, 3:], element["director"], element["frame"])
-    x = element["x"] + unknowns[:, :3]
+    return element["x"] + unknowns[:, :3], d
+
+
+def strains_of_shape(x, d, element, layers, metric):
+    """`local_strains` from positions and directors (4, 3) of the nodes; but for a constant a quadratic form of them."""
     basis = jnp.einsum("pac,ai->pci", SLOPE, x)
     turn = jnp.einsum("pac,ai->pci", SLOPE, d)
     c0 = _voigt(basis, basis, 0.5) - element["m0"]
@@ -166,10 +175,10 @@ def element_energy(kinds, metric, unknowns, element, layers):
     element, layers : dict of arrays, see `element_arrays` and `section_arrays`
     """
     strains = material_strains(local_strains(unknowns, element, layers, metric), layers)
-    return jnp.sum(_point_volumes(metric, element, layers) * point_energies(kinds, layers["parameters"], strains))
+    return jnp.sum(point_volumes(metric, element, layers) * point_energies(kinds, layers["parameters"], strains))
 
 
-def _point_volumes(metric, element, layers):
+def point_volumes(metric, element, layers):
     """Volumes (4, np) that the layer points of one element stand for, m3."""
     weight = element["h"] * element["area"][:, None] * layers["weight"]
     return weight * element["mu"] if metric == TRUE_METRIC else weight
@@ -183,7 +192,7 @@ def material_part(kinds, metric, unknowns, element, layers):
         lambda u: material_strains(local_strains(u, element, layers, metric), layers), unknowns
     )
     slope = jax.vmap(back)(jnp.eye(20).reshape(20, 4, 5))
-    weight = _point_volumes(metric, element, layers)
+    weight = point_volumes(metric, element, layers)
 
     def stress(e):
         return jax.grad(lambda x: jnp.sum(weight * point_energies(kinds, layers["parameters"], x)))(e)

@@ -12,6 +12,7 @@ from .kernel import shell_force, shell_tangent
 from .mass import assemble_mass, convective_inertia, mass_integrals
 from .mesh import ShellMesh
 from .reference import reference_geometry, thickness_over_radius
+from .relaxed_forms import relaxed_force_form
 from .rotation import director_derivatives
 from .section import Section
 from .supports import DofMap
@@ -159,6 +160,21 @@ class Shell:
     def third(self, q, a, b, c) -> np.ndarray:
         """Third directional derivative (n,) of the internal force along a, b and c (n,)."""
         return self._scatter(np.asarray(self.energies.third(*map(self._element_unknowns, (q, a, b, c)))))
+
+    def relaxed_form(self, q, directions, factors) -> np.ndarray:
+        """Derivative (n,), complex, of the internal force of a wall that relaxes, along k directions (n,).
+
+        Parameters
+        ----------
+        q : (n,) array
+        directions : sequence of k complex (n,) arrays
+        factors : (2**k, nl) complex array
+            On the stress of each layer that belongs to each set of directions, see `relaxed_forms`; ones give
+            `second` and `third`.
+        """
+        fields = [self.dofs.expand(np.asarray(x))[self.mesh.quads] for x in directions]
+        form = relaxed_force_form(self.energies, self._element_unknowns(q), fields, np.asarray(factors))
+        return self._scatter(form.real) + 1j * self._scatter(form.imag)
 
     def strains(self, q: np.ndarray) -> np.ndarray:
         """Green-Lagrange strains (ne, 4, np, 5) in layer axes at all integration points."""

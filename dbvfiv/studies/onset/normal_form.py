@@ -8,10 +8,12 @@ import numpy as np
 
 from continuation import ContinuationError
 from continuation.hopf import hopf_borders
+from continuation.memory import hopf_normal_form_with_memory
 from continuation.normal_form import hopf_normal_form
 
 from ...case.parameters import PARAMETERS
 from ...errors import SolveError
+from ...model.memory_forms import ValveMemoryForms
 from ...model.system import ValveSystem
 from ..case import Case
 from ..stability.place import Place, rebuilder
@@ -48,11 +50,15 @@ def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: 
     ContinuationError
         If the eigenvalue is not simple.
     """
-    system = system_of(case, walk, place)
     mu = place.mu()
-    u = system.state(walk.equilibrium(place), mu)
     omega = abs(complex(mode.eigenvalue).imag)
+    name = PARAMETERS[parameter].system_name or None if parameter else None
+    system = system_of(case, walk, place)
+    model = system.model(mu)
+    if place.loss_factor and model.relaxation.groups:
+        forms = ValveMemoryForms(model, walk.equilibrium(place), mu)
+        return hopf_normal_form_with_memory(forms, omega, np.concatenate([mode.q, mode.u]), name)
+    u = system.state(walk.equilibrium(place), mu)
     vector = np.concatenate([mode.q, 1j * omega * mode.q, mode.u])
     left, right = hopf_borders(system.linear(u, mu), omega, vector / np.linalg.norm(vector))
-    name = PARAMETERS[parameter].system_name or None if parameter else None
     return hopf_normal_form(system, u, mu, omega, right, left, name)

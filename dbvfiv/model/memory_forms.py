@@ -1,0 +1,184 @@
+"""The valve's residual for motions that grow at given rates, a wall that relaxes included.
+
+What a wall remembers of a motion exp(s t) is known from s, so no unknowns are needed for it: displacements q and the
+flow's unknowns U have velocities s q, accelerations s^2 q and rates s U, and the stress of a layer its factor r(s).
+Steady stresses, pressures and lip stops do not relax.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from continuation.memory import Motion
+from continuation.multilinear import expand
+from eigen import CoupledPencil
+from eigen.pencil import real_apply
+
+from .analytic import AnalyticResidual
+from .system import factored, pencil_at
+from .valve import ValveModel
+
+#: Relative step of central differences by the factor on loss factors.
+_STEP = 1e-4
+
+
+class ValveMemoryForms:
+    """`continuation.memory.MemoryForms` of a steady valve: vectors are (q, U), (n + l,), states (q, v, U).
+
+    Parameters
+    ----------
+    model : ValveModel
+    q : (n,) array
+        Displacements of the steady state.
+    mu : mapping
+        Parameters of a `ValveSystem`, `loss_factor` among them where the wall relaxes.
+    """
+
+    def __init__(self, model: ValveModel, q: np.ndarray, mu: Mapping[str, float]):
+        self.model, self.q, self.mu = model, np.asarray(q, float), dict(mu)
+        self._analytic = AnalyticResidual(model)
+        inner = model.flow.steady_inner(model.rows.areas(model.nodal(self.q)), self.mu)
+        zero = np.zeros(model.size)
+        self._motion = (self.q, zero, zero, inner, np.zeros_like(inner))
+        self._values = model.flow.values(self.mu) | {name: float(self.mu[name]) for name in ("alpha", "beta")}
+        self._coupled = pencil_at(model, self.q, inner, self.mu)
+        self._pencils: dict[complex, PencilAt] = {}
+        self.rest = np.concatenate([self.q, zero, inner])
+
+    def pencil(self, s: complex) -> PencilAt:
+        """T(s); those asked for are kept."""
+        if s not in self._pencils:
+            self._pencils[s] = PencilAt(self._coupled, s)
+        return self._pencils[s]
+
+    def slope(self, motion: Motion) -> np.ndarray:
+        """T'(s) x, complex (n + l,)."""
+        return slope_of(self._coupled, motion.rate, motion.vector)
+
+    def state(self, motion: Motion) -> np.ndarray:
+        """Displacements, velocities and flow unknowns (2 n + l,)."""
+        n = self.model.size
+        q, inner = motion.vector[:n], motion.vector[n:]
+        return np.concatenate([q, motion.rate * q, inner])
+
+    def second(self, a: Motion, b: Motion) -> np.ndarray:
+        """Second form of the residual, complex (n + l,)."""
+        return self._form(a, b)
+
+    def third(self, a: Motion, b: Motion, c: Motion) -> np.ndarray:
+        """Third form of the residual, complex (n + l,)."""
+        return self._form(a, b, c)
+
+    def parameter_slope(self, name: str) -> np.ndarray:
+        """Derivative (n + l,) of the residual by a parameter; what relaxes has none at rest."""
+        if name == "loss_factor":
+            return np.zeros(self.model.size + self.model.flow.inner)
+        return self._analytic.parameter_slope(self._motion, self._values, name)
+
+    def mixed(self, motion: Motion, name: str) -> np.ndarray:
+        """Derivative of T(s) x, complex (n + l,), by a parameter."""
+        if name != "loss_factor":
+            form = lambda x: self._analytic.mixed(self._motion, self._values, self._split(x), name)  # noqa: E731
+            return expand(form, self._joined(motion))
+        factor, n = self.mu["loss_factor"], self.model.size
+        above, below = (self._relaxed(motion.rate, factor * (1 + sign * _STEP)) for sign in (1, -1))
+        slopes = (above - below) / (2 * _STEP * factor)
+        force = sum(x * real_apply(k, motion.vector[:n]) for x, k in zip(slopes, self._coupled.relaxing))
+        return np.concatenate([force, np.zeros(self.model.flow.inner)])
+
+    def _relaxed(self, s: complex, factor: float) -> np.ndarray:
+        """phi_g(s) (g,)."""
+        return np.array([group.series.scaled(factor).modulus(s) - 1.0 for group in self.model.relaxation.groups])
+
+    # -- forms
+    # ----
+
+    def _form(self, *motions: Motion) -> np.ndarray:
+        remainder = lambda *x: self._analytic.remainder_form(self._motion, self._values, *map(self._split, x))  # noqa: E731
+        out = expand(remainder, *map(self._joined, motions)).astype(complex)
+        n, rates = self.model.size, [motion.rate for motion in motions]
+        # beta damps with the tangent of the unrelaxed wall, so its force is the rate of the elastic one
+        factors = self._factors(rates) + self._values["beta"] * sum(rates)
+        out[:n] += self.model.shell.relaxed_form(self.q, [motion.vector[:n] for motion in motions], factors)
+        return out
+
+    def _factors(self, rates) -> np.ndarray:
+        """(2**k, nl): r(s) of each layer for the sum s of each set of rates, see `Shell.relaxed_form`."""
+        sums = [
+            sum(s for s, there in zip(reversed(rates), chosen) if there)
+            for chosen in product((0, 1), repeat=len(rates))
+        ]
+        factors = np.ones((len(sums), len(self.model.shell.section.layers)), complex)
+        relaxation = self._coupled.relaxation
+        if relaxation is not None:
+            for group, relaxed in zip(self.model.relaxation.groups, relaxation.factors(sums)):
+                factors[:, list(group.layers)] += relaxed[:, None]
+        return factors
+
+    def _joined(self, motion: Motion) -> np.ndarray:
+        """Displacements, velocities, accelerations, flow unknowns and their rates (3 n + 2 l,)."""
+        n, s = self.model.size, motion.rate
+        q, inner = motion.vector[:n], motion.vector[n:]
+        return np.concatenate([q, s * q, s * s * q, inner, s * inner])
+
+    def _split(self, joined: np.ndarray) -> tuple:
+        n, inner = self.model.size, self.model.flow.inner
+        return tuple(np.split(joined, [n, 2 * n, 3 * n, 3 * n + inner]))
+
+
+def slope_of(pencil: CoupledPencil, s: complex, x: np.ndarray) -> np.ndarray:
+    """T'(s) x (n + b,) of a pencil, what relaxes included."""
+    q, u = x[: pencil.n], x[pencil.n :]
+    y = real_apply(pencil.J, q)
+    force = 2 * s * real_apply(pencil.M, q) + real_apply(pencil.C, q)
+    force = force - real_apply(pencil.G, pencil.A1 @ y + 2 * s * (pencil.A2 @ y) + pencil.B1 @ u)
+    if pencil.relaxation is not None:
+        force = force + sum(f * real_apply(k, q) for f, k in zip(pencil.relaxation.slopes(s), pencil.relaxing))
+    return np.concatenate([force, pencil.R1 @ y + 2 * s * (pencil.R2 @ y) + pencil.S1 @ u])
+
+
+class PencilAt:
+    """T(s) of a coupled pencil as products and solves in (q, U).
+
+    Parameters
+    ----------
+    pencil : CoupledPencil
+    s : complex
+    """
+
+    def __init__(self, pencil: CoupledPencil, s: complex):
+        self.pencil, self.s = pencil, s
+        self.size = pencil.n + pencil.b
+
+    @cached_property
+    def _factor(self):
+        return factored(self.pencil, self.s)
+
+    def matvec(self, x):
+        n = self.pencil.n
+        structure, fluid = self.pencil.terms(self.s, x[:n], x[n:])
+        return np.concatenate([sum(structure), sum(fluid)])
+
+    def rmatvec(self, x):
+        p, s = self.pencil, self.s
+        w, c = x[: p.n], x[p.n :]
+        A, B, R, S = p.fluid_at(s)
+        t = real_apply(p.G.T.tocsr(), w)
+        force = s * s * real_apply(p.M.T.tocsr(), w) + s * real_apply(p.C.T.tocsr(), w) + real_apply(p.K.T.tocsr(), w)
+        if p.relaxation is not None:
+            factors = p.relaxation.factors(s)
+            force = force + sum(f * real_apply(k.T.tocsr(), w) for f, k in zip(factors, p.relaxing))
+        force = force + real_apply(p.J.T.tocsr(), R.T @ c - A.T @ t)
+        return np.concatenate([force, S.T @ c - B.T @ t])
+
+    def solve(self, rhs):
+        n = self.pencil.n
+        return np.concatenate(self._factor.solve(rhs[:n], rhs[n:]))
+
+    def solve_transpose(self, rhs):
+        n = self.pencil.n
+        return np.concatenate(self._factor.solve_transposed(rhs[:n], rhs[n:]))
