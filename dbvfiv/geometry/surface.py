@@ -32,9 +32,19 @@ class Surface:
         return np.array([profile.z for profile in self.profiles])
 
     def section(self, z: float, s: np.ndarray) -> np.ndarray:
-        """Points (k, 3) of the section at the axial position z and normalised arc lengths s (k,)."""
+        """Points (k, 3) of the section at the axial position z, normalised arc lengths s (k,).
+
+        Raises
+        ------
+        ValueError
+            If two profiles lie at one place.
+        """
         breaks = self.breaks
         i = int(np.clip(np.searchsorted(breaks, z, side="right") - 1, 0, len(breaks) - 2))
+        if not breaks[i + 1] > breaks[i]:
+            raise ValueError(
+                f"Two sections of the valve lie at z = {breaks[i]:g} m: one length is nothing beside the rest."
+            )
         share = (z - breaks[i]) / (breaks[i + 1] - breaks[i])
         if self.smooth:
             share = share**2 * (3 - 2 * share)
