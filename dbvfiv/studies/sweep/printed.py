@@ -45,10 +45,8 @@ def crossing_line(result: SweepResult, crossing: Crossing) -> str:
     shown = PARAMETERS[result.parameter]
     becomes = "unstable" if crossing.to_unstable else "stable"
     how = f"at {crossing.frequency:.4g} Hz" if crossing.frequency > 0 else "without oscillation"
-    return (
-        f"Branch {crossing.branch} becomes {becomes} near {result.parameter} "
-        f"{crossing.value / shown.scale:.4g} {shown.shown_unit} {how} (interpolated)."
-    )
+    place = f"{crossing.value / shown.scale:.4g} {shown.shown_unit}".rstrip()
+    return f"Branch {crossing.branch} becomes {becomes} near {result.parameter} {place} {how} (interpolated)."
 
 
 def _row(value: float, growth: float, frequency: float, unstable: int) -> str:
