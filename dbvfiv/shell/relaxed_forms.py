@@ -92,7 +92,7 @@ def _products(form, left, right, count):
     stacked = lambda parts, rows: jax.tree.map(lambda *x: jnp.stack(x)[rows], *parts)  # noqa: E731
     values = jax.vmap(form)(stacked(left, pairs[:, 1]), stacked(right, pairs[:, 0] - pairs[:, 1]))
     summed = jax.tree.map(lambda x: jax.ops.segment_sum(x, pairs[:, 0], 1 << count), values)
-    return tuple(jax.tree.map(lambda x: x[i], summed) for i in range(1 << count))
+    return tuple(jax.tree.map(lambda x, i=i: x[i], summed) for i in range(1 << count))
 
 
 @partial(jax.jit, static_argnums=(0, 1))

@@ -136,14 +136,17 @@ class OnsetResult(StudyResult):
     def _without_onset(self) -> str:
         row = PARAMETERS[self.parameter]
         low, high = (self.values[[0, -1]] / row.scale) if len(self.values) else (math.nan, math.nan)
+        scanned = f"from {low:.6g} to {high:.6g} {row.shown_unit}".rstrip()
+        if not self.complete:
+            return f"No onset has been located yet: the search ended early, after {len(self.values)} values {scanned}."
         if not len(self.values) or not self.certified.all():
             sure = int(self.certified.sum())
             return (
-                f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values from {low:.6g} to "
-                f"{high:.6g} {row.shown_unit} carry a certificate."
+                f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values {scanned} carry a "
+                "certificate."
             )
         state = "unstable" if self.growth_rates[0, 0] > 0 else "stable"
-        return f"No onset: the valve is {state} from {low:.6g} to {high:.6g} {row.shown_unit}."
+        return f"No onset: the valve is {state} {scanned}."
 
     def _line(self, point: dict[str, Any]) -> str:
         scale = PARAMETERS[self.parameter].scale

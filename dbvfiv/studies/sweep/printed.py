@@ -45,11 +45,9 @@ def crossing_line(result: SweepResult, crossing: Crossing) -> str:
     shown = PARAMETERS[result.parameter]
     becomes = "unstable" if crossing.to_unstable else "stable"
     how = f"at {crossing.frequency:.4g} Hz" if crossing.frequency > 0 else "without oscillation"
+    place = f"{crossing.value / shown.scale:.4g} {shown.shown_unit}".rstrip()
     under = f" under {result.case.continuity}" if result.case.continuity else ""
-    return (
-        f"Branch {crossing.branch} becomes {becomes} near {result.parameter} "
-        f"{crossing.value / shown.scale:.4g} {shown.shown_unit} {how}{under} (interpolated)."
-    )
+    return f"Branch {crossing.branch} becomes {becomes} near {result.parameter} {place} {how}{under} (interpolated)."
 
 
 def _row(value: float, growth: float, frequency: float, unstable: int) -> str:

@@ -250,7 +250,7 @@ class SweepResult(StudyResult):
         places = ", ".join(f"{check['value']:.4g}" for check in self.checks)
         word = "Certified" if self.certified else "Not certified"
         checked = (
-            [f"{word}: checked at {self.parameter} {places} {self.units}."]
+            [f"{word}: checked at {self.parameter} {places} {self.units}".rstrip() + "."]
             if self.checks
             else ["Not certified: no value was checked."]
         )
