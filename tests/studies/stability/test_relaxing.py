@@ -128,9 +128,13 @@ def test_onset_over_the_loss_factor_is_where_bisection_finds_it(lossy_case, loss
     assert low <= point.value <= high
 
 
-def test_a_normal_form_is_refused_in_a_sentence(lossy_case):
+@pytest.mark.slow
+def test_the_normal_form_of_an_onset_over_the_loss_factor(lossy_case):
     case = lossy_case.replace(
         {"onset.over": "loss_factor=1.5:2.5:2", "onset.coarse_mesh": 0, "fluid.continuity": "storage"}
     )
     (point,) = (p for p in run_onset(case).points if p.edge)
-    assert point.criticality is None and "remembers" in point.note
+    assert point.criticality in ("super", "sub")
+    assert (point.first_lyapunov_coefficient < 0) == (point.criticality == "super")
+    across = (point.above.eigenvalue.real - point.below.eigenvalue.real) / (point.above.value - point.below.value)
+    assert point.crossing_speed == pytest.approx(across, rel=1e-2)
