@@ -98,7 +98,9 @@ class ValveMemoryForms:
     # ----
 
     def _form(self, *motions: Motion) -> np.ndarray:
-        remainder = lambda *x: self._analytic.remainder_form(self._motion, self._values, *map(self._split, x))  # noqa: E731
+        def remainder(*directions):
+            return self._analytic.remainder_form(self._motion, self._values, *map(self._split, directions))
+
         out = expand(remainder, *map(self._joined, motions)).astype(complex)
         n, rates = self.model.size, [motion.rate for motion in motions]
         # beta damps with the tangent of the unrelaxed wall, so its force is the rate of the elastic one
