@@ -131,12 +131,19 @@ def test_many_random_states(around, along, number, seed):
 
 
 def against_the_full_pencil(result: Examined) -> None:
-    """The number of unstable modes by the argument principle on the full pencil, without a basis."""
+    """The number of unstable modes by the argument principle on the full pencil, without a basis.
+
+    Up to a band: far beyond the modes that were searched for a wall without stiffness damping has thousands of lightly
+    damped ones, which the basis does not hold and which no number of points resolves.
+    """
     spectrum, count = result.certified.spectrum, result.certified.count
-    band = count.band if np.isfinite(count.band) else None
+    band = count.band if np.isfinite(count.band) else 1.5 * spectrum.band
     full = unstable_count(result.state.pencil, band=band, line=count.line, hints=spectrum.eigenvalues, max_points=1500)
     assert full.certain, f"{result.state}: {full.notes}"
-    assert full.number == result.certified.unstable_count_independent, str(result.state)
+    if not np.isfinite(count.band):  # both routes found the same number over all frequencies
+        assert result.certified.unstable_count_independent == spectrum.count_right_of(count.line), str(result.state)
+    inside = spectrum.select(np.flatnonzero(spectrum.frequency <= band))
+    assert full.number == inside.count_right_of(count.line), str(result.state)
 
 
 def test_a_hundred_random_states_that_relax():
