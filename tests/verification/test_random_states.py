@@ -91,7 +91,7 @@ def against_all_eigenvalues(result: Examined) -> None:
     spectrum, count = result.certified.spectrum, result.certified.count
     every = all_eigenvalues(result.state.pencil)
     every = every[np.argsort(-every.real)]
-    if spectrum.status == "complete":
+    if spectrum.status == "complete" and len(spectrum):
         band = spectrum.band * (1 + 1e-9)
         listed = spectrum.growth_rate[spectrum.frequency <= band]  # unstable ones beyond the band come on top
         inside = every[every.imag <= 2 * np.pi * band][: len(listed)]
