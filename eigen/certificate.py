@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -195,12 +196,8 @@ def listed_unstable(spectrum: Spectrum, count: Count) -> int:
 
 def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> float:
     """Largest error of log det of the condensed pencil made by the basis, at i 2 pi f."""
-    structure = StructureMatrices(pencil)
-    factor = SuperluFactorization(structure)
     worst = 0.0
-    for f in frequencies:
-        s = 2j * np.pi * float(f)
-        factor.refactor(structure.values(s).astype(complex))
+    for s, factor in _factored(pencil, frequencies):
         exact = real_apply(pencil.J, factor.solve(pencil.G.toarray().astype(complex)))
         small = [condensed_matrix(*pencil.fluid_at(s), H) for H in (exact, basis.transfer(pencil, s))]
         if small[0].size:
@@ -211,13 +208,21 @@ def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> 
 
 def responses(pencil: CoupledPencil, frequencies) -> list[np.ndarray]:
     """Responses of the full structure to all forces, and of its transpose to all motions, at i 2 pi f; (n, m) each."""
-    structure = StructureMatrices(pencil)
-    factor, found = SuperluFactorization(structure), []
-    for f in frequencies:
-        factor.refactor(structure.values(2j * np.pi * float(f)).astype(complex))
+    found = []
+    for _, factor in _factored(pencil, frequencies):
         found.append(factor.solve(pencil.G.toarray().astype(complex)))
         found.append(factor.solve_transposed(pencil.J.toarray().T.astype(complex)))
     return found
+
+
+def _factored(pencil: CoupledPencil, frequencies) -> Iterator[tuple[complex, SuperluFactorization]]:
+    """Places i 2 pi f and the factored structure there."""
+    structure = StructureMatrices(pencil)
+    factor = SuperluFactorization(structure)
+    for f in frequencies:
+        s = 2j * np.pi * float(f)
+        factor.refactor(structure.values(s).astype(complex))
+        yield s, factor
 
 
 def _checks(spectrum, winding, number, finer, basis):

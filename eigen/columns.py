@@ -15,7 +15,6 @@ from .family import Condition, PencilFamily
 from .phase_count import phase_counts
 from .reduction import FamilyReduction, ReducedFamily, StaticSolver
 from .search import leading_modes
-from .transfer import TransferBasis
 from .winding import unstable_count
 
 #: Estimated relative error of an eigenvalue above which a cell is treated directly.
@@ -217,17 +216,13 @@ class ColumnSolver:
         return self._recounted(column, family, conditions, [i for i in cells if not column.certificate(i).agrees])
 
     def _recounted(self, column: Column, family, conditions, cells) -> Column:
-        """Cells that still lack agreement, with a count of their own on a basis of structural modes.
-
-        The vectors of the spectrum join that basis: a mode that is all but neutral would otherwise stand on either side
-        of the line by the error of the basis alone.
+        """Cells that still lack agreement, with a count of their own on a basis of structural modes, made finer as far
+        as it takes.
         """
         for i in cells:
             pencil, options = family.pencil(conditions[i]), family.search(conditions[i])
             try:
-                basis = TransferBasis(pencil)
-                basis.enlarge(leading_modes(pencil, 6, options, workspace=self._workspace).q)
-                found = certified_spectrum(pencil, 6, options, workspace=self._workspace, basis=basis)
+                found = certified_spectrum(pencil, 6, options, workspace=self._workspace)
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue
             if len(found.spectrum):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from .coverage import CLEAR
 from .pencil import CoupledPencil
 from .relaxation import Relaxation
 
-#: What counts as clearly right of the crowd, as a fraction of its right edge.
-CLEAR = 0.8
 #: Share of the size of an eigenvalue below which its imaginary part is no oscillation: a crowd of creep that rounding
 #: has split, or a motion whose damping ratio exceeds 0.995.
 OVERDAMPED = 0.1

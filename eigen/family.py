@@ -8,14 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .coverage import CLEAR
 from .creep import edge_of
 from .options import SearchOptions
 from .pencil import CoupledPencil
 from .relaxation import Relaxation
 from .shifts import SLOPE
-
-#: Eigenvalues closer to the limit point than this share of it are not listed.
-CLEAR = 0.8
 
 
 class Condition(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 
 from .creep import OVERDAMPED
 from .rational import SAME, RationalCells, Refined, Surrogate, real_roots, refined, started
+from .structure_response import relative
 
 if TYPE_CHECKING:
     from .family import Condition
@@ -37,19 +38,18 @@ class SmallSpectra:
 
     def __init__(self, reduced: ReducedFamily):
         self.reduced = reduced
-        squares, motions = np.linalg.eigh(_relative(reduced.K, reduced.M))
+        root = np.linalg.cholesky(reduced.M)
+        squares, motions = np.linalg.eigh(relative(reduced.K, root))
         low = np.flatnonzero(squares > 0)[:TYPICAL]
         #: Typical angular frequency, rad/s.
         self.frequency = float(np.exp(0.5 * np.log(squares[low]).mean())) if low.size else 1.0
         self._top = TOP * float(np.sqrt(squares[low[-1]])) if low.size else 1.0
-        motions = np.linalg.solve(np.linalg.cholesky(reduced.M).T, motions[:, low])
+        motions = np.linalg.solve(root.T, motions[:, low])
         parts = np.einsum("ai,gab,bi->gi", motions, reduced.relaxing, motions)
         #: Share of each relaxing part in the stiffness of typical motions, (g,).
         self.shares = (parts / squares[low]).mean(axis=1) if low.size else np.ones(len(reduced.relaxing))
         #: The same of the stiffest motions.
-        self.stiff_shares = (
-            np.array([np.trace(_relative(part, reduced.M)) for part in reduced.relaxing]) / squares.sum()
-        )
+        self.stiff_shares = np.array([np.trace(relative(part, root)) for part in reduced.relaxing]) / squares.sum()
 
     def problem(self, conditions: list[Condition]) -> RationalCells:
         """The rational pencils of conditions."""
@@ -182,10 +182,3 @@ def _joined(row: list[complex], value: complex) -> bool:
         return False
     row.append(value)
     return True
-
-
-def _relative(stiffness: np.ndarray, mass: np.ndarray) -> np.ndarray:
-    """L^-1 sym(K) L^-T with M = L L^T."""
-    root = np.linalg.cholesky(mass)
-    half = np.linalg.solve(root, 0.5 * (stiffness + stiffness.T))
-    return np.linalg.solve(root, half.T)

@@ -165,8 +165,7 @@ class Reference:
         root = np.linalg.cholesky(M)
 
         def positive(matrix, least):
-            half = np.linalg.solve(root, 0.5 * (matrix + matrix.T))
-            weight, turn = np.linalg.eigh(np.linalg.solve(root, half.T))
+            weight, turn = np.linalg.eigh(relative(matrix, root))
             weight = np.maximum(weight, least * np.abs(weight).max(initial=0.0))
             turn = root @ turn
             return (turn * weight) @ turn.T, np.sqrt(weight)
@@ -174,6 +173,12 @@ class Reference:
         stiffness, frequencies = positive(K, SOFTEST)
         parts = np.array([positive(part, 0.0)[0] for part in relaxing]).reshape(relaxing.shape)
         return cls(stiffness, positive(D, 0.0)[0], parts, frequencies)
+
+
+def relative(matrix: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """L^-1 sym(K) L^-T, the symmetric part of a matrix seen by a mass L L^T."""
+    half = np.linalg.solve(root, 0.5 * (matrix + matrix.T))
+    return np.linalg.solve(root, half.T)
 
 
 def response(reduced: ReducedFamily, damping: tuple[float, float, float]) -> Response | RelaxingResponse:

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..errors import CaseError
 from .parameters import PARAMETERS
+from .quantity import number_or_text
 
 _PRESSURE = PARAMETERS["pressure"]
 _ALLOWED = (
@@ -25,7 +26,7 @@ def read_pressures(given: Iterable[Any], name: str, density: float | None = None
     found = []
     for value in given:
         try:
-            pressure = _PRESSURE.quantity.parse(_number(value), density)
+            pressure = _PRESSURE.quantity.parse(number_or_text(value), density)
         except ValueError as error:
             raise CaseError(f"{name} is given as {value!r}, {error}; {_ALLOWED}.") from None
         if not 0 < pressure <= _PRESSURE.high:
@@ -39,13 +40,3 @@ def read_pressures(given: Iterable[Any], name: str, density: float | None = None
 def is_single(pressure: Any) -> bool:
     """Whether it is one pressure and not several."""
     return isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0
-
-
-def _number(value: Any) -> Any:
-    """A number where the value is one, numpy's and text such as "36e3" included."""
-    if isinstance(value, (bool, int)):
-        return value
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        return value

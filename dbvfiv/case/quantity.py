@@ -67,6 +67,16 @@ def _angle_like(unit_text: str) -> bool:
     return bool(re.fullmatch(r"(deg|degree|degrees|°|rad|radian|radians|mrad|gon|grad|arcmin|turn)", unit_text))
 
 
+def number_or_text(value: Any) -> Any:
+    """A number where the value is one, numpy's and text such as "36e3" included; anything else as it is."""
+    if isinstance(value, (bool, int)):
+        return value
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return value
+
+
 def head_of(pressure: float, density: float) -> float:
     """Head, m, of a fluid, kg/m3, that a pressure, Pa, carries."""
     return pressure / (density * GRAVITY)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbvfiv.case.quantity import Quantity
+from dbvfiv.case.quantity import Quantity, number_or_text
 from dbvfiv.errors import CaseError
 from dbvfiv.materials.damping import MaterialDamping, damping_of
 from dbvfiv.materials.prony import Prony
@@ -231,19 +231,12 @@ def read_frequencies(given: str | Sequence[float]) -> tuple[float, float]:
     quantity = Quantity("Hz")
     parts = given.split(",") if isinstance(given, str) else list(given)
     try:
-        values = [quantity.parse(_number(part)) for part in parts]
+        values = [quantity.parse(number_or_text(part)) for part in parts]
     except ValueError as error:
         raise CaseError(f"--at is given as {given!r}, {error}; it must be two frequencies such as 5,40.") from None
     if len(values) != 2 or min(values) <= 0 or values[0] == values[1]:
         raise CaseError(f"--at is given as {given!r}; it must be two different frequencies above 0 Hz, such as 5,40.")
     return min(values), max(values)
-
-
-def _number(part: Any) -> Any:
-    try:
-        return float(part)
-    except (TypeError, ValueError):
-        return part
 
 
 def _fit_row(material: MaterialDamping) -> tuple[str, str, str, str]:

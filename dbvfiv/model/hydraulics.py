@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 
-from ..case.quantity import GRAVITY, WATER
+from ..case.quantity import GRAVITY, WATER, head_of
 
 #: Kv in m3/h at 1 bar over Cv in US gallons a minute at 1 psi (IEC 60534-1).
 CV_OVER_KV = 1.156
@@ -72,7 +72,7 @@ def hydraulics_of(
     (36.0, 201.0)
     """
     velocity_head = flange_velocity**2 / (2 * GRAVITY)
-    total = pressure / (density * GRAVITY) + velocity_head
+    total = head_of(pressure, density) + velocity_head
     flows = velocity_head > 0
     kv = 3600 * volume_flow * math.sqrt(density / WATER * 1e5 / pressure) if pressure > 0 else math.nan
     return Hydraulics(

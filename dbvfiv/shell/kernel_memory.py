@@ -10,8 +10,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .kernel_rubber import FAST, rubber_stress
-from .kernel_section import linear_response, point_strain
+from .kernel_rubber import FAST
+from .kernel_section import add_point_stress, linear_response
 from .kernel_strain import edge_shears, gather, strains_at
 
 
@@ -62,16 +62,7 @@ def slow_resultants(
             for l in range(points.shape[0]):
                 if member[l] < 0:
                     continue
-                stress = slow[member[l]]
-                point_strain(points[l, 0], h, scales[l], strain, e)
-                rubber_stress(constants[l, 0], constants[l, 1], constants[l, 2], e, s)
-                w = points[l, 1] * h
-                t = points[l, 0] * h
-                for i in range(3):
-                    stress[i] += w * s[i]
-                    stress[3 + i] += w * t * s[i]
-                stress[6] += w * scales[l] * s[3]
-                stress[7] += w * scales[l] * s[4]
+                add_point_stress(points[l], constants[l], scales[l], h, strain, slow[member[l]], e, s)
 
 
 # a function of its own without fast arithmetic, so that it has the same digits wherever it is called

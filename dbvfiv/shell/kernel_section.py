@@ -39,19 +39,25 @@ def point_strain(zeta, h, scale, strain, e):
 
 
 @numba.njit(fastmath=FAST, inline="always")
+def add_point_stress(point, constants, scale, h, strain, stress, e, s):
+    """Add what one point of rubber contributes to the resultants (8,); e and s are workspace (5,)."""
+    point_strain(point[0], h, scale, strain, e)
+    rubber_stress(constants[0], constants[1], constants[2], e, s)
+    w = point[1] * h
+    t = point[0] * h
+    for i in range(3):
+        stress[i] += w * s[i]
+        stress[3 + i] += w * t * s[i]
+    stress[6] += w * scale * s[3]
+    stress[7] += w * scale * s[4]
+
+
+@numba.njit(fastmath=FAST, inline="always")
 def section_stress(stiffness, points, constants, scales, h, strain, stress, e, s):
     """Resultants (8,) of all layers; e and s are workspace (5,)."""
     linear_response(stiffness, h, strain, stress)
     for l in range(points.shape[0]):
-        point_strain(points[l, 0], h, scales[l], strain, e)
-        rubber_stress(constants[l, 0], constants[l, 1], constants[l, 2], e, s)
-        w = points[l, 1] * h
-        t = points[l, 0] * h
-        for i in range(3):
-            stress[i] += w * s[i]
-            stress[3 + i] += w * t * s[i]
-        stress[6] += w * scales[l] * s[3]
-        stress[7] += w * scales[l] * s[4]
+        add_point_stress(points[l], constants[l], scales[l], h, strain, stress, e, s)
 
 
 @numba.njit(fastmath=FAST, inline="always")

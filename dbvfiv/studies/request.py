@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
+
+#: What several studies take in place of keys of the case.
+PressureOption = Annotated[
+    str | None, typer.Option("--pressure", "-p", metavar="P", help="Pressure in place of drive.pressure.")
+]
+DensityOption = Annotated[
+    str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
+]
 
 
 @dataclass(frozen=True)
@@ -25,11 +35,3 @@ class Request:
     changes: dict[str, Any] = field(default_factory=dict)
     choices: dict[str, Any] = field(default_factory=dict)
     further: Callable[[Any], list[Path]] | None = None
-
-
-def number_or_text(value: str | None) -> float | str | None:
-    """A number where an option is one; texts with units as they are."""
-    try:
-        return None if value is None else float(value)
-    except ValueError:
-        return value

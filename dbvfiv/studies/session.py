@@ -20,7 +20,7 @@ from ..record.part import RecordPart
 from ..record.record import GrowingRecord, Record, StoredRecord
 from . import KINDS
 from .case import Case
-from .study import Study, find_study
+from .study import Study, find_study, nothing_to_resume
 
 #: Keyword arguments of the Python interface and the keys of the case that they stand for.
 KEYWORDS = {row.name: row.key for row in PARAMETERS.values() if row.swept} | {
@@ -212,7 +212,7 @@ def resume_result(path: str | Path, observer: Observer | None = None, changes: M
     check_writable(path)  # what another process is about to add must not be missed
     study, known = _find(path), _read(path)
     if study.rows_to_keep is None and known.complete and not changes:
-        raise CaseError(f"The {known.header.kind} run in {str(path)!r} is complete; there is nothing to resume.")
+        raise nothing_to_resume(study.kind, path)
     session = Session(known.header.rebuildable_case(), known.header.name).replace(changes)
     if study.rows_to_keep is not None:
         known = RecordPart(known, study.rows_to_keep(known, session.case))

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
+from ..errors import CaseError
 from ..record.mesh import MeshData
 from ..record.record import Record
 from ..record.table import TableSpec
@@ -47,6 +49,11 @@ class Study:
     resumable: bool = True
     rows_to_keep: Callable[[Record, Case], Mapping[str, int]] | None = None
     live: Callable[[Case], Callable[[Any], str]] | None = None
+
+
+def nothing_to_resume(kind: str, path: str | Path | None) -> CaseError:
+    """What is said where a complete run is to go on."""
+    return CaseError(f"The {kind} run in {str(path)!r} is complete; there is nothing to resume.")
 
 
 def find_study(kind: str) -> Study:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ...case.quantity import Quantity
+from ...case.quantity import Quantity, number_or_text
 from ...errors import CaseError
 from ...record.files import kind_of
 from ...resuming import resume
@@ -31,7 +31,7 @@ def go_on(
     end = None
     if duration is not None:
         try:
-            end = Quantity("s", "s").parse(_number_or_text(duration))
+            end = Quantity("s", "s").parse(number_or_text(duration))
         except ValueError as error:
             raise CaseError(f"--duration is given as {duration!r}, {error}.") from None
     result = resume(file, duration=end, workers=workers, observer=Progress(quiet=as_json))
@@ -41,10 +41,3 @@ def go_on(
 
 def _film_into(path: Path) -> Callable[[Any], list[Path]]:
     return lambda result: [result.animate(path)]
-
-
-def _number_or_text(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text

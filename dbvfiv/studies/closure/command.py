@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from ..request import Request, number_or_text
+from ...case.quantity import number_or_text
+from ..request import Request
 
 ORDER = 35
 

@@ -7,8 +7,9 @@ from typing import Annotated
 import typer
 
 from ...case.parameters import listed
+from ...case.quantity import number_or_text
 from ..case import Case
-from ..request import Request, number_or_text
+from ..request import Request
 from ..stability.fixed import refuse_moved
 
 ORDER = 30

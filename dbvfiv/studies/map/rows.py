@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import CaseError
 from ...observer import Observer
 from ...record.layout import Column
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import TableSpec
 from ..case import Case
+from ..study import nothing_to_resume
 from .checks import Check
 from .column import CELLS, MapColumn, MapPlan
 from .curves import OnsetCurve
@@ -157,7 +157,7 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
         If the map is complete.
     """
     if known.complete:
-        raise CaseError(f"The map run in {str(known.path)!r} is complete; there is nothing to resume.")
+        raise nothing_to_resume("map", known.path)
     count = known.rows(COLUMNS)
     if not count:
         return {CELL_ROWS: 0, ONSETS: 0}

@@ -7,9 +7,10 @@ from typing import Annotated, Any
 
 import typer
 
+from ...case.quantity import number_or_text
 from ...errors import CaseError
 from ..case import Case
-from ..request import Request, number_or_text
+from ..request import DensityOption, Request
 
 ORDER = 25
 
@@ -25,9 +26,7 @@ def command(
             help="Static inlet pressure in place of drive.pressure; 0 with --in-vacuo is the valve at rest.",
         ),
     ] = None,
-    density: Annotated[
-        str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
-    ] = None,
+    density: DensityOption = None,
     count: Annotated[int | None, typer.Option("--count", "-n", metavar="N", help="How many modes.")] = None,
     in_vacuo: Annotated[
         bool, typer.Option("--in-vacuo", help="Leave the fluid out: the structure under its steady pressures alone.")

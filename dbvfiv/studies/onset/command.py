@@ -7,8 +7,9 @@ from typing import Annotated
 import typer
 
 from ...case.parameters import listed
+from ...case.quantity import number_or_text
 from ..case import Case
-from ..request import Request, number_or_text
+from ..request import DensityOption, PressureOption, Request
 from ..stability.fixed import refuse_moved
 
 ORDER = 28
@@ -24,13 +25,8 @@ def command(
             help=f"{listed()}, with =START:STOP:COUNT[:log] for a range of one's own; onset.over without it.",
         ),
     ] = None,
-    pressure: Annotated[
-        str | None,
-        typer.Option("--pressure", "-p", metavar="P", help="Static inlet pressure in place of drive.pressure."),
-    ] = None,
-    density: Annotated[
-        str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
-    ] = None,
+    pressure: PressureOption = None,
+    density: DensityOption = None,
 ) -> Request:
     """Every onset along one parameter: value, frequency, super- or subcritical, uncertainty of the mesh.
 

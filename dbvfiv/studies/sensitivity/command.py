@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from ..request import Request, number_or_text
+from ...case.quantity import number_or_text
+from ..request import DensityOption, PressureOption, Request
 
 ORDER = 27
 
@@ -20,13 +21,8 @@ def command(
             help="pressure, density, ..., or 'layer 3 angle', 'layer 2 c10'; may be repeated; all without it.",
         ),
     ] = None,
-    pressure: Annotated[
-        str | None,
-        typer.Option("--pressure", "-p", metavar="P", help="Static inlet pressure in place of drive.pressure."),
-    ] = None,
-    density: Annotated[
-        str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
-    ] = None,
+    pressure: PressureOption = None,
+    density: DensityOption = None,
     mode: Annotated[
         int | None, typer.Option("--mode", metavar="N", help="Number of the mode, by falling growth rate.")
     ] = None,

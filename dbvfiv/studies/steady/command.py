@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 from ...case.axis import parse_axis
+from ...case.quantity import number_or_text
 from ...errors import CaseError
 from ..case import Case
-from ..request import Request, number_or_text
+from ..request import Request
 
 ORDER = 20
 

@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from ...case.parameters import SWEPT, listed
-from ..request import Request, number_or_text
+from ...case.quantity import number_or_text
+from ..request import DensityOption, PressureOption, Request
 
 ORDER = 26
 
@@ -21,13 +22,8 @@ def command(
             help=f"PARAMETER=START:STOP:COUNT[:log] of {listed(SWEPT)}; sweep.over without it.",
         ),
     ] = None,
-    pressure: Annotated[
-        str | None,
-        typer.Option("--pressure", "-p", metavar="P", help="Static inlet pressure in place of drive.pressure."),
-    ] = None,
-    density: Annotated[
-        str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
-    ] = None,
+    pressure: PressureOption = None,
+    density: DensityOption = None,
     count: Annotated[
         int | None, typer.Option("--count", "-n", metavar="N", help="How many leading modes to follow.")
     ] = None,
