@@ -11,6 +11,7 @@ from . import physics
 from .damping import Damping
 from .load import make_case, put
 from .materials import DEFAULT_LAYERS, Layer, Materials
+from .outside import Outside
 from .parameters import PARAMETERS
 from .relaxing import SHIPPED_LOSSES
 from .section import BrokenRule, Section, key
@@ -44,6 +45,7 @@ class Case(Section):
     fluid: physics.Fluid = key(physics.Fluid(), "The fluid and its conservation laws.")
     drive: physics.Drive = key(physics.Drive(), "The load.")
     upstream: Upstream = key(Upstream(), "The line in front of the valve.")
+    outside: Outside = key(Outside(), "The fluid outside the wall.")
     supports: physics.Supports = key(physics.Supports(), "One-sided stops of the lips.")
 
     @model_validator(mode="before")
@@ -89,6 +91,7 @@ class Case(Section):
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
         self.upstream.check_roughness(2 * (self.valve.flange_radius - self.valve.flange_wall_deduction))
+        self.outside.check_pipe(2 * self.valve.flange_radius + self.valve.thickness_at(self.valve.length))
         return self
 
     @property
