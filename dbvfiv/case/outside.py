@@ -62,6 +62,11 @@ class Outside(Section):
         """Density outside for one inside, kg/m3; zero where there is none."""
         return 0.0 if self.fluid == "none" else inside if self.fluid == "same" else float(self.fluid)
 
+    @property
+    def fixed_density(self) -> float:
+        """Density that does not follow the one inside, kg/m3; zero where there is none."""
+        return 0.0 if isinstance(self.fluid, str) else float(self.fluid)
+
     def words(self, inside: float) -> str:
         """What is outside, as a clause of a sentence; empty where nothing is."""
         if not self.is_there:

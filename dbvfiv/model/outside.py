@@ -13,6 +13,7 @@ that of the first motion left out, 1/sqrt(mu_(r+1)), do not see it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,7 +29,7 @@ from ..shell import Shell
 from ..shell.face import OuterFace
 
 #: Motions kept of the added mass.
-KEPT = 40
+KEPT = 30
 #: Length of the rigid tube that goes on upstream in unbounded fluid, in diameters of the flange.
 TUBE = 4.0
 #: Where a pipe around the valve is open, from lip and flange, in its diameters.
@@ -57,6 +58,37 @@ class AddedMass:
     def rank(self) -> int:
         return self.columns.shape[1]
 
+    def left_out(self, density: float) -> float:
+        """Frequency of the first motion left out, of a wall without mass in a fluid of a density (kg/m3), Hz."""
+        return float(1.0 / (2.0 * np.pi * np.sqrt(density * self.slowness[-1])))
+
+    def projected(self, basis: np.ndarray) -> AddedMass:
+        """On the span of columns (n, k)."""
+        return AddedMass(basis.T @ self.columns, self.slowness)
+
+    def coupling(self, forces, slope) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """G (n, m + r) and J (m + r, n): the flow's own with the added mass behind them."""
+        own = sp.csr_matrix(self.columns)
+        return sp.hstack([sp.csr_matrix(forces), own], "csr"), sp.vstack([sp.csr_matrix(slope), own.T], "csr")
+
+    def parts(self, flow: dict[str, np.ndarray], density: float) -> dict[str, np.ndarray]:
+        """Parts A0 to S1 of `eigen.CoupledPencil` for that coupling.
+
+        Parameters
+        ----------
+        flow : dict
+            Those of the flow, A0 (m, m) to S1.
+        density : float
+            Of the fluid outside, kg/m3.
+        """
+        r = self.rank
+        wider = {"A": ((0, r), (0, r)), "B": ((0, r), (0, 0)), "R": ((0, 0), (0, r)), "S": ((0, 0), (0, 0))}
+        found = {name: np.pad(value, wider[name[0]]) for name, value in flow.items()}
+        inertia = found["A2"]
+        outside = np.arange(inertia.shape[0] - r, inertia.shape[0])
+        inertia[outside, outside] = -density
+        return found
+
 
 class OutsideFluid:
     """What the fluid outside a valve does.
@@ -82,8 +114,13 @@ class OutsideFluid:
         rest = shell.dofs.expand(np.zeros(shell.size))
         points, _ = self.face.points(rest)
         self._check_clearance(points)
-        self.flow = PotentialFlow(surroundings(points[mesh.rows], self.radius))
+        self._at_rest = points[mesh.rows]
         self._workspace = Workspace()
+
+    @cached_property
+    def flow(self) -> PotentialFlow:
+        """The fluid between the wall and what stays at rest."""
+        return PotentialFlow(surroundings(self._at_rest, self.radius))
 
     def _check_clearance(self, points: np.ndarray) -> None:
         widest = float(np.hypot(points[:, 0], points[:, 1]).max())

@@ -7,18 +7,18 @@ from functools import partial
 import numpy as np
 
 from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, Workspace, lowest_frequencies
-from eigen.reduction import POWERS
 
-from ...model.dynamics import Conditions, LinearisedState, fluid_parts
+from ...model.dynamics import Conditions, LinearisedState
 from ...model.leading import select_search
+
+Law = float | tuple[float, float] | tuple[float, float | None, float]
 
 #: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
 _KEPT = 256
 
 
 class ValveFamily(PencilFamily):
-    """Conditions are (density, alpha, beta, law, loss factor); the law is the blend of the continuity laws, and with a
-    line in front (blend, length of the line in m).
+    """Conditions are (density, alpha, beta, law, loss factor); the law as `law_of` makes it.
 
     At unit density the fluid's unknown is the inlet velocity, at others that times the root of the density.
 
@@ -43,7 +43,7 @@ class ValveFamily(PencilFamily):
     ):
         self.linear, self.max_frequency, self.modes, self._workspace = linear, max_frequency, modes, workspace
         self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
-        self.forces, self.slope = linear.forces, linear.slope
+        self.forces, self.slope = linear.coupling
         self._parts: dict[object, dict[str, np.ndarray]] = {}
         self._relaxations: dict[float, Relaxation | None] = {}
         self._frequencies = np.zeros(0)
@@ -71,7 +71,7 @@ class ValveFamily(PencilFamily):
             self._relaxations[loss] = self.linear.relaxation(loss)
         return self._relaxations[loss]
 
-    def parts(self, law: float | tuple[float, float]) -> dict[str, np.ndarray]:
+    def parts(self, law: Law) -> dict[str, np.ndarray]:
         """A0 to S1 at density 1."""
         if law not in self._parts:
             if len(self._parts) > _KEPT:
@@ -79,23 +79,37 @@ class ValveFamily(PencilFamily):
             self._parts[law] = self._computed(law)
         return self._parts[law]
 
-    def _computed(self, law: float | tuple[float, float]) -> dict[str, np.ndarray]:
-        linear, flow, m = self.linear, self.linear.model.flow, len(self.linear.area)
-        if flow.has_fluid and flow.unsteady:
-            return fluid_parts(flow, linear.area, linear.inlet, 1.0, *law_parts(law))
-        zero = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
-        parts = {name: np.zeros(zero[name[0]]) for name in POWERS}
-        if flow.has_fluid:
-            parts["A0"] = flow.steady_operator(linear.area, linear.inlet)[1]
-        return parts
+    def _computed(self, law: Law) -> dict[str, np.ndarray]:
+        linear, flow = self.linear, self.linear.model.flow
+        storage, pipe_length, outside = law_parts(law)
+        parts = linear.flow_parts(1.0, storage, pipe_length) if flow.has_fluid else linear.no_flow()
+        if linear.added is None:
+            return parts
+        return linear.added.parts(parts, 1.0 if outside is None else outside)
 
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The full pencil, with the inlet velocity itself as unknown."""
         density, alpha, beta, law, loss_factor = condition
-        storage, pipe_length = law_parts(law)
+        storage, pipe_length, _ = law_parts(law)
         return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, pipe_length), storage=storage)
 
 
-def law_parts(law: float | tuple[float, float]) -> tuple[float, float | None]:
-    """Blend of the continuity laws and length of the line, None without one, of a condition's law."""
-    return law if isinstance(law, tuple) else (float(law), None)
+def law_of(storage: float, pipe_length: float | None, outside: float | None) -> Law:
+    """The law of a condition: the blend of the continuity laws, and what else the coupling at unit density depends on.
+
+    Parameters
+    ----------
+    storage : float
+    pipe_length : float or None
+        Of the line in front, m; None without one.
+    outside : float or None
+        Density outside over that inside, where it does not follow it.
+    """
+    if outside is not None:
+        return storage, pipe_length, outside
+    return (storage, pipe_length) if pipe_length else storage
+
+
+def law_parts(law: Law) -> tuple[float, float | None, float | None]:
+    """What `law_of` was made of."""
+    return (*law, None)[:3] if isinstance(law, tuple) else (float(law), None, None)

@@ -13,7 +13,7 @@ from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ...model.dynamics import Conditions
 from ..case import Case
-from .family import law_parts
+from .family import law_of, law_parts
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ class Place:
         Blend of the continuity laws, 0 quasi-steady, 1 storage.
     pipe_length : float, m
         Of the line in front; 0 without one.
+    outside : float, kg/m3
+        Density of the fluid outside where it is fixed; 0 where there is none or it follows `density`.
     design : dict
         Values of those parameters of the design (`dbvfiv.case.parameters.DESIGN`) that are not the case's own.
     """
@@ -42,6 +44,7 @@ class Place:
     storage: float
     loss_factor: float = 0.0
     pipe_length: float = 0.0
+    outside: float = 0.0
     design: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
@@ -57,6 +60,7 @@ class Place:
             storage,
             damping.loss_factor,
             case.upstream.length if case.has_line else 0.0,
+            case.outside.fixed_density,
         )
 
     def at(self, **values: float) -> Place:
@@ -68,13 +72,14 @@ class Place:
     @property
     def condition(self) -> Condition:
         """(density, alpha, beta, law, loss factor), the law as `dbvfiv.studies.stability.family.ValveFamily` has it."""
-        law = (self.storage, self.pipe_length) if self.pipe_length else self.storage
+        ratio = self.outside / self.density if self.outside else None
+        law = law_of(self.storage, self.pipe_length or None, ratio)
         return Condition(self.density, self.alpha, self.beta, law, self.loss_factor)
 
     def under(self, condition: Condition) -> Place:
         """The same steady state under another condition."""
         density, alpha, beta, law, loss_factor = condition
-        storage, length = law_parts(law)
+        storage, length, _ = law_parts(law)
         return self.at(
             density=density,
             alpha=alpha,
