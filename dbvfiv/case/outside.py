@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator
 
@@ -51,6 +51,12 @@ class Outside(Section):
         "outer face.",
         gt=0,
         le=100,
+    )
+
+    lips: Literal["closed", "open"] = key(
+        "closed",
+        "What the fluid outside finds between the lips: a rigid lid (closed), or an opening that it may pass, at the "
+        "outlet pressure of the flow (open).",
     )
 
     @property

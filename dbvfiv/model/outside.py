@@ -23,7 +23,7 @@ from eigen import CoupledPencil, SingularShiftError, Workspace
 
 from ..case.model import Case
 from ..flow.outside import Panels, PotentialFlow, Surroundings
-from ..flow.outside.surfaces import arc, end_face, extruded, lid, pipe, ring_face, stretched
+from ..flow.outside.surfaces import arc, end_face, extruded, pipe, ring_face, stretched, strip
 from ..geometry import ValveMesh
 from ..shell import Shell
 from ..shell.face import OuterFace
@@ -34,6 +34,8 @@ KEPT = 30
 TUBE = 4.0
 #: Where a pipe around the valve is open, from lip and flange, in its diameters.
 OPEN_DOWN, OPEN_UP = 2.0, 2.0
+#: Least height of an open gap between the lips over their half width.
+SLIVER = 1e-3
 #: Panels around a quarter of the surrounding pipe for each column of the wall.
 AROUND = 0.5
 
@@ -109,6 +111,7 @@ class OutsideFluid:
         self.face = OuterFace(shell)
         self.shell = shell
         self._edge = mesh.rows[0]
+        self.open_lips = case.outside.lips == "open"
         diameter = case.outside.pipe_diameter
         self.radius = None if diameter is None else 0.5 * diameter
         rest = shell.dofs.expand(np.zeros(shell.size))
@@ -131,16 +134,34 @@ class OutsideFluid:
             )
 
     def panels(self, q: np.ndarray) -> Panels:
-        """Outer faces of the elements at a state, in their order, and behind them the lid between the lips."""
+        """Outer faces of the elements at a state, in their order; behind them what closes the end of the tube, and
+        last the opening between the lips where that is open.
+        """
         points, directors = self.face.points(self.shell.dofs.expand(q))
         self._check_clearance(points)
         quads = self.shell.mesh.quads
-        edge = points[self._edge].copy()
-        return Panels.joined(Panels.of(points[quads], directors[quads]), lid(edge))
+        wall = Panels.of(points[quads], directors[quads])
+        outer, middle = points[self._edge], np.array([1.0, 0.0, 1.0])
+        if not self.open_lips:
+            return Panels.joined(wall, strip(outer, outer * middle))
+        inner = self._inner_edge(outer, directors)
+        return Panels.joined(wall, strip(outer, inner), strip(inner, inner * middle))
+
+    def _inner_edge(self, outer: np.ndarray, directors: np.ndarray) -> np.ndarray:
+        """Edge (k, 3) of the opening: that of the inner face, kept apart where lips touch and the side edge folds."""
+        edge = outer - 2.0 * self.face.half_wall[self._edge, None] * directors[self._edge]
+        apart = SLIVER * outer[-1, 0]
+        edge[:, 1] = np.clip(edge[:, 1], np.minimum(apart, 0.5 * outer[:, 1]), outer[:, 1])
+        edge[-1, 1] = 0.0
+        steps = np.maximum(np.diff(np.clip(edge[:, 0], 0.0, outer[:, 0])), 0.1 * np.diff(outer[:, 0]))
+        edge[:, 0] = np.minimum(np.concatenate([[0.0], np.cumsum(steps)]), outer[:, 0])
+        return edge
 
     def impedance(self, q: np.ndarray, frozen: Panels | None = None) -> np.ndarray:
         """S (ne, ne), 1/m: see `PotentialFlow.impedance`."""
-        return self.flow.impedance(self.panels(q), len(self.shell.mesh.quads), frozen)
+        panels = self.panels(q)
+        opening = 2 * (len(self._edge) - 1) if self.open_lips else 0
+        return self.flow.impedance(panels, len(self.shell.mesh.quads), opening, frozen)
 
     def operator(self, q: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray]:
         """E (ne, n), m2, and S (ne, ne), 1/m, at a state."""

@@ -64,7 +64,9 @@ class PotentialFlow:
         """Conditions on the panels of the surroundings."""
         return np.concatenate([velocity[: self._open], potential[self._open :]])
 
-    def impedance(self, moving: Panels, wet: int | None = None, frozen: Panels | None = None) -> np.ndarray:
+    def impedance(
+        self, moving: Panels, wet: int | None = None, open_count: int = 0, frozen: Panels | None = None
+    ) -> np.ndarray:
         """Mean potential of panels, with its sign changed, for unit volume flux through others.
 
         Times the fluid's density and the rate of the fluxes it is the pressure on the panels, positive where the fluid
@@ -74,7 +76,9 @@ class PotentialFlow:
         ----------
         moving : Panels
         wet : int, optional
-            Number of panels, the first ones, that flow may pass; the others are rigid. All by default.
+            Number of panels, the first ones, whose motion and pressure matter; the others are rigid. All by default.
+        open_count : int
+            Number of panels, the last ones, that are open instead of rigid.
         frozen : Panels, optional
             Places of the moving panels that choose between exact integrals and quadratures, see `influence`.
 
@@ -83,17 +87,17 @@ class PotentialFlow:
         (wet, wet) array, 1/m
         """
         wet = len(moving) if wet is None else wet
-        held = moving if frozen is None else frozen
+        held, shut = moving if frozen is None else frozen, len(moving) - open_count
         potential, velocity = influence(moving, moving, self.signs, 0, (held, held))
-        potential = potential[:wet]
+        rows, potential = np.concatenate([velocity[:shut], potential[shut:]]), potential[:wet]
         if self._fixed is not None:
             fixed = self._fixed
             back = self._rows(*influence(fixed, moving, self.signs, frozen=(fixed, held)))
             back = la.lu_solve(self._factor, back, check_finite=False, overwrite_b=True)
             there, passing = influence(moving, fixed, self.signs, frozen=(held, fixed))
-            velocity -= passing @ back
+            rows -= np.concatenate([passing[:shut], there[shut:]]) @ back
             potential = potential - there[:wet] @ back
-        # potential velocity^-1 by solves with the transpose
-        solved = la.solve(velocity.T, potential.T, check_finite=False, overwrite_a=True, overwrite_b=True)[:wet].T
+        # potential rows^-1 by solves with the transpose
+        solved = la.solve(rows.T, potential.T, check_finite=False, overwrite_a=True, overwrite_b=True)[:wet].T
         found = -solved / moving.areas[:wet]
         return 0.5 * (found + found.T)

@@ -47,18 +47,10 @@ def arc(radius: float, angles: np.ndarray) -> np.ndarray:
     return radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
-def lid(edge: np.ndarray, rings: int = 2) -> Panels:
-    """What closes a tube between its edge and the plane y = 0, the fluid below it (towards smaller z).
-
-    Parameters
-    ----------
-    edge : (k, 3) array, m
-        From x = 0 to y = 0, x ascending; the last point lies on y = 0.
-    rings : int
-        Panels over the height.
-    """
+def strip(outer: np.ndarray, inner: np.ndarray, rings: int = 2) -> Panels:
+    """Panels between two edges (k, 3) from x = 0 to y = 0, the fluid below them (towards smaller z)."""
     shares = np.linspace(0.0, 1.0, rings + 1)
-    grid = np.stack([edge * [1.0, s, 1.0] for s in shares])
+    grid = np.stack([(1.0 - s) * inner + s * outer for s in shares])
     return Panels.of(_between(grid, turned=True))
 
 
