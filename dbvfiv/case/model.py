@@ -101,8 +101,12 @@ class Case(Section):
 
     @property
     def continuity(self) -> str:
-        """The continuity law in words; empty where none is needed: without flow, and in the steady law."""
-        return f"{self.fluid.continuity} continuity" if self.drive.kind == "flow" and self.fluid.unsteady else ""
+        """The continuity law in words, and what is outside; empty where no law is needed: without flow, and in the
+        steady law.
+        """
+        if self.drive.kind != "flow" or not self.fluid.unsteady:
+            return ""
+        return f"{self.fluid.continuity} continuity {self.outside.words}".rstrip()
 
     @property
     def pressure_at(self) -> str:

@@ -73,13 +73,15 @@ class Outside(Section):
         """Density that does not follow the one inside, kg/m3; zero where there is none."""
         return 0.0 if isinstance(self.fluid, str) else float(self.fluid)
 
-    def words(self, inside: float) -> str:
-        """What is outside, as a clause of a sentence; empty where nothing is."""
+    @property
+    def words(self) -> str:
+        """What is outside, as words behind a sentence's subject; empty where nothing is."""
         if not self.is_there:
             return ""
-        density = self.density(inside)
+        fluid = "the same fluid" if self.fluid == "same" else f"fluid of {self.fixed_density:g} kg/m3"
         place = "unbounded" if self.pipe_diameter is None else f"in a pipe of {1e3 * self.pipe_diameter:g} mm"
-        return f"fluid of {density:g} kg/m3 outside, {place}"
+        lips = ", lips open to it" if self.lips == "open" else ""
+        return f"with {fluid} outside, {place}{lips}"
 
     def check_pipe(self, outer: float) -> None:
         """Refuse a pipe that the valve does not go into; `outer` is the diameter of its outer face at the flange, m.

@@ -29,7 +29,11 @@ def command(
     density: DensityOption = None,
     count: Annotated[int | None, typer.Option("--count", "-n", metavar="N", help="How many modes.")] = None,
     in_vacuo: Annotated[
-        bool, typer.Option("--in-vacuo", help="Leave the fluid out: the structure under its steady pressures alone.")
+        bool,
+        typer.Option(
+            "--in-vacuo",
+            help="Leave the flow out: the structure under its steady pressures, with the fluid outside if there is one.",
+        ),
     ] = False,
     animate: Annotated[
         list[int] | None,

@@ -80,8 +80,11 @@ class ModesResult(StudyResult):
 
     @property
     def verdict(self) -> str:
-        """One sentence for people, which names the continuity law."""
-        return self.certificate.verdict("" if self.case.modes.in_vacuo else self.case.continuity)
+        """One sentence for people, which names the continuity law and what is outside."""
+        case = self.case
+        if case.modes.in_vacuo or not case.continuity:
+            return self.certificate.verdict(case.outside.words)
+        return self.certificate.verdict(f"under {case.continuity}")
 
     @cached_property
     def state(self) -> State:

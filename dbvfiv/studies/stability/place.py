@@ -116,6 +116,8 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
     if case.has_line:
         given["pipe_length"] = case.upstream.length
     given = {name: value for name, value in given.items() if not case.damping.lacks(name)}
+    if case.outside.is_there:
+        given["outside"] = case.outside.words
     return {name: value for name, value in given.items() if name not in moved}
 
 
