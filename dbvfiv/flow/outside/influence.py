@@ -98,36 +98,43 @@ def _by_points(x, points, weights, out):
         out[3] -= slope * d2
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath={"contract", "arcp", "nsz"})
 def _influence(targets, sources, rule, signs, shift, potential, velocity):
     """Fill potential and velocity (t, s); target i + shift is panel i of the sources."""
     points, normals = targets
     corners, panel_normals, gauss, weights, centres, areas = sources
     rule_points, rule_centres, reach = rule
-    out, x, one, weight = np.empty(4), np.empty(3), np.empty((1, 3)), np.empty(1)
+    out, x, n = np.empty(4), np.empty(3), np.empty(3)
     factor = 1.0 / (4.0 * math.pi)
+    potential[:] = 0.0
+    velocity[:] = 0.0
     for i in range(points.shape[0]):
-        for j in range(corners.shape[0]):
-            phi = speed = 0.0
-            for k in range(4):
-                mirror = REFLECTIONS[k]
-                far = 0.0
-                for c in range(3):
-                    x[c] = mirror[c] * points[i, c]
-                    far += (mirror[c] * rule_points[i, c] - rule_centres[j, c]) ** 2
-                far /= reach[j]
-                if far < EXACT:
+        for k in range(4):
+            # the target mirrored in place of the source
+            for c in range(3):
+                x[c] = REFLECTIONS[k, c] * points[i, c]
+                n[c] = REFLECTIONS[k, c] * normals[i, c]
+            r0, r1, r2 = (
+                REFLECTIONS[k, 0] * rule_points[i, 0],
+                REFLECTIONS[k, 1] * rule_points[i, 1],
+                REFLECTIONS[k, 2] * rule_points[i, 2],
+            )
+            sign = factor * signs[k]
+            for j in range(corners.shape[0]):
+                far = (r0 - rule_centres[j, 0]) ** 2 + (r1 - rule_centres[j, 1]) ** 2 + (r2 - rule_centres[j, 2]) ** 2
+                if far >= FOUR * reach[j]:
+                    d0, d1, d2 = x[0] - centres[j, 0], x[1] - centres[j, 1], x[2] - centres[j, 2]
+                    inverse = 1.0 / (d0 * d0 + d1 * d1 + d2 * d2)
+                    value = sign * areas[j] * math.sqrt(inverse)
+                    potential[i, j] -= value
+                    velocity[i, j] += value * inverse * (d0 * n[0] + d1 * n[1] + d2 * n[2])
+                    continue
+                if far < EXACT * reach[j]:
                     _exact(x, corners[j], panel_normals[j], k == 0 and i + shift == j, out)
-                elif far < FOUR:
-                    _by_points(x, gauss[j], weights[j], out)
                 else:
-                    one[0], weight[0] = centres[j], areas[j]
-                    _by_points(x, one, weight, out)
-                phi -= signs[k] * out[0]
-                for c in range(3):
-                    speed -= signs[k] * out[1 + c] * mirror[c] * normals[i, c]
-            potential[i, j] = factor * phi
-            velocity[i, j] = factor * speed
+                    _by_points(x, gauss[j], weights[j], out)
+                potential[i, j] -= sign * out[0]
+                velocity[i, j] -= sign * (out[1] * n[0] + out[2] * n[1] + out[3] * n[2])
 
 
 def influence(

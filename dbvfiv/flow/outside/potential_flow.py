@@ -98,6 +98,7 @@ class PotentialFlow:
             rows -= np.concatenate([passing[:shut], there[shut:]]) @ back
             potential = potential - there[:wet] @ back
         # potential rows^-1 by solves with the transpose
-        solved = la.solve(rows.T, potential.T, check_finite=False, overwrite_a=True, overwrite_b=True)[:wet].T
+        factor = la.lu_factor(rows.T, overwrite_a=True, check_finite=False)
+        solved = la.lu_solve(factor, potential.T, overwrite_b=True, check_finite=False)[:wet].T
         found = -solved / moving.areas[:wet]
         return 0.5 * (found + found.T)
