@@ -44,6 +44,7 @@ class ValveFamily(PencilFamily):
         self.linear, self.max_frequency, self.modes, self._workspace = linear, max_frequency, modes, workspace
         self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
         self.forces, self.slope = linear.coupling
+        self.added = 0 if linear.added is None else linear.added.rank
         self._parts: dict[object, dict[str, np.ndarray]] = {}
         self._relaxations: dict[float, Relaxation | None] = {}
         self._frequencies = np.zeros(0)
