@@ -22,7 +22,7 @@ import scipy.sparse.linalg as spla
 from eigen import CoupledPencil, SingularShiftError, Workspace
 
 from ..case.model import Case
-from ..flow.outside import Panels, PotentialFlow, Surroundings
+from ..flow.outside import BODY, ROOM, Panels, PotentialFlow, Surroundings
 from ..flow.outside.surfaces import arc, end_face, extruded, pipe, ring_face, stretched, strip
 from ..geometry import ValveMesh
 from ..shell import Shell
@@ -123,7 +123,8 @@ class OutsideFluid:
     @cached_property
     def flow(self) -> PotentialFlow:
         """The fluid between the wall and what stays at rest."""
-        return PotentialFlow(surroundings(self._at_rest, self.radius))
+        closed = BODY if self.radius is None else ROOM
+        return PotentialFlow(surroundings(self._at_rest, self.radius), closed=closed)
 
     def _check_clearance(self, points: np.ndarray) -> None:
         widest = float(np.hypot(points[:, 0], points[:, 1]).max())

@@ -41,24 +41,35 @@ class Surroundings:
         return 0 if self.rigid is None else len(self.rigid)
 
 
+#: Flux through a closed boundary, on the fluid's side, of sources on it over their strength: of a body, of a room.
+BODY, ROOM = 1.0, 0.0
+
+
 class PotentialFlow:
     """Potential flow between moving panels and given surroundings.
+
+    What passes a closed boundary is known exactly: all that sources on a body give, nothing of those on the walls of a
+    room. The panels' own velocities are set so that it does; without that fluid leaks at edges, and what moves columns
+    of it is of first order only.
 
     Parameters
     ----------
     surroundings : Surroundings
     symmetry : {"SS", "SA", "AS", "AA"}
         Motions symmetric (S) or antisymmetric (A) about x = 0, then about y = 0; all panels lie in x > 0, y > 0.
+    closed : float, optional
+        `BODY` or `ROOM`, where moving and other panels with their images make up one closed boundary.
     """
 
-    def __init__(self, surroundings: Surroundings | None = None, symmetry: str = "SS"):
+    def __init__(
+        self, surroundings: Surroundings | None = None, symmetry: str = "SS", closed: float | None = None
+    ):
         self.surroundings = surroundings or Surroundings()
+        self.symmetry, self.closed = symmetry, closed
         self.signs = image_signs(symmetry)
         self._fixed, self._open = self.surroundings.panels, self.surroundings.rigid_count
-        self._factor = None
         if self._fixed is not None:
-            potential, velocity = influence(self._fixed, self._fixed, self.signs, 0)
-            self._factor = la.lu_factor(self._rows(potential, velocity), check_finite=False)
+            self._alone = influence(self._fixed, self._fixed, self.signs, 0)
 
     def _rows(self, potential, velocity):
         """Conditions on the panels of the surroundings."""
@@ -88,17 +99,49 @@ class PotentialFlow:
         """
         wet = len(moving) if wet is None else wet
         held, shut = moving if frozen is None else frozen, len(moving) - open_count
-        potential, velocity = influence(moving, moving, self.signs, 0, (held, held))
+        blocks = self._blocks(moving, held, self.signs)
+        (potential, velocity), across, back, alone = blocks
+        if self.closed is not None:
+            own, fixed_own = self._own(moving, blocks if self.symmetry == "SS" else self._symmetric(moving, held))
+            velocity[np.diag_indices(len(moving))] += own
         rows, potential = np.concatenate([velocity[:shut], potential[shut:]]), potential[:wet]
         if self._fixed is not None:
-            fixed = self._fixed
-            back = self._rows(*influence(fixed, moving, self.signs, frozen=(fixed, held)))
-            back = la.lu_solve(self._factor, back, check_finite=False, overwrite_b=True)
-            there, passing = influence(moving, fixed, self.signs, frozen=(held, fixed))
-            rows -= np.concatenate([passing[:shut], there[shut:]]) @ back
-            potential = potential - there[:wet] @ back
+            matrix = self._rows(*alone)
+            if self.closed is not None:
+                rigid = np.arange(self._open)
+                matrix[rigid, rigid] += fixed_own[: self._open]
+            carried = la.lu_solve(la.lu_factor(matrix, check_finite=False), self._rows(*back), check_finite=False)
+            rows -= np.concatenate([across[1][:shut], across[0][shut:]]) @ carried
+            potential = potential - across[0][:wet] @ carried
         # potential rows^-1 by solves with the transpose
         factor = la.lu_factor(rows.T, overwrite_a=True, check_finite=False)
         solved = la.lu_solve(factor, potential.T, overwrite_b=True, check_finite=False)[:wet].T
         found = -solved / moving.areas[:wet]
         return 0.5 * (found + found.T)
+
+    def _blocks(self, moving: Panels, held: Panels, signs: np.ndarray):
+        """Potentials and velocities of moving on moving panels, of the surroundings on them, of them on the
+        surroundings, and of those on themselves.
+        """
+        own, fixed = influence(moving, moving, signs, 0, (held, held)), self._fixed
+        if fixed is None:
+            return own, None, None, None
+        across = influence(moving, fixed, signs, frozen=(held, fixed))
+        return own, across, influence(fixed, moving, signs, frozen=(fixed, held)), self._alone
+
+    def _symmetric(self, moving: Panels, held: Panels):
+        """The same for symmetric images, on which the whole flux rests."""
+        signs = image_signs("SS")
+        blocks = self._blocks(moving, held, signs)
+        return blocks if self._fixed is None else (*blocks[:3], influence(self._fixed, self._fixed, signs, 0))
+
+    def _own(self, moving: Panels, blocks) -> tuple[np.ndarray, np.ndarray | None]:
+        """What panels' own velocities lack for the whole flux of each to be right, for moving and other panels."""
+        (_, velocity), across, back, alone = blocks
+        flux = moving.areas @ velocity
+        if self._fixed is None:
+            return self.closed - flux / moving.areas, None
+        areas = self._fixed.areas
+        flux += areas @ back[1]
+        other = moving.areas @ across[1] + areas @ alone[1]
+        return self.closed - flux / moving.areas, self.closed - other / areas

@@ -21,9 +21,11 @@ def extruded(contour: np.ndarray, z: np.ndarray) -> Panels:
     return Panels.of(_between(_layers(contour, z), turned=True), _between(normals, turned=True))
 
 
-def end_face(contour: np.ndarray, z: float, up: bool) -> Panels:
-    """Flat face inside a contour (k, 2) at z, in rings around the axis; the fluid above it, or below."""
-    shares = np.linspace(0.0, 1.0, 5)
+def end_face(contour: np.ndarray, z: float, up: bool, rings: int = 6) -> Panels:
+    """Flat face inside a contour (k, 2) at z, in rings around the axis, finer at the rim; the fluid above it, or
+    below.
+    """
+    shares = np.sin(np.linspace(0.0, 0.5 * np.pi, rings + 1))
     grid = np.stack([np.column_stack([s * contour, np.full(len(contour), z)]) for s in shares])
     return Panels.of(_between(grid, turned=not up))
 
