@@ -25,6 +25,20 @@ from .valve import ValveModel
 DAMPING = ("alpha", "beta")
 
 
+def require_forms(model: ValveModel) -> None:
+    """Refuse higher derivatives where they are not known.
+
+    Raises
+    ------
+    SolveError
+    """
+    if model.outside is not None:
+        raise SolveError(
+            "With fluid outside the wall the higher derivatives of its added mass by the shape are not known, so "
+            "whether an onset is soft or hard is not either; runs in time beside the onset tell."
+        )
+
+
 class AnalyticResidual:
     """Residual of the equations of motion and its multilinear forms.
 
@@ -96,71 +110,6 @@ class AnalyticResidual:
         structure = self.model.shell.dofs.matrix(self.model.structure(q)[1])
         columns = self.model.outside.added_mass(q, structure).columns
         return columns @ (columns.T @ a)
-
-    def _require_no_outside(self) -> None:
-        """Refuse higher derivatives where they are not known.
-
-        Raises
-        ------
-        SolveError
-        """
-        if self.model.outside is not None:
-            raise SolveError(
-                "With fluid outside the wall the higher derivatives of its added mass by the shape are not known, so "
-                "whether an onset is soft or hard is not either; runs in time beside the onset tell."
-            )
-
-    def second(self, motion, parameters, a, b) -> np.ndarray:
-        """Second directional derivative (n + l,) along two motions."""
-        self._check_at_rest(motion)
-        self._require_no_outside()
-        motion, parameters = self._shaped(motion), self._given(parameters)
-        a, b = self._shaped(a), self._shaped(b)
-        out = np.array(_form_of_remainder(motion, parameters, (a, b), self._arrays))
-        form = partial(_form, self.model.shell.second, motion[0])
-        # form(a0, b0) + beta (form(a0, b1) + form(a1, b0)), in one evaluation where one of the motions has no velocity
-        beta = parameters["beta"]
-        out[self._forces] += form(a[0] + beta * a[1], b[0] + beta * b[1]) - beta**2 * form(a[1], b[1])
-        return out
-
-    def third(self, motion, parameters, a, b, c) -> np.ndarray:
-        """Third directional derivative (n + l,) along three motions."""
-        self._check_at_rest(motion)
-        self._require_no_outside()
-        motion, parameters = self._shaped(motion), self._given(parameters)
-        a, b, c = self._shaped(a), self._shaped(b), self._shaped(c)
-        out = np.array(_form_of_remainder(motion, parameters, (a, b, c), self._arrays))
-        form = partial(_form, self.model.shell.third, motion[0])
-        beta = parameters["beta"]
-        out[self._forces] += form(a[0], b[0], c[0] + beta * c[1]) + beta * (
-            form(a[0], b[1], c[0]) + form(a[1], b[0], c[0])
-        )
-        return out
-
-    def remainder_form(self, motion, parameters, *directions) -> np.ndarray:
-        """Directional derivative (n + l,), along two or three motions, of all but the structure's own force."""
-        self._check_at_rest(motion)
-        self._require_no_outside()
-        motion, parameters = self._shaped(motion), self._given(parameters)
-        return np.array(_form_of_remainder(motion, parameters, tuple(map(self._shaped, directions)), self._arrays))
-
-    def parameter_slope(self, motion, parameters, name: str) -> np.ndarray:
-        """Derivative (n + l,) with respect to a parameter, at v = 0."""
-        self._check_at_rest(motion)
-        motion, parameters = self._shaped(motion), self._given(parameters)
-        return np.array(_parameter_slope(motion, parameters, self._unit(name), self._arrays))
-
-    def mixed(self, motion, parameters, a, name: str) -> np.ndarray:
-        """Derivative (n + l,) along a motion and with respect to a parameter, at v = 0."""
-        self._check_at_rest(motion)
-        motion, parameters, a = self._shaped(motion), self._given(parameters), self._shaped(a)
-        out = np.array(_mixed(motion, parameters, a, self._unit(name), self._arrays))
-        if name == "beta":
-            _, structure = self.model.structure(motion[0])
-            out[self._forces] += self.model.shell.dofs.matrix(structure) @ a[1]
-        if name == "density" and self._outside_share:
-            out[self._forces] += self._outside_share * self._added(motion[0], a[2])
-        return out
 
     @staticmethod
     def _check_at_rest(motion) -> None:

@@ -61,9 +61,7 @@ class PotentialFlow:
         `BODY` or `ROOM`, where moving and other panels with their images make up one closed boundary.
     """
 
-    def __init__(
-        self, surroundings: Surroundings | None = None, symmetry: str = "SS", closed: float | None = None
-    ):
+    def __init__(self, surroundings: Surroundings | None = None, symmetry: str = "SS", closed: float | None = None):
         self.surroundings = surroundings or Surroundings()
         self.symmetry, self.closed = symmetry, closed
         self.signs = image_signs(symmetry)

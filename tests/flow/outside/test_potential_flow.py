@@ -87,7 +87,12 @@ def test_ring_modes_in_a_pipe(mode, symmetry, radius):
 def test_images_are_the_mirrored_panels():
     panels = sphere(2)
     rng = np.random.default_rng(1)
-    for symmetry, signs in (("SS", (1, 1, 1, 1)), ("SA", (1, 1, -1, -1)), ("AS", (1, -1, 1, -1)), ("AA", (1, -1, -1, 1))):
+    for symmetry, signs in (
+        ("SS", (1, 1, 1, 1)),
+        ("SA", (1, 1, -1, -1)),
+        ("AS", (1, -1, 1, -1)),
+        ("AA", (1, -1, -1, 1)),
+    ):
         potential, velocity = influence(panels, panels, PotentialFlow(symmetry=symmetry).signs, 0)
         whole, moving = np.zeros_like(potential), np.zeros_like(velocity)
         for k, sign in enumerate(signs):
