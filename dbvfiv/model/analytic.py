@@ -99,11 +99,57 @@ class AnalyticResidual:
             out[self._forces] += density * self._added(motion[0], motion[2])
         return out
 
-    @property
-    def _outside_share(self) -> float:
-        """How much the density outside follows that inside."""
-        outside = self.model.case.outside
-        return 1.0 if outside.fluid == "same" else 0.0
+    def second(self, motion, parameters, a, b) -> np.ndarray:
+        """Second directional derivative (n + l,) along two motions."""
+        self._check_at_rest(motion)
+        require_forms(self.model)
+        motion, parameters = self._shaped(motion), self._given(parameters)
+        a, b = self._shaped(a), self._shaped(b)
+        out = np.array(_form_of_remainder(motion, parameters, (a, b), self._arrays))
+        form = partial(_form, self.model.shell.second, motion[0])
+        # form(a0, b0) + beta (form(a0, b1) + form(a1, b0)), in one evaluation where one of the motions has no velocity
+        beta = parameters["beta"]
+        out[self._forces] += form(a[0] + beta * a[1], b[0] + beta * b[1]) - beta**2 * form(a[1], b[1])
+        return out
+
+    def third(self, motion, parameters, a, b, c) -> np.ndarray:
+        """Third directional derivative (n + l,) along three motions."""
+        self._check_at_rest(motion)
+        require_forms(self.model)
+        motion, parameters = self._shaped(motion), self._given(parameters)
+        a, b, c = self._shaped(a), self._shaped(b), self._shaped(c)
+        out = np.array(_form_of_remainder(motion, parameters, (a, b, c), self._arrays))
+        form = partial(_form, self.model.shell.third, motion[0])
+        beta = parameters["beta"]
+        out[self._forces] += form(a[0], b[0], c[0] + beta * c[1]) + beta * (
+            form(a[0], b[1], c[0]) + form(a[1], b[0], c[0])
+        )
+        return out
+
+    def remainder_form(self, motion, parameters, *directions) -> np.ndarray:
+        """Directional derivative (n + l,), along two or three motions, of all but the structure's own force."""
+        self._check_at_rest(motion)
+        require_forms(self.model)
+        motion, parameters = self._shaped(motion), self._given(parameters)
+        return np.array(_form_of_remainder(motion, parameters, tuple(map(self._shaped, directions)), self._arrays))
+
+    def parameter_slope(self, motion, parameters, name: str) -> np.ndarray:
+        """Derivative (n + l,) with respect to a parameter, at v = 0."""
+        self._check_at_rest(motion)
+        motion, parameters = self._shaped(motion), self._given(parameters)
+        return np.array(_parameter_slope(motion, parameters, self._unit(name), self._arrays))
+
+    def mixed(self, motion, parameters, a, name: str) -> np.ndarray:
+        """Derivative (n + l,) along a motion and with respect to a parameter, at v = 0."""
+        self._check_at_rest(motion)
+        motion, parameters, a = self._shaped(motion), self._given(parameters), self._shaped(a)
+        out = np.array(_mixed(motion, parameters, a, self._unit(name), self._arrays))
+        if name == "beta":
+            _, structure = self.model.structure(motion[0])
+            out[self._forces] += self.model.shell.dofs.matrix(structure) @ a[1]
+        if name == "density" and self.model.case.outside.fluid == "same":
+            out[self._forces] += self._added(motion[0], a[2])
+        return out
 
     def _added(self, q, a) -> np.ndarray:
         """Inertia (n,) of a fluid of unit density outside; the part quadratic in the velocities is left out."""

@@ -41,7 +41,7 @@ def look_at(number: int, seed: int) -> list[str]:
         search = select_search(SearchOptions(), conditions, lambda n: lowest_frequencies(pencil, n), 6)
         found = certified_spectrum(pencil, 6, search.options)
         if not found.agrees:
-            missed.append(f"{i}: {pressure:.4g} Pa, {density:.4g} kg/m3, storage {storage:g}, {keys}: {found.statement}")
+            missed.append(f"{i}: {pressure:.4g} Pa, {density:.4g} kg/m3, {storage:g}, {keys}: {found.statement}")
     return missed
 
 

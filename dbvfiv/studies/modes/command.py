@@ -32,7 +32,7 @@ def command(
         bool,
         typer.Option(
             "--in-vacuo",
-            help="Leave the flow out: the structure under its steady pressures, with the fluid outside if there is one.",
+            help="Leave the flow out: the structure under its steady pressures, with any fluid outside.",
         ),
     ] = False,
     animate: Annotated[
