@@ -141,9 +141,9 @@ def run_modes(
     observer = Observer() if observer is None else observer
     require_equilibrium(model, state)
     without_fluid = options.in_vacuo or not model.flow.has_fluid
-    if not without_fluid and state.pressure <= 0:
+    if not without_fluid and state.pressure <= model.flow.back:
         raise CaseError(
-            "Coupled modes need an inlet pressure greater than 0, because without one the velocity of an "
+            f"Coupled modes need an inlet pressure greater than {model.flow.back:g}, because without one the velocity of an "
             "ideal fluid is undetermined; "
             "modes.in_vacuo gives those of the structure at rest."
         )
