@@ -11,6 +11,9 @@ from ...errors import CaseError
 from ...studies.case import Case, load_case
 from .._output import print_json
 
+#: What a new case differs in from the defaults, which reproduce the thesis: this law conserves volume.
+_PREDICTION = "fluid.continuity=storage"
+
 
 def check(target: str | None, overrides: list[str] | None, as_json: bool) -> None:
     """Check a case and print it."""
@@ -26,7 +29,7 @@ def write_new(target: str | None, overrides: list[str] | None, as_json: bool) ->
     if target is None:
         raise CaseError("--new needs the name of the file to write, such as my.toml.")
     path = Path(target)
-    text = case_toml(load_case(None, overrides or ()), comments=True)
+    text = case_toml(load_case(None, (_PREDICTION, *(overrides or ()))), comments=True)
     try:
         with path.open("x") as file:
             file.write(text)
