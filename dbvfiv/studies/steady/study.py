@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from ...errors import SolveError
 from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_warnings
@@ -14,6 +15,7 @@ from ..case import Case
 from ..load_path import go_on, way_on
 from ..session import Session
 from ..study import Study
+from .cracking import NOTE, find_cracking
 from .result import STATES, SteadyResult, tables_of
 
 
@@ -46,6 +48,10 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
     finally:
         for sentence in state_warnings(model, states):
             record.warn(sentence)
+    if model.flow.has_fluid and states and not record.notes(NOTE):
+        record.progress("cracking pressure")
+        with suppress(SolveError):  # none is given then
+            record.note(NOTE, **find_cracking(model, states, session.case.steady.cracking_area).summary())
 
 
 def print_live(case: Case) -> Callable[[SteadyState], str]:
