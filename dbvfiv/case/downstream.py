@@ -16,9 +16,9 @@ class Downstream(Section):
 
     pressure: Annotated[Pressure, Field(ge=0, le=PARAMETERS["pressure"].high)] = key(
         0.0,
-        "Pressure downstream over that of the surroundings, a depth such as '1.5 m' included: around jet and wall where "
-        "the discharge is free or submerged, at the far end of the pipe where there is one. drive.pressure works against "
-        "it, and a valve does not open until it is larger; what the wall sees is their difference.",
+        "Pressure downstream over that of the surroundings, as a depth too ('1.5 m'): around jet and wall where the "
+        "discharge is free or submerged, at the far end of the pipe where there is one. drive.pressure works against "
+        "it and has to be greater; what the wall sees is their difference.",
     )
     pipe_diameter: Length | None = key(
         None,

@@ -104,7 +104,11 @@ class SteadyState:
         density = self.mass_flow / self.volume_flow
         velocity = float(self.station_velocity[-1])
         behind = Behind(
-            self.outlet_pressure, self.outlet_velocity, self.recovered_pressure, self.downstream_velocity, self.tail_loss
+            self.outlet_pressure,
+            self.outlet_velocity,
+            self.recovered_pressure,
+            self.downstream_velocity,
+            self.tail_loss,
         )
         return hydraulics_of(self.flange_pressure, density, self.volume_flow, velocity, self.line_loss, behind)
 

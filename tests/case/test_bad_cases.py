@@ -120,7 +120,10 @@ BAD = {
     "step longer than the history": ("[transient]\nstep = '2 s'", "transient.step.*at most"),
     "numerical damping too large": ("[transient]\nnumerical_damping = 0.6", "numerical_damping"),
     "negative pressure downstream": ("[downstream]\npressure = '-1 kPa'", r"downstream\.pressure.*at least 0 kPa"),
-    "pressure downstream that is a length": ("[downstream]\npressure = '3 mm'", r"downstream\.pressure.*not a pressure"),
+    "pressure downstream that is a length": (
+        "[downstream]\npressure = '3 mm'",
+        r"downstream\.pressure.*not a pressure",
+    ),
     "pressure downstream without a unit": ("[downstream]\npressure = '3'", r"downstream\.pressure.*no unit"),
     "pipe downstream without width": ("[downstream]\npipe_diameter = 0", r"pipe_diameter.*greater than 0"),
     "pipe downstream that the valve is too wide for": (

@@ -76,7 +76,9 @@ def side_by_side(own: str, modes: Sequence[dict[str, Any]], other: OtherLaw) -> 
         f"{'mode':>6}" + 2 * f"{'1/s':>14}{'Hz':>13}{'damping':>13}",
     ]
     for i in range(max(len(modes), len(other.modes))):
-        lines.append(f"{i + 1:6d}" + "".join(_cells(found[i] if i < len(found) else None) for found in (modes, other.modes)))
+        lines.append(
+            f"{i + 1:6d}" + "".join(_cells(found[i] if i < len(found) else None) for found in (modes, other.modes))
+        )
     return lines
 
 

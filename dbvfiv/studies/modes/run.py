@@ -146,8 +146,8 @@ def run_modes(
     without_fluid = options.in_vacuo or not model.flow.has_fluid
     if not without_fluid and state.pressure <= model.flow.back:
         raise CaseError(
-            f"Coupled modes need an inlet pressure greater than {model.flow.back:g}, because without one the velocity of an "
-            "ideal fluid is undetermined; "
+            f"Coupled modes need an inlet pressure greater than {model.flow.back:g}, because without one the velocity "
+            "of an ideal fluid is undetermined; "
             "modes.in_vacuo gives those of the structure at rest."
         )
     observer.begin("modes", 1)

@@ -56,6 +56,8 @@ def _discharge(case: Case) -> str:
         return "Free discharge: the energy of the jet is lost, nothing is recovered."
     pipe = f"a pipe of {1e3 * case.downstream.pipe_diameter:.4g} mm"
     if case.downstream.expansion_loss is None:
-        return f"Into {pipe}: the jet widens and loses head as Borda and Carnot have it; K and Kv are up to behind that."
+        return (
+            f"Into {pipe}: the jet widens and loses head as Borda and Carnot have it; K and Kv are up to behind that."
+        )
     lost = f"{case.downstream.expansion_loss:g} of its velocity head"
     return f"Into {pipe}: the jet widens and loses {lost}; K and Kv are up to behind that."
