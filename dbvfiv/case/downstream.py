@@ -32,7 +32,7 @@ class Downstream(Section):
         0.0,
         "Length of that pipe behind the valve: a rigid column that is set in motion with the flow.",
         ge=0,
-        le=PARAMETERS["pipe_length"].high,
+        le=PARAMETERS["tail_length"].high,
     )
     loss: Number = key(
         0.0,

@@ -52,7 +52,7 @@ def test_ranges_end_where_the_key_does():
 
 def test_groups():
     assert SURROUNDINGS == ("density", "alpha", "beta", "loss_factor", "storage", "pipe_length")
-    assert DESIGN == ("thickness", "angle", "strain")
+    assert DESIGN == ("thickness", "angle", "tail_length", "strain")
     assert SWEPT == ("pressure", "density", "alpha", "beta", "loss_factor", "pipe_length")
     assert SYSTEM_NAMES == ("inlet", "density", "alpha", "beta", "loss_factor", "storage", "pipe_length")
     assert set(inspect.signature(Conditions).parameters) < set(SURROUNDINGS)

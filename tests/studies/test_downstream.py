@@ -7,7 +7,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case.quantity import GRAVITY
-from dbvfiv.errors import SolveError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import Conditions, ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import Case
@@ -172,3 +172,40 @@ def test_walks_reach_states_against_a_pressure():
     for pressure in (6e3, 9e3, 5e3):
         state = load(LIGHT).steady(pressure=pressure - 4e3)
         assert walk.equilibrium(place.at(pressure=pressure)) == pytest.approx(state.q, rel=1e-6, abs=1e-9)
+
+
+# -- over the length of the pipe
+# ----
+
+KEYS = {"drive.pressure": 2e3, "fluid.density": 60.0, "damping.alpha": 0.0, "onset.coarse_mesh": 0}
+
+
+def test_onset_over_the_length_of_the_pipe():
+    valve = load(PIPE, KEYS)
+    found = valve.onset("tail_length=0.2:60:4:log")
+    assert found.points and found.certified.all()
+    for point in found.points:
+        assert point["confirmed"] and point["criticality"] in ("super", "sub")
+        there = load(PIPE, KEYS, {"downstream.length": point["value"]}).modes(count=4).modes
+        assert min(abs(mode.growth_rate) for mode in there) < 1e-4
+
+
+def test_sensitivity_to_the_length_of_the_pipe():
+    (found,) = load(PIPE, KEYS).steady(pressure=2e3).sensitivity("tail_length").sensitivities
+    low, high = (
+        load(PIPE, KEYS, {"downstream.length": 5.0 + step}).modes(count=4).modes[0].growth_rate for step in (-0.02, 0.02)
+    )
+    assert found.growth_rate == pytest.approx((high - low) / 0.04, rel=1e-3)
+
+
+def test_map_over_the_length_of_the_pipe():
+    found = load(PIPE, KEYS, {"map.x": "density=10:200:3:log", "map.y": "tail_length=1:20:3:log"}).map()
+    assert not found.failures and found.grid("certified").all()
+    (growth,) = found.grid("growth_rate")
+    leading = load(PIPE, KEYS, {"downstream.length": 20.0, "fluid.density": 200.0}).modes(count=4).modes[0]
+    assert growth[-1, -1] == pytest.approx(leading.growth_rate, rel=1e-6)
+
+
+def test_a_case_without_a_pipe_has_no_length_to_change():
+    with pytest.raises(CaseError, match="no tail_length to change.*downstream.pipe_diameter"):
+        load(LIGHT).onset("tail_length=1:50:5:log")

@@ -207,6 +207,8 @@ def _value(model, pressure, conditions, name) -> float:
         return max(abs(layer.angle) for layer in model.case.layers)
     if name == "strain":
         return model.case.materials.strain_level
+    if name == "tail_length":
+        return model.case.downstream.length
     i, quantity = _layer(name)
     layer = model.shell.section.layers[i]
     return float(getattr(layer if quantity in ("thickness", "angle") else layer.law, quantity))

@@ -174,6 +174,11 @@ def require_parameter(case: Case, name: str) -> None:
             "is then that at its far end, see drive.at).",
             key=PARAMETERS[name].key,
         )
+    if name == "tail_length" and not case.has_tail:
+        raise CaseError(
+            "There is no tail_length to change: no pipe follows the valve; give downstream.pipe_diameter.",
+            key=PARAMETERS[name].key,
+        )
     lacking = case.damping.lacks(name)
     if lacking:
         raise CaseError(f"There is no {name} to change: {lacking}.", key=PARAMETERS[name].key)
@@ -190,7 +195,7 @@ def require_parameter(case: Case, name: str) -> None:
 
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
-    level (0.1 for 10 %), length of the line (m) where the steady state depends on it.
+    level (0.1 for 10 %), length of the pipe behind (m), and of the line in front where the steady state depends on it.
 
     Raises
     ------
@@ -200,6 +205,8 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     changes: dict[str, object] = {}
     if "pipe_length" in design:
         changes["upstream.length"] = design["pipe_length"]
+    if "tail_length" in design:
+        changes["downstream.length"] = design["tail_length"]
     if "thickness" in design:
         changes["valve.thickness_factor"] = case.valve.thickness_factor * design["thickness"]
     if "strain" in design:
