@@ -19,9 +19,7 @@ HEAD = """# A case of dbvfiv: a duckbill valve, its material, the fluid and the 
 #
 # Quantities are SI numbers or strings with units: 18e3 or "18 kPa", 0.012 or "12 mm", "54 deg", "10 %".
 # Every key is optional and is set to its default here, which is the 12-inch inline valve; delete what you
-# do not change. One key differs in a new file: fluid.continuity is "storage", which a prediction should rest
-# on, while its default reproduces the thesis; keep that line.
-# `dbvfiv case FILE` checks the file, `dbvfiv case --explain KEY` explains a key.
+# do not change. `dbvfiv case FILE` checks the file, `dbvfiv case --explain KEY` explains a key.
 """
 
 OWN_MATERIAL = """

@@ -91,9 +91,9 @@ def test_a_valve_at_the_pressure_it_sees_is_that_of_a_free_discharge():
 
 
 def test_onset_with_a_pipe_behind_is_where_modes_cross():
-    valve = load(LIGHT, PIPE, {"onset.coarse_mesh": 0})
-    (point,) = valve.onset("density=10:300:4:log", pressure="6 kPa").points
-    assert point["confirmed"] and point["criticality"] in ("super", "sub")
+    valve = load(LIGHT, PIPE, {"onset.coarse_mesh": 0, "onset.normal_form": False})
+    (point,) = valve.onset("density=10:300:3:log", pressure="6 kPa").points
+    assert point["confirmed"]
     modes = valve.modes(density=point["value"], count=4).modes
     assert min(abs(mode.growth_rate) for mode in modes) < 1e-4
 
@@ -153,7 +153,7 @@ def count_of_random(rng, conditions_each: int) -> list[str]:
 def test_random_discharges():
     """None fails, and spectrum and independent count agree, or it is said."""
     rng = np.random.default_rng(23)
-    left_open = [text for _ in range(6) for text in count_of_random(rng, 5)]
+    left_open = [text for _ in range(4) for text in count_of_random(rng, 5)]
     print(*left_open, sep="\n")
     assert len(left_open) <= 1
 
@@ -193,9 +193,19 @@ def test_onset_over_the_length_of_the_pipe():
 def test_sensitivity_to_the_length_of_the_pipe():
     (found,) = load(PIPE, KEYS).steady(pressure=2e3).sensitivity("tail_length").sensitivities
     low, high = (
-        load(PIPE, KEYS, {"downstream.length": 5.0 + step}).modes(count=4).modes[0].growth_rate for step in (-0.02, 0.02)
+        load(PIPE, KEYS, {"downstream.length": 5.0 + step}).modes(count=4).modes[0].growth_rate
+        for step in (-0.02, 0.02)
     )
     assert found.growth_rate == pytest.approx((high - low) / 0.04, rel=1e-3)
+
+
+def test_modes_over_the_length_of_the_pipe_are_those_of_each_length():
+    found = load(PIPE, KEYS).sweep("tail_length=1:50:5:log")
+    assert found.certified
+    for i, value in enumerate(found.values):
+        leading = load(PIPE, KEYS, {"downstream.length": float(value)}).modes(count=4).modes[0]
+        growth = max(b.growth_rate[i] for b in found.branches if np.isfinite(b.growth_rate[i]))
+        assert growth == pytest.approx(leading.growth_rate, rel=1e-6)
 
 
 def test_map_over_the_length_of_the_pipe():

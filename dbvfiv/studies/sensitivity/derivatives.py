@@ -198,7 +198,8 @@ def _value(model, pressure, conditions, name) -> float:
         return pressure
     if name in _OF_PENCIL:
         value = getattr(conditions, name)
-        return model.case.upstream.length if value is None else value
+        own = {"pipe_length": model.case.upstream.length, "tail_length": model.case.downstream.length}
+        return own[name] if value is None else value
     if name == "storage":
         return 1.0 if model.case.fluid.continuity == "storage" else 0.0
     if name == "thickness":
@@ -207,8 +208,6 @@ def _value(model, pressure, conditions, name) -> float:
         return max(abs(layer.angle) for layer in model.case.layers)
     if name == "strain":
         return model.case.materials.strain_level
-    if name == "tail_length":
-        return model.case.downstream.length
     i, quantity = _layer(name)
     layer = model.shell.section.layers[i]
     return float(getattr(layer if quantity in ("thickness", "angle") else layer.law, quantity))
