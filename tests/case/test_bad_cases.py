@@ -142,7 +142,10 @@ BAD = {
     ),
     "negative length downstream": ("[downstream]\npipe_diameter = 0.3\nlength = -1", r"downstream\.length.*at least 0"),
     "negative loss downstream": ("[downstream]\npipe_diameter = 0.3\nloss = -1", r"downstream\.loss.*at least 0"),
-    "unknown key downstream": ("[downstream]\ndiameter = 0.3", r"downstream\.diameter is not a key.*upstream\.diameter"),
+    "unknown key downstream": (
+        "[downstream]\ndiameter = 0.3",
+        r"downstream\.diameter is not a key.*upstream\.diameter",
+    ),
     "line of negative length": ("[upstream]\nlength = '-2 m'", r"upstream\.length.*at least 0 m"),
     "line without a unit": ("[upstream]\nlength = '20'", r"upstream\.length.*no unit.*length"),
     "line around the earth": ("[upstream]\nlength = '40000 km'", r"upstream\.length.*at most"),
