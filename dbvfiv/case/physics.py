@@ -56,7 +56,7 @@ class Drive(Section):
     pressure: Pressure = key(
         18e3,
         "Static pressure at the flange over that of the surroundings (flow), or the pressure on the wall (uniform). "
-        "With a line upstream it is the pressure at its far end: see drive.at.",
+        "With a line upstream it is the pressure at its far end: see drive.at. It works against downstream.pressure.",
         ge=0,
         le=PARAMETERS["pressure"].high,
     )
