@@ -74,7 +74,11 @@ def eigenvalues(result: ModesResult) -> Figure:
 
 def conditions(result: ModesResult) -> str:
     """Pressure and fluid as they stand in titles."""
-    where = "at rest" if result.state.pressure == 0 else f"at {driven(result.case, result.state.pressure)}"
+    where = (
+        "at rest"
+        if result.state.pressure == result.case.rest_pressure
+        else f"at {driven(result.case, result.state.pressure)}"
+    )
     fluid = "in vacuo" if in_vacuo(result) else f"{result.case.fluid.density:g} kg/m³"
     return f"{where}, {fluid}"
 

@@ -18,7 +18,7 @@ _KEPT = 256
 
 class ValveFamily(PencilFamily):
     """Conditions are (density, alpha, beta, law, loss factor); the law is the blend of the continuity laws, and with a
-    line in front (blend, length of the line in m).
+    line in front (blend, length of the line in m); with a pipe behind its length comes third.
 
     At unit density the fluid's unknown is the inlet velocity, at others that times the root of the density.
 
@@ -75,7 +75,7 @@ class ValveFamily(PencilFamily):
             self._relaxations[loss] = self.linear.relaxation(loss)
         return self._relaxations[loss]
 
-    def parts(self, law: float | tuple[float, float]) -> dict[str, np.ndarray]:
+    def parts(self, law: Law) -> dict[str, np.ndarray]:
         """A0 to S1 at density 1."""
         if law not in self._parts:
             if len(self._parts) > _KEPT:
@@ -83,7 +83,7 @@ class ValveFamily(PencilFamily):
             self._parts[law] = self._computed(law)
         return self._parts[law]
 
-    def _computed(self, law: float | tuple[float, float]) -> dict[str, np.ndarray]:
+    def _computed(self, law: Law) -> dict[str, np.ndarray]:
         linear, flow, m = self.linear, self.linear.model.flow, len(self.linear.area)
         if flow.has_fluid and flow.unsteady:
             return fluid_parts(flow, linear.area, linear.inlet, 1.0, *law_parts(law))
@@ -96,10 +96,23 @@ class ValveFamily(PencilFamily):
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The full pencil, with the inlet velocity itself as unknown."""
         density, alpha, beta, law, loss_factor = condition
-        storage, pipe_length = law_parts(law)
-        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, pipe_length), storage=storage)
+        storage, line = law_parts(law)
+        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, **line), storage=storage)
 
 
-def law_parts(law: float | tuple[float, float]) -> tuple[float, float | None]:
-    """Blend of the continuity laws and length of the line, None without one, of a condition's law."""
-    return law if isinstance(law, tuple) else (float(law), None)
+#: Blend of the continuity laws; with the length of a line in front, m, and that of a pipe behind.
+Law = float | tuple[float, float] | tuple[float, float, float]
+
+
+def law_of(storage: float, pipe_length: float, tail_length: float) -> Law:
+    """The law of a condition; a length of 0 m is none, or that of the case."""
+    if tail_length:
+        return storage, pipe_length, tail_length
+    return (storage, pipe_length) if pipe_length else storage
+
+
+def law_parts(law: Law) -> tuple[float, dict[str, float]]:
+    """Blend of the continuity laws, and parameters of the line as `Conditions.of_line` has them, of a law."""
+    if not isinstance(law, tuple):
+        return float(law), {}
+    return law[0], {name: value for name, value in zip(("pipe_length", "tail_length"), law[1:]) if value}
