@@ -46,6 +46,7 @@ class ValveFamily(PencilFamily):
         self.forces, self.slope = linear.forces, linear.slope
         self._parts: dict[object, dict[str, np.ndarray]] = {}
         self._relaxations: dict[float, Relaxation | None] = {}
+        self._searches: dict[tuple[float, float], SearchOptions] = {}
         self._frequencies = np.zeros(0)
 
     def _lowest(self, count: int, workspace: Workspace | None = None) -> np.ndarray:
@@ -57,10 +58,13 @@ class ValveFamily(PencilFamily):
 
     def search(self, condition: Condition) -> SearchOptions:
         """What is searched in the spectrum: the rule that every study follows."""
-        conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss)
-        asked = SearchOptions(max_frequency=self.max_frequency)
-        lowest = partial(self._lowest, workspace=self._workspace) if condition.loss else self._lowest
-        return select_search(asked, conditions, lowest, self.modes).options
+        key = condition.beta, condition.loss  # nothing else decides
+        if key not in self._searches:
+            conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss)
+            asked = SearchOptions(max_frequency=self.max_frequency)
+            lowest = partial(self._lowest, workspace=self._workspace) if condition.loss else self._lowest
+            self._searches[key] = select_search(asked, conditions, lowest, self.modes).options
+        return self._searches[key]
 
     def relaxation(self, loss: float) -> Relaxation | None:
         """What relaxes with a factor on the loss factors of all materials."""
