@@ -20,7 +20,7 @@ from .winding import unstable_count
 #: Estimated relative error of an eigenvalue above which a cell is treated directly.
 TOLERANCE = 1e-6
 #: Directions weaker than this are left out where two spaces are put together.
-JOINT = 1e-5
+JOINT = 1e-3
 #: How a cell was found.
 REDUCED, DIRECT, MISSING = 0, 1, 2
 #: Share of a band up to which eigenvalues are counted, clear of those at its end.
@@ -165,19 +165,15 @@ class ColumnSolver:
         leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
         counted = _beside_changes(leading) if edges else np.arange(len(conditions))
         counts = _uncounted(family, conditions)
+        counter = first
+        if any(conditions[i].loss for i in counted) and error <= TOLERANCE:
+            # static responses alone say little of what relaxes; with the vectors that the list rests on they are enough
+            counter = ReducedFamily(family, np.hstack([first.V, fine.V]), JOINT)
         if len(counted):
-            found = count_unstable(first, [conditions[i] for i in counted], [leading[i] for i in counted])
+            found = count_unstable(counter, [conditions[i] for i in counted], [leading[i] for i in counted])
             counts.enter(counted, found)
         column = _column(leading, values, counts, error)
         doubtful = counted[~column.certified[counted]]
-        relaxing = np.array([i for i in doubtful if conditions[i].loss and error <= TOLERANCE], int)
-        if relaxing.size:
-            # static responses alone say less of what relaxes; with the vectors that the list rests on they are enough
-            joint = ReducedFamily(family, np.hstack([first.V, fine.V]), JOINT)
-            counts.enter(
-                relaxing, count_unstable(joint, [conditions[i] for i in relaxing], [leading[i] for i in relaxing])
-            )
-            doubtful = counted[~column.certified[counted]]
         return self._repaired(column, family, conditions, doubtful)
 
     def direct(self, family: PencilFamily, condition, count: int = 6):

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg as la
 
 #: Pairs of a cell and a place evaluated at once, so that they stay in the processor's cache.
 CHUNK = 128
@@ -169,9 +170,8 @@ def started(problem: RationalCells, surrogate: Surrogate | None, cells, values) 
         i, s = cells[some], values[some] * (1.0 + 1e-7)
         factors = None if surrogate is None else surrogate.level[i] + surrogate.slope[i] * s[:, None]
         matrix = problem.at(i, s, factors)
-        x = np.linalg.solve(matrix, np.broadcast_to(probe[0][:, None], (len(i), n, 1)))
-        y = np.linalg.solve(matrix.conj().swapaxes(1, 2), np.broadcast_to(probe[1][:, None], (len(i), n, 1)))
-        x, y = (v[:, :, 0] / np.linalg.norm(v, axis=1) for v in (x, y))
+        found = _solved_both(matrix, *(np.broadcast_to(own, (len(i), n)) for own in probe))
+        x, y = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in found)
         out.right[some], out.left[some] = x, y
         out.values[some] = _quotient(problem, i, values[some], x, y)
     return out
@@ -219,26 +219,43 @@ def _stepped(problem: RationalCells, cells, found: Refined, active) -> np.ndarra
     s = found.values[active]
     s = np.where(np.abs(s) > 0, s, 1e-12)
     matrix, slope = problem.at(cells[active], s), problem.slope(cells[active], s)
-    right = np.matmul(slope, found.right[active][..., None])
-    left = np.matmul(slope.conj().swapaxes(1, 2), found.left[active][..., None])
+    right = np.matmul(slope, found.right[active][..., None])[..., 0]
+    left = np.matmul(found.left[active].conj()[:, None], slope)[:, 0].conj()
     try:
-        x = np.linalg.solve(matrix, right)
-        y = np.linalg.solve(matrix.conj().swapaxes(1, 2), left)
+        x, y = _solved_both(matrix, right, left)
     except np.linalg.LinAlgError:  # an exact eigenvalue: a little beside it
         found.values[active] = s * (1.0 + 1e-10)
         return np.zeros(len(active), bool)
     size = np.linalg.norm(x, axis=1, keepdims=True)
     x, right, y = x / size, right / size, y / np.linalg.norm(y, axis=1, keepdims=True)
-    yh = y.conj().swapaxes(1, 2)
+    moved = np.matmul(slope, x[..., None])[..., 0]
     with np.errstate(all="ignore"):
-        change = (np.matmul(yh, right) / np.matmul(yh, np.matmul(slope, x)))[:, 0, 0]
+        change = (y.conj() * right).sum(axis=1) / (y.conj() * moved).sum(axis=1)
     lost = ~np.isfinite(change)
     change[lost] = 0.0
     found.values[active] = s - change
-    found.right[active], found.left[active] = x[:, :, 0], y[:, :, 0]
+    found.right[active], found.left[active] = x, y
     done = ~lost & (np.abs(change) <= SETTLED * np.abs(s))
     found.settled[active] = done
     return done | lost
+
+
+def _solved_both(matrices: np.ndarray, right: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """T^-1 right and T^-H left of complex matrices (p, n, n), each factored once; vectors are (p, n).
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If one is singular.
+    """
+    factor, solve = la.get_lapack_funcs(("getrf", "getrs"), dtype=complex)
+    x, y = np.empty(right.shape, complex), np.empty(left.shape, complex)
+    for i, matrix in enumerate(matrices):
+        lu, pivots, singular = factor(matrix)
+        if singular:
+            raise np.linalg.LinAlgError("A pencil is singular at the place.")
+        x[i], y[i] = solve(lu, pivots, right[i])[0], solve(lu, pivots, left[i], trans=2)[0]
+    return x, y
 
 
 def real_roots(problem: RationalCells, low: float, top: float) -> tuple[np.ndarray, np.ndarray]:

@@ -20,6 +20,7 @@ import scipy.sparse as sp
 
 from .family import Condition, PencilFamily
 from .pencil import CoupledPencil, real_apply
+from .rational import Refined
 from .relaxation import Relaxation
 from .small_spectra import SmallSpectra
 from .static_solver import StaticSolver
@@ -207,8 +208,11 @@ class ReducedFamily:
         """Leading eigenpairs in the reach of a condition, lifted to the full unknowns; down to a share of its floor."""
         reach = self.family.reach(condition)
         if self.family.relaxation(condition.loss) is not None:
-            values = reach.leading(self.small.leading([condition])[0])
-            return self._of_rational(condition, values[values.real > share * reach.floor][:most])
+            lowest = share * reach.floor
+            found = self.small.leading_pairs(
+                condition, lambda values: np.array([v for v in reach.leading(values) if v.real > lowest][:most])
+            )
+            return self._of_rational(found)
         floor, band = reach.floor, reach.band
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
         keep = np.flatnonzero((values.imag >= 0) & (values.imag <= band) & (values.real > share * floor))
@@ -217,14 +221,13 @@ class ReducedFamily:
     def near(self, condition: Condition, eigenvalue: complex) -> Pairs:
         """The eigenpair nearest to a place."""
         if self.family.relaxation(condition.loss) is not None:
-            return self._of_rational(condition, [eigenvalue])
+            return self._of_rational(self.small.pairs(condition, [eigenvalue]))
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
         return self._lifted(condition, values, left, right, [int(np.argmin(np.abs(values - eigenvalue)))])
 
-    def _of_rational(self, condition, starts) -> Pairs:
-        """Eigenpairs near places, lifted."""
+    def _of_rational(self, found: Refined) -> Pairs:
+        """Eigenpairs of what relaxes, lifted."""
         k = self.size
-        found = self.small.pairs(condition, starts)
         right, left = found.right.T, found.left.T
         return Pairs(found.values, self.V @ right[:k], right[k:], self.V @ left[:k], left[k:])
 

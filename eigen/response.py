@@ -18,6 +18,7 @@ import scipy.sparse as sp
 
 from .condensation import condensed_matrix
 from .factorization import SingularShiftError, StructureMatrices, SuperluFactorization, is_positive_definite, superlu
+from .oscillators import Oscillators
 from .pencil import CoupledPencil, real_apply
 from .relaxation import Relaxation
 
@@ -148,7 +149,9 @@ class Determinant:
         if not self._dense:
             return np.zeros(0, complex)
         if self._relaxation is not None:
-            return relaxed_zeros(*(self._parts[i] for i in (0, 3, 4)), self._reference_relaxing, self._relaxation)
+            mass, damping, stiffness = (self._parts[i] for i in (0, 3, 4))
+            modes = Oscillators.of(mass, damping, stiffness, self._reference_relaxing, self._relaxation)
+            return modes.zeros(self._relaxation)
         values = self._every_reference_zero
         return values[values.imag > 0]
 
@@ -271,23 +274,6 @@ def _stacked(matrices, n):
 def _relaxed(relaxation, matrices, s):
     """sum phi_g K_g at a stack of places, shape (k, n, n); zero where nothing relaxes."""
     return 0.0 if relaxation is None else np.tensordot(relaxation.factors(s).T, matrices, 1)
-
-
-def relaxed_zeros(M, C, K, relaxing, relaxation, steps: int = 12):
-    """Estimates of the oscillating zeros of a symmetric structure that relaxes, one equation for each mode."""
-    fast = np.tensordot(relaxation.strengths.sum(axis=1), relaxing, 1)
-    squares, X = la.eigh(K + fast, M)
-    damping, slow = (np.einsum("ik,ij,jk->k", X, part, X) for part in (C, K))
-    parts = np.einsum("ik,gij,jk->gk", X, relaxing, X)
-    values = 1j * np.sqrt(np.maximum(squares, 0.0))
-    for _ in range(steps):
-        stiffness = slow + (relaxation.factors(values) * parts).sum(axis=0)
-        values = (
-            -0.5 * damping
-            + 1j * np.sqrt(np.maximum((stiffness - 0.25 * damping**2).real, 0.0))
-            - 0.5 * (stiffness.imag / np.where(values.imag > 0, values.imag, 1.0))
-        )
-    return values[values.imag > 0]
 
 
 def _log_determinant(stack) -> np.ndarray:

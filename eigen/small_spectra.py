@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 #: Eigenvalues of a cell that are taken from the surrogate to the rational pencil.
 TAKEN = 6
 #: Eigenvalues of a surrogate from which the first of these are chosen.
-STARTED = 12
+STARTED = 10
 #: Room above a band for starts.
 ROOM = 1.1
 #: Growth rates of a cell that have to be right; a start that was lost below them does not matter.
@@ -79,8 +79,34 @@ class SmallSpectra:
 
     def leading(self, conditions: list[Condition]) -> np.ndarray:
         """Leading eigenvalues with their conjugates, (cells, w) complex; NaN where there are fewer."""
+        rows, _ = self._found(conditions)
+        out = np.full((len(conditions), 2 * max(map(len, rows), default=0)), complex(np.nan, np.nan))
+        for line, row in zip(out, rows):
+            values = np.array(row, complex)
+            values = np.concatenate([values, values[values.imag > 0].conj()])
+            line[: values.size] = values
+        return out
+
+    def leading_pairs(self, condition: Condition, chosen) -> Refined:
+        """Leading eigenpairs of one pencil; `chosen` picks among the eigenvalues of the upper half-plane."""
+        rows, vectors = self._found([condition])
+        values = chosen(np.array(rows[0], complex))
+        known = [vectors.get((0, complex(value))) for value in values]
+        lacking = [i for i, pair in enumerate(known) if pair is None]
+        if lacking:
+            found = self.pairs(condition, values[lacking])
+            for place, i in enumerate(lacking):
+                known[i] = found.right[place], found.left[place]
+        right, left = (np.array([pair[side] for pair in known]).reshape(len(values), -1) for side in (0, 1))
+        return Refined(values, right, left, None)
+
+    def _found(self, conditions: list[Condition]) -> tuple[list[list[complex]], dict]:
+        """Leading eigenvalues of each cell in the upper half-plane; and right and left vectors, where they came along,
+        by cell and eigenvalue.
+        """
         problem = self.problem(conditions)
         rows: list[list[complex]] = [[] for _ in conditions]
+        vectors = {}
         doubtful = np.zeros(len(conditions), bool)
         cells, start = self._starts(conditions, problem)
         place = _places(cells, start.values.real)  # rank in its cell, by growth rate
@@ -90,11 +116,13 @@ class SmallSpectra:
             if not taken.size:
                 break
             found = refined(problem, cells[taken], start[taken])
-            lost = [
-                (i, begun.real)
-                for i, value, settled, begun in zip(cells[taken], found.values, found.settled, start.values[taken])
-                if not (settled and _joined(rows[i], value))
-            ]
+            lost = []
+            for j, i in enumerate(cells[taken]):
+                value = complex(found.values[j])
+                if found.settled[j] and _joined(rows[i], value):
+                    vectors[i, value] = found.right[j], found.left[j]
+                else:
+                    lost.append((i, start.values[taken[j]].real))
             for i, growth in lost:
                 watched = sorted((v.real for v in rows[i]), reverse=True)[:WATCHED]
                 doubtful[i] |= len(watched) < WATCHED or growth > watched[-1]
@@ -106,12 +134,7 @@ class SmallSpectra:
             _joined(rows[i], complex(value))
         for i in np.flatnonzero(doubtful):
             rows[i] = list(self._exactly(conditions[i]))
-        out = np.full((len(conditions), 2 * max(map(len, rows), default=0)), complex(np.nan, np.nan))
-        for line, row in zip(out, rows):
-            values = np.array(row, complex)
-            values = np.concatenate([values, values[values.imag > 0].conj()])
-            line[: values.size] = values
-        return out
+        return rows, vectors
 
     def pairs(self, condition: Condition, values) -> Refined:
         """Eigenpairs of one pencil at eigenvalues, or near places close to them."""

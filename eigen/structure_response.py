@@ -1,9 +1,9 @@
 """The response h(i omega) = J (s^2 M + s C + K)^-1 G of the structure of a reduced family, for counts of eigenvalues.
 
 A structure that does not relax is known by its poles. For one that does they are too many: h(i omega) is solved for at
-frequencies that neighbouring cells share, and its phase is put relative to a symmetric structure that relaxes alike,
-s^2 M + s C + K + sum phi_g(s) K_g with all of them positive. That one is passive and has no zero right of the axis, so
-the zeros of the structure itself are counted along.
+frequencies that neighbouring cells share, and its phase is put relative to that of oscillators that relax alike, one
+for each mode. All their numbers are positive, so they are passive and have no zero right of the axis, and the zeros of
+the structure itself are counted along.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg as la
 
-from .response import relaxed_zeros
+from .oscillators import Oscillators
 
 if TYPE_CHECKING:
     from .reduction import ReducedFamily
@@ -100,40 +100,36 @@ class RelaxingResponse:
     unstable = 0
 
     def __init__(self, reduced: ReducedFamily, alpha: float, beta: float, loss: float):
-        self._mass, self._stiffness = reduced.M, reduced.K
-        self._damping = alpha * reduced.M + beta * reduced.D
-        self._relaxing, self._relaxation = reduced.relaxing, reduced.family.relaxation(loss)
+        parts = np.stack([reduced.K, reduced.M, alpha * reduced.M + beta * reduced.D, *reduced.relaxing])
+        self._shape, self._flat = reduced.K.shape, parts.reshape(len(parts), -1)
+        self._relaxation = reduced.family.relaxation(loss)
         reference = reduced.reference
-        self._reference = alpha * reduced.M + beta * reference.damping, reference.stiffness, reference.relaxing
+        damping = alpha * reduced.M + beta * reference.damping
+        self._oscillators = Oscillators.of(
+            reduced.M, damping, reference.stiffness, reference.relaxing, self._relaxation
+        )
         self._known: dict[float, tuple[np.ndarray, float]] = {}
         frequencies = reference.frequencies
         self.scale = float(frequencies[0])
-        zeros = relaxed_zeros(reduced.M, self._reference[0], *self._reference[1:], self._relaxation)
+        zeros = self._oscillators.zeros(self._relaxation)
         near = np.abs(zeros.imag[np.abs(zeros.real) < NEAR * zeros.imag])
         self.beside = np.sort(near)[:BESIDE]
         stiffest = frequencies[-1] * np.sqrt(1.0 + self._relaxation.strengths.sum(axis=1).max(initial=0.0))
         self.top = 30.0 * float(max(stiffest, beta * stiffest**2, alpha))
         motion, force = reduced.J.astype(complex), reduced.G.astype(complex)
         omega = self.scale * np.array(SAMPLED)
-        self.P, self.Q = _both_patterns(motion @ self._solved(self._at(omega), force))
+        self.P, self.Q = _both_patterns(motion @ _solved_with_signs(self._at(omega), force)[0])
         self._out, self._in = self.P.T @ motion, force @ self.Q
 
-    def _at(self, omega: np.ndarray, reference: bool = False) -> np.ndarray:
+    def _at(self, omega: np.ndarray) -> np.ndarray:
         """Dynamic stiffness at i omega, (len(omega), k, k)."""
-        damping, stiffness, relaxing = (
-            self._reference if reference else (self._damping, self._stiffness, self._relaxing)
-        )
         factors = self._relaxation.factors(1j * omega).T
-        flat = relaxing.reshape(len(relaxing), -1)
-        w = omega[:, None, None]
-        out = np.empty((len(omega), *stiffness.shape), complex)
-        out.real = stiffness - w**2 * self._mass + (factors.real @ flat).reshape(out.shape)
-        out.imag = w * damping + (factors.imag @ flat).reshape(out.shape)
+        even, odd = np.ones_like(omega), np.zeros_like(omega)
+        real = np.column_stack([even, -(omega**2), odd, factors.real]) @ self._flat
+        imaginary = np.column_stack([odd, odd, omega, factors.imag]) @ self._flat
+        out = np.empty((len(omega), *self._shape), complex)
+        out.real, out.imag = real.reshape(out.shape), imaginary.reshape(out.shape)
         return out
-
-    @staticmethod
-    def _solved(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
-        return np.linalg.solve(matrices, np.broadcast_to(right, (len(matrices), *right.shape)))
 
     def inverse(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Inverses of h(i omega), and the phases of its determinant times that of the structure over the reference's;
@@ -141,13 +137,26 @@ class RelaxingResponse:
         """
         new = np.array([w for w in omega if w not in self._known], float)
         if new.size:
-            matrices = self._at(new)
-            h = self._out @ self._solved(matrices, self._in)
-            signs = [np.linalg.slogdet(x)[0] for x in (h, matrices, self._at(new, reference=True))]
-            phase = np.angle(signs[0] * signs[1] * signs[2].conj())
+            solved, own = _solved_with_signs(self._at(new), self._in)
+            h = self._out @ solved
+            passive = np.angle(self._oscillators.values(self._relaxation, new)).sum(axis=1)
+            phase = np.angle(np.linalg.slogdet(h)[0] * own * np.exp(-1j * passive))
             self._known.update(zip(new, zip(np.linalg.inv(h), phase)))
         inverses, phases = zip(*(self._known[w] for w in omega))
         return np.array(inverses), np.array(phases)
+
+
+def _solved_with_signs(matrices: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Solutions of complex systems, and the signs of their determinants, from one factorisation each."""
+    factor, solve = la.get_lapack_funcs(("getrf", "getrs"), (matrices, right))
+    solved, signs = np.empty((len(matrices), *right.shape), complex), np.empty(len(matrices), complex)
+    for i, matrix in enumerate(matrices):
+        lu, pivots, _ = factor(matrix)
+        solved[i] = solve(lu, pivots, right)[0]
+        diagonal = lu.diagonal()
+        swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
+        signs[i] = (-1.0) ** swaps * np.prod(diagonal / np.abs(diagonal))
+    return solved, signs
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pydantic import ValidationInfo, model_validator
 
 from . import physics
 from .damping import Damping
+from .downstream import Downstream
 from .load import make_case, put
 from .materials import DEFAULT_LAYERS, Layer, Materials
 from .outside import Outside
@@ -45,6 +46,7 @@ class Case(Section):
     fluid: physics.Fluid = key(physics.Fluid(), "The fluid and its conservation laws.")
     drive: physics.Drive = key(physics.Drive(), "The load.")
     upstream: Upstream = key(Upstream(), "The line in front of the valve.")
+    downstream: Downstream = key(Downstream(), "What the valve discharges into.")
     outside: Outside = key(Outside(), "The fluid outside the wall.")
     supports: physics.Supports = key(physics.Supports(), "One-sided stops of the lips.")
 
@@ -90,7 +92,9 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
-        self.upstream.check_roughness(2 * (self.valve.flange_radius - self.valve.flange_wall_deduction))
+        inlet = 2 * (self.valve.flange_radius - self.valve.flange_wall_deduction)
+        self.upstream.check_roughness(inlet)
+        self.downstream.check_pipe(inlet)
         self.outside.check_pipe(2 * self.valve.flange_radius + self.valve.thickness_at(self.valve.length))
         return self
 
@@ -98,6 +102,16 @@ class Case(Section):
     def has_line(self) -> bool:
         """Whether fluid comes through a pipe in front of the valve."""
         return self.drive.kind == "flow" and self.upstream.length > 0
+
+    @property
+    def has_tail(self) -> bool:
+        """Whether the jet runs into a pipe behind the valve."""
+        return self.drive.kind == "flow" and self.downstream.pipe_diameter is not None
+
+    @property
+    def rest_pressure(self) -> float:
+        """The drive.pressure, Pa, at which nothing flows."""
+        return self.downstream.pressure if self.drive.kind == "flow" else 0.0
 
     @property
     def continuity(self) -> str:

@@ -38,7 +38,8 @@ class Fluid(Section):
     density: Density = key(1000.0, "Mass density.", **PARAMETERS["density"].limits)
     continuity: Literal["quasi-steady", "storage"] = key(
         "quasi-steady",
-        "A U the same at every station (quasi-steady, the thesis), or dA/dt + d(AU)/dz = 0 (storage).",
+        "A U the same at every station (quasi-steady, the thesis), or dA/dt + d(AU)/dz = 0 (storage), which conserves "
+        "volume under moving walls and is what predictions should rest on; new case files have it.",
     )
     unsteady: StrictBool = key(True, "Keep the unsteady term of Bernoulli's equation.")
     area_floor: Number = key(
@@ -55,7 +56,7 @@ class Drive(Section):
     pressure: Pressure = key(
         18e3,
         "Static pressure at the flange over that of the surroundings (flow), or the pressure on the wall (uniform). "
-        "With a line upstream it is the pressure at its far end: see drive.at.",
+        "With a line upstream it is the pressure at its far end: see drive.at. It works against downstream.pressure.",
         ge=0,
         le=PARAMETERS["pressure"].high,
     )

@@ -35,6 +35,8 @@ DIMENSION = {
     "Hz": "frequency",
     "N/m": "stiffness",
     "m/s": "velocity",
+    "m^3/s": "volume flow",
+    "kg/s": "mass flow",
     "deg": "angle",
     "": "plain number",
 }

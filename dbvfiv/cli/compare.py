@@ -1,4 +1,4 @@
-"""``dbvfiv compare``: several transient runs in one figure and one table."""
+"""``dbvfiv compare``: several runs of one kind in one figure and one table."""
 
 from __future__ import annotations
 
@@ -14,13 +14,17 @@ ORDER = 52
 
 
 def command(
-    files: Annotated[list[Path], typer.Argument(metavar="RUN.h5 RUN.h5 ...", help="Result files of transient runs.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN.h5 RUN.h5 ...", help="Result files of transient runs, or of steady ones."),
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.png", help="Figure to write.")] = Path(
         "comparison.png"
     ),
     as_json: AsJson = False,
 ) -> None:
-    """Compare transient runs: their histories in one figure, their verdicts in one table, named by the case keys that
-    tell them apart.
+    """Compare transient runs: their histories in one figure, their verdicts in one table; or steady runs: their head
+    and discharge in one figure, the flows at the pressures of the first and what they differ by in one table. Runs are
+    named by the case keys that tell them apart.
     """
     action("compare").compare(files, output, as_json)

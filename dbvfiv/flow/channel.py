@@ -38,6 +38,8 @@ class Channel(FlowLaw):
         Keep the term d/dt integral U ds.
     terms : sequence of FlowTerm
         Losses and inertances on the way.
+    back : float
+        Pressure at the far end downstream, Pa.
     reversible : bool
         Let flow that is drawn in lose its head; see `dbvfiv.flow.heads`. Small motions of an outward flow are the same.
 
@@ -48,7 +50,7 @@ class Channel(FlowLaw):
         the square of the speeds and the speeds.
     """
 
-    DATA = ("step", "floor", "terms")
+    DATA = ("step", "floor", "terms", "back")
     STATIC = ("unsteady", "reversible")
     inner_names = ("inlet velocity",)
 
@@ -60,13 +62,14 @@ class Channel(FlowLaw):
         unsteady: bool = True,
         terms: Sequence[FlowTerm] = (),
         reversible: bool = False,
+        back: float = 0.0,
     ):
         self.z = np.asarray(z, float)
         self.step = np.diff(self.z)
         if np.any(self.step <= 0):
             raise ValueError("The stations of a channel must have increasing positions from the outlet to the inlet.")
         self.floor = float(floor)
-        self.storage = float(storage)
+        self.storage, self.back = float(storage), float(back)
         self.unsteady, self.reversible = bool(unsteady), bool(reversible)
         self.terms = tuple(terms)
         self._check_terms()
@@ -116,7 +119,7 @@ class Channel(FlowLaw):
         speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
         head = (reversible_head if self.reversible else outward_head)(speed, inner[0])
         if self.terms:
-            head = head + self.term_heads(Stream(area, area_rate, speed, inner), parameters)
+            head = head + self.term_heads(self.stream(area, area_rate, speed, inner), parameters)
         return head
 
     def psi(self, area, area_rate, inner, parameters):
@@ -126,8 +129,12 @@ class Channel(FlowLaw):
         speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
         psi = _upstream(self.step, speed)
         if self.terms:
-            psi = psi + self.term_momenta(Stream(area, area_rate, speed, inner), parameters)
+            psi = psi + self.term_momenta(self.stream(area, area_rate, speed, inner), parameters)
         return psi
+
+    def stream(self, area, area_rate, speed, inner) -> Stream:
+        """The streamline as terms see it; traceable."""
+        return Stream(area, area_rate, speed, inner, above_floor(area, self.floor))
 
     def term_heads(self, stream: Stream, parameters):
         """Heads (m,) that the terms add; traceable."""
@@ -144,7 +151,7 @@ class Channel(FlowLaw):
             momentum = lambda a, r, u: self.psi(a, r, u, parameters)  # noqa: E731
             _, inertia = jax.jvp(momentum, (area, rate, inner), (rate, acceleration, inner_rate))
         head = self.heads(area, rate, inner, parameters)
-        p = parameters["inlet"] - parameters["density"] * (head + inertia)
+        p = parameters["inlet"] - self.back - parameters["density"] * (head + inertia)
         return jnp.concatenate([jnp.zeros(1), p[1:]]), p[:1]
 
     def _blend(self, parameters):
@@ -156,7 +163,7 @@ class Channel(FlowLaw):
     def steady_start(self, area, parameters):
         open_ = above_floor(area, self.floor)
         ratio = jnp.maximum((open_[-1] / open_[0]) ** 2 - 1.0, 0.1)
-        return jnp.sqrt(2.0 * jnp.abs(parameters["inlet"]) / (parameters["density"] * ratio))[None] + 1e-3
+        return jnp.sqrt(2.0 * jnp.abs(parameters["inlet"] - self.back) / (parameters["density"] * ratio))[None] + 1e-3
 
     def steady(self, area, parameters):
         """Bernoulli's pressures, which depend on ratios of areas only; heads go with the square of the discharge.
@@ -167,9 +174,9 @@ class Channel(FlowLaw):
         total = open_**-2.0
         still = jnp.zeros_like(area)
         ratio = (open_[-1] / open_[0]) ** 2 - 1.0
-        inlet, kinetic = parameters["inlet"], total[-1]
+        inlet, kinetic = parameters["inlet"] - self.back, total[-1]
         if self.terms:
-            unit = Stream(area, still, 1.0 / open_, 1.0 / open_[-1:])
+            unit = self.stream(area, still, 1.0 / open_, 1.0 / open_[-1:])
             lost = 2.0 * self.term_heads(unit, parameters)
             total, ratio = total + lost, ratio + lost[0] * open_[-1] ** 2
         pressure = inlet * (total[0] - total) / (total[0] - kinetic)
@@ -185,7 +192,7 @@ def _trial(count: int, size: float) -> Stream:
     """A stream of some size to try terms on."""
     area = np.linspace(2.0, 5.0, count)
     speed = size / area
-    return Stream(area, size * np.linspace(0.1, 0.3, count), speed, speed[-1:])
+    return Stream(area, size * np.linspace(0.1, 0.3, count), speed, speed[-1:], area)
 
 
 def _upstream(step, values):

@@ -142,6 +142,9 @@ class FlowLaw(Traceable, ABC):
         Smallest area that the fluid sees, m2; 0 without such a floor.
     has_fluid : bool
         Whether a fluid moves: its density matters, and small motions of the wall change the pressures.
+    back : float
+        Pressure that inlet pressures work against, Pa: that at the far end downstream. Station pressures are what the
+        wall sees and not over it.
     unsteady : bool
         Whether rates matter; without, the steady law holds at every instant and the inner unknowns follow from the
         passage.
@@ -149,6 +152,7 @@ class FlowLaw(Traceable, ABC):
 
     inner_names: ClassVar[tuple[str, ...]] = ()
     floor: float = 0.0
+    back: float = 0.0
     has_fluid: bool = True
     unsteady: bool = True
 

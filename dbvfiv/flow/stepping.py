@@ -19,8 +19,6 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
-from .term import Stream
-
 if TYPE_CHECKING:
     from .channel import Channel
 
@@ -125,7 +123,7 @@ class MovingFluid:
         start = (1.0 - theta) * old
         a = 0.5 * (s1[0] * s1[0] - 1.0)
         b = s0[0] * s1[0] + psi_weight * p1 / theta
-        c = 0.5 * s0[0] * s0[0] + psi_weight * (p0 - p1 * start / theta) + psi_known - inlet / self.density
+        c = 0.5 * s0[0] * s0[0] + psi_weight * (p0 - p1 * start / theta) + psi_known - self._driving(inlet)
         square = b * b - 4.0 * a * c
         if not square >= 0.0:
             return np.nan
@@ -141,7 +139,7 @@ class MovingFluid:
         start = (1.0 - theta) * old  # the velocity where the equations are met is start + theta times the new one
         p0, p1 = (float(part) for part in self.integrate(np.stack(self._affine(*new), axis=1))[0])
         rise = psi_weight * p1 / theta
-        known = psi_weight * (p0 - p1 * start / theta) + psi_known - inlet / self.density
+        known = psi_weight * (p0 - p1 * start / theta) + psi_known - self._driving(inlet)
 
         def missing(u: float) -> tuple[float, float]:
             speed = still + u * unit
@@ -166,7 +164,11 @@ class MovingFluid:
 
     def pressure(self, flow: FlowState, psi_rate: np.ndarray, inlet: float) -> np.ndarray:
         """Pressures (m,), Pa; the first, at the outlet, is to vanish."""
-        return inlet - self.density * (self._whole_head(flow) + psi_rate)
+        return inlet - self.channel.back - self.density * (self._whole_head(flow) + psi_rate)
+
+    def _driving(self, inlet: float) -> float:
+        """What drives the flow, as pressure over density, m2/s2."""
+        return (inlet - self.channel.back) / self.density
 
     def _whole_head(self, flow: FlowState) -> np.ndarray:
         head = self.head(flow.speed)
@@ -237,7 +239,7 @@ class MovingFluid:
 
 def _term_parts(channel, parameters, area, rate, velocity):
     speed = channel.speeds(area, rate, velocity, parameters["storage"])
-    stream = Stream(area, rate, speed, velocity[None])
+    stream = channel.stream(area, rate, speed, velocity[None])
     return channel.term_heads(stream, parameters), channel.term_momenta(stream, parameters)
 
 

@@ -18,12 +18,16 @@ class Stream(NamedTuple):
         Of the fluid at the stations, m/s; negative inwards.
     inner : (l,) array
         The law's own unknowns; the first is the inlet velocity, m/s.
+    open_area : (m,) array, optional
+        Areas that the fluid sees, m2: they stay above the floor of the channel, so that `open_area * speed` is the
+        discharge.
     """
 
     area: Any
     area_rate: Any
     speed: Any
     inner: Any
+    open_area: Any = None
 
 
 class FlowTerm(Traceable):

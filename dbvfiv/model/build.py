@@ -44,4 +44,5 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
         return UniformLoad(len(mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
     gap_area = mesh.rest_area[0] - mesh.wall_deduction[0]
     storage = 1.0 if case.fluid.continuity == "storage" else 0.0
-    return Channel(mesh.z, case.fluid.area_floor * gap_area, storage, case.fluid.unsteady, terms_of(case))
+    floor, back = case.fluid.area_floor * gap_area, case.rest_pressure
+    return Channel(mesh.z, floor, storage, case.fluid.unsteady, terms_of(case), back=back)

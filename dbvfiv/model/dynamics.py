@@ -11,6 +11,7 @@ sum_g phi_g(lambda) K_g, with K_g the material part of the tangent of layers tha
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -40,6 +41,8 @@ class Conditions:
         Factor on the loss factors of all materials; zero leaves them elastic.
     pipe_length : float, optional
         Of the line in front, m; the case's own where it is not given, and of no effect without a line.
+    tail_length : float, optional
+        Of the pipe behind, m; likewise.
     """
 
     density: float
@@ -47,11 +50,19 @@ class Conditions:
     beta: float
     loss_factor: float = 0.0
     pipe_length: float | None = None
+    tail_length: float | None = None
 
     @classmethod
     def of(cls, case) -> Conditions:
-        length = case.upstream.length if case.has_line else None
-        return cls(case.fluid.density, case.damping.alpha, case.damping.beta, case.damping.loss_factor, length)
+        damping, length = case.damping, case.upstream.length if case.has_line else None
+        behind = case.downstream.length if case.has_tail else None
+        return cls(case.fluid.density, damping.alpha, damping.beta, damping.loss_factor, length, behind)
+
+    @property
+    def of_line(self) -> dict[str, float]:
+        """Parameters of what is in front of the valve and behind it by their names; those not given left out."""
+        given = {"pipe_length": self.pipe_length, "tail_length": self.tail_length}
+        return {name: value for name, value in given.items() if value is not None}
 
 
 def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q, v, a, inner, inner_rate):
@@ -161,17 +172,17 @@ class LinearisedState:
         flowing = fluid and self.model.flow.has_fluid
         if not flowing and self.added is None:
             return CoupledPencil(damped.M, damped.C, damped.K, relaxation=damped.relaxation)
-        parts = self.flow_parts(conditions.density, storage, conditions.pipe_length) if flowing else {}
+        parts = self.flow_parts(conditions.density, storage, conditions.of_line) if flowing else {}
         if self.added is not None:
             density = self.model.case.outside.density(conditions.density)
             parts = self.added.parts(parts or self.no_flow(), density)
         return damped.replace(**parts)
 
-    def flow_parts(self, density: float, storage: float | None = None, pipe_length: float | None = None) -> dict:
+    def flow_parts(self, density: float, storage: float | None = None, line: dict | None = None) -> dict:
         """A0 to S1 of the flow alone at a density; of a steady flow A0 is all."""
         flow = self.model.flow
         if flow.unsteady:
-            return fluid_parts(flow, self.area, self.inlet, density, storage, pipe_length)
+            return fluid_parts(flow, self.area, self.inlet, density, storage, line)
         return self.no_flow() | {"A0": flow.steady_operator(self.area, self.inlet)[1]}
 
     def no_flow(self) -> dict:
@@ -187,11 +198,11 @@ def fluid_parts(
     inlet: float,
     density: float,
     storage: float | None = None,
-    pipe_length: float | None = None,
+    line: Mapping[str, float] = {},
 ) -> dict[str, np.ndarray]:
-    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow."""
-    given = {"inlet": inlet, "density": density, "storage": storage, "pipe_length": pipe_length}
-    return flow.linearise_still(area, {name: value for name, value in given.items() if value is not None}).parts()
+    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow; `line` as `Conditions.of_line`."""
+    given = {"inlet": inlet, "density": density, **line}
+    return flow.linearise_still(area, given if storage is None else given | {"storage": storage}).parts()
 
 
 def linearise(model: ValveModel, q: np.ndarray, inlet: float) -> LinearisedState:

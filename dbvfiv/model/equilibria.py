@@ -58,7 +58,12 @@ _NEARLY_AS_WIDE = 0.9
 
 @dataclass
 class LoadPath(LoadSteps):
-    """Walks a valve from one steady state to the next in pressure."""
+    """Walks a valve from one steady state to the next in pressure; at rest the inlet pressure is that downstream."""
+
+    def __post_init__(self):
+        if self.q is None:
+            self.pressure = self.model.flow.back
+        super().__post_init__()
 
     def go_to(self, target: float) -> SteadyState:
         """Equilibrium at a pressure, Pa.
@@ -67,7 +72,14 @@ class LoadPath(LoadSteps):
         ------
         SolveError
             If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
+            If the pressure downstream is not overcome.
         """
+        back = self.model.flow.back
+        if back and target <= back:
+            raise SolveError(
+                f"At {target:.6g} Pa nothing flows: the pressure downstream is {back:.6g} Pa, and the drive must be "
+                "greater; `dbvfiv closure` says what a back pressure does to the valve."
+            )
         try:
             way = self.reach(target)
         except SolveError as error:
@@ -159,11 +171,11 @@ def redescribe(model: ValveModel, state: SteadyState) -> SteadyState:
 
 
 def rest_state(model: ValveModel) -> SteadyState:
-    """The valve at rest without pressure, as a state."""
+    """The valve at rest without pressure difference, as a state."""
     return describe_state(
         model,
         model.rest(),
-        0.0,
+        model.flow.back,
         converged=True,
         iterations=0,
         load_steps=0,

@@ -12,8 +12,33 @@ CV_OVER_KV = 1.156
 
 
 @dataclass(frozen=True)
+class Behind:
+    """What follows the valve; that of a free discharge without anything given.
+
+    Attributes
+    ----------
+    pressure : float, Pa
+        Static, around the jet, over that of the surroundings.
+    jet_velocity : float, m/s
+        NaN where it is not known.
+    recovered : float, Pa
+        By which the pressure rises where the jet has widened to a pipe; 0 where its energy is lost.
+    velocity : float, m/s
+        In that pipe; 0 without one.
+    loss : float, m
+        Head lost in that pipe up to its far end.
+    """
+
+    pressure: float = 0.0
+    jet_velocity: float = math.nan
+    recovered: float = 0.0
+    velocity: float = 0.0
+    loss: float = 0.0
+
+
+@dataclass(frozen=True)
 class Hydraulics:
-    """A valve that discharges freely: the energy of its jet is lost, nothing is recovered behind it.
+    """Of a valve that discharges freely all of the head ends in its jet; in a pipe behind it the jet gives back a part.
 
     Attributes
     ----------
@@ -21,19 +46,27 @@ class Hydraulics:
     total_head : float, m
         At the flange, static and velocity head, of the fluid, over that of the surroundings.
     head_loss : float, m
-        Total head that ends in the valve and its jet; of a free discharge all of it.
+        Total head that ends in the valve and its jet: from the flange to the fluid at rest around a free discharge, or
+        to the pipe behind where the jet has widened.
     loss_coefficient : float
         K, the loss over the velocity head at the flange; infinite without a flow.
     discharge_coefficient : float
-        Flow over that of the flange's section at the jet velocity of the total head.
+        Flow over that of the flange's section at the jet velocity of the head that is lost; 1/sqrt(K).
     kv : float, m3/h
-        Flow of water at a static pressure of 1 bar at the flange (IEC 60534-1), at this opening.
+        Flow of water at a static pressure of 1 bar between flange and fluid behind (IEC 60534-1), at this opening.
     cv : float, US gallons a minute
         The same at 1 psi.
     line_loss : float, m
         Head lost by friction and fittings of a line in front; 0 without one.
     supply_head : float, m
         Total head at the far end of the line, or at the flange without one.
+    jet_velocity : float, m/s
+    recovered_pressure, recovered_head : float, Pa, m
+        What the jet gives back in a pipe behind the valve.
+    tail_loss : float, m
+        Head lost in that pipe.
+    downstream_head : float, m
+        Static head at its far end, or around a free discharge, over that of the surroundings.
     """
 
     flange_velocity: float
@@ -45,6 +78,11 @@ class Hydraulics:
     cv: float
     line_loss: float
     supply_head: float
+    jet_velocity: float
+    recovered_pressure: float
+    recovered_head: float
+    tail_loss: float
+    downstream_head: float
 
     def summary(self) -> dict[str, float]:
         """Plain numbers, SI but for kv and cv."""
@@ -52,9 +90,14 @@ class Hydraulics:
 
 
 def hydraulics_of(
-    pressure: float, density: float, volume_flow: float, flange_velocity: float, line_loss: float = 0.0
+    pressure: float,
+    density: float,
+    volume_flow: float,
+    flange_velocity: float,
+    line_loss: float = 0.0,
+    behind: Behind | None = None,
 ) -> Hydraulics:
-    """Hydraulics of a flow into free surroundings.
+    """Hydraulics of a flow.
 
     Parameters
     ----------
@@ -64,6 +107,8 @@ def hydraulics_of(
     volume_flow : float, m3/s
     flange_velocity : float, m/s
     line_loss : float, m
+    behind : Behind, optional
+        Free discharge into the surroundings without it.
 
     Examples
     --------
@@ -71,18 +116,27 @@ def hydraulics_of(
     >>> round(found.kv, 6), round(found.loss_coefficient, 6)
     (36.0, 201.0)
     """
+    behind = Behind() if behind is None else behind
     velocity_head = flange_velocity**2 / (2 * GRAVITY)
     total = head_of(pressure, density) + velocity_head
     flows = velocity_head > 0
-    kv = 3600 * volume_flow * math.sqrt(density / WATER * 1e5 / pressure) if pressure > 0 else math.nan
+    static = behind.pressure + behind.recovered
+    loss = total - head_of(static, density) - behind.velocity**2 / (2 * GRAVITY)
+    drop = pressure - static
+    kv = 3600 * volume_flow * math.sqrt(density / WATER * 1e5 / drop) if drop > 0 else math.nan
     return Hydraulics(
         flange_velocity=flange_velocity,
         total_head=total,
-        head_loss=total,
-        loss_coefficient=total / velocity_head if flows else math.inf,
-        discharge_coefficient=flange_velocity / math.sqrt(2 * GRAVITY * total) if flows else 0.0,
+        head_loss=loss,
+        loss_coefficient=loss / velocity_head if flows else math.inf,
+        discharge_coefficient=flange_velocity / math.sqrt(2 * GRAVITY * loss) if flows and loss > 0 else 0.0,
         kv=kv,
         cv=CV_OVER_KV * kv,
         line_loss=line_loss,
         supply_head=total + line_loss,
+        jet_velocity=behind.jet_velocity,
+        recovered_pressure=behind.recovered,
+        recovered_head=head_of(behind.recovered, density),
+        tail_loss=behind.loss,
+        downstream_head=head_of(static, density) - behind.loss,
     )

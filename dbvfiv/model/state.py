@@ -8,7 +8,7 @@ import numpy as np
 
 from ..case.quantity import GRAVITY, head_of
 from ..errors import SolveError
-from .hydraulics import Hydraulics, hydraulics_of
+from .hydraulics import Behind, Hydraulics, hydraulics_of
 from .lip import LipCentre
 from .valve import QUARTERS, ValveModel
 
@@ -28,6 +28,14 @@ class SteadyState:
         At the flange, whatever is in front of it.
     line_loss : float, m
         Head lost in a line in front; 0 without one.
+    outlet_pressure : float, Pa
+        Around the jet and on the outer side of the wall, over that of the surroundings.
+    recovered_pressure : float, Pa
+        By which it rises where the jet has widened to a pipe behind the valve; 0 without one.
+    downstream_velocity : float, m/s
+        In that pipe; 0 without one.
+    tail_loss : float, m
+        Head lost in that pipe.
     q : (n,) array
         Free displacements (m) and rotations (rad).
     nodal : (nn, 5) array
@@ -45,6 +53,7 @@ class SteadyState:
     lip_displacement : float, m
         Displacement in y of the mid-surface of one lip there.
     station_area, station_velocity, station_pressure : (m,) arrays, m2 (a quarter), m/s, Pa
+        Pressures as the wall sees them, over `outlet_pressure`.
     stops : int
         Lip stops in contact.
     converged : bool
@@ -62,6 +71,10 @@ class SteadyState:
     head: float
     flange_pressure: float
     line_loss: float
+    outlet_pressure: float
+    recovered_pressure: float
+    downstream_velocity: float
+    tail_loss: float
     q: np.ndarray
     nodal: np.ndarray
     mass_flow: float
@@ -90,7 +103,14 @@ class SteadyState:
             return None
         density = self.mass_flow / self.volume_flow
         velocity = float(self.station_velocity[-1])
-        return hydraulics_of(self.flange_pressure, density, self.volume_flow, velocity, self.line_loss)
+        behind = Behind(
+            self.outlet_pressure,
+            self.outlet_velocity,
+            self.recovered_pressure,
+            self.downstream_velocity,
+            self.tail_loss,
+        )
+        return hydraulics_of(self.flange_pressure, density, self.volume_flow, velocity, self.line_loss, behind)
 
 
 def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution) -> SteadyState:
@@ -106,11 +126,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     density = model.case.fluid.density
     velocity = model.flow.inlet_velocity(area, pressure, density)
     if not np.isfinite(velocity):
-        raise SolveError(
-            f"At {pressure:.6g} Pa no finite steady flow belongs to the equilibrium: its passage at the lips, "
-            f"{1e4 * QUARTERS * area[0]:.4g} cm2, is not smaller than that of the flange, "
-            f"{1e4 * QUARTERS * area[-1]:.4g} cm2, so no pressure would be left to hold the fluid back."
-        )
+        raise SolveError(_boundless(model, area, pressure))
     speeds = model.flow.velocities(area, velocity)
     displacement = np.linalg.norm(nodal[:, :3], axis=1)
     where = int(np.argmax(displacement))
@@ -118,11 +134,16 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     mass_flow = model.mass_flow(area, pressure)
     station_pressure = model.flow.steady_pressure(area, pressure)
     line = model.line
+    outlet, recovered, tail_speed, tail_loss = _behind(model, area, velocity, float(speeds[0]))
     return SteadyState(
         pressure=float(pressure),
         head=head_of(pressure, density),
-        flange_pressure=float(pressure if line is None else station_pressure[-1]),
+        flange_pressure=float(pressure if line is None else station_pressure[-1] + outlet),
         line_loss=0.0 if line is None else line.lost_head(float(area[-1]), velocity) / GRAVITY,
+        outlet_pressure=outlet,
+        recovered_pressure=recovered,
+        downstream_velocity=tail_speed,
+        tail_loss=tail_loss,
         q=np.asarray(q),
         nodal=nodal,
         mass_flow=mass_flow,
@@ -138,4 +159,42 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
         station_pressure=station_pressure,
         stops=model.stops.touching(q),
         **solution,
+    )
+
+
+def _behind(model: ValveModel, area: np.ndarray, velocity: float, jet: float) -> tuple[float, float, float, float]:
+    """Pressure around the jet, its rise in a pipe behind the valve, Pa, speed there, m/s, and head lost there, m.
+
+    Raises
+    ------
+    SolveError
+        If the jet is wider than the pipe.
+    """
+    tail, density = model.tail, model.case.fluid.density
+    if tail is None:
+        return model.flow.back, 0.0, 0.0, 0.0
+    if area[0] > tail.quarter:
+        raise SolveError(
+            f"The passage at the lips, {1e4 * QUARTERS * area[0]:.4g} cm2, is wider than the pipe that it stands in, "
+            f"{1e4 * QUARTERS * float(tail.quarter):.4g} cm2: downstream.pipe_diameter must be larger."
+        )
+    speed = float(tail.speed(area[-1], velocity))
+    recovered = density * float(tail.gained(model.flow.open_area(area)[0], jet, speed))
+    lost = float(tail.lost_head(speed))
+    return model.flow.back + density * lost - recovered, recovered, speed, lost / GRAVITY
+
+
+def _boundless(model: ValveModel, area: np.ndarray, pressure: float) -> str:
+    """Why no finite flow belongs to a state."""
+    lips, flange = (f"{1e4 * QUARTERS * some:.4g} cm2" for some in (area[0], area[-1]))
+    begin = f"At {pressure:.6g} Pa no finite steady flow belongs to the equilibrium: "
+    if model.tail is not None and area[0] < area[-1]:
+        return begin + (
+            f"the pipe downstream gives back all the head that the jet takes, because the passage at the lips, {lips}, "
+            f"is little smaller than that of the flange, {flange}, and the pipe is wider than both; give its losses "
+            "(downstream.loss), or the pressure in a reservoir upstream."
+        )
+    return begin + (
+        f"its passage at the lips, {lips}, is not smaller than that of the flange, {flange}, so no pressure would be "
+        "left to hold the fluid back."
     )

@@ -29,7 +29,7 @@ from .analytic import DAMPING, AnalyticResidual
 from .valve import ValveModel
 
 #: Names that no design parameter has, whether the flow law depends on them or not.
-CONDITIONS = ("inlet", "density", "storage", "pipe_length", *DAMPING, "loss_factor")
+CONDITIONS = ("inlet", "density", "storage", "pipe_length", "tail_length", *DAMPING, "loss_factor")
 
 
 _MEMORY = (
@@ -184,7 +184,7 @@ class ValveSystem(SystemBase):
 
     @cached_property
     def _unit_load(self) -> float:
-        return self._base.force_scale(self._base.rest(), 1.0)
+        return self._base.force_scale(self._base.rest(), self._base.flow.back + 1.0)
 
     def linear(self, u, mu) -> ValveLinearisation:
         q, _, inner = self.split(np.asarray(u, float))

@@ -20,6 +20,7 @@ import scipy.sparse as sp
 from ..case.model import Case
 from ..flow import RowAreas
 from ..flow.terms.line import Line
+from ..flow.terms.tail import Tail
 from ..geometry import ValveMesh
 from ..shell import Section, StepWall
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
@@ -97,8 +98,15 @@ class ValveModel:
     @property
     def line(self) -> Line | None:
         """The pipe in front of the valve, if there is one."""
-        terms = getattr(self.flow, "terms", ())
-        return next((term for term in terms if isinstance(term, Line)), None)
+        return self._term(Line)
+
+    @property
+    def tail(self) -> Tail | None:
+        """The pipe behind the valve, if there is one."""
+        return self._term(Tail)
+
+    def _term(self, kind: type):
+        return next((term for term in getattr(self.flow, "terms", ()) if isinstance(term, kind)), None)
 
     @property
     def stations(self) -> int:
@@ -224,9 +232,11 @@ class ValveModel:
         return float(np.finfo(float).eps * np.linalg.norm(stiffness @ self.shell.dofs.restrict(position)))
 
     def pressure_derivative(self, q: np.ndarray, pressure: float) -> np.ndarray:
-        """Derivative (n,) of the residual by the inlet pressure; steady pressures are proportional to it."""
+        """Derivative (n,) of the residual by the inlet pressure; steady pressures are proportional to what it has over
+        that downstream.
+        """
         nodal = self.nodal(q)
-        unit = self.flow.steady_pressure(self.rows.areas(nodal), 1.0)
+        unit = self.flow.steady_pressure(self.rows.areas(nodal), self.flow.back + 1.0)
         return -self.pressure_force(nodal, unit)
 
     def force_scale(self, q: np.ndarray, pressure: float) -> float:

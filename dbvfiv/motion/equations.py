@@ -123,7 +123,7 @@ class ValveMotion:
                 model.pressure_force(nodal, p), outlet, p, area_new, flow.speed, flow.psi, psi_rate, inlet, mid_speed
             )
         p = model.flow.steady_pressure(area, inlet)
-        speed = model.flow.inlet_velocity(area_new, inlet, self.conditions.density) if inlet > 0 else 0.0
+        speed = model.flow.inlet_velocity(area_new, inlet, self.conditions.density) if inlet > model.flow.back else 0.0
         zero = np.zeros(self.stations)
         return Load(
             model.pressure_force(nodal, p),

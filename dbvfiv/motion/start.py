@@ -54,7 +54,7 @@ def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observe
     observer.progress(f"steady state at {inlet:.6g} Pa")
     q = steady_positions(model, inlet, SteadyOptions.of(case))
     areas = model.rows.areas(model.nodal(q))
-    speed = model.flow.inlet_velocity(areas, inlet, motion.conditions.density) if inlet > 0 else 0.0
+    speed = model.flow.inlet_velocity(areas, inlet, motion.conditions.density) if inlet > model.flow.back else 0.0
     if transient.start == "steady":
         return consistent_state(motion, 0.0, q, np.zeros(model.size), speed, inlet), None
     observer.progress("mode to follow")
@@ -72,7 +72,7 @@ def steady_positions(model: ValveModel, inlet: float, options: SteadyOptions | N
 
     It is as exact as rounding allows: what is left of a residual would shake light parts of the wall.
     """
-    if inlet <= 0:
+    if inlet <= model.flow.back:
         return model.rest()
     options = SteadyOptions.of(model.case) if options is None else options
     path = LoadPath(model, SteadyOptions(NewtonOptions(1e-13, options.newton.max_iterations), options.min_step))

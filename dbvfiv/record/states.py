@@ -26,6 +26,10 @@ SUMMARY = (
     Column("head", "m", "The same as a head of the fluid", shown=Shown("head", "m", 8, lambda s: f"{s.head:.4g}")),
     Column("flange_pressure", "Pa", "Static pressure at the flange"),
     Column("line_loss", "m", "Head lost in a line in front of the valve"),
+    Column("outlet_pressure", "Pa", "Static pressure around the jet and the wall over that of the surroundings"),
+    Column("recovered_pressure", "Pa", "By which it rises in a pipe behind the valve"),
+    Column("downstream_velocity", "m/s", "Velocity in that pipe"),
+    Column("tail_loss", "m", "Head lost in that pipe"),
     Column(
         "mass_flow",
         "kg/s",
@@ -107,7 +111,7 @@ FIELDS = (
     Column("nodal", "m, rad", "Displacements ux uy uz and two rotations of each node"),
     Column("station_area", "m^2", "Flow area of a quarter at each row"),
     Column("station_velocity", "m/s", "Velocity at each row"),
-    Column("station_pressure", "Pa", "Static pressure at each row"),
+    Column("station_pressure", "Pa", "Static pressure at each row, over that outside the wall"),
 )
 #: Layers, inside to outside, in their own axes.
 LAYERS = (
@@ -165,8 +169,15 @@ def read_states(record: Record, table: str) -> list[SteadyState]:
     return states
 
 
+#: Of the hydraulics, those that stand beside the flow as well.
+_COEFFICIENTS = ("loss_coefficient", "discharge_coefficient", "kv")
+
+
 def summarise(state: SteadyState) -> dict[str, Any]:
     """Plain SI numbers of a state for JSON."""
     values = {c.name: getattr(state, c.name) for c in SUMMARY}
     found = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
-    return found | ({} if state.hydraulics is None else {"hydraulics": state.hydraulics.summary()})
+    hydraulics = state.hydraulics
+    if hydraulics is None:
+        return found
+    return found | {name: getattr(hydraulics, name) for name in _COEFFICIENTS} | {"hydraulics": hydraulics.summary()}

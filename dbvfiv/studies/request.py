@@ -16,6 +16,14 @@ PressureOption = Annotated[
 DensityOption = Annotated[
     str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
 ]
+LawOption = Annotated[
+    str | None,
+    typer.Option(
+        "--law",
+        metavar="LAW",
+        help="Continuity law in place of fluid.continuity: quasi-steady, storage, or both side by side.",
+    ),
+]
 
 
 @dataclass(frozen=True)

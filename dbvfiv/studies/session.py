@@ -124,7 +124,7 @@ class Session:
         model, pressure = self.model, self.case.drive.pressure
         if self.start is not None and self.start.pressure == pressure:
             return redescribe(model, self.start)  # flow and jet follow the density of this case
-        if pressure == 0:
+        if pressure == model.flow.back:
             return rest_state(model)
         return find_equilibrium(model, pressure, observer)
 

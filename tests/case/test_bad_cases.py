@@ -140,6 +140,33 @@ BAD = {
     ),
     "unknown state of the lips": ("[outside]\nlips = 'ajar'", r"outside\.lips.*closed.*open"),
     "depth outside": ("[outside]\ndepth = 3", r"outside\.depth"),
+    "negative pressure downstream": ("[downstream]\npressure = '-1 kPa'", r"downstream\.pressure.*at least 0 kPa"),
+    "pressure downstream that is a length": (
+        "[downstream]\npressure = '3 mm'",
+        r"downstream\.pressure.*not a pressure",
+    ),
+    "pressure downstream without a unit": ("[downstream]\npressure = '3'", r"downstream\.pressure.*no unit"),
+    "pipe downstream without width": ("[downstream]\npipe_diameter = 0", r"pipe_diameter.*greater than 0"),
+    "pipe downstream that the valve is too wide for": (
+        "[downstream]\npipe_diameter = '200 mm'",
+        r"line 2: downstream\.pipe_diameter is 200 mm around a valve .*262 mm.*at least 262 mm",
+    ),
+    "length downstream without a pipe": (
+        "[downstream]\nlength = 5",
+        r"downstream\.length is 5 m without pipe_diameter.*give pipe_diameter",
+    ),
+    "loss downstream without a pipe": ("[downstream]\nloss = 2", r"downstream\.loss is 2 without pipe_diameter"),
+    "expansion without a pipe": ("[downstream]\nexpansion_loss = 0", r"expansion_loss is 0 without pipe_diameter"),
+    "expansion that loses more than there is": (
+        "[downstream]\npipe_diameter = 0.3\nexpansion_loss = 1.2",
+        r"expansion_loss.*at most 1",
+    ),
+    "negative length downstream": ("[downstream]\npipe_diameter = 0.3\nlength = -1", r"downstream\.length.*at least 0"),
+    "negative loss downstream": ("[downstream]\npipe_diameter = 0.3\nloss = -1", r"downstream\.loss.*at least 0"),
+    "unknown key downstream": (
+        "[downstream]\ndiameter = 0.3",
+        r"downstream\.diameter is not a key.*upstream\.diameter",
+    ),
     "line of negative length": ("[upstream]\nlength = '-2 m'", r"upstream\.length.*at least 0 m"),
     "line without a unit": ("[upstream]\nlength = '20'", r"upstream\.length.*no unit.*length"),
     "line around the earth": ("[upstream]\nlength = '40000 km'", r"upstream\.length.*at most"),

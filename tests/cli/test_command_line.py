@@ -105,6 +105,7 @@ def test_a_new_case_is_commented_valid_and_never_overwrites(command_line, one_se
     text = file.read_text()
     assert "# Static pressure" in text and 'density = "1.2 kg/m^3"' in text
     assert command_line("case", file).status == 0
+    assert '\ncontinuity = "storage"' in text and '\ncontinuity = "quasi-steady"' in command_line("case").out
     again = command_line("case", "--new", file)
     assert again.status == 2 and one_sentence(again.err) and file.read_text() == text
     nowhere = command_line("case", "--new", tmp_path / "no" / "folder.toml")

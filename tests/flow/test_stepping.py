@@ -12,6 +12,7 @@ from dbvfiv.flow import Channel
 from dbvfiv.flow.reversed import ReversibleFluid
 from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.flow.terms.line import Line
+from dbvfiv.flow.terms.tail import Tail
 from tests.flow.test_adding_a_law import LipLoss, Pipe
 from tests.flow.test_channel import FLOOR, passage
 
@@ -22,6 +23,7 @@ KINDS = [
     pytest.param(ReversibleFluid, True, (LipLoss(0.7), Pipe(3.0, 1.2)), id="with terms"),
     pytest.param(ReversibleFluid, True, (Line(20.0, 0.15, 0.02, 0.0, 1.5),), id="with a line from a reservoir"),
     pytest.param(ReversibleFluid, True, (Line(5.0, None, 0.0, 1e-4, 0.5, False),), id="with a line"),
+    pytest.param(ReversibleFluid, True, (Tail(0.16, 5.0, 0.5),), id="with a pipe behind"),
 ]
 #: outward, with one station of rest reversed by the moving walls, and drawn in
 VELOCITIES = [1.7, 0.02, -1.1]

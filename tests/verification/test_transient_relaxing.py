@@ -67,3 +67,41 @@ def test_a_small_push_grows_at_the_eigenvalues_rate(law, pressure, density):
     assert growth < 0.01 and frequency < 0.005
     off = [abs(complex(r.real, abs(r.imag)) - value) for r in rings]
     assert off[1] < 0.3 * off[0]
+
+
+#: Continuity law, pressure (Pa), bracket of densities (kg/m3) around the onset at which stability is lost or regained.
+ONSETS = [
+    (QUASI, 6e3, (800.0, 1200.0)),
+    (QUASI, 12e3, (1.2, 2.6)),
+    (STORAGE, 6e3, (200.0, 260.0)),
+    (STORAGE, 12e3, (70.0, 90.0)),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law, pressure, bracket", ONSETS)
+def test_the_onset_lies_where_the_sign_changes_in_time(law, pressure, bracket):
+    """A little below and above the onset a push decays on one side and grows on the other, at rates that vanish where
+    the eigenvalue's does.
+    """
+    changes = {
+        "mesh.around": 6,
+        "mesh.along": 8,
+        "fluid.continuity": law,
+        "drive.pressure": pressure,
+        "damping.model": "loss factor",
+        "onset.normal_form": False,
+        "onset.coarse_mesh": 0.0,
+    }
+    found = dbvfiv.load(changes=changes).onset(f"density={bracket[0]}:{bracket[1]}:5").summary()["points"]
+    assert len(found) == 1
+    onset, limits = found[0]["value"], []
+    densities = onset * np.array([0.98, 1.02])
+    for density in densities:
+        value, rings = two_routes(law, pressure, float(density))
+        assert abs(value.imag) / (2 * np.pi) == pytest.approx(found[0]["frequency"], rel=0.02)
+        limits.append((rings[1] + (rings[1] - rings[0]) / 3.0).real)
+    crossing = densities[0] - limits[0] * (densities[1] - densities[0]) / (limits[1] - limits[0])
+    print(f"\n{law} {pressure:g} Pa: onset {onset:.4f} kg/m3, in time {limits} 1/s, {crossing:.4f} kg/m3")
+    assert limits[0] * limits[1] < 0
+    assert crossing == pytest.approx(onset, rel=2e-3)

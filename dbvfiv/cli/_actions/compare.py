@@ -1,31 +1,59 @@
-"""Several transient runs in one figure and one table."""
+"""Several runs of one kind in one figure and one table."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from ...errors import CaseError
 from ...studies.session import load_result
-from ...studies.transient.comparison import labels, save_comparison
+from ...studies.steady import comparison as steady
+from ...studies.transient import comparison as transient
 from .._output import print_json
+
+#: Kinds of results that can be compared.
+_KINDS = ("transient", "steady")
 
 
 def compare(files: Sequence[Path], output: Path, as_json: bool) -> None:
-    """Draw and print what several transient runs did.
+    """Draw and print what several runs found.
 
     Raises
     ------
     CaseError
-        If a file holds another kind of result.
+        If a file holds another kind of result, or they hold several kinds.
     """
     results = [load_result(file) for file in files]
     for file, result in zip(files, results):
-        if result.kind != "transient":
-            raise CaseError(f"{str(file)!r} holds a result of kind {result.kind!r} and not a transient run.")
+        if result.kind not in _KINDS:
+            raise CaseError(
+                f"{str(file)!r} holds a result of kind {result.kind!r}; {' and '.join(_KINDS)} runs can be compared."
+            )
+        if result.kind != results[0].kind:
+            raise CaseError(
+                f"{str(file)!r} holds a result of kind {result.kind!r} and {str(files[0])!r} one of kind "
+                f"{results[0].kind!r}; runs of one kind can be compared."
+            )
+    (_compare_transient if results[0].kind == "transient" else _compare_steady)(files, results, output, as_json)
+
+
+def _compare_steady(files: Sequence[Path], results: Sequence[Any], output: Path, as_json: bool) -> None:
+    found = steady.compare(results)
+    path = steady.save_comparison(results, output)
+    if as_json:
+        runs = [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, found.labels, results)]
+        print_json({"runs": runs, "comparison": found.summary(), "remark": found.remark, "figure": str(path)})
+        return
+    print("\n".join(found.lines()))
+    print(f"Wrote {path}.")
+
+
+def _compare_transient(files: Sequence[Path], results: Sequence[Any], output: Path, as_json: bool) -> None:
+    for result in results:
         result.require_steps()
-    path = save_comparison(results, output)
-    names = labels(results)
+    path = transient.save_comparison(results, output)
+    names = transient.labels(results)
     if as_json:
         print_json(
             {

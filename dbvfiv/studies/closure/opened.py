@@ -27,7 +27,7 @@ def turn_back(case: Case, record: GrowingRecord) -> None:
         for sentence in record.notes("turned back")[-1]["failures"]:
             record.fail(sentence)
         return
-    model = ValveModel(case.replace({"drive.kind": "flow", "drive.side": "inside"}))
+    model = ValveModel(case.replace({"drive.kind": "flow", "drive.side": "inside", "downstream.pressure": 0.0}))
     path = LoadPath(model, SteadyOptions.of(model.case), observer=record)
     states, failures = read_states(record, OPENED), []
     if states:

@@ -277,7 +277,7 @@ def _onsets(scan: Scan, along: Axis) -> list[tuple[float, float, float, float]]:
     found = []
     for crossing in scan.run(along.values):
         value = locate(scan, crossing, LOCATED)
-        eigenvalue = complex(scan.at(value).eigenvalues[crossing.index])
+        eigenvalue = complex(scan.within(value).eigenvalues[crossing.index])
         direction = 1.0 if crossing.high.unstable > crossing.low.unstable else -1.0
         left = abs(eigenvalue.real) / max(abs(eigenvalue), 1.0)
         found.append((value, abs(eigenvalue.imag) / (2 * np.pi), direction, left))

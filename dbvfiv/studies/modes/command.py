@@ -10,7 +10,8 @@ import typer
 from ...case.quantity import number_or_text
 from ...errors import CaseError
 from ..case import Case
-from ..request import DensityOption, Request
+from ..request import DensityOption, LawOption, Request
+from ..stability.laws import law_changes
 
 ORDER = 25
 
@@ -27,6 +28,7 @@ def command(
         ),
     ] = None,
     density: DensityOption = None,
+    law: LawOption = None,
     count: Annotated[int | None, typer.Option("--count", "-n", metavar="N", help="How many modes.")] = None,
     in_vacuo: Annotated[
         bool,
@@ -48,7 +50,8 @@ def command(
 
     The number of unstable eigenvalues is counted twice, in the list of modes and by the winding of the determinant
     along the imaginary axis; both eigenvalues of a pair count. The model has one quarter of the valve, so all modes are
-    symmetric about both planes.
+    symmetric about both planes. With --law both the other continuity law is asked too, and where both disagree about
+    stable or not the result says so.
 
     dbvfiv modes cases/dbv12.toml -p "6 kPa" --density 10 --set damping.alpha=0 -o modes.h5 --plots figures --animate 1
     """
@@ -63,5 +66,5 @@ def command(
         "fluid.density": number_or_text(density),
         "modes.count": count,
         "modes.in_vacuo": in_vacuo or None,
-    }
+    } | law_changes(law, "modes")
     return Request(changes, further=further)

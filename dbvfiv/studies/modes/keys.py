@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import StrictBool, StrictInt
 
 from ...case.quantity import Frequency, Number, Rate
@@ -18,4 +20,5 @@ class Keys(Section):
     shift: Rate | None = key(None, "Real part of a shift to search near, instead of automatic ones.", ge=-1e6, le=1e6)
     shift_frequency: Frequency = key(0.0, "Frequency of that shift.", ge=0, le=1e6)
     tolerance: Number = key(1e-8, "Largest accepted relative residual of the full pencil.", gt=0, le=1e-2)
+    continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
     in_vacuo: StrictBool = key(False, "Leave the fluid out: the stressed structure alone.")

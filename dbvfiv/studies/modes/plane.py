@@ -74,7 +74,11 @@ def eigenvalues(result: ModesResult) -> Figure:
 
 def conditions(result: ModesResult) -> str:
     """Pressure and fluid as they stand in titles."""
-    where = "at rest" if result.state.pressure == 0 else f"at {driven(result.case, result.state.pressure)}"
+    where = (
+        "at rest"
+        if result.state.pressure == result.case.rest_pressure
+        else f"at {driven(result.case, result.state.pressure)}"
+    )
     case = result.case
     fluid = f"{case.fluid.density:g} kg/m³"
     if in_vacuo(result):

@@ -17,8 +17,9 @@ from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
 from ..result import StudyResult
 from ..session import describe_surroundings
+from ..stability.laws import compare_states
 from ..state import State, states_of
-from . import centre_line, plane, shapes, winding
+from . import centre_line, other_law, plane, shapes, winding
 from .animation import animate_mode
 from .certificate import CURVE, Certificate
 from .mode import MODE, ModeShape
@@ -87,6 +88,18 @@ class ModesResult(StudyResult):
         return self.certificate.verdict(f"under {case.continuity}")
 
     @cached_property
+    def other_law(self) -> other_law.OtherLaw | None:
+        """The same state under the other continuity law, where that was asked for."""
+        notes = self.record.notes(other_law.NOTE)
+        return other_law.read(notes[-1], self.case.outside.words) if notes else None
+
+    @property
+    def comparison(self) -> str | None:
+        """One sentence on what both laws say; None where one was asked."""
+        other = self.other_law
+        return other and compare_states(self.case.fluid.continuity, self.stable, other.continuity, other.stable)
+
+    @cached_property
     def state(self) -> State:
         """The equilibrium, with its layers and figures."""
         return states_of(self, STATE)[0]
@@ -108,6 +121,7 @@ class ModesResult(StudyResult):
     def summary(self) -> dict[str, Any]:
         if self.certificate is None:
             return {"state": None, "modes": [], "stable": None, "warnings": list(self.warnings)}
+        both = {"other_law": self.other_law.summary(), "comparison": self.comparison} if self.other_law else {}
         return {
             "state": self.state.summary() | describe_surroundings(self.case) | {"in_vacuo": self.case.modes.in_vacuo},
             "modes": [mode.summary() for mode in self.modes],
@@ -117,7 +131,7 @@ class ModesResult(StudyResult):
             "certificate": self.certificate.summary(),
             "notes": list(self.notes),
             "warnings": list(self.warnings),
-        }
+        } | both
 
     def lines(self) -> list[str]:
         if self.certificate is None:
@@ -126,7 +140,12 @@ class ModesResult(StudyResult):
             f"{m.number:6d}{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:16.4f}{m.residual:11.1e}"
             for m in self.modes
         ]
-        return [*HEAD, *rows, "", self.verdict, *(f"Note: {note}" for note in self.notes)]
+        notes = [f"Note: {note}" for note in self.notes]
+        other = self.other_law
+        if other is None:
+            return [*HEAD, *rows, "", self.verdict, *notes]
+        table = other_law.side_by_side(self.case.fluid.continuity, [mode.summary() for mode in self.modes], other)
+        return [*table, "", self.verdict, other.verdict, self.comparison, *notes]
 
     def steps(self, valve: WholeValve, mode: int | None = None, phases: int = 24) -> Sequence[Step]:
         """The modes one after the other, or one cycle of one of them; see `dbvfiv.studies.modes.steps`."""

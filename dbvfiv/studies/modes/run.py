@@ -116,6 +116,7 @@ def run_modes(
     conditions: Conditions | None = None,
     options: ModesOptions | None = None,
     observer: Observer | None = None,
+    storage: float | None = None,
 ) -> FoundModes:
     """Leading modes of a steady state.
 
@@ -128,6 +129,8 @@ def run_modes(
         Fluid density and Rayleigh damping; those of the case otherwise.
     options : ModesOptions, optional
     observer : Observer, optional
+    storage : float, optional
+        Blend of the continuity laws in place of the model's own.
 
     Raises
     ------
@@ -141,16 +144,16 @@ def run_modes(
     observer = Observer() if observer is None else observer
     require_equilibrium(model, state)
     without_fluid = options.in_vacuo or not model.flow.has_fluid
-    if not without_fluid and state.pressure <= 0:
+    if not without_fluid and state.pressure <= model.flow.back:
         raise CaseError(
-            "Coupled modes need an inlet pressure greater than 0, because without one the velocity of an "
-            "ideal fluid is undetermined; "
+            f"Coupled modes need an inlet pressure greater than {model.flow.back:g}, because without one the velocity "
+            "of an ideal fluid is undetermined; "
             "modes.in_vacuo gives those of the structure at rest."
         )
     observer.begin("modes", 1)
     observer.progress("linearising")
     linear = linearise(model, state.q, state.pressure)
-    pencil = linear.pencil(conditions, fluid=not without_fluid)
+    pencil = linear.pencil(conditions, not without_fluid, storage)
     observer.progress("searching")
     with solving(state.pressure):
         # without stiffness damping the band follows from the structural frequencies

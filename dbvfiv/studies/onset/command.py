@@ -9,8 +9,9 @@ import typer
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
 from ..case import Case
-from ..request import DensityOption, PressureOption, Request
+from ..request import DensityOption, LawOption, PressureOption, Request
 from ..stability.fixed import refuse_moved
+from ..stability.laws import law_changes
 
 ORDER = 28
 
@@ -27,12 +28,15 @@ def command(
     ] = None,
     pressure: PressureOption = None,
     density: DensityOption = None,
+    law: LawOption = None,
 ) -> Request:
     """Every onset along one parameter: value, frequency, super- or subcritical, uncertainty of the mesh.
 
     All crossings of the range are looked for, also tongues of instability that close again. Each is located with the
     full matrices, confirmed by direct eigenvalues and independent counts on both sides, described by its first Lyapunov
     coefficient (onset.normal_form), and found again on a coarser mesh for an uncertainty (onset.coarse_mesh).
+
+    With --law both the other continuity law is scanned too, and what both disagree about is said.
 
     With -o every value of the scan and every onset is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash.
 
@@ -44,4 +48,4 @@ def command(
         "fluid.density": number_or_text(density),
         "onset.over": over,
     }
-    return Request(changes)
+    return Request(changes | law_changes(law, "onset"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import StrictBool
 
 from ...case.axis import Axis
@@ -32,6 +34,8 @@ class Keys(Section):
         ge=0,
         lt=1,
     )
+
+    continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
 
     @property
     def axis(self) -> Axis:

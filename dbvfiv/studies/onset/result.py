@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from ...case.parameters import PARAMETERS
 from ..result import StudyResult
 from ..stability.crossings import WATCHED
+from ..stability.laws import compare_ranges
 from ..stability.place import describe_fixed, fixed_conditions
-from . import figures
+from . import figures, other_law
 from .intervals import Interval, known_intervals, uncertain_intervals
 from .point import FINE, OnsetSample
 from .rows import read_points, read_samples
@@ -99,7 +100,30 @@ class OnsetResult(StudyResult):
         edges = [point["value"] for point in self.points if point["edge"]]
         return known_intervals(self.values, self.growth_rates[:, 0], self.certified, edges, unstable)
 
+    @cached_property
+    def other_law(self) -> dict[str, Any] | None:
+        """Onsets under the other continuity law, where that was asked for; see `dbvfiv.studies.onset.other_law`."""
+        notes = self.record.notes(other_law.NOTE)
+        return {name: value for name, value in notes[-1].items() if name != "what"} if notes else None
+
+    @property
+    def disagreements(self) -> list[tuple[float, float, str]]:
+        """Stretches of the range in which the two laws disagree, and the one that is stable there."""
+        if self.other_law is None:
+            return []
+        own = self.case.fluid.continuity
+        return other_law.disagreements(own, self.stable_intervals, self.unstable_intervals, self.other_law)
+
+    @property
+    def comparison(self) -> str | None:
+        """One sentence on what both laws say; None where one was asked."""
+        if self.other_law is None:
+            return None
+        row = PARAMETERS[self.parameter]
+        return compare_ranges(self.parameter, self.disagreements, row.shown_unit, row.scale)
+
     def summary(self) -> dict[str, Any]:
+        compared = {"other_law": self.other_law, "comparison": self.comparison, "disagreements": self.disagreements}
         return {
             "parameter": self.parameter,
             "points": list(self.points),
@@ -113,7 +137,7 @@ class OnsetResult(StudyResult):
             "failures": list(self.failures),
             "warnings": list(self.warnings),
             "interrupted": not self.complete,
-        }
+        } | (compared if self.other_law else {})
 
     def shortfall(self) -> str | None:
         failed = len(self.failures)
@@ -124,14 +148,29 @@ class OnsetResult(StudyResult):
 
     def lines(self) -> list[str]:
         fixed = f"At {describe_fixed(self.case, self.parameter)}:"
-        if not self.points:
+        if self.other_law is not None:
+            return [*self._table(fixed, self.points), *self._other_lines(), self.comparison]
+        return self._table(fixed, self.points)
+
+    def _table(self, fixed: str, points) -> list[str]:
+        if not points:
             return [fixed, self._without_onset()]
         unit = PARAMETERS[self.parameter].shown_unit
         head = (
             f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  "
             f"{'':<28}{'below, 1/s':>11}{'above, 1/s':>11}"
         )
-        return [fixed, head, *(self._line(point) for point in self.points)]
+        return [fixed, head, *(self._line(point) for point in points)]
+
+    def _other_lines(self) -> list[str]:
+        other = self.other_law
+        fixed = f"Under {other['continuity']} continuity:"
+        if other["points"]:
+            return self._table(fixed, other["points"])
+        growth = other["scan"]["growth_rate"]
+        sure = all(other["scan"]["certified"]) and growth
+        said = f"No onset: the valve is {'unstable' if growth and growth[0] > 0 else 'stable'} over the range."
+        return [fixed, said if sure else "No onset was found, and none is ruled out: some values lack a certificate."]
 
     def _without_onset(self) -> str:
         row = PARAMETERS[self.parameter]

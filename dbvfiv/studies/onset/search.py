@@ -100,7 +100,7 @@ class OnsetSearch:
         self._samples = {item.value: item for item in known if isinstance(item, OnsetSample) and item.mesh == mesh}
         self._known = {item.key: item for item in known if isinstance(item, OnsetPoint)}
         self.points: dict[tuple, OnsetPoint] = {}
-        self.scan = Scan(self._scanned, options.log)
+        self.scan = Scan(self._scanned, options.log, inside=self._inside)
         self._column = None
 
     def place(self, value: float) -> Place:
@@ -122,6 +122,15 @@ class OnsetSearch:
         if known.failure:
             raise SolveError(known.failure)
         return Sample(value, known.eigenvalues, known.certified)
+
+    def _inside(self, value: float) -> Sample:
+        """A sample on the way to a crossing. Where the wall relaxes the count costs most by far, and next to a neutral
+        mode it is of no use, so it is left out there and the sample is not kept.
+        """
+        eigenvalues = None if self._column is None else self._column.eigenvalues
+        if eigenvalues is None or value in self._samples or not self.place(value).condition.loss:
+            return self._scanned(value)
+        return Sample(value, eigenvalues(self.place(value).condition)[:WATCHED])
 
     def _solved(self, value: float) -> OnsetSample:
         place = self.place(value)
@@ -205,7 +214,7 @@ class OnsetSearch:
     def _located(self, crossing: Crossing):
         parameter = self.options.parameter
         value = locate(self.scan, crossing, self.options.tolerance)
-        expected = complex(self.scan.at(value).eigenvalues[crossing.index])
+        expected = complex(self.scan.within(value).eigenvalues[crossing.index])
         if is_surrounding(self.case, parameter):
             value = self._polished(value, crossing, expected)
         place = self.place(value)

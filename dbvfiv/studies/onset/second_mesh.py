@@ -56,7 +56,7 @@ def with_uncertainty(
     for crossing in search.scan.run(options.values):
         try:
             value = locate(search.scan, crossing, LOCATED)
-            expected = complex(search.scan.at(value).eigenvalues[crossing.index])
+            expected = complex(search.scan.within(value).eigenvalues[crossing.index])
             eigenvalue = search.critical(search.place(value), expected).eigenvalue
         except SolveError:
             continue

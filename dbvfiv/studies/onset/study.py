@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from ...errors import CaseError
 from ...observer import Observers
 from ...record.record import GrowingRecord
+from ..case import Case
 from ..session import Session
+from ..stability.laws import other_law, require_two_laws
 from ..stability.walk import StabilityWalk
 from ..study import Study
+from .other_law import NOTE, note_of
 from .result import OnsetResult
 from .rows import KeepItems, known_items, tables_of
 from .run import run_onset
 
 
 def run(session: Session, record: GrowingRecord) -> None:
-    """Onsets along `onset.over` of the case; every sample and point is kept as it is found."""
+    """Onsets along `onset.over` of the case, under both continuity laws where that is asked for; every sample and point
+    of its own law is kept as it is found.
+    """
+    both = session.case.onset.continuity == "both"
+    if both:
+        _require_two_laws(session.case)
     found = run_onset(
         session.case,
         observer=Observers(KeepItems(record), record),
@@ -24,6 +33,29 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.fail(sentence)
     if found.interrupted:
         raise KeyboardInterrupt
+    if both and not record.notes(NOTE):
+        record.progress("the other continuity law")
+        other = session.replace({"fluid.continuity": other_law(session.case)})
+        found = run_onset(other.case, walk=StabilityWalk(other.case, record, other.model))
+        if found.interrupted:
+            raise KeyboardInterrupt
+        record.note(NOTE, **note_of(found))
+
+
+def _require_two_laws(case: Case) -> None:
+    """Refuse to compare laws along their own blend, and without any at work.
+
+    Raises
+    ------
+    CaseError
+    """
+    require_two_laws(case, "onset")
+    if case.onset.axis.parameter == "storage":
+        raise CaseError(
+            "onset.continuity is given as 'both', but onset.over moves the continuity law itself; it must be 'case' "
+            "then.",
+            key="onset.continuity",
+        )
 
 
 STUDY = Study("onset", tables_of, run, OnsetResult)

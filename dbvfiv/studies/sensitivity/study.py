@@ -63,8 +63,8 @@ def _find_mode(session: Session, state: SteadyState, conditions: Conditions) -> 
     """The mode asked for, with its left vector."""
     model, number = session.model, session.case.sensitivity.mode
     require_equilibrium(model, state)
-    if model.flow.has_fluid and state.pressure <= 0:
-        raise CaseError("Coupled modes need an inlet pressure greater than 0.")
+    if model.flow.has_fluid and state.pressure <= model.flow.back:
+        raise CaseError(f"Coupled modes need an inlet pressure greater than {model.flow.back:g}.")
     linear = linearise(model, state.q, state.pressure)
     family = ValveFamily(linear, session.case.modes.max_frequency, session.case.modes.count)
     with solving(state.pressure):

@@ -71,6 +71,8 @@ class Scan:
     certify : callable, optional
         From a value to whether an independent count agrees with its sample; asked at the ends of brackets. Without it
         all samples are taken as they are.
+    inside : callable, optional
+        As `sample`, for values inside a bracket, where only the eigenvalues matter; `sample` by default.
 
     Attributes
     ----------
@@ -83,20 +85,27 @@ class Scan:
         sample: Callable[[float], np.ndarray | Sample],
         log: bool = False,
         certify: Callable[[float], bool] | None = None,
+        inside: Callable[[float], np.ndarray | Sample] | None = None,
     ):
-        self._sample, self.log, self._certify = sample, log, certify
+        self._sample, self.log, self._certify, self._inside = sample, log, certify, inside or sample
         self.samples: dict[float, Sample] = {}
         self.failures: dict[float, str] = {}
         self.uncertain: list[tuple[float, float]] = []
 
     def at(self, value: float) -> Sample | None:
         """The sample at a value; None where there is no equilibrium, with the sentence kept in `failures`."""
-        value = float(value)
+        return self._asked(float(value), self._sample)
+
+    def within(self, value: float) -> Sample | None:
+        """The same inside a bracket: a sample that nothing has to vouch for."""
+        return self._asked(float(value), self._inside)
+
+    def _asked(self, value: float, sample) -> Sample | None:
         if value in self.failures:
             return None
         if value not in self.samples:
             try:
-                found = self._sample(value)
+                found = sample(value)
                 self.samples[value] = found if isinstance(found, Sample) else Sample(value, np.asarray(found))
             except SolveError as error:
                 self.failures[value] = str(error)
@@ -180,7 +189,7 @@ def locate(scan: Scan, crossing: Crossing, tolerance: float) -> float:
     """
 
     def growth(value: float) -> float:
-        sample = scan.at(value)
+        sample = scan.within(value)
         if sample is None:
             raise SolveError(scan.failures[float(value)])
         return float(sample.growth[crossing.index])

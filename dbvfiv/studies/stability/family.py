@@ -11,7 +11,9 @@ from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOpti
 from ...model.dynamics import Conditions, LinearisedState
 from ...model.leading import select_search
 
-Law = float | tuple[float, float] | tuple[float, float | None, float]
+#: Blend of the continuity laws; with the length of a line in front, m, and that of a pipe behind; and with the density
+#: outside over that inside where it does not follow it.
+Law = float | tuple[float, float] | tuple[float, float, float] | tuple[float, float, float, float]
 
 #: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
 _KEPT = 256
@@ -47,6 +49,7 @@ class ValveFamily(PencilFamily):
         self.added = 0 if linear.added is None else linear.added.rank
         self._parts: dict[object, dict[str, np.ndarray]] = {}
         self._relaxations: dict[float, Relaxation | None] = {}
+        self._searches: dict[tuple[float, float], SearchOptions] = {}
         self._frequencies = np.zeros(0)
 
     def _lowest(self, count: int, workspace: Workspace | None = None) -> np.ndarray:
@@ -58,10 +61,13 @@ class ValveFamily(PencilFamily):
 
     def search(self, condition: Condition) -> SearchOptions:
         """What is searched in the spectrum: the rule that every study follows."""
-        conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss)
-        asked = SearchOptions(max_frequency=self.max_frequency)
-        lowest = partial(self._lowest, workspace=self._workspace) if condition.loss else self._lowest
-        return select_search(asked, conditions, lowest, self.modes).options
+        key = condition.beta, condition.loss  # nothing else decides
+        if key not in self._searches:
+            conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss)
+            asked = SearchOptions(max_frequency=self.max_frequency)
+            lowest = partial(self._lowest, workspace=self._workspace) if condition.loss else self._lowest
+            self._searches[key] = select_search(asked, conditions, lowest, self.modes).options
+        return self._searches[key]
 
     def relaxation(self, loss: float) -> Relaxation | None:
         """What relaxes with a factor on the loss factors of all materials."""
@@ -82,35 +88,38 @@ class ValveFamily(PencilFamily):
 
     def _computed(self, law: Law) -> dict[str, np.ndarray]:
         linear, flow = self.linear, self.linear.model.flow
-        storage, pipe_length, outside = law_parts(law)
-        parts = linear.flow_parts(1.0, storage, pipe_length) if flow.has_fluid else linear.no_flow()
+        parts = linear.flow_parts(1.0, *law_parts(law)) if flow.has_fluid else linear.no_flow()
         if linear.added is None:
             return parts
-        return linear.added.parts(parts, 1.0 if outside is None else outside)
+        return linear.added.parts(parts, outside_of(law) or 1.0)
 
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The full pencil, with the inlet velocity itself as unknown."""
         density, alpha, beta, law, loss_factor = condition
-        storage, pipe_length, _ = law_parts(law)
-        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, pipe_length), storage=storage)
+        storage, line = law_parts(law)
+        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, **line), storage=storage)
 
 
-def law_of(storage: float, pipe_length: float | None, outside: float | None) -> Law:
-    """The law of a condition: the blend of the continuity laws, and what else the coupling at unit density depends on.
+def law_of(storage: float, pipe_length: float, tail_length: float, outside: float = 0.0) -> Law:
+    """The law of a condition; a length of 0 m is none, or that of the case.
 
-    Parameters
-    ----------
-    storage : float
-    pipe_length : float or None
-        Of the line in front, m; None without one.
-    outside : float or None
-        Density outside over that inside, where it does not follow it.
+    `outside` is the density outside over that inside where it does not follow it: the coupling at unit density depends
+    on it.
     """
-    if outside is not None:
-        return storage, pipe_length, outside
+    if outside:
+        return storage, pipe_length, tail_length, outside
+    if tail_length:
+        return storage, pipe_length, tail_length
     return (storage, pipe_length) if pipe_length else storage
 
 
-def law_parts(law: Law) -> tuple[float, float | None, float | None]:
-    """What `law_of` was made of."""
-    return (*law, None)[:3] if isinstance(law, tuple) else (float(law), None, None)
+def law_parts(law: Law) -> tuple[float, dict[str, float]]:
+    """Blend of the continuity laws, and parameters of the line as `Conditions.of_line` has them, of a law."""
+    if not isinstance(law, tuple):
+        return float(law), {}
+    return law[0], {name: value for name, value in zip(("pipe_length", "tail_length"), law[1:]) if value}
+
+
+def outside_of(law: Law) -> float:
+    """Density outside over that inside of a law; 0 where it follows it."""
+    return law[3] if isinstance(law, tuple) and len(law) > 3 else 0.0

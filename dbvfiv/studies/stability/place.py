@@ -31,6 +31,8 @@ class Place:
         Blend of the continuity laws, 0 quasi-steady, 1 storage.
     pipe_length : float, m
         Of the line in front; 0 without one.
+    tail_length : float, m
+        Of the pipe behind; 0 without one.
     outside : float, kg/m3
         Density of the fluid outside where it is fixed; 0 where there is none or it follows `density`.
     design : dict
@@ -44,6 +46,7 @@ class Place:
     storage: float
     loss_factor: float = 0.0
     pipe_length: float = 0.0
+    tail_length: float = 0.0
     outside: float = 0.0
     design: Mapping[str, float] = field(default_factory=dict)
 
@@ -60,6 +63,7 @@ class Place:
             storage,
             damping.loss_factor,
             case.upstream.length if case.has_line else 0.0,
+            case.downstream.length if case.has_tail else 0.0,
             case.outside.fixed_density,
         )
 
@@ -72,27 +76,29 @@ class Place:
     @property
     def condition(self) -> Condition:
         """(density, alpha, beta, law, loss factor), the law as `dbvfiv.studies.stability.family.ValveFamily` has it."""
-        ratio = self.outside / self.density if self.outside else None
-        law = law_of(self.storage, self.pipe_length or None, ratio)
+        ratio = self.outside / self.density if self.outside else 0.0
+        law = law_of(self.storage, self.pipe_length, self.tail_length, ratio)
         return Condition(self.density, self.alpha, self.beta, law, self.loss_factor)
 
     def under(self, condition: Condition) -> Place:
         """The same steady state under another condition."""
         density, alpha, beta, law, loss_factor = condition
-        storage, length, _ = law_parts(law)
+        storage, line = law_parts(law)
         return self.at(
             density=density,
             alpha=alpha,
             beta=beta,
             storage=storage,
             loss_factor=loss_factor,
-            pipe_length=length or 0.0,
+            pipe_length=line.get("pipe_length", 0.0),
+            tail_length=line.get("tail_length", 0.0),
         )
 
     @property
     def conditions(self) -> Conditions:
         """What surrounds the structure there."""
-        return Conditions(self.density, self.alpha, self.beta, self.loss_factor, self.pipe_length or None)
+        line = self.pipe_length or None, self.tail_length or None
+        return Conditions(self.density, self.alpha, self.beta, self.loss_factor, *line)
 
     def value(self, name: str) -> float:
         return float(self.design[name] if name in DESIGN else getattr(self, name))
@@ -115,6 +121,8 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
     }
     if case.has_line:
         given["pipe_length"] = case.upstream.length
+    if case.has_tail and case.downstream.length:
+        given["tail_length"] = case.downstream.length
     given = {name: value for name, value in given.items() if not case.damping.lacks(name)}
     if case.outside.is_there:
         given["outside"] = case.outside.words
@@ -179,6 +187,11 @@ def require_parameter(case: Case, name: str) -> None:
         raise CaseError(
             "There is no pipe_length to change: the valve has no line in front; give upstream.length (drive.pressure "
             "is then that at its far end, see drive.at).",
+            key=PARAMETERS[name].key,
+        )
+    if name == "tail_length" and not case.has_tail:
+        raise CaseError(
+            "There is no tail_length to change: no pipe follows the valve; give downstream.pipe_diameter.",
             key=PARAMETERS[name].key,
         )
     lacking = case.damping.lacks(name)

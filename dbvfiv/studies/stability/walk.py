@@ -135,8 +135,9 @@ class StabilityWalk:
             return built.known[place.pressure]
         path = built.path
         before = path.pressure, path.q, path.slope
-        nearest = min([0.0, *built.known], key=lambda p: abs(p - place.pressure))
-        if nearest and abs(nearest - place.pressure) < abs(path.pressure - place.pressure):
+        rest = built.model.flow.back
+        nearest = min([rest, *built.known], key=lambda p: abs(p - place.pressure))
+        if nearest != rest and abs(nearest - place.pressure) < abs(path.pressure - place.pressure):
             path.pressure, path.q, path.slope = nearest, built.known[nearest], None
         built.aim(place.pressure)
         try:

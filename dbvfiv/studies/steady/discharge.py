@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, new_figure, parameter_label
+from ...case.quantity import head_of
+from ...drawing.style import (
+    ACCENT,
+    COMPUTED,
+    PUBLISHED,
+    kilopascals,
+    new_figure,
+    parameter_label,
+    pressure_colours,
+    some_of,
+)
 from . import published
 
 if TYPE_CHECKING:
@@ -22,6 +32,8 @@ def draw(result: SteadyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
         yield "head-discharge", lambda: head_discharge(result)
         yield "area-discharge", lambda: area_discharge(result)
         yield "jet-velocity", lambda: jet_velocity(result)
+        if result.case.has_line:
+            yield "operating-point", lambda: operating_point(result)
     yield "deflection", lambda: deflection(result)
 
 
@@ -49,7 +61,34 @@ def head_discharge(result: SteadyResult) -> Figure:
             mew=1.6,
             ms=7,
         )
+    if result.measured is not None:
+        points = result.measured
+        axes.plot(points.mass_flow, points.pressure / 1e3, "x", color="black", label="measured", mew=1.6, ms=7)
     return _finish(figure, axes, "Head and discharge")
+
+
+def operating_point(result: SteadyResult) -> Figure:
+    """Total head that the valve takes and that the line leaves it, over the flow; they cross where the valve works.
+
+    The head of the line is that of its far end less losses that go with the square of the flow, for some of the
+    pressures.
+    """
+    states = [state for state in ordered(result) if state.hydraulics is not None]
+    figure, axes = _axes("Flow, L/s", "Total head at the flange, m")
+    flow = np.array([0.0] + [1e3 * s.volume_flow for s in states])
+    rest = head_of(result.case.rest_pressure, result.case.fluid.density)
+    head = np.array([rest] + [s.hydraulics.total_head for s in states])
+    axes.plot(flow, head, "-", color=COMPUTED, label="valve and what is behind it")
+    chosen = some_of(states, 5)
+    reach = np.linspace(0.0, 1.15 * flow.max(), 60)
+    for state, colour in zip(chosen, pressure_colours([s.pressure for s in chosen])):
+        found = state.hydraulics
+        lost = found.line_loss * (reach / (1e3 * state.volume_flow)) ** 2
+        axes.plot(
+            reach, found.supply_head - lost, "--", color=colour, lw=1.2, label=f"line, {kilopascals(state.pressure)}"
+        )
+        axes.plot(1e3 * state.volume_flow, found.total_head, "o", color=colour)
+    return _finish(figure, axes, "Operating points")
 
 
 def area_discharge(result: SteadyResult) -> Figure:

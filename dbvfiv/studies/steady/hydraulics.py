@@ -14,6 +14,11 @@ _LINE = (
     Column("supply_head", "", "", shown=Shown("supply", "m", 8, lambda s: f"{s.hydraulics.supply_head:.4g}")),
     Column("line_loss", "", "", shown=Shown("line loss", "m", 9, lambda s: f"{s.hydraulics.line_loss:.4g}")),
 )
+#: Of the pipe behind; where there is one.
+_TAIL = (
+    Column("recovered", "", "", shown=Shown("recovered", "m", 9, lambda s: f"{s.hydraulics.recovered_head:.4g}")),
+    Column("tail_loss", "", "", shown=Shown("pipe loss", "m", 9, lambda s: f"{s.hydraulics.tail_loss:.4g}")),
+)
 _VALVE = tuple(
     Column(name, "", "", shown=shown)
     for name, shown in (
@@ -34,11 +39,25 @@ def lines(case: Case, states: Sequence[State]) -> list[str]:
     flowing = [state for state in states if state.hydraulics is not None]
     if not flowing:
         return []
-    columns = (*_LINE, *_VALVE) if case.has_line else _VALVE
+    columns = (*(_LINE if case.has_line else ()), *_VALVE, *(_TAIL if case.has_tail else ()))
     rows = [printed_row(columns, state) for state in flowing]
-    said = ["Free discharge: the energy of the jet is lost, nothing is recovered."]
+    said = [_discharge(case)]
+    if case.downstream.pressure:
+        said[0] += f" Downstream are {case.downstream.pressure / 1e3:.4g} kPa, and heads are over the surroundings."
     if case.has_line:
         said.insert(
             0, "Supply: total head at the far end of the line; what follows the line loss is of the valve alone."
         )
     return [*printed_head(columns), *rows, *said]
+
+
+def _discharge(case: Case) -> str:
+    if not case.has_tail:
+        return "Free discharge: the energy of the jet is lost, nothing is recovered."
+    pipe = f"a pipe of {1e3 * case.downstream.pipe_diameter:.4g} mm"
+    if case.downstream.expansion_loss is None:
+        return (
+            f"Into {pipe}: the jet widens and loses head as Borda and Carnot have it; K and Kv are up to behind that."
+        )
+    lost = f"{case.downstream.expansion_loss:g} of its velocity head"
+    return f"Into {pipe}: the jet widens and loses {lost}; K and Kv are up to behind that."

@@ -40,4 +40,5 @@ def applies(case: Case) -> bool:
     wall may not.
     """
     same_shape = case.valve.model_copy(update={"saddle": "ruled"}) == Valve()
-    return same_shape and case.drive.kind == "flow" and case.fluid.density == _WATER and not case.has_line
+    bare = not (case.has_line or case.has_tail or case.rest_pressure)
+    return same_shape and case.drive.kind == "flow" and case.fluid.density == _WATER and bare

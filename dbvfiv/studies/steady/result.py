@@ -19,7 +19,7 @@ from ...record.whole_valve import WholeValve
 from ..load_path import WAY_ON, way_on_shapes
 from ..result import StudyResult
 from ..state import State, gather_states, states_of
-from . import discharge, hydraulics, passage, shapes
+from . import cracking, discharge, hydraulics, measured, passage, shapes
 
 STATES = "states"
 
@@ -43,6 +43,19 @@ class SteadyResult(StudyResult):
     def states(self) -> tuple[State, ...]:
         return states_of(self, STATES)
 
+    @property
+    def cracking(self) -> cracking.Cracking | None:
+        """Where the valve begins to open; None without a flow."""
+        notes = self.record.notes(cracking.NOTE)
+        names = cracking.Cracking.__dataclass_fields__
+        return cracking.Cracking(**{name: notes[-1][name] for name in names}) if notes else None
+
+    @property
+    def measured(self) -> measured.Measured | None:
+        """Measured points beside the states; None where none are given."""
+        notes = self.record.notes(measured.NOTE)
+        return measured.against(notes[-1]["points"], self.states, self.case.rest_pressure) if notes else None
+
     def only(self, *states: State) -> SteadyResult:
         """A result with some of its states."""
         return gather_states(self, states)
@@ -55,6 +68,8 @@ class SteadyResult(StudyResult):
         """Keys as scripts rely on, in SI units."""
         return {
             "points": [state.summary() for state in self.states],
+            "cracking": self.cracking and self.cracking.summary(),
+            "measured": self.measured.summary() if self.measured else [],
             "failures": list(self.failures),
             "warnings": list(self.warnings),
             "interrupted": not self.complete,
@@ -65,7 +80,12 @@ class SteadyResult(StudyResult):
         return [*printed_head(columns), *(printed_row(columns, state) for state in self.states), *self.remarks()]
 
     def remarks(self) -> list[str]:
-        return hydraulics.lines(self.case, self.states)
+        lines, cracking = hydraulics.lines(self.case, self.states), self.cracking
+        if cracking is not None and self.states:
+            lines.append(cracking.sentence(max(state.pressure for state in self.states)))
+        if self.measured:
+            lines.append(self.measured.sentence())
+        return lines
 
     def shortfall(self) -> str | None:
         if not self.failures:

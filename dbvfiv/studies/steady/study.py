@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
-from ...errors import SolveError
+from ...case.measured import read_measured
+from ...errors import CaseError, SolveError
 from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_warnings
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
@@ -14,6 +16,8 @@ from ..case import Case
 from ..load_path import go_on, way_on
 from ..session import Session
 from ..study import Study
+from . import measured
+from .cracking import NOTE, find_cracking
 from .result import STATES, SteadyResult, tables_of
 
 
@@ -28,6 +32,7 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
     known = {state.pressure for state in states}
     if states:
         go_on(path, record, STATES, len(states) - 1, states[-1])
+    _keep_measured(session.case, record)
     record.begin("steady", len(pressures))
     for sentence in model_warnings(model):
         record.warn(sentence)
@@ -46,6 +51,27 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
     finally:
         for sentence in state_warnings(model, states):
             record.warn(sentence)
+    if model.flow.has_fluid and states and not record.notes(NOTE):
+        record.progress("cracking pressure")
+        with suppress(SolveError):  # none is given then
+            record.note(NOTE, **find_cracking(model, states, session.case.steady.cracking_area).summary())
+
+
+def _keep_measured(case: Case, record: GrowingRecord) -> None:
+    """Put the measured points of a case into the record, so that its file has them.
+
+    Raises
+    ------
+    CaseError
+        If their file has gone.
+    """
+    if case.steady.measured is None or record.notes(measured.NOTE):
+        return
+    try:
+        points = read_measured(case.steady.measured, case.fluid.density)
+    except ValueError as error:
+        raise CaseError(f"steady.measured is given as {str(case.steady.measured)!r}, {error}.") from None
+    record.note(measured.NOTE, points=points)
 
 
 def print_live(case: Case) -> Callable[[SteadyState], str]:

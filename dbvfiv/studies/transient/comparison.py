@@ -10,8 +10,8 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing.style import new_figure, style
-from ...errors import CaseError
+from ...drawing.style import new_figure
+from .. import comparing
 
 if TYPE_CHECKING:
     from .result import TransientResult
@@ -22,23 +22,9 @@ _QUIET = tuple(
 )
 
 
-def differing_keys(results: Sequence[TransientResult]) -> list[str]:
-    """Keys of the cases that are not the same in all runs, those that only steer the run left out."""
-    flat = [_flat(result.case.to_dict()) for result in results]
-    keys = [key for key in flat[0] if any(case.get(key) != flat[0][key] for case in flat)]
-    return [key for key in keys if key not in _QUIET]
-
-
 def labels(results: Sequence[TransientResult]) -> list[str]:
     """Legend entries that say what tells the runs apart."""
-    keys = differing_keys(results)[:3]
-    if not keys:
-        return [result.path.stem if result.path else result.header.name for result in results]
-    found = []
-    for result in results:
-        flat = _flat(result.case.to_dict())
-        found.append(", ".join(f"{key.split('.')[-1]} {_text(flat.get(key))}" for key in keys))
-    return found
+    return comparing.labels(results, _QUIET)
 
 
 def compare(results: Sequence[TransientResult]) -> Figure:
@@ -103,23 +89,4 @@ def save_comparison(results: Sequence[TransientResult], path: Path) -> Path:
     CaseError
         If the file cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with style():
-            compare(results).savefig(path)
-    except (OSError, ValueError) as error:
-        raise CaseError(f"{str(path)!r} cannot be written ({error}).") from error
-    return path
-
-
-def _flat(data, prefix: str = "") -> dict:
-    if isinstance(data, dict):
-        found = {}
-        for key, value in data.items():
-            found |= _flat(value, f"{prefix}.{key}" if prefix else key)
-        return found
-    return {prefix: data}
-
-
-def _text(value) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return comparing.save_figure(lambda: compare(results), path)

@@ -232,7 +232,7 @@ class Runner:
         state, inlet = progress.state, self.drive(progress.state.time)
         residual = np.nan
         constant = self.drive.constant_after(state.time)
-        if constant and inlet > 0:
+        if constant and inlet > self.model.flow.back:
             residual = float(
                 np.linalg.norm(self.model.residual(state.q, inlet)) / self.model.force_scale(state.q, inlet)
             )

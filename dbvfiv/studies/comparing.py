@@ -1,0 +1,64 @@
+"""What tells several runs apart, and one figure of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from ..drawing.style import style
+from ..errors import CaseError
+from .result import StudyResult
+
+
+def differing_keys(results: Sequence[StudyResult], quiet: Sequence[str] = ()) -> list[str]:
+    """Keys of the cases that are not the same in all runs, those left out that only steer a run (`quiet`)."""
+    flat = [_flat(result.case.to_dict()) for result in results]
+    keys = [key for key in flat[0] if any(case.get(key) != flat[0][key] for case in flat)]
+    return [key for key in keys if key not in quiet]
+
+
+def labels(results: Sequence[StudyResult], quiet: Sequence[str] = ()) -> list[str]:
+    """Legend entries that say what tells the runs apart: by three keys, by more where those do not."""
+    keys = differing_keys(results, quiet)
+    if not keys:
+        return [result.path.stem if result.path else result.header.name for result in results]
+    flat = [_flat(result.case.to_dict()) for result in results]
+    last = [key.split(".")[-1] for key in keys]
+    names = [key if last.count(word) > 1 else word for key, word in zip(keys, last)]
+    for count in range(min(3, len(keys)), len(keys) + 1):
+        found = [", ".join(f"{n} {_text(case.get(k))}" for n, k in zip(names[:count], keys)) for case in flat]
+        if len(set(found)) == len(found):
+            break
+    return found
+
+
+def save_figure(draw: Callable[[], Figure], path: Path) -> Path:
+    """Draw into a file.
+
+    Raises
+    ------
+    CaseError
+        If the file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with style():
+            draw().savefig(path)
+    except (OSError, ValueError) as error:
+        raise CaseError(f"{str(path)!r} cannot be written ({error}).") from error
+    return path
+
+
+def _flat(data, prefix: str = "") -> dict:
+    if isinstance(data, dict):
+        found = {}
+        for key, value in data.items():
+            found |= _flat(value, f"{prefix}.{key}" if prefix else key)
+        return found
+    return {prefix: data}
+
+
+def _text(value) -> str:
+    return "none" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

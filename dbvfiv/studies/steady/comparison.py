@@ -1,0 +1,132 @@
+"""Head and discharge of several runs: one figure, one table with differences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...drawing.style import new_figure, parameter_label
+from ...errors import CaseError
+from .. import comparing
+from .between import flow_at
+from .result import SteadyResult
+
+#: Keys that do not change what a run finds.
+_QUIET = ("steady.pressures", "steady.measured", "steady.cracking_area", "steady.max_iterations", "steady.min_step")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Flows of several runs at the pressures of the first.
+
+    Attributes
+    ----------
+    labels : list of str
+        What tells the runs apart.
+    pressure : (k,) array, Pa
+    mass_flow, volume_flow : (runs, k) arrays, kg/s, m3/s
+        Whole valve; between the states of a run by a monotone cubic, NaN beyond them.
+    remark : str
+        What stands in the way of comparing; empty if nothing does.
+    """
+
+    labels: list[str]
+    pressure: np.ndarray
+    mass_flow: np.ndarray
+    volume_flow: np.ndarray
+    remark: str = ""
+
+    @property
+    def difference(self) -> np.ndarray:
+        """(runs, k) volume flow over that of the first run less 1."""
+        return self.volume_flow / self.volume_flow[0] - 1.0
+
+    def summary(self) -> list[dict[str, Any]]:
+        """One entry for each pressure; None where a run has nothing."""
+        rows = zip(self.pressure, self.mass_flow.T, self.volume_flow.T, self.difference.T)
+        names = ("mass_flow", "volume_flow", "difference")
+        return [{"pressure": float(p)} | {n: _plain(v) for n, v in zip(names, values)} for p, *values in rows]
+
+    def lines(self) -> list[str]:
+        """Table for people: flow of each run and what it differs by from the first."""
+        numbered = [f"{i}: {label}" for i, label in enumerate(self.labels, 1)]
+        runs = range(len(self.labels))
+        head = f"{'kPa':>10}" + "".join(f"{f'{i + 1}, L/s':>12}" + (f"{'%':>9}" if i else "") for i in runs)
+        rows = []
+        for k, pressure in enumerate(self.pressure):
+            cells = ""
+            for i in runs:
+                flow, off = 1e3 * self.volume_flow[i, k], 100 * self.difference[i, k]
+                cells += f"{flow:12.5g}" if np.isfinite(flow) else f"{'-':>12}"
+                cells += (f"{off:+9.3f}" if np.isfinite(off) else f"{'-':>9}") if i else ""
+            rows.append(f"{pressure / 1e3:10.6g}{cells}")
+        return [*numbered, head, *rows, *([self.remark] if self.remark else [])]
+
+
+def compare(results: Sequence[SteadyResult]) -> Comparison:
+    """Hold several runs against the first.
+
+    Raises
+    ------
+    CaseError
+        If one of them has no flow or no state.
+    """
+    for result in results:
+        name = str(result.path or result.header.name)
+        if result.case.drive.kind != "flow":
+            raise CaseError(f"{name!r} holds states without flow, so there is no discharge to compare.")
+        if not result.states:
+            raise CaseError(f"{name!r} holds no states to compare.")
+    pressure = np.array(sorted({state.pressure for state in results[0].states}))
+    places = {result.case.pressure_at for result in results}
+    remark = f"The pressures are not of one place: {' and '.join(sorted(places))}." if len(places) > 1 else ""
+    flows = [np.array([_at(result, pressure, name) for result in results]) for name in ("mass_flow", "volume_flow")]
+    return Comparison(comparing.labels(results, _QUIET), pressure, *flows, remark)
+
+
+def _at(result: SteadyResult, pressure: np.ndarray, name: str) -> np.ndarray:
+    return flow_at(result.states, pressure, result.case.rest_pressure, name)
+
+
+def _plain(values: np.ndarray) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def draw(results: Sequence[SteadyResult]) -> Figure:
+    """Pressure over volume flow of several runs, with the measured points that they name."""
+    figure = new_figure(7.0, 4.6 + 0.22 * len(results))
+    axes = figure.add_subplot()
+    colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(results)))
+    found = compare(results)
+    for result, label, colour in zip(results, found.labels, colours):
+        states = sorted(result.states, key=lambda state: state.pressure)
+        flow, pressure = [1e3 * s.volume_flow for s in states], [s.pressure / 1e3 for s in states]
+        axes.plot(flow, pressure, "o-", color=colour, ms=4, label=label)
+        if result.measured is not None:
+            points = result.measured
+            flow = 1e3 * points.mass_flow / result.case.fluid.density
+            axes.plot(flow, points.pressure / 1e3, "x", color=colour, ms=7, label=f"measured, {label}")
+    axes.set_xlabel("Flow, L/s")
+    axes.set_ylabel(parameter_label(results[0].case, "pressure"))
+    axes.set_xlim(left=0)
+    axes.set_ylim(bottom=0)
+    axes.set_title("Head and discharge", loc="left", fontweight="bold")
+    figure.legend(loc="outside lower left", ncols=2 if len(results) > 3 else 1)
+    return figure
+
+
+def save_comparison(results: Sequence[SteadyResult], path: Path) -> Path:
+    """Draw a comparison into a file.
+
+    Raises
+    ------
+    CaseError
+        If the file cannot be written.
+    """
+    return comparing.save_figure(lambda: draw(results), path)

@@ -1,0 +1,54 @@
+"""A structure that relaxes as a row of oscillators that know nothing of each other."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg as la
+
+from .relaxation import Relaxation
+
+
+class Oscillators(NamedTuple):
+    """A symmetric structure that relaxes, one equation s^2 + s c + k + sum phi_g(s) k_g = 0 for each mode.
+
+    The modes are those of the stiffness that nothing has relaxed of; what couples them besides is left out.
+
+    Attributes
+    ----------
+    squares : (k,) array
+        Of their angular frequencies, rad2/s2.
+    damping, slow : (k,) arrays, 1/s, 1/s2
+    relaxing : (g, k) array, 1/s2
+    """
+
+    squares: np.ndarray
+    damping: np.ndarray
+    slow: np.ndarray
+    relaxing: np.ndarray
+
+    @classmethod
+    def of(cls, M, C, K, relaxing, relaxation: Relaxation) -> Oscillators:
+        """From symmetric matrices; relaxing (g, n, n)."""
+        fast = np.tensordot(relaxation.strengths.sum(axis=1), relaxing, 1)
+        squares, X = la.eigh(K + fast, M)
+        damping, slow = (np.einsum("ik,ij,jk->k", X, part, X, optimize=True) for part in (C, K))
+        return cls(squares, damping, slow, np.einsum("ik,gij,jk->gk", X, relaxing, X, optimize=True))
+
+    def values(self, relaxation: Relaxation, omega: np.ndarray) -> np.ndarray:
+        """The left sides at s = i omega, (len(omega), k)."""
+        w = np.asarray(omega, float)[:, None]
+        return self.slow - w**2 + 1j * w * self.damping + relaxation.factors(1j * w[:, 0]).T @ self.relaxing
+
+    def zeros(self, relaxation: Relaxation, steps: int = 12) -> np.ndarray:
+        """Estimates of the oscillating zeros."""
+        found = 1j * np.sqrt(np.maximum(self.squares, 0.0))
+        for _ in range(steps):
+            stiffness = self.slow + (relaxation.factors(found) * self.relaxing).sum(axis=0)
+            found = (
+                -0.5 * self.damping
+                + 1j * np.sqrt(np.maximum((stiffness - 0.25 * self.damping**2).real, 0.0))
+                - 0.5 * (stiffness.imag / np.where(found.imag > 0, found.imag, 1.0))
+            )
+        return found[found.imag > 0]

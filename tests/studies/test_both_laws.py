@@ -1,0 +1,91 @@
+"""Modes and onsets under both continuity laws side by side, and what is said where they disagree."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import dbvfiv
+from dbvfiv.case import CaseError
+from dbvfiv.studies.onset.other_law import disagreements
+from dbvfiv.studies.stability.laws import compare_ranges, compare_states
+
+SMALL = {"mesh.around": 6, "mesh.along": 8, "damping.alpha": 0.0, "drive.pressure": "6 kPa", "fluid.density": 60.0}
+BOTH = {"modes.continuity": "both", "onset.continuity": "both", "onset.coarse_mesh": 0, "onset.normal_form": False}
+OPTIONS = [f"--set={key}={value}" for key, value in SMALL.items()]
+
+
+def load(**changes):
+    return dbvfiv.load(None, SMALL | {key.replace("__", "."): value for key, value in changes.items()})
+
+
+def test_modes_under_both_laws_are_those_of_each(command_line):
+    document = json.loads(command_line("modes", *OPTIONS, "--law", "both", "--count=4", "--json").out)
+    alone = {law: load().modes(continuity=law, count=4) for law in ("quasi-steady", "storage")}
+    other = document["other_law"]
+    assert document["state"]["continuity"] == "quasi-steady" and other["continuity"] == "storage"
+    for found, law in ((document, "quasi-steady"), (other, "storage")):
+        assert found["modes"] == [pytest.approx(mode.summary(), rel=1e-7, abs=1e-8) for mode in alone[law].modes]
+        assert found["stable"] == alone[law].stable
+        assert found["unstable_count"] == found["unstable_count_independent"]
+    # here is a state on which they disagree
+    assert document["stable"] is False and other["stable"] is True
+    assert "disagree: unstable under quasi-steady, stable under storage" in document["comparison"]
+    assert "conserves volume" in document["comparison"] and "water tunnel" in document["comparison"]
+
+
+def test_they_are_printed_side_by_side_and_kept(command_line, tmp_path):
+    out = command_line("modes", *OPTIONS, "--law=both", "--count=3", "-o", tmp_path / "both.h5").out
+    assert "Unstable under quasi-steady continuity: " in out and "Stable under storage continuity: " in out
+    assert out.count("growth rate") == 0 and "disagree" in out
+    read = dbvfiv.load_result(tmp_path / "both.h5")
+    assert read.other_law.continuity == "storage" and len(read.other_law.modes) == 3
+    assert "\n".join(read.lines()) in out
+
+
+def test_one_law_in_place_of_the_cases(command_line):
+    for law in ("storage", "quasi-steady"):
+        document = json.loads(command_line("modes", *OPTIONS, "--law", law, "--count=1", "--json").out)
+        assert document["state"]["continuity"] == law and "other_law" not in document
+
+
+def test_onsets_under_both_laws_are_those_of_each():
+    found = load(**{key.replace(".", "__"): value for key, value in BOTH.items()}).onset("density=5:300:6:log")
+    other = load(onset__coarse_mesh=0, onset__normal_form=False).onset("density=5:300:6:log", continuity="storage")
+    assert found.other_law["points"][0]["value"] == pytest.approx(other.points[0]["value"], rel=1e-8)
+    ((low, high, law),) = found.disagreements
+    assert law == "storage"
+    assert (low, high) == pytest.approx((other.points[0]["value"], found.points[0]["value"]), rel=1e-6)
+    assert "(stable under storage alone)" in found.comparison and "conserves volume" in found.comparison
+    assert "other_law" in found.summary() and "Under storage continuity:" in "\n".join(found.lines())
+
+
+@pytest.mark.parametrize(
+    "study, keys, words",
+    [
+        ("modes", {"modes__in_vacuo": True}, "in_vacuo leaves the fluid out"),
+        ("modes", {"fluid__unsteady": False}, "fluid.unsteady is false"),
+        ("modes", {"drive__kind": "uniform"}, "drive.kind is 'uniform'"),
+        ("onset", {"onset__over": "storage"}, "onset.over moves the continuity law itself"),
+        ("onset", {"fluid__unsteady": False}, "fluid.unsteady is false"),
+    ],
+)
+def test_where_no_law_is_at_work_there_are_not_two(study, keys, words):
+    with pytest.raises(CaseError, match=rf"{study}\.continuity is given as 'both', but .*{words}"):
+        getattr(load(**keys | {f"{study}__continuity": "both"}), study)()
+
+
+def test_a_law_that_is_none(command_line, one_sentence):
+    for study in ("modes", "onset"):
+        outcome = command_line(study, "--law=volume")
+        assert outcome.status == 2 and one_sentence(outcome.err) and "quasi-steady, storage or both" in outcome.err
+
+
+def test_sentences():
+    assert compare_states("storage", True, "quasi-steady", True) == "Both continuity laws find the state stable."
+    assert "cannot be compared: undecided under storage" in compare_states("storage", None, "quasi-steady", None)
+    assert "say the same" in compare_ranges("density", [], "kg/m³", 1.0)
+    other = {"continuity": "storage", "stable": [(1.0, 2.0), (4.0, 9.0)], "unstable": [(2.0, 4.0)]}
+    found = disagreements("quasi-steady", [(3.0, 5.0)], [(1.0, 3.0), (5.0, 6.0), (6.0, 7.0)], other)
+    assert found == [(1.0, 2.0, "storage"), (3.0, 4.0, "quasi-steady"), (5.0, 7.0, "storage")]
