@@ -53,8 +53,12 @@ class PencilFamily(ABC):
         M, D and K; C = alpha M + beta D.
     forces : (n, m) real sparse matrix G
     slope : (m, n) real sparse matrix J
+    added : int
+        Number of coupling forces, the last ones, that are inertia alone: the structure swings with that mass, not with
+        its own.
     """
 
+    added: int = 0
     mass: object
     damping: object
     stiffness: object

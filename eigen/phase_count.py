@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .reduction import POWERS, ReducedFamily
-from .structure_response import RelaxingResponse, Response, response
+from .structure_response import NEAR, RelaxingResponse, Response, response
 
 #: Largest accepted step of the phase between neighbours, rad.
 LARGEST_STEP = np.pi / 3
@@ -86,6 +86,7 @@ class _Walk:
         self.phase = [np.zeros(0) for _ in conditions]
         self.points = 0
         self._cut = [False] * len(conditions)
+        self._laden = [_turning(reduced.laden_frequencies(c), c) for c in conditions]
         self._same = len({id(p) for p in self._parts}) == 1
 
     def _condensed(self, parts):
@@ -147,7 +148,7 @@ class _Walk:
         base = [0.0, *np.geomspace(0.1 * scale, self.response.top, 17), *self.response.beside]
         cells, omega = [], []
         for i, hint in enumerate(hints):
-            own = list(base)
+            own = [*base, *self._laden[i]]
             for value in np.asarray(hint, complex):
                 width, middle = max(abs(value.real), 1e-6 * abs(value)), abs(value.imag)
                 own += [
@@ -202,6 +203,14 @@ class _Walk:
                 )
             )
         return np.array(number), np.array(certain)
+
+
+def _turning(omega: np.ndarray, condition) -> list[float]:
+    """Places, coarser where damping is strong, beside which the frequencies given turn the phase."""
+    light = np.full(len(omega), condition.loss > 0)
+    if not condition.loss:
+        light = 0.5 * (condition.alpha / omega + condition.beta * omega) < NEAR
+    return sorted({_shared(w, (0.03 if fast else 0.3) * w) for w, fast in zip(omega, light)})
 
 
 def _shared(omega: float, play: float) -> float:

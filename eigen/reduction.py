@@ -117,6 +117,18 @@ class ReducedFamily:
             self._coupled[law] = parts
         return self._coupled[law]
 
+    def laden_frequencies(self, condition: Condition) -> np.ndarray:
+        """Angular frequencies of the undamped structure with the inertia that its coupling brings, rad/s; none where
+        the family says that it brings none.
+        """
+        if not self.family.added:
+            return np.zeros(0)
+        added = self.G[:, -self.family.added :]
+        weight = -condition.inertia * np.diag(self.family.parts(condition.law)["A2"])[-self.family.added :]
+        symmetric = 0.5 * (self.K + self.K.T)
+        squares = la.eigh(symmetric, self.M + (added * weight) @ added.T, eigvals_only=True)
+        return np.sqrt(squares[squares > 0])
+
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The pencil of a condition on the space, inner unknowns scaled."""
         root = np.sqrt(condition.inertia)

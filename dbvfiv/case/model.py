@@ -12,6 +12,7 @@ from .damping import Damping
 from .downstream import Downstream
 from .load import make_case, put
 from .materials import DEFAULT_LAYERS, Layer, Materials
+from .outside import Outside
 from .parameters import PARAMETERS
 from .relaxing import SHIPPED_LOSSES
 from .section import BrokenRule, Section, key
@@ -46,6 +47,7 @@ class Case(Section):
     drive: physics.Drive = key(physics.Drive(), "The load.")
     upstream: Upstream = key(Upstream(), "The line in front of the valve.")
     downstream: Downstream = key(Downstream(), "What the valve discharges into.")
+    outside: Outside = key(Outside(), "The fluid outside the wall.")
     supports: physics.Supports = key(physics.Supports(), "One-sided stops of the lips.")
 
     @model_validator(mode="before")
@@ -93,6 +95,7 @@ class Case(Section):
         inlet = 2 * (self.valve.flange_radius - self.valve.flange_wall_deduction)
         self.upstream.check_roughness(inlet)
         self.downstream.check_pipe(inlet)
+        self.outside.check_pipe(2 * self.valve.flange_radius + self.valve.thickness_at(self.valve.length))
         return self
 
     @property
@@ -112,8 +115,12 @@ class Case(Section):
 
     @property
     def continuity(self) -> str:
-        """The continuity law in words; empty where none is needed: without flow, and in the steady law."""
-        return f"{self.fluid.continuity} continuity" if self.drive.kind == "flow" and self.fluid.unsteady else ""
+        """The continuity law in words, and what is outside; empty where no law is needed: without flow, and in the
+        steady law.
+        """
+        if self.drive.kind != "flow" or not self.fluid.unsteady:
+            return ""
+        return f"{self.fluid.continuity} continuity {self.outside.words}".rstrip()
 
     @property
     def pressure_at(self) -> str:

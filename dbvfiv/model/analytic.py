@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..errors import SolveError
 from ..flow import FlowMotion
 from ..flow.derivatives import along
 from ..shell.mass import mass_integrals
@@ -22,6 +23,20 @@ from .valve import ValveModel
 
 #: Parameters of the damping; those of the flow law come before them.
 DAMPING = ("alpha", "beta")
+
+
+def require_forms(model: ValveModel) -> None:
+    """Refuse higher derivatives where they are not known.
+
+    Raises
+    ------
+    SolveError
+    """
+    if model.outside is not None:
+        raise SolveError(
+            "With fluid outside the wall the higher derivatives of its added mass by the shape are not known, so "
+            "whether an onset is soft or hard is not either; runs in time beside the onset tell."
+        )
 
 
 class AnalyticResidual:
@@ -79,11 +94,15 @@ class AnalyticResidual:
         out = np.array(_value(motion, parameters, self._arrays))
         force, structure = self.model.structure(motion[0])
         out[self._forces] += force + parameters["beta"] * (self.model.shell.dofs.matrix(structure) @ motion[1])
+        if self.model.outside is not None and np.any(motion[2]):
+            density = self.model.case.outside.density(parameters["density"])
+            out[self._forces] += density * self._added(motion[0], motion[2])
         return out
 
     def second(self, motion, parameters, a, b) -> np.ndarray:
         """Second directional derivative (n + l,) along two motions."""
         self._check_at_rest(motion)
+        require_forms(self.model)
         motion, parameters = self._shaped(motion), self._given(parameters)
         a, b = self._shaped(a), self._shaped(b)
         out = np.array(_form_of_remainder(motion, parameters, (a, b), self._arrays))
@@ -96,6 +115,7 @@ class AnalyticResidual:
     def third(self, motion, parameters, a, b, c) -> np.ndarray:
         """Third directional derivative (n + l,) along three motions."""
         self._check_at_rest(motion)
+        require_forms(self.model)
         motion, parameters = self._shaped(motion), self._given(parameters)
         a, b, c = self._shaped(a), self._shaped(b), self._shaped(c)
         out = np.array(_form_of_remainder(motion, parameters, (a, b, c), self._arrays))
@@ -109,6 +129,7 @@ class AnalyticResidual:
     def remainder_form(self, motion, parameters, *directions) -> np.ndarray:
         """Directional derivative (n + l,), along two or three motions, of all but the structure's own force."""
         self._check_at_rest(motion)
+        require_forms(self.model)
         motion, parameters = self._shaped(motion), self._given(parameters)
         return np.array(_form_of_remainder(motion, parameters, tuple(map(self._shaped, directions)), self._arrays))
 
@@ -126,7 +147,15 @@ class AnalyticResidual:
         if name == "beta":
             _, structure = self.model.structure(motion[0])
             out[self._forces] += self.model.shell.dofs.matrix(structure) @ a[1]
+        if name == "density" and self.model.case.outside.fluid == "same":
+            out[self._forces] += self._added(motion[0], a[2])
         return out
+
+    def _added(self, q, a) -> np.ndarray:
+        """Inertia (n,) of a fluid of unit density outside; the part quadratic in the velocities is left out."""
+        structure = self.model.shell.dofs.matrix(self.model.structure(q)[1])
+        columns = self.model.outside.added_mass(q, structure).columns
+        return columns @ (columns.T @ a)
 
     @staticmethod
     def _check_at_rest(motion) -> None:

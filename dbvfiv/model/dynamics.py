@@ -18,8 +18,10 @@ from functools import cached_property
 import numpy as np
 
 from eigen import CoupledPencil, Relaxation
+from eigen.pencil import FLUID_PARTS
 
 from ..flow import FlowLaw, FlowMotion
+from .outside import AddedMass
 from .valve import ValveModel
 
 
@@ -112,6 +114,8 @@ class LinearisedState:
     forces : (n, m) sparse matrix G
     slope : (m, n) sparse matrix J
     area : (m,) array, m2
+    added : AddedMass or None
+        Of the fluid outside, at unit density; None where there is none.
     """
 
     model: ValveModel
@@ -123,12 +127,18 @@ class LinearisedState:
     forces: object
     slope: object
     area: np.ndarray
+    added: AddedMass | None = None
     _damped: dict = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def relaxing(self) -> tuple:
         """K_g (n, n): material part of the tangent of each group of layers that relax alike."""
         return self.model.relaxing_stiffness(self.q)
+
+    @cached_property
+    def coupling(self) -> tuple:
+        """G and J with what couples the fluid outside behind what couples the flow."""
+        return (self.forces, self.slope) if self.added is None else self.added.coupling(self.forces, self.slope)
 
     def relaxation(self, loss_factor: float) -> Relaxation | None:
         """What relaxes of the stiffness with a factor on all loss factors; None where nothing does."""
@@ -142,7 +152,7 @@ class LinearisedState:
         if key not in self._damped:
             self._damped.clear()
             damping, relaxation = alpha * self.mass + beta * self.structure, self.relaxation(loss_factor)
-            wall = (self.mass, damping, self.stiffness, self.forces, self.slope)
+            wall = (self.mass, damping, self.stiffness, *self.coupling)
             self._damped[key] = CoupledPencil(*wall, relaxation=relaxation)
         return self._damped[key]
 
@@ -153,20 +163,33 @@ class LinearisedState:
         ----------
         conditions : Conditions
         fluid : bool
-            False leaves the fluid out altogether: motions in vacuo of the stressed structure, the steady pressures kept
-            as follower loads.
+            False leaves the flow out: motions of the stressed structure, the steady pressures kept as follower loads,
+            in vacuo or in the fluid outside.
         storage : float, optional
             Blend of the continuity laws, 0 quasi-steady to 1 storage; the law's own by default.
         """
         damped = self.damped(conditions.alpha, conditions.beta, conditions.loss_factor)
-        flow = self.model.flow
-        if not fluid or not flow.has_fluid:
+        flowing = fluid and self.model.flow.has_fluid
+        if not flowing and self.added is None:
             return CoupledPencil(damped.M, damped.C, damped.K, relaxation=damped.relaxation)
-        if not flow.unsteady:
-            _, slope = flow.steady_operator(self.area, self.inlet)
-            return damped.replace(A0=slope)
-        parts = fluid_parts(flow, self.area, self.inlet, conditions.density, storage, conditions.of_line)
+        parts = self.flow_parts(conditions.density, storage, conditions.of_line) if flowing else {}
+        if self.added is not None:
+            density = self.model.case.outside.density(conditions.density)
+            parts = self.added.parts(parts or self.no_flow(), density)
         return damped.replace(**parts)
+
+    def flow_parts(self, density: float, storage: float | None = None, line: dict | None = None) -> dict:
+        """A0 to S1 of the flow alone at a density; of a steady flow A0 is all."""
+        flow = self.model.flow
+        if flow.unsteady:
+            return fluid_parts(flow, self.area, self.inlet, density, storage, line)
+        return self.no_flow() | {"A0": flow.steady_operator(self.area, self.inlet)[1]}
+
+    def no_flow(self) -> dict:
+        """A0 to S1 of a flow that does nothing."""
+        m = len(self.area)
+        shapes = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
+        return {name: np.zeros(shapes[name[0]]) for name in FLUID_PARTS}
 
 
 def fluid_parts(
@@ -187,6 +210,8 @@ def linearise(model: ValveModel, q: np.ndarray, inlet: float) -> LinearisedState
     tangent = model.tangent(q, inlet)
     stiffness, forces, slope = model.matrices(tangent)
     matrix = model.shell.dofs.matrix
+    structure = matrix(tangent.structure)
+    added = None if model.outside is None else model.outside.added_mass(q, structure)
     return LinearisedState(
-        model, q, inlet, matrix(model.mass(q)), matrix(tangent.structure), stiffness, forces, slope, tangent.area
+        model, q, inlet, matrix(model.mass(q)), structure, stiffness, forces, slope, tangent.area, added
     )

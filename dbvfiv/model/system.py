@@ -262,8 +262,12 @@ def pencil_at(model: ValveModel, q, inner, mu) -> CoupledPencil:
     damping = mu["alpha"] * mass + mu["beta"] * own
     parts = model.flow.linearise(still, mu).parts()
     relaxation = model.relaxation.stiffness(mu.get("loss_factor", 0.0), lambda: model.relaxing_stiffness(q))
-    wall = (mass, damping, stiffness, model.station_forces(nodal), model.rows.jacobian(nodal))
-    return CoupledPencil(*wall, relaxation=relaxation, **parts)
+    coupling = model.station_forces(nodal), model.rows.jacobian(nodal)
+    if model.outside is not None:
+        added = model.outside.added_mass(q, own)
+        parts = added.parts(parts, model.case.outside.density(mu["density"]))
+        coupling = added.coupling(*coupling)
+    return CoupledPencil(mass, damping, stiffness, *coupling, relaxation=relaxation, **parts)
 
 
 class ValveLinearisation:

@@ -26,6 +26,7 @@ from ..shell import Section, StepWall
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_flow, build_shell
 from .linear import CoupledFactor
+from .outside import OutsideFluid
 from .relaxing import WallRelaxation
 from .supports import lip_stops
 
@@ -82,6 +83,7 @@ class ValveModel:
         self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
         self.loaded = loaded_share(self.mesh, case)
         self.flow = build_flow(case, self.mesh)
+        self.outside = OutsideFluid(case, self.mesh, self.shell) if case.outside.is_there else None
         self.relaxation = WallRelaxation.of(self.shell.section)
         self._stop_slots = dofs.diagonal_slots[self.stops.unknowns]
 

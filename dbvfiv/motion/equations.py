@@ -16,6 +16,7 @@ from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
 from ..shell import Memory, StepWall, WallMemory
 from .kernels import inertia_force, kinetic_energy, row_motion, strain_energy
+from .outside import MovingOutside, OutsideCorrection
 from .terms import Load, Step, Weights
 
 
@@ -50,10 +51,15 @@ class ValveMotion:
         self._quads = shell.mesh.quads
         self._integrals = shell._integrals
         self._factor: CoupledFactor | None = None
+        self._correction: OutsideCorrection | None = None
         free = shell.dofs.free
         scale = np.ones(free.shape)
         scale[:, 3:] = 0.5 * float(np.mean(shell.geometry.thickness))
         self._scale = scale[free]
+        self.outside: MovingOutside | None = None
+        if model.outside is not None:
+            density = model.case.outside.density(self.conditions.density)
+            self.outside = MovingOutside(model, density, self.length)
         self._rotations = np.flatnonzero(np.broadcast_to(np.arange(5) >= 3, free.shape)[free])
 
     # -- forces
@@ -193,12 +199,21 @@ class ValveMotion:
         if not self.moving_fluid:
             _, gradient = model.flow.steady_operator(mid[0], load.inlet)
             self._solver(0).refactor(values, forces, slope, weights.theta * gradient)
+            self._add_outside(weights.outside)
             return
         new = self._passage(model.nodal(q_new), v_new)
         found = self.fluid.pressure_slopes(
             mid, new, load.mid_speed, load.speed[-1], weights.theta, weights.velocity, weights.psi
         )
         self._refactor_moving(values, forces, slope, *found)
+        self._add_outside(weights.outside)
+
+    def _add_outside(self, weight: float) -> None:
+        """Take a multiple of the added mass, if there is one, into the solves with the factors just made."""
+        if self.outside is not None:
+            none = np.zeros(self._factor.inner)
+            solve = self._factor.solve_with_inner
+            self._correction = self.outside.correction(lambda f, r: solve(f, none if r is None else r), weight)
 
     def _refactor_moving(self, values, forces, slope, by_area, by_speed):
         row, corner = by_area[0].copy(), by_speed[0]
@@ -207,15 +222,18 @@ class ValveMotion:
 
     def solve(self, force: np.ndarray, outlet: float) -> tuple[np.ndarray, float]:
         """Changes of q (n,) and U that the last factored matrix gives for a force (n,) and an outlet pressure."""
-        dq, du = self._factor.solve_with_inner(force, np.array([outlet]) if self.moving_fluid else np.zeros(0))
+        solve = self._factor.solve_with_inner if self._correction is None else self._correction.solve
+        dq, du = solve(force, np.array([outlet]) if self.moving_fluid else np.zeros(0))
         return dq, float(du[0]) if self.moving_fluid else 0.0
 
     def begin_step(self, state, h: float, inlet: float) -> None:
-        """A step starts from a state; nothing to prepare where wall and fluid are solved together."""
+        """A step starts from a state, whose shape says whether the added mass still holds."""
+        if self.outside is not None:
+            self.outside.begin_step(state.q, state.v)
 
     def drop_factors(self) -> None:
         """Forget the factorisation with its analysis, so that later numbers do not depend on matrices seen before."""
-        self._factor = None
+        self._factor = self._correction = None
 
     @property
     def factored(self) -> bool:
@@ -239,12 +257,15 @@ class ValveMotion:
         model, alpha, beta = self.model, self.conditions.alpha, self.conditions.beta
         nodal = model.nodal(q)
         wall = None if memory is None else self.wall.held(memory)
+        if self.outside is not None:
+            self.outside.begin_step(q, v)
         forces = self.internal_force(q, wall) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
         mass = model.mass(q)
         if not self.moving_fluid:
             load = self.load(q, v, q, v, self._instant(speed, np.zeros(self.stations), inlet))
             none = np.zeros((self.stations, self.stations))
             self._solver(0).refactor(mass, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
+            self._add_outside(1.0)
             return self.solve(load.force - forces, 0.0)[0], load
         rows, fluid = model.rows, self.fluid
         area, rate = self._passage(nodal, v)
@@ -256,6 +277,7 @@ class ValveMotion:
         self._refactor_moving(
             mass, model.station_forces(nodal).data, rows.jacobian(nodal).data, -density * by_rate, -density * by_speed
         )
+        self._add_outside(1.0)
         a, speed_rate = self.solve(load.force - forces, -load.outlet)
         psi_rate = known + by_rate @ rows.second(self._position(nodal), model.nodal(a)) + by_speed * speed_rate
         return a, self.load(q, v, q, v, self._instant(speed, psi_rate, inlet), speed)
@@ -269,7 +291,7 @@ class ValveMotion:
     # ----
 
     def energies(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float, float]:
-        """Kinetic, strain and stop energy of the quarter model, J."""
+        """Kinetic, strain and stop energy of the quarter model, J; the fluid outside is `outside_energy`."""
         shell = self.model.shell
         nodal = self.model.nodal(q)
         d, d1, _ = shell.directors(nodal)
@@ -279,3 +301,7 @@ class ValveMotion:
         else:
             strain = shell.energy(q)
         return float(kinetic), float(strain), self.model.stops.energy(q)
+
+    def outside_energy(self, q: np.ndarray, v: np.ndarray) -> float:
+        """Kinetic energy of the fluid outside, J of a quarter; zero where there is none."""
+        return 0.0 if self.outside is None else self.outside.energy(q, v)

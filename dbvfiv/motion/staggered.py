@@ -26,6 +26,7 @@ class StaggeredMotion(ValveMotion):
 
     def begin_step(self, state, h: float, inlet: float) -> None:
         """Advance the fluid through the passage of a state by a backward difference."""
+        super().begin_step(state, h, inlet)
         self.moving_fluid = self.coupled_fluid
         step = Step(1.0, state.speed, 1.0 / h, -state.psi / h, inlet)
         self._frozen = super().load(state.q, state.v, state.q, state.v, step)
@@ -47,6 +48,7 @@ class StaggeredMotion(ValveMotion):
         values = model.follower_stiffness(nodal, weights.load * weights.theta * load.pressure, values)
         none = np.zeros((self.stations, self.stations))
         self._solver(0).refactor(values, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
+        self._add_outside(weights.outside)
 
     def accelerations(self, q, v, speed, inlet, memory=None):
         self._frozen, self.moving_fluid = None, self.coupled_fluid

@@ -25,6 +25,8 @@ class Weights:
         Derivative of the new velocities with respect to the new positions, 1/s.
     psi : float
         Derivative of the rate of psi with respect to the new psi, 1/s.
+    outside : float
+        Factor of the added mass of fluid outside, 1/s2: no damping acts on it.
     """
 
     theta: float
@@ -33,6 +35,7 @@ class Weights:
     force: float
     velocity: float
     psi: float
+    outside: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ class Trial:
             force=now + motion.conditions.beta * s.rate / h,
             velocity=s.gamma / (s.beta * h),
             psi=rate / h,
+            outside=(1.0 - s.alpha_m) / (s.beta * h * h),
         )
         self.fluid = Step(
             theta,
@@ -79,6 +80,8 @@ class Trial:
         self.damping = beta * (old.force_rate + s.rate * (self.force_rate - old.force_rate))
         elastic = old.force + now * (self.force - old.force)
         inertia = motion.inertia(self.q_mid, self.v_mid, self.a_mid + alpha * self.v_mid if alpha else self.a_mid)
+        if motion.outside is not None:
+            inertia += motion.outside.force(self.q_mid, self.a_mid)
         share = self.weights.load
         self.push = self.load.force if share == 1.0 else old.load + share * (self.load.force - old.load)
         self.residual = inertia + self.damping + elastic - self.push

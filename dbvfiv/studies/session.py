@@ -48,7 +48,8 @@ def describe_surroundings(case: Case) -> dict[str, Any]:
     """Fluid and damping of a case, for JSON."""
     damping = {name: getattr(case.damping, name) for name in ("alpha", "beta", "loss_factor")}
     known = {name: value for name, value in damping.items() if not case.damping.lacks(name)}
-    return {"density": case.fluid.density, "continuity": case.fluid.continuity} | known
+    outside = {"outside": case.outside.words} if case.outside.is_there else {}
+    return {"density": case.fluid.density, "continuity": case.fluid.continuity} | known | outside
 
 
 class Session:

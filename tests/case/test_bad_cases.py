@@ -119,6 +119,27 @@ BAD = {
     "map of one parameter": ("[map]\ny = 'pressure=1:10:5'", "map.y.*another parameter"),
     "step longer than the history": ("[transient]\nstep = '2 s'", "transient.step.*at most"),
     "numerical damping too large": ("[transient]\nnumerical_damping = 0.6", "numerical_damping"),
+    "unknown fluid outside": ("[outside]\nfluid = 'water'", r"outside\.fluid.*\"water\".*none.*same.*density"),
+    "massless fluid outside": ("[outside]\nfluid = 0", r"outside\.fluid.*out of range.*greater than 0"),
+    "negative density outside": ("[outside]\nfluid = -1000.0", r"outside\.fluid.*out of range"),
+    "density outside beyond all liquids": ("[outside]\nfluid = 1e6", r"outside\.fluid.*at most 30000"),
+    "density outside of another dimension": ("[outside]\nfluid = '1000 kg'", r"outside\.fluid.*not a density"),
+    "truth value for the fluid outside": ("[outside]\nfluid = true", r"outside\.fluid.*truth value"),
+    "list for the fluid outside": ("[outside]\nfluid = [1000]", r"outside\.fluid.*list"),
+    "surrounding pipe without width": (
+        "[outside]\nfluid = 'same'\npipe_diameter = 0",
+        r"outside\.pipe_diameter.*greater",
+    ),
+    "surrounding pipe inside the valve": (
+        "[outside]\nfluid = 'same'\npipe_diameter = '250 mm'",
+        r"outside\.pipe_diameter is 250 mm around a flange of 294\.4 mm.*at least",
+    ),
+    "surrounding pipe that is a pressure": (
+        "[outside]\npipe_diameter = '3 kPa'",
+        r"outside\.pipe_diameter.*not a length",
+    ),
+    "unknown state of the lips": ("[outside]\nlips = 'ajar'", r"outside\.lips.*closed.*open"),
+    "depth outside": ("[outside]\ndepth = 3", r"outside\.depth"),
     "negative pressure downstream": ("[downstream]\npressure = '-1 kPa'", r"downstream\.pressure.*at least 0 kPa"),
     "pressure downstream that is a length": (
         "[downstream]\npressure = '3 mm'",

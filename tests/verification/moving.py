@@ -21,6 +21,7 @@ class Motion:
     """What the stepper asks of any motion without a fluid; the load is a force that the positions fix."""
 
     moving_fluid = False
+    outside = None
     wall = None
     resolution = 0.0
 

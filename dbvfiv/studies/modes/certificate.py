@@ -121,11 +121,10 @@ class Certificate:
         names = cls.__dataclass_fields__.keys() - {"frequency", "phase"}
         return cls(**{name: note[name] for name in names}, frequency=frequency, phase=phase)
 
-    def verdict(self, continuity: str = "") -> str:
-        """One sentence for people, with the continuity law in words if there is one."""
+    def verdict(self, conditions: str = "") -> str:
+        """One sentence for people, with the words behind "stable" that say under which conditions."""
         word = {True: "Stable", False: "Unstable", None: "Undecided"}[self.stable]
-        under = f" under {continuity}" if continuity else ""
-        return f"{word}{under}: {self.statement[0].lower()}{self.statement[1:]}"
+        return f"{word} {conditions}".rstrip() + f": {self.statement[0].lower()}{self.statement[1:]}"
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON, without the curve."""

@@ -31,7 +31,11 @@ def command(
     law: LawOption = None,
     count: Annotated[int | None, typer.Option("--count", "-n", metavar="N", help="How many modes.")] = None,
     in_vacuo: Annotated[
-        bool, typer.Option("--in-vacuo", help="Leave the fluid out: the structure under its steady pressures alone.")
+        bool,
+        typer.Option(
+            "--in-vacuo",
+            help="Leave the flow out: the structure under its steady pressures, with any fluid outside.",
+        ),
     ] = False,
     animate: Annotated[
         list[int] | None,

@@ -28,11 +28,14 @@ class OtherLaw:
         growth_rate, frequency, damping_ratio, residual, by falling growth rate.
     certificate : Certificate
         Without its curve.
+    outside : str
+        What is outside the wall, in words.
     """
 
     continuity: str
     modes: tuple[dict[str, Any], ...]
     certificate: Certificate
+    outside: str = ""
 
     @property
     def stable(self) -> bool | None:
@@ -41,7 +44,7 @@ class OtherLaw:
     @property
     def verdict(self) -> str:
         """One sentence, which names the law."""
-        return self.certificate.verdict(f"{self.continuity} continuity")
+        return self.certificate.verdict(f"under {self.continuity} continuity {self.outside}".rstrip())
 
     def summary(self) -> dict[str, Any]:
         """Keys as those of the case's own law."""
@@ -61,12 +64,12 @@ def note_of(found: FoundModes, continuity: str) -> dict[str, Any]:
     return {"continuity": continuity, "modes": modes, "certificate": Certificate.of(found).note()}
 
 
-def read(note: dict[str, Any]) -> OtherLaw:
-    """From a note of a record."""
+def read(note: dict[str, Any], outside: str = "") -> OtherLaw:
+    """From a note of a record; `outside` says in words what is outside the wall."""
     nothing = np.zeros(0)
     shapeless = {"backward_error": np.nan, "shape": nothing, "area": nothing, "pressure": nothing, "inlet_velocity": 0j}
     modes = (ModeShape(number=i + 1, **row, **shapeless).summary() for i, row in enumerate(note["modes"]))
-    return OtherLaw(note["continuity"], tuple(modes), Certificate.read(note["certificate"], nothing, nothing))
+    return OtherLaw(note["continuity"], tuple(modes), Certificate.read(note["certificate"], nothing, nothing), outside)
 
 
 def side_by_side(own: str, modes: Sequence[dict[str, Any]], other: OtherLaw) -> list[str]:

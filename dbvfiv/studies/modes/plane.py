@@ -79,8 +79,11 @@ def conditions(result: ModesResult) -> str:
         if result.state.pressure == result.case.rest_pressure
         else f"at {driven(result.case, result.state.pressure)}"
     )
-    fluid = "in vacuo" if in_vacuo(result) else f"{result.case.fluid.density:g} kg/m³"
-    return f"{where}, {fluid}"
+    case = result.case
+    fluid = f"{case.fluid.density:g} kg/m³"
+    if in_vacuo(result):
+        fluid = "no flow" if case.outside.is_there else "in vacuo"
+    return f"{where}, {fluid} {case.outside.words}".rstrip()
 
 
 def in_vacuo(result: ModesResult) -> bool:

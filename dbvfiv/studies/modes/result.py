@@ -81,14 +81,17 @@ class ModesResult(StudyResult):
 
     @property
     def verdict(self) -> str:
-        """One sentence for people, which names the continuity law."""
-        return self.certificate.verdict("" if self.case.modes.in_vacuo else self.case.continuity)
+        """One sentence for people, which names the continuity law and what is outside."""
+        case = self.case
+        if case.modes.in_vacuo or not case.continuity:
+            return self.certificate.verdict(case.outside.words)
+        return self.certificate.verdict(f"under {case.continuity}")
 
     @cached_property
     def other_law(self) -> other_law.OtherLaw | None:
         """The same state under the other continuity law, where that was asked for."""
         notes = self.record.notes(other_law.NOTE)
-        return other_law.read(notes[-1]) if notes else None
+        return other_law.read(notes[-1], self.case.outside.words) if notes else None
 
     @property
     def comparison(self) -> str | None:

@@ -192,9 +192,12 @@ def _described(
         shapes.append(nodal / scales[-1])
     scale = np.array(scales, complex).reshape(len(spectrum))
     change = linear.slope @ spectrum.q
-    pressure = np.zeros((pencil.m, len(spectrum)), complex)
-    for i, value in enumerate(spectrum.eigenvalues if pencil.m else ()):
+    stations = 0 if in_vacuo else len(change)
+    pressure = np.zeros((stations, len(spectrum)), complex)
+    for i, value in enumerate(spectrum.eigenvalues if stations else ()):
         by_area, by_velocity, _, _ = pencil.fluid_at(value)
+        # behind the stations stands what couples the fluid outside
+        by_area, by_velocity = by_area[:stations, :stations], by_velocity[:stations]
         pressure[:, i] = by_area @ change[:, i] + by_velocity @ spectrum.u[:, i]
     velocity = spectrum.u[0] if pencil.b else np.zeros(len(spectrum), complex)
     return FoundModes(

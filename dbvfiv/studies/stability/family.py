@@ -7,18 +7,20 @@ from functools import partial
 import numpy as np
 
 from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, Workspace, lowest_frequencies
-from eigen.reduction import POWERS
 
-from ...model.dynamics import Conditions, LinearisedState, fluid_parts
+from ...model.dynamics import Conditions, LinearisedState
 from ...model.leading import select_search
+
+#: Blend of the continuity laws; with the length of a line in front, m, and that of a pipe behind; and with the density
+#: outside over that inside where it does not follow it.
+Law = float | tuple[float, float] | tuple[float, float, float] | tuple[float, float, float, float]
 
 #: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
 _KEPT = 256
 
 
 class ValveFamily(PencilFamily):
-    """Conditions are (density, alpha, beta, law, loss factor); the law is the blend of the continuity laws, and with a
-    line in front (blend, length of the line in m); with a pipe behind its length comes third.
+    """Conditions are (density, alpha, beta, law, loss factor); the law as `law_of` makes it.
 
     At unit density the fluid's unknown is the inlet velocity, at others that times the root of the density.
 
@@ -43,7 +45,8 @@ class ValveFamily(PencilFamily):
     ):
         self.linear, self.max_frequency, self.modes, self._workspace = linear, max_frequency, modes, workspace
         self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
-        self.forces, self.slope = linear.forces, linear.slope
+        self.forces, self.slope = linear.coupling
+        self.added = 0 if linear.added is None else linear.added.rank
         self._parts: dict[object, dict[str, np.ndarray]] = {}
         self._relaxations: dict[float, Relaxation | None] = {}
         self._searches: dict[tuple[float, float], SearchOptions] = {}
@@ -84,14 +87,11 @@ class ValveFamily(PencilFamily):
         return self._parts[law]
 
     def _computed(self, law: Law) -> dict[str, np.ndarray]:
-        linear, flow, m = self.linear, self.linear.model.flow, len(self.linear.area)
-        if flow.has_fluid and flow.unsteady:
-            return fluid_parts(flow, linear.area, linear.inlet, 1.0, *law_parts(law))
-        zero = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
-        parts = {name: np.zeros(zero[name[0]]) for name in POWERS}
-        if flow.has_fluid:
-            parts["A0"] = flow.steady_operator(linear.area, linear.inlet)[1]
-        return parts
+        linear, flow = self.linear, self.linear.model.flow
+        parts = linear.flow_parts(1.0, *law_parts(law)) if flow.has_fluid else linear.no_flow()
+        if linear.added is None:
+            return parts
+        return linear.added.parts(parts, outside_of(law) or 1.0)
 
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The full pencil, with the inlet velocity itself as unknown."""
@@ -100,12 +100,14 @@ class ValveFamily(PencilFamily):
         return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, **line), storage=storage)
 
 
-#: Blend of the continuity laws; with the length of a line in front, m, and that of a pipe behind.
-Law = float | tuple[float, float] | tuple[float, float, float]
+def law_of(storage: float, pipe_length: float, tail_length: float, outside: float = 0.0) -> Law:
+    """The law of a condition; a length of 0 m is none, or that of the case.
 
-
-def law_of(storage: float, pipe_length: float, tail_length: float) -> Law:
-    """The law of a condition; a length of 0 m is none, or that of the case."""
+    `outside` is the density outside over that inside where it does not follow it: the coupling at unit density depends
+    on it.
+    """
+    if outside:
+        return storage, pipe_length, tail_length, outside
     if tail_length:
         return storage, pipe_length, tail_length
     return (storage, pipe_length) if pipe_length else storage
@@ -116,3 +118,8 @@ def law_parts(law: Law) -> tuple[float, dict[str, float]]:
     if not isinstance(law, tuple):
         return float(law), {}
     return law[0], {name: value for name, value in zip(("pipe_length", "tail_length"), law[1:]) if value}
+
+
+def outside_of(law: Law) -> float:
+    """Density outside over that inside of a law; 0 where it follows it."""
+    return law[3] if isinstance(law, tuple) and len(law) > 3 else 0.0

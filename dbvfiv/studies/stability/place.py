@@ -33,6 +33,8 @@ class Place:
         Of the line in front; 0 without one.
     tail_length : float, m
         Of the pipe behind; 0 without one.
+    outside : float, kg/m3
+        Density of the fluid outside where it is fixed; 0 where there is none or it follows `density`.
     design : dict
         Values of those parameters of the design (`dbvfiv.case.parameters.DESIGN`) that are not the case's own.
     """
@@ -45,6 +47,7 @@ class Place:
     loss_factor: float = 0.0
     pipe_length: float = 0.0
     tail_length: float = 0.0
+    outside: float = 0.0
     design: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
@@ -61,6 +64,7 @@ class Place:
             damping.loss_factor,
             case.upstream.length if case.has_line else 0.0,
             case.downstream.length if case.has_tail else 0.0,
+            case.outside.fixed_density,
         )
 
     def at(self, **values: float) -> Place:
@@ -72,7 +76,8 @@ class Place:
     @property
     def condition(self) -> Condition:
         """(density, alpha, beta, law, loss factor), the law as `dbvfiv.studies.stability.family.ValveFamily` has it."""
-        law = law_of(self.storage, self.pipe_length, self.tail_length)
+        ratio = self.outside / self.density if self.outside else 0.0
+        law = law_of(self.storage, self.pipe_length, self.tail_length, ratio)
         return Condition(self.density, self.alpha, self.beta, law, self.loss_factor)
 
     def under(self, condition: Condition) -> Place:
@@ -119,6 +124,8 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
     if case.has_tail and case.downstream.length:
         given["tail_length"] = case.downstream.length
     given = {name: value for name, value in given.items() if not case.damping.lacks(name)}
+    if case.outside.is_there:
+        given["outside"] = case.outside.words
     return {name: value for name, value in given.items() if name not in moved}
 
 

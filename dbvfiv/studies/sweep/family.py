@@ -135,6 +135,7 @@ class FluidFamily:
             basis.V.T @ linear.forces,
             linear.slope @ basis.V,
             linear.area,
+            None if linear.added is None else linear.added.projected(basis.V),
         )
         # what relaxes would be computed on the elements otherwise
         vars(self.small)["relaxing"] = tuple(basis.project(part) for part in linear.relaxing)

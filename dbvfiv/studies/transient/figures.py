@@ -35,6 +35,7 @@ def title(result: TransientResult) -> str:
     """Name of the case, its last pressure, its fluid."""
     case = result.case
     fluid = f", {case.fluid.density:g} kg/m³, {case.fluid.continuity}" if case.drive.kind == "flow" else ""
+    fluid = f"{fluid} {case.outside.words}".rstrip()
     return f"{result.header.name}: {driven(case, float(result.history['inlet_pressure'][-1]))}{fluid}"
 
 
@@ -115,12 +116,14 @@ def _draw_branches(axes, result: TransientResult, name: str) -> None:
 
 _STORED = (
     ("kinetic_energy", "kinetic", {"color": ACCENT}),
+    ("outside_energy", "fluid\noutside", {"color": ACCENT, "ls": "--"}),
     ("strain_energy", "strain", {"color": COMPUTED}),
     ("stop_energy", "lip stops", {"color": "0.45", "ls": ":"}),
 )
 _EXCHANGED = (
     ("pressure_work", "work of the\npressure", {"color": COMPUTED}),
     ("dissipation", "lost to\ndamping", {"color": ACCENT}),
+    ("outside_renewed", "renewals of the\nadded mass", {"color": "0.45", "ls": ":"}),
 )
 
 

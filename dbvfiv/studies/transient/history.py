@@ -53,7 +53,9 @@ class Reader:
         area = load.area
         throat = int(np.argmin(area))
         out = density * load.speed[0] * float(self.motion.model.flow.open_area(area[0]))
-        balance = kinetic + strain + stop - self.energy - self.work + self.dissipation
+        outside = motion.outside_energy(state.q, state.v)
+        renewed = 0.0 if motion.outside is None else motion.outside.renewed
+        balance = kinetic + outside + strain + stop - self.energy - self.work + self.dissipation - renewed
         memory, by_group = state.memory, {}
         if memory is not None:
             balance += memory.work.sum()
@@ -73,6 +75,8 @@ class Reader:
             "lip_velocity": self._lip.displacement(state.v),
             "stops": model.stops.touching(state.q),
             "kinetic_energy": QUARTERS * kinetic,
+            "outside_energy": QUARTERS * outside,
+            "outside_renewed": QUARTERS * renewed,
             "strain_energy": QUARTERS * strain,
             "stop_energy": QUARTERS * stop,
             "pressure_work": QUARTERS * self.work,

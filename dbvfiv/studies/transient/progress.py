@@ -29,7 +29,7 @@ class Progress:
     steps : int
     saved : int
         Full states kept so far.
-    work, dissipation, energy : float
+    work, dissipation, energy, renewed : float
         The books of energy, J of a quarter.
     control : tuple of float
         Of the step control.
@@ -43,6 +43,7 @@ class Progress:
     work: float = 0.0
     dissipation: float = 0.0
     energy: float = 0.0
+    renewed: float = 0.0
     control: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
     eigenvalue: complex = complex(np.nan, np.nan)
 
@@ -74,7 +75,7 @@ class Progress:
             state,
             int(values["steps"]),
             int(values["saved"]),
-            *(float(values[name]) for name in ("work", "dissipation", "energy")),
+            *(float(values[name]) for name in ("work", "dissipation", "energy", "renewed")),
             tuple(float(value) for value in values["control"]),
             complex(*values["eigenvalue"]),
         )

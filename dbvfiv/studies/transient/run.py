@@ -108,9 +108,8 @@ class Runner:
         self._begin(0)
         inlet = self.drive(0.0)
         state, kick = (first, None) if first is not None else self._first(inlet)
-        progress = Progress(
-            state, energy=sum(self.motion.energies(state.q, state.v)), control=tuple(self.control.pack())
-        )
+        energy = sum(self.motion.energies(state.q, state.v)) + self.motion.outside_energy(state.q, state.v)
+        progress = Progress(state, energy=energy, control=tuple(self.control.pack()))
         if kick is not None:
             progress.eigenvalue = kick.eigenvalue
         self._reader = Reader(self.motion, progress.energy)
@@ -127,6 +126,9 @@ class Runner:
         self.control.unpack(progress.control)
         self._reader = Reader(self.motion, progress.energy, progress.work, progress.dissipation)
         self.stepper.forget()
+        if self.motion.outside is not None:
+            self.motion.outside.start_afresh(progress.state.q, progress.state.v)
+            self.motion.outside.renewed = progress.renewed
         return self._go(progress)
 
     def _first(self, inlet: float):
@@ -216,6 +218,10 @@ class Runner:
     def _checkpoint(self, progress: Progress, needed: bool = False) -> None:
         """Make the past safe, and the future independent of it but for the state."""
         self.stepper.forget()
+        outside = self.motion.outside
+        if outside is not None:
+            outside.start_afresh(progress.state.q, progress.state.v)
+            progress.renewed = outside.renewed
         progress.control = tuple(self.control.pack())
         self.keeper.restart(progress, needed)
 

@@ -26,6 +26,12 @@ SCALARS = (
     Column("lip_velocity", "m/s", "Rate of the lip displacement"),
     Column("stops", "", "Lip stops in contact, of a quarter"),
     Column("kinetic_energy", "J", "Kinetic energy of the wall"),
+    Column("outside_energy", "J", "Kinetic energy of the fluid outside the wall"),
+    Column(
+        "outside_renewed",
+        "J",
+        "Energy that renewals of the added mass of that fluid have put in since the start, as the shape moved on",
+    ),
     Column("strain_energy", "J", "Strain energy of the wall"),
     Column("stop_energy", "J", "Energy of the lip stops"),
     Column("pressure_work", "J", "Work of the pressure on the wall since the start"),
@@ -33,8 +39,8 @@ SCALARS = (
     Column(
         "balance",
         "J",
-        "Energy gained since the start, by Maxwell branches too, less work plus dissipation: what the scheme itself "
-        "adds or takes",
+        "Energy gained since the start, by Maxwell branches and the fluid outside too, less work plus dissipation, and "
+        "less what renewals put in: what the scheme itself adds or takes",
     ),
     Column("step", "s", "Length of the step"),
     Column("evaluations", "", "Residuals evaluated in the step"),
@@ -98,6 +104,7 @@ BOOKS = (
     Column("work", "J", "Work of the pressure on a quarter since the start"),
     Column("dissipation", "J", "Energy of a quarter lost to damping since the start"),
     Column("energy", "J", "Energy of a quarter at the start"),
+    Column("renewed", "J", "Energy of a quarter that renewals of the added mass outside have put in"),
     Column("control", "", "Numbers of the step control"),
     Column("eigenvalue", "1/s", "Real and imaginary part of that of the mode of a kick"),
 )

@@ -1,0 +1,111 @@
+"""Water outside the 28 x 48 valve against none: its added mass, modes, a column of a map, a step in time, memory."""
+
+from __future__ import annotations
+
+from time import process_time
+
+import numpy as np
+
+from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.motion.options import RunOptions
+from dbvfiv.studies.case import Case
+from dbvfiv.studies.stability.place import Place
+from dbvfiv.studies.stability.walk import StabilityWalk
+from dbvfiv.studies.transient.run import Runner
+from eigen import SearchOptions, Workspace, leading_modes
+
+from .registry import Row, benchmark
+from .transient import BLOCK, BLOCKS, RINGING, _block
+
+WATER = {"outside.fluid": "same"}
+BETA = 0.00116
+
+
+def _times(functions: dict, rounds: int = 3) -> dict[str, float]:
+    """Least processor time of each, in turn."""
+    for function in functions.values():
+        function()
+    taken = {name: [] for name in functions}
+    for _ in range(rounds):
+        for name, function in functions.items():
+            start = process_time()
+            function()
+            taken[name].append(process_time() - start)
+    return {name: min(values) for name, values in taken.items()}
+
+
+@benchmark("outside-modes")
+def modes():
+    """Ten leading pairs at 6 kPa with their linearisation, and a column of 64 densities with its steady state."""
+    models = {"dry": ValveModel(Case()), "wet": ValveModel(Case().replace(WATER))}
+    q = find_equilibria(models["dry"], [6e3]).states[0].q
+    workspace, wet = Workspace(), models["wet"]
+    structure = wet.shell.dofs.matrix(wet.structure(q)[1])
+
+    def pairs(model):
+        pencil = linearise(model, q, 6e3).pencil(Conditions(1000.0, 0.0, BETA))
+        return leading_modes(pencil, 10, SearchOptions(limit_point=-1 / BETA), workspace=workspace)
+
+    def column(model):
+        case = model.case.replace({"damping.alpha": 0.0, "damping.beta": BETA})
+        walk, place = StabilityWalk(case, model=model), Place.of(case).at(pressure=6e3)
+        walk.equilibrium(place)
+        return walk.column([place.at(density=d) for d in np.geomspace(1.0, 1000.0, 64)])
+
+    times = _times(
+        {
+            "added": lambda: wet.outside.added_mass(q, structure),
+            "operator": lambda: wet.outside.operator(q),
+            **{f"pairs {name}": lambda m=model: pairs(m) for name, model in models.items()},
+        }
+    )
+    fluxes, impedance = wet.outside.operator(q)
+    size = impedance.nbytes + wet.outside.added_mass(q, structure).columns.nbytes
+    yield Row(
+        "added mass of one state",
+        times["added"],
+        "s",
+        target=1.0,
+        note=f"of it the panels {times['operator']:.2f} s; {size / 2**20:.0f} MiB, rank {30} of {len(impedance)}",
+    )
+    yield Row(
+        "ten leading pairs with water outside over those without, linearisation included",
+        times["pairs wet"] / times["pairs dry"],
+        target=3.0,
+        note=f"processor time {times['pairs wet']:.2f} and {times['pairs dry']:.2f} s",
+    )
+    taken, found = {}, {}
+    for name, model in models.items():
+        column(model)
+        start = process_time()
+        found[name] = column(model)
+        taken[name] = process_time() - start
+    direct = int(np.count_nonzero(found["wet"].how))
+    yield Row(
+        "a column of 64 cells with water outside over one without, steady state included",
+        taken["wet"] / taken["dry"],
+        target=3.0,
+        note=f"processor time {taken['wet']:.2f} and {taken['dry']:.2f} s, {direct} cells solved directly",
+    )
+
+
+@benchmark("outside-steps")
+def time_steps():
+    """Blocks of steps with water outside and without, in turn; both with history and file."""
+    models = {"dry": ValveModel(Case().replace(RINGING)), "wet": ValveModel(Case().replace(RINGING | WATER))}
+    states, spent = {}, {name: [] for name in models}
+    for name, model in models.items():
+        warm = model.case.replace({"transient.duration": 50e-4})
+        states[name] = Runner(model, RunOptions.of(warm), case=warm).start().progress.state
+    for _ in range(BLOCKS):
+        for name, model in models.items():
+            taken, _, states[name] = _block(model, states[name])
+            spent[name].append(taken)
+    times = {name: 1e3 * np.median(values) / BLOCK for name, values in spent.items()}
+    yield Row(
+        "one step with water outside over one without",
+        times["wet"] / times["dry"],
+        target=2.0,
+        note=f"processor time {times['wet']:.2f} and {times['dry']:.2f} ms, restart points included",
+    )

@@ -1,0 +1,111 @@
+"""Flat quadrilateral panels of a surface in potential flow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Panels:
+    """Panels with corners in their mean plane.
+
+    Attributes
+    ----------
+    corners : (k, 4, 3) array, m
+        Counter-clockwise seen from the fluid; two may coincide.
+    centres : (k, 3) array, m
+        Centroids, where the boundary conditions hold.
+    normals : (k, 3) array
+        Unit vectors into the fluid.
+    areas : (k,) array, m2
+    bend : (k,) array
+        Normal velocity at its centre that a source panel has from its own curvature, see `own_bend`.
+    """
+
+    corners: np.ndarray
+    centres: np.ndarray
+    normals: np.ndarray
+    areas: np.ndarray
+    bend: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.areas)
+
+    @classmethod
+    def of(cls, corners: np.ndarray, corner_normals: np.ndarray | None = None) -> Panels:
+        """Panels of quadrilaterals (k, 4, 3), which need not be flat: their corners move to the mean plane, normal to
+        the area vector.
+
+        Parameters
+        ----------
+        corners : (k, 4, 3) array, m
+        corner_normals : (k, 4, 3) array, optional
+            Unit normals of the true surface at the corners, for its curvature; flat without.
+
+        Raises
+        ------
+        ValueError
+            If one has no area.
+        """
+        corners = np.asarray(corners, float).reshape(-1, 4, 3)
+        first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+        vector = 0.5 * np.cross(first, second)
+        area = np.linalg.norm(vector, axis=1)
+        size = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
+        if np.any(area <= 1e-9 * size):
+            raise ValueError(f"Panel {int(np.argmin(area - 1e-9 * size))} has no area.")
+        normal = vector / area[:, None]
+        middle = corners.mean(axis=1)
+        height = np.einsum("kai,ki->ka", corners - middle[:, None], normal)
+        flat = corners - height[..., None] * normal[:, None]
+        bend = np.zeros(len(area)) if corner_normals is None else own_bend(corners, corner_normals)
+        return cls(np.ascontiguousarray(flat), _centroid(flat, normal, area), normal, area, bend)
+
+    @classmethod
+    def joined(cls, *parts: Panels) -> Panels:
+        """All panels of several surfaces, in order."""
+        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
+
+    @property
+    def extents(self) -> np.ndarray:
+        """Longer diagonal of each panel (k,), m."""
+        c = self.corners
+        return np.maximum(np.linalg.norm(c[:, 2] - c[:, 0], axis=1), np.linalg.norm(c[:, 3] - c[:, 1], axis=1))
+
+
+def _centroid(corners, normal, area):
+    """Centroids of flat quadrilaterals from those of their two triangles."""
+    total = np.zeros((len(corners), 3))
+    for a, b, c in ((0, 1, 2), (0, 2, 3)):
+        p, q, r = corners[:, a], corners[:, b], corners[:, c]
+        part = 0.5 * np.einsum("ki,ki->k", np.cross(q - p, r - p), normal)
+        total += part[:, None] * (p + q + r) / 3.0
+    return total / area[:, None]
+
+
+def own_bend(corners: np.ndarray, corner_normals: np.ndarray) -> np.ndarray:
+    """Normal velocity (k,) at the centre of a curved source panel of unit strength, over the half of a flat one.
+
+    A rectangle a by b with curvatures k1 and k2 along its sides lies k1 u^2/2 + k2 w^2/2 below its tangent plane, so
+    that u_n = 1/(8 pi) integral (k1 u^2 + k2 w^2)/r^3 dA = (k1 b asinh(a/b) + k2 a asinh(b/a))/(4 pi). Without it
+    flat panels are of first order only.
+
+    Parameters
+    ----------
+    corners, corner_normals : (k, 4, 3) arrays
+    """
+    normals = np.asarray(corner_normals, float).reshape(-1, 4, 3)
+
+    def across(field, one, other):
+        return 0.5 * (field[:, other[0]] + field[:, other[1]] - field[:, one[0]] - field[:, one[1]])
+
+    total, sides = np.zeros(len(corners)), []
+    for one, other in (((0, 3), (1, 2)), ((0, 1), (3, 2))):
+        way = across(corners, one, other)
+        square = np.einsum("ki,ki->k", way, way)
+        sides.append((np.sqrt(square), np.einsum("ki,ki->k", across(normals, one, other), way) / square))
+    (a, first), (b, second) = sides
+    total = first * b * np.arcsinh(a / b) + second * a * np.arcsinh(b / a)
+    return total / (4.0 * np.pi)

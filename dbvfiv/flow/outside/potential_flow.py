@@ -1,0 +1,145 @@
+"""Potential flow outside a moving surface: what pressure its motion makes.
+
+Sources sigma on all panels; their normal velocities are those of the surfaces, zero on rigid ones, and on open
+panels the potential vanishes instead. Panels that never move are eliminated once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from .influence import image_signs, influence
+from .panels import Panels
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """Surfaces that stay where they are.
+
+    Attributes
+    ----------
+    rigid : Panels or None
+        No flow passes them.
+    open : Panels or None
+        No pressure acts on them.
+    """
+
+    rigid: Panels | None = None
+    open: Panels | None = None
+
+    @property
+    def panels(self) -> Panels | None:
+        """All of them, rigid ones first."""
+        parts = [p for p in (self.rigid, self.open) if p is not None and len(p)]
+        return Panels.joined(*parts) if parts else None
+
+    @property
+    def rigid_count(self) -> int:
+        return 0 if self.rigid is None else len(self.rigid)
+
+
+#: Flux through a closed boundary, on the fluid's side, of sources on it over their strength: of a body, of a room.
+BODY, ROOM = 1.0, 0.0
+
+
+class PotentialFlow:
+    """Potential flow between moving panels and given surroundings.
+
+    What passes a closed boundary is known exactly: all that sources on a body give, nothing of those on the walls of a
+    room. The panels' own velocities are set so that it does; without that fluid leaks at edges, and what moves columns
+    of it is of first order only.
+
+    Parameters
+    ----------
+    surroundings : Surroundings
+    symmetry : {"SS", "SA", "AS", "AA"}
+        Motions symmetric (S) or antisymmetric (A) about x = 0, then about y = 0; all panels lie in x > 0, y > 0.
+    closed : float, optional
+        `BODY` or `ROOM`, where moving and other panels with their images make up one closed boundary.
+    """
+
+    def __init__(self, surroundings: Surroundings | None = None, symmetry: str = "SS", closed: float | None = None):
+        self.surroundings = surroundings or Surroundings()
+        self.symmetry, self.closed = symmetry, closed
+        self.signs = image_signs(symmetry)
+        self._fixed, self._open = self.surroundings.panels, self.surroundings.rigid_count
+        if self._fixed is not None:
+            self._alone = influence(self._fixed, self._fixed, self.signs, 0)
+
+    def _rows(self, potential, velocity):
+        """Conditions on the panels of the surroundings."""
+        return np.concatenate([velocity[: self._open], potential[self._open :]])
+
+    def impedance(
+        self, moving: Panels, wet: int | None = None, open_count: int = 0, frozen: Panels | None = None
+    ) -> np.ndarray:
+        """Mean potential of panels, with its sign changed, for unit volume flux through others.
+
+        Times the fluid's density and the rate of the fluxes it is the pressure on the panels, positive where the fluid
+        resists. The discretised operator is symmetric up to its error; its symmetric part is given.
+
+        Parameters
+        ----------
+        moving : Panels
+        wet : int, optional
+            Number of panels, the first ones, whose motion and pressure matter; the others are rigid. All by default.
+        open_count : int
+            Number of panels, the last ones, that are open instead of rigid.
+        frozen : Panels, optional
+            Places of the moving panels that choose between exact integrals and quadratures, see `influence`.
+
+        Returns
+        -------
+        (wet, wet) array, 1/m
+        """
+        wet = len(moving) if wet is None else wet
+        held, shut = moving if frozen is None else frozen, len(moving) - open_count
+        blocks = self._blocks(moving, held, self.signs)
+        (potential, velocity), across, back, alone = blocks
+        if self.closed is not None:
+            own, fixed_own = self._own(moving, blocks if self.symmetry == "SS" else self._symmetric(moving, held))
+            velocity[np.diag_indices(len(moving))] += own
+        rows, potential = np.concatenate([velocity[:shut], potential[shut:]]), potential[:wet]
+        if self._fixed is not None:
+            matrix = self._rows(*alone)
+            if self.closed is not None:
+                rigid = np.arange(self._open)
+                matrix[rigid, rigid] += fixed_own[: self._open]
+            carried = la.lu_solve(la.lu_factor(matrix, check_finite=False), self._rows(*back), check_finite=False)
+            rows -= np.concatenate([across[1][:shut], across[0][shut:]]) @ carried
+            potential = potential - across[0][:wet] @ carried
+        # potential rows^-1 by solves with the transpose
+        factor = la.lu_factor(rows.T, overwrite_a=True, check_finite=False)
+        solved = la.lu_solve(factor, potential.T, overwrite_b=True, check_finite=False)[:wet].T
+        found = -solved / moving.areas[:wet]
+        return 0.5 * (found + found.T)
+
+    def _blocks(self, moving: Panels, held: Panels, signs: np.ndarray):
+        """Potentials and velocities of moving on moving panels, of the surroundings on them, of them on the
+        surroundings, and of those on themselves.
+        """
+        own, fixed = influence(moving, moving, signs, 0, (held, held)), self._fixed
+        if fixed is None:
+            return own, None, None, None
+        across = influence(moving, fixed, signs, frozen=(held, fixed))
+        return own, across, influence(fixed, moving, signs, frozen=(fixed, held)), self._alone
+
+    def _symmetric(self, moving: Panels, held: Panels):
+        """The same for symmetric images, on which the whole flux rests."""
+        signs = image_signs("SS")
+        blocks = self._blocks(moving, held, signs)
+        return blocks if self._fixed is None else (*blocks[:3], influence(self._fixed, self._fixed, signs, 0))
+
+    def _own(self, moving: Panels, blocks) -> tuple[np.ndarray, np.ndarray | None]:
+        """What panels' own velocities lack for the whole flux of each to be right, for moving and other panels."""
+        (_, velocity), across, back, alone = blocks
+        flux = moving.areas @ velocity
+        if self._fixed is None:
+            return self.closed - flux / moving.areas, None
+        areas = self._fixed.areas
+        flux += areas @ back[1]
+        other = moving.areas @ across[1] + areas @ alone[1]
+        return self.closed - flux / moving.areas, self.closed - other / areas

@@ -1,0 +1,256 @@
+"""Fluid outside the wall: potential flow on the deformed outer face as added mass.
+
+    M_a(q) = rho E' S E,     E: volume swept by the panels, S: pressure impulse on them of unit volume fluxes
+
+S is symmetric and full. Of M_a the part kept is that of the r motions x_i that it slows down most,
+
+    M_a x_i = mu_i K_s x_i,     M_r = sum_i w_i w_i',  w_i = M_a x_i / sqrt(x_i' M_a x_i),
+
+which is exact for every motion made of them and leaves out at most mu_(r+1) K_s: frequencies that stand well below
+that of the first motion left out, 1/sqrt(mu_(r+1)), do not see it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from eigen import CoupledPencil, SingularShiftError, Workspace
+
+from ..case.model import Case
+from ..flow.outside import BODY, ROOM, Panels, PotentialFlow, Surroundings
+from ..flow.outside.surfaces import arc, end_face, extruded, pipe, ring_face, stretched, strip
+from ..geometry import ValveMesh
+from ..shell import Shell
+from ..shell.face import OuterFace
+
+#: Motions kept of the added mass.
+KEPT = 30
+#: Length of the rigid tube that goes on upstream in unbounded fluid, in diameters of the flange.
+TUBE = 4.0
+#: Where a pipe around the valve is open, from lip and flange, in its diameters.
+OPEN_DOWN, OPEN_UP = 2.0, 2.0
+#: Least height of an open gap between the lips over their half width.
+SLIVER = 1e-3
+#: Panels around a quarter of the surrounding pipe for each column of the wall.
+AROUND = 0.5
+
+
+@dataclass(frozen=True)
+class AddedMass:
+    """Added mass of unit density, m3 for displacements.
+
+    Attributes
+    ----------
+    columns : (n, r) array
+        w_i: the mass is their product with their transpose.
+    slowness : (r + 1,) array
+        mu_i of the motions kept and of the first left out, s2 m3/kg: a massless wall in a fluid of density rho has the
+        frequencies 1/sqrt(rho mu)/(2 pi).
+    """
+
+    columns: np.ndarray
+    slowness: np.ndarray
+
+    @property
+    def rank(self) -> int:
+        return self.columns.shape[1]
+
+    def left_out(self, density: float) -> float:
+        """Frequency of the first motion left out, of a wall without mass in a fluid of a density (kg/m3), Hz."""
+        return float(1.0 / (2.0 * np.pi * np.sqrt(density * self.slowness[-1])))
+
+    def projected(self, basis: np.ndarray) -> AddedMass:
+        """On the span of columns (n, k)."""
+        return AddedMass(basis.T @ self.columns, self.slowness)
+
+    def coupling(self, forces, slope) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """G (n, m + r) and J (m + r, n): the flow's own with the added mass behind them."""
+        own = sp.csr_matrix(self.columns)
+        return sp.hstack([sp.csr_matrix(forces), own], "csr"), sp.vstack([sp.csr_matrix(slope), own.T], "csr")
+
+    def parts(self, flow: dict[str, np.ndarray], density: float) -> dict[str, np.ndarray]:
+        """Parts A0 to S1 of `eigen.CoupledPencil` for that coupling.
+
+        Parameters
+        ----------
+        flow : dict
+            Those of the flow, A0 (m, m) to S1.
+        density : float
+            Of the fluid outside, kg/m3.
+        """
+        r = self.rank
+        wider = {"A": ((0, r), (0, r)), "B": ((0, r), (0, 0)), "R": ((0, 0), (0, r)), "S": ((0, 0), (0, 0))}
+        found = {name: np.pad(value, wider[name[0]]) for name, value in flow.items()}
+        inertia = found["A2"]
+        outside = np.arange(inertia.shape[0] - r, inertia.shape[0])
+        inertia[outside, outside] = -density
+        return found
+
+
+class OutsideFluid:
+    """What the fluid outside a valve does.
+
+    Parameters
+    ----------
+    case : Case
+    mesh : ValveMesh
+    shell : Shell
+
+    Raises
+    ------
+    ValueError
+        If the pipe around the valve does not clear its outer face at rest.
+    """
+
+    def __init__(self, case: Case, mesh: ValveMesh, shell: Shell):
+        self.face = OuterFace(shell)
+        self.shell = shell
+        self._edge = mesh.rows[0]
+        self.open_lips = case.outside.lips == "open"
+        diameter = case.outside.pipe_diameter
+        self.radius = None if diameter is None else 0.5 * diameter
+        rest = shell.dofs.expand(np.zeros(shell.size))
+        points, _ = self.face.points(rest)
+        self._check_clearance(points)
+        self._at_rest = points[mesh.rows]
+        self._workspace = Workspace()
+
+    @cached_property
+    def flow(self) -> PotentialFlow:
+        """The fluid between the wall and what stays at rest."""
+        closed = BODY if self.radius is None else ROOM
+        return PotentialFlow(surroundings(self._at_rest, self.radius), closed=closed)
+
+    def _check_clearance(self, points: np.ndarray) -> None:
+        widest = float(np.hypot(points[:, 0], points[:, 1]).max())
+        if self.radius is not None and widest >= self.radius:
+            raise ValueError(
+                f"outside.pipe_diameter is {2e3 * self.radius:g} mm; the valve's outer face reaches "
+                f"{2e3 * widest:.4g} mm, so it must be larger."
+            )
+
+    def panels(self, q: np.ndarray) -> Panels:
+        """Outer faces of the elements at a state, in their order; behind them what closes the end of the tube, and
+        last the opening between the lips where that is open.
+        """
+        points, directors = self.face.points(self.shell.dofs.expand(q))
+        self._check_clearance(points)
+        quads = self.shell.mesh.quads
+        wall = Panels.of(points[quads], directors[quads])
+        outer, middle = points[self._edge], np.array([1.0, 0.0, 1.0])
+        if not self.open_lips:
+            return Panels.joined(wall, strip(outer, outer * middle))
+        inner = self._inner_edge(outer, directors)
+        return Panels.joined(wall, strip(outer, inner), strip(inner, inner * middle))
+
+    def _inner_edge(self, outer: np.ndarray, directors: np.ndarray) -> np.ndarray:
+        """Edge (k, 3) of the opening: that of the inner face, kept apart where lips touch and the side edge folds."""
+        edge = outer - 2.0 * self.face.half_wall[self._edge, None] * directors[self._edge]
+        apart = SLIVER * outer[-1, 0]
+        edge[:, 1] = np.clip(edge[:, 1], np.minimum(apart, 0.5 * outer[:, 1]), outer[:, 1])
+        edge[-1, 1] = 0.0
+        steps = np.maximum(np.diff(np.clip(edge[:, 0], 0.0, outer[:, 0])), 0.1 * np.diff(outer[:, 0]))
+        edge[:, 0] = np.minimum(np.concatenate([[0.0], np.cumsum(steps)]), outer[:, 0])
+        return edge
+
+    def impedance(self, q: np.ndarray, frozen: Panels | None = None) -> np.ndarray:
+        """S (ne, ne), 1/m: see `PotentialFlow.impedance`."""
+        panels = self.panels(q)
+        opening = 2 * (len(self._edge) - 1) if self.open_lips else 0
+        return self.flow.impedance(panels, len(self.shell.mesh.quads), opening, frozen)
+
+    def operator(self, q: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray]:
+        """E (ne, n), m2, and S (ne, ne), 1/m, at a state."""
+        return self.face.fluxes(self.shell.dofs.expand(q)), self.impedance(q)
+
+    def added_mass(self, q: np.ndarray, structure: sp.csr_matrix, kept: int = KEPT) -> AddedMass:
+        """Added mass of unit density at a state.
+
+        Parameters
+        ----------
+        q : (n,) array
+        structure : (n, n) sparse matrix
+            The structure's own tangent, which says what motions are slow.
+        kept : int
+            Rank r.
+        """
+        fluxes, impedance = self.operator(q)
+        return leading_added_mass(fluxes, impedance, structure, kept, self._workspace)
+
+
+def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Workspace | None = None) -> AddedMass:
+    """The part of E' S E that slows motions down most, see the module.
+
+    Parameters
+    ----------
+    fluxes : (k, n) sparse matrix E
+    impedance : (k, k) array S
+    structure : (n, n) sparse matrix
+        Symmetric; where it is not positive it is shifted by a small part of its diagonal.
+    kept : int
+    """
+    n = structure.shape[0]
+    kept = min(kept, fluxes.shape[0] - 2, n - 2)
+    back = fluxes.T.tocsr()
+    apply = lambda x: back @ (impedance @ (fluxes @ x))  # noqa: E731
+    unit = sp.diags(structure.diagonal()).tocsr()
+    start = np.random.default_rng(11).standard_normal(n)
+    for share in (0.0, 1e-6, 1e-3, 1e-1):
+        stiffness = structure if share == 0.0 else (structure + share * unit).tocsr()
+        try:
+            solver = (workspace or Workspace()).factored(CoupledPencil(unit, 0.0 * unit, stiffness), 0.0)
+        except SingularShiftError:
+            continue
+        inverse = spla.LinearOperator((n, n), matvec=lambda x: solver.solve(np.ravel(x)).real)  # noqa: B023
+        values, vectors = spla.eigsh(
+            spla.LinearOperator((n, n), matvec=lambda x: apply(np.ravel(x))),
+            kept + 1,
+            stiffness,
+            Minv=inverse,
+            v0=apply(start),
+            tol=1e-6,
+        )
+        if values.min() > 0.0:
+            break
+    order = np.argsort(-values)
+    values, vectors = values[order], vectors[:, order]
+    images = apply(vectors[:, :kept])
+    # orthonormal in M_a whatever the iteration left
+    gram = vectors[:, :kept].T @ images
+    turn = np.linalg.cholesky(0.5 * (gram + gram.T))
+    return AddedMass(np.linalg.solve(turn, images.T).T, values)
+
+
+def surroundings(grid: np.ndarray, radius: float | None) -> Surroundings:
+    """What stays at rest around a valve.
+
+    Parameters
+    ----------
+    grid : (l, k, 3) array, m
+        Outer face at rest from the lip's row to the flange's, columns from x = 0 to y = 0.
+    radius : float, optional
+        Of the pipe around it, m; without one the fluid is unbounded.
+    """
+    contour, top = grid[-1][:, :2], float(grid[-1][:, 2].mean())
+    bore, step = float(contour[0, 1]), float(grid[-1][:, 2].mean() - grid[-2][:, 2].mean())
+    if radius is None:
+        length = 2 * TUBE * bore
+        tube = extruded(contour, stretched(top, step, length))
+        return Surroundings(Panels.joined(tube, end_face(contour, top + length, True)))
+    around = max(4, round(AROUND * (grid.shape[1] - 1)))
+    lip = float(grid[0][:, 2].min())
+    low, high = lip - 2 * OPEN_DOWN * radius, top + 2 * OPEN_UP * radius
+    beside = np.linspace(lip, top, max(2, round((top - lip) / (radius * 0.5 * np.pi / around))) + 1)
+    spacing = beside[1] - beside[0]
+    down, up = stretched(0.0, spacing, lip - low), stretched(top, spacing, high - top)
+    z = np.concatenate([(lip - down)[::-1], beside[1:], up[1:]])
+    tube = extruded(contour, up)
+    circle = arc(radius, np.linspace(0.5 * np.pi, 0.0, len(contour)))
+    coarse = arc(radius, np.linspace(0.5 * np.pi, 0.0, around + 1))
+    ends = Panels.joined(end_face(coarse, low, True), ring_face(contour, circle, high, False))
+    return Surroundings(Panels.joined(tube, pipe(radius, z, around)), ends)

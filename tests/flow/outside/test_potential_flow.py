@@ -1,0 +1,152 @@
+"""Added mass by panels against closed forms, and what images, open panels and frozen rules do.
+
+Lamb, Hydrodynamics (1932): a sphere carries half the mass of the fluid it displaces; a ring that moves outwards with
+cos(n t) carries rho R/n per area in unbounded fluid, and between it and a rigid pipe of radius Ro the multiple
+(Ro^2n + R^2n)/(Ro^2n - R^2n) of that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbvfiv.flow.outside import BODY, ROOM, Panels, PotentialFlow, Surroundings
+from dbvfiv.flow.outside.influence import REFLECTIONS, influence
+from dbvfiv.flow.outside.surfaces import arc, end_face, extruded, pipe, stretched, strip
+
+
+def quads(grid):
+    return np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=2).reshape(-1, 4, 3)
+
+
+def sphere(n: int) -> Panels:
+    """A quarter of the unit sphere: faces of a cube, n by n panels to an octant's face, blown up."""
+    t = np.tan(np.linspace(0.0, 0.25 * np.pi, n + 1))
+    a, b = np.meshgrid(t, t, indexing="ij")
+    corners = []
+    for axis in range(3):
+        face = np.empty((n + 1, n + 1, 3))
+        face[..., axis], face[..., (axis + 1) % 3], face[..., (axis + 2) % 3] = 1.0, a, b
+        ball = quads(face / np.linalg.norm(face, axis=2, keepdims=True))
+        corners += [ball, ball[:, ::-1] * [1.0, 1.0, -1.0]]
+    corners = np.concatenate(corners)
+    return Panels.of(corners, corners)
+
+
+def heaving(n: int, symmetry: str, axis: int) -> float:
+    panels = sphere(n)
+    flux = panels.normals[:, axis] * panels.areas
+    return 4.0 * float(flux @ PotentialFlow(symmetry=symmetry, closed=BODY).impedance(panels) @ flux)
+
+
+@pytest.mark.parametrize("symmetry, axis", [("SS", 2), ("AS", 0), ("SA", 1)])
+def test_a_heaving_sphere_carries_half_the_fluid_it_displaces(symmetry, axis):
+    errors = [heaving(n, symmetry, axis) / (2.0 * np.pi / 3.0) - 1.0 for n in (3, 6, 12)]
+    assert abs(errors[-1]) < 0.002  # 864 panels
+    orders = np.log2(np.abs(np.array(errors[:-1]) / errors[1:]))
+    assert orders.min() > 1.8, (errors, orders)
+
+
+def ring(around: int, radius: float | None, mode: int, symmetry: str, length: float) -> float:
+    """Added mass per area of a mode, midway along a tube of unit radius, over the closed form."""
+    contour = arc(1.0, np.linspace(0.5 * np.pi, 0.0, around + 1))
+    if radius is None:  # fine in the middle
+        half = stretched(0.0, 1.5 / around, length, 1.15)
+        z = np.concatenate([-half[:0:-1], half])
+        surroundings = None
+    else:
+        z = np.linspace(-length, length, 2 * round(0.5 * length * around) + 1)
+        surroundings = Surroundings(pipe(radius, z, around))
+    tube = extruded(contour, z)
+    wave = np.cos(mode * np.arctan2(tube.centres[:, 1], tube.centres[:, 0]))
+    potential = PotentialFlow(surroundings, symmetry).impedance(tube) @ (wave * tube.areas)
+    middle = np.abs(tube.centres[:, 2]) < 0.35
+    weight = (tube.areas * wave)[middle]
+    found = float(weight @ potential[middle]) / float(weight @ wave[middle])
+    if radius is None:
+        return found * mode
+    a = radius ** (2 * mode)
+    return found * mode * (a - 1.0) / (a + 1.0)
+
+
+@pytest.mark.parametrize("mode, symmetry", [(2, "SS"), (3, "AS")])
+def test_ring_modes_in_unbounded_fluid(mode, symmetry):
+    errors = [abs(ring(around, None, mode, symmetry, 8.0) - 1.0) for around in (6, 12)]
+    assert errors[0] < 0.02 and errors[1] < 0.01, errors
+
+
+@pytest.mark.parametrize("mode, symmetry", [(2, "SS"), (3, "AS")])
+@pytest.mark.parametrize("radius", [1.3, 2.0])
+def test_ring_modes_in_a_pipe(mode, symmetry, radius):
+    errors = [ring(around, radius, mode, symmetry, 3.0) - 1.0 for around in (4, 8, 16)]
+    assert abs(errors[-1]) < 0.01, errors
+    # of second order where the error is one of the mesh, not of the ends
+    assert abs(errors[0]) > 3.0 * abs(errors[1]) > 3.0 * abs(errors[2]) or abs(errors[1]) < 2e-3, errors
+
+
+def test_images_are_the_mirrored_panels():
+    panels = sphere(2)
+    rng = np.random.default_rng(1)
+    for symmetry, signs in (
+        ("SS", (1, 1, 1, 1)),
+        ("SA", (1, 1, -1, -1)),
+        ("AS", (1, -1, 1, -1)),
+        ("AA", (1, -1, -1, 1)),
+    ):
+        potential, velocity = influence(panels, panels, PotentialFlow(symmetry=symmetry).signs, 0)
+        whole, moving = np.zeros_like(potential), np.zeros_like(velocity)
+        for k, sign in enumerate(signs):
+            corners = panels.corners * REFLECTIONS[k]
+            turned = corners if REFLECTIONS[k].prod() > 0 else corners[:, ::-1]
+            alone = influence(panels, Panels.of(turned), np.array([1.0, 0, 0, 0]), 0 if k == 0 else None)
+            whole += sign * alone[0]
+            moving += sign * alone[1]
+        source = rng.standard_normal(len(panels))
+        np.testing.assert_allclose(potential @ source, whole @ source, atol=2e-5)
+        np.testing.assert_allclose(velocity @ source, moving @ source, atol=2e-4)
+
+
+def test_near_and_far_integrals_meet():
+    """A panel cut into sixteen, each small enough to be far, against its exact integral."""
+    corner = np.array([[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.9, 1.2, 0.0], [0.0, 0.8, 0.0]]) + [2.0, 2.0, 0.0]
+    t = np.linspace(0.0, 1.0, 17)
+    u, v = np.meshgrid(t, t, indexing="ij")
+    grid = sum(
+        w[..., None] * c for w, c in zip(((1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v), corner, strict=True)
+    )
+    whole, parts = Panels.of(corner[None]), Panels.of(quads(grid))
+    alone = np.array([1.0, 0.0, 0.0, 0.0])
+    for place in ([2.4, 2.5, 0.3], [3.5, 3.4, 1.0], [2.5, 2.4, 6.0], [2.5, 9.0, 9.0]):
+        target = Panels.of((np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0.02], [0, 0.1, 0]]) + place)[None])
+        one, many = influence(target, whole, alone), influence(target, parts, alone)
+        assert one[0][0, 0] == pytest.approx(many[0].sum(), rel=2e-4)
+        assert one[1][0, 0] == pytest.approx(many[1].sum(), rel=2e-3, abs=1e-8)
+
+
+def test_an_open_end_lets_a_column_go():
+    """A piston in a tube of length L that is open at the far end moves the column: rho L per area."""
+    length, z = 2.0, np.linspace(0.0, 2.0, 17)
+    errors = []
+    for n in (4, 8):
+        contour = arc(1.0, np.linspace(0.5 * np.pi, 0.0, n + 1))
+        piston = end_face(contour, 0.0, True)
+        flow = PotentialFlow(Surroundings(pipe(1.0, z, n), end_face(contour, length, False)), closed=ROOM)
+        pressure = flow.impedance(piston) @ piston.areas
+        errors.append(float(piston.areas @ pressure / piston.areas.sum()) / length - 1.0)
+    assert max(map(abs, errors)) < 0.005, errors  # without closing the balance: 0.15
+
+
+def test_the_matrix_is_symmetric_and_positive_also_beside_rigid_and_open_panels():
+    contour = arc(1.0, np.linspace(0.5 * np.pi, 0.0, 7))
+    tube = extruded(contour, np.linspace(0.0, 2.0, 7))
+    edge = np.column_stack([contour, np.zeros(len(contour))])
+    for open_count in (0, 12):
+        moving = Panels.joined(tube, strip(edge, edge * [1.0, 0.0, 1.0]))
+        found = PotentialFlow(Surroundings(end_face(contour, 2.0, True))).impedance(moving, len(tube), open_count)
+        assert np.array_equal(found, found.T)
+        assert np.linalg.eigvalsh(found)[0] > 0.0
+
+
+def test_a_panel_without_area_is_named():
+    with pytest.raises(ValueError, match="Panel 0 has no area"):
+        Panels.of(np.zeros((1, 4, 3)))
