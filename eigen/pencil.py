@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
 from .relaxation import Relaxation
@@ -266,3 +267,9 @@ def _real_csr(name: str, value) -> sp.csr_matrix:
         matrix = matrix.copy()
         matrix.sum_duplicates()
     return matrix
+
+
+def fluid_zeros(S0: np.ndarray, S1: np.ndarray) -> np.ndarray:
+    """Finite zeros in the upper half-plane of det (S0 + s S1): the fluid's own swinging between walls that stand."""
+    values = la.eigvals(-S0, S1)
+    return values[np.isfinite(values) & (values.imag > 0)]

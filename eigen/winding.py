@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .pencil import CoupledPencil
+from .pencil import CoupledPencil, fluid_zeros
 from .response import Determinant
 
 MAX_PHASE = np.pi / 4  # largest accepted phase increment between neighbours
@@ -110,6 +110,8 @@ def unstable_count(
     dense = pencil.n <= Determinant.dense_below
     # a zero of the pencil can hide from a coarse walk only beside a zero of the reference
     hints = [complex(h) for h in hints] + [line + z for z in determinant.reference_zeros()]
+    if pencil.b > 1:
+        hints += list(fluid_zeros(pencil.S0, pencil.S1))
     walk = _Walk(determinant, max_points or (4000 if dense else 300), band)
     walk.start(scale, hints)
     walk.refine()

@@ -97,6 +97,11 @@ class Case(Section):
         return self.drive.kind == "flow" and self.upstream.length > 0
 
     @property
+    def has_waves(self) -> bool:
+        """Whether that pipe is elastic."""
+        return self.has_line and self.fluid.unsteady and self.upstream.is_elastic
+
+    @property
     def continuity(self) -> str:
         """The continuity law in words; empty where none is needed: without flow, and in the steady law."""
         return f"{self.fluid.continuity} continuity" if self.drive.kind == "flow" and self.fluid.unsteady else ""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from ..case.model import Case
 from ..flow import Channel, FlowLaw, UniformLoad
+from ..flow.elastic_line import ElasticLine, LineChannel
 from ..flow.terms import terms_of
+from ..flow.terms.line import Line
 from ..geometry import ValveMesh, valve_mesh
 from ..materials.damping import relaxation_from_case
 from ..materials.library import law_from_case
@@ -44,4 +46,10 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
         return UniformLoad(len(mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
     gap_area = mesh.rest_area[0] - mesh.wall_deduction[0]
     storage = 1.0 if case.fluid.continuity == "storage" else 0.0
-    return Channel(mesh.z, case.fluid.area_floor * gap_area, storage, case.fluid.unsteady, terms_of(case))
+    terms, floor = terms_of(case), case.fluid.area_floor * gap_area
+    rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms)
+    if not case.has_waves:
+        return rigid
+    line = next(term for term in terms if isinstance(term, Line))
+    channel = Channel(mesh.z, floor, storage, terms=[term for term in terms if term is not line])
+    return LineChannel(channel, rigid, ElasticLine(line, case.upstream.wave_speed, case.upstream.elements))

@@ -11,6 +11,7 @@ sum_g phi_g(lambda) K_g, with K_g the material part of the tangent of layers tha
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -38,6 +39,8 @@ class Conditions:
         Factor on the loss factors of all materials; zero leaves them elastic.
     pipe_length : float, optional
         Of the line in front, m; the case's own where it is not given, and of no effect without a line.
+    wave_speed : float, optional
+        In an elastic line, m/s; likewise.
     """
 
     density: float
@@ -45,11 +48,19 @@ class Conditions:
     beta: float
     loss_factor: float = 0.0
     pipe_length: float | None = None
+    wave_speed: float | None = None
 
     @classmethod
     def of(cls, case) -> Conditions:
         length = case.upstream.length if case.has_line else None
-        return cls(case.fluid.density, case.damping.alpha, case.damping.beta, case.damping.loss_factor, length)
+        damping, speed = case.damping, case.upstream.wave_speed if case.has_waves else None
+        return cls(case.fluid.density, damping.alpha, damping.beta, damping.loss_factor, length, speed)
+
+    @property
+    def of_line(self) -> dict[str, float]:
+        """Parameters of the line by their names; those that are not given left out."""
+        given = {"pipe_length": self.pipe_length, "wave_speed": self.wave_speed}
+        return {name: value for name, value in given.items() if value is not None}
 
 
 def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q, v, a, inner, inner_rate):
@@ -154,7 +165,7 @@ class LinearisedState:
         if not flow.unsteady:
             _, slope = flow.steady_operator(self.area, self.inlet)
             return damped.replace(A0=slope)
-        parts = fluid_parts(flow, self.area, self.inlet, conditions.density, storage, conditions.pipe_length)
+        parts = fluid_parts(flow, self.area, self.inlet, conditions.density, storage, conditions.of_line)
         return damped.replace(**parts)
 
 
@@ -164,11 +175,11 @@ def fluid_parts(
     inlet: float,
     density: float,
     storage: float | None = None,
-    pipe_length: float | None = None,
+    line: Mapping[str, float] = {},
 ) -> dict[str, np.ndarray]:
-    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow."""
-    given = {"inlet": inlet, "density": density, "storage": storage, "pipe_length": pipe_length}
-    return flow.linearise_still(area, {name: value for name, value in given.items() if value is not None}).parts()
+    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow; `line` as `Conditions.of_line`."""
+    given = {"inlet": inlet, "density": density, **line}
+    return flow.linearise_still(area, given if storage is None else given | {"storage": storage}).parts()
 
 
 def linearise(model: ValveModel, q: np.ndarray, inlet: float) -> LinearisedState:

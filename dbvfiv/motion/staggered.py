@@ -48,10 +48,10 @@ class StaggeredMotion(ValveMotion):
         none = np.zeros((self.stations, self.stations))
         self._solver(0).refactor(values, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
 
-    def accelerations(self, q, v, speed, inlet, memory=None):
+    def accelerations(self, q, v, speed, inlet, memory=None, line=None):
         self._frozen, self.moving_fluid = None, self.coupled_fluid
         try:
-            return super().accelerations(q, v, speed, inlet, memory)
+            return super().accelerations(q, v, speed, inlet, memory, line)
         finally:
             self.moving_fluid = False
             self.drop_factors()

@@ -124,7 +124,8 @@ def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, push:
     model = motion.model
     pencil = linearise(model, q, inlet).pencil(motion.conditions)
     try:
-        found, index = _find_mode(pencil, motion.conditions, push)
+        resolved = model.flow.resolved(motion.conditions.of_line)
+        found, index = _find_mode(pencil, motion.conditions, push, resolved)
     except (SingularShiftError, np.linalg.LinAlgError) as error:
         said = str(error).rstrip(".")
         raise SolveError(f"The mode to push along at {inlet:.6g} Pa was not found: {said}.") from error
@@ -162,11 +163,13 @@ def on_mode(
     return consistent_state(motion, 0.0, moved, (eigenvalue * shape).real, speed + flow, inlet, memory)
 
 
-def _find_mode(pencil: CoupledPencil, conditions: Conditions, push: Push) -> tuple[Spectrum, int]:
+def _find_mode(
+    pencil: CoupledPencil, conditions: Conditions, push: Push, resolved: float = np.inf
+) -> tuple[Spectrum, int]:
     """Leading modes, by the rule of all studies, and the place of the one to push along among them."""
     count = max(push.count, push.mode)
     while True:
-        search = select_search(push.search, conditions, lambda n: lowest_frequencies(pencil, n), count)
+        search = select_search(push.search, conditions, lambda n: lowest_frequencies(pencil, n), count, resolved)
         found = leading_modes(pencil, count, search.options)
         oscillating = [i for i in range(len(found)) if found.eigenvalues[i].imag > 1e-6 * abs(found.eigenvalues[i])]
         if len(oscillating) >= push.mode:

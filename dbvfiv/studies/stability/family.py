@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +18,8 @@ _KEPT = 256
 
 
 class ValveFamily(PencilFamily):
-    """Conditions are (density, alpha, beta, law, loss factor); the law is the blend of the continuity laws, and with a
-    line in front (blend, length of the line in m).
+    """Conditions are (density, alpha, beta, law, loss factor); the law is the blend of the continuity laws, with a line
+    in front (blend, length of the line in m), and with an elastic one `Waves`.
 
     At unit density the fluid's unknown is the inlet velocity, at others that times the root of the density.
 
@@ -57,10 +58,12 @@ class ValveFamily(PencilFamily):
 
     def search(self, condition: Condition) -> SearchOptions:
         """What is searched in the spectrum: the rule that every study follows."""
-        conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss)
+        line = law_parts(condition.law)[1]
+        conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss, **line)
         asked = SearchOptions(max_frequency=self.max_frequency)
         lowest = partial(self._lowest, workspace=self._workspace) if condition.loss else self._lowest
-        return select_search(asked, conditions, lowest, self.modes).options
+        resolved = self.linear.model.flow.resolved(line)
+        return select_search(asked, conditions, lowest, self.modes, resolved).options
 
     def relaxation(self, loss: float) -> Relaxation | None:
         """What relaxes with a factor on the loss factors of all materials."""
@@ -71,7 +74,7 @@ class ValveFamily(PencilFamily):
             self._relaxations[loss] = self.linear.relaxation(loss)
         return self._relaxations[loss]
 
-    def parts(self, law: float | tuple[float, float]) -> dict[str, np.ndarray]:
+    def parts(self, law: Law) -> dict[str, np.ndarray]:
         """A0 to S1 at density 1."""
         if law not in self._parts:
             if len(self._parts) > _KEPT:
@@ -79,10 +82,13 @@ class ValveFamily(PencilFamily):
             self._parts[law] = self._computed(law)
         return self._parts[law]
 
-    def _computed(self, law: float | tuple[float, float]) -> dict[str, np.ndarray]:
+    def _computed(self, law: Law) -> dict[str, np.ndarray]:
         linear, flow, m = self.linear, self.linear.model.flow, len(self.linear.area)
         if flow.has_fluid and flow.unsteady:
-            return fluid_parts(flow, linear.area, linear.inlet, 1.0, *law_parts(law))
+            storage, line = law_parts(law)
+            if isinstance(law, Waves):  # so that the compressibility is that of the fluid
+                line["wave_speed"] *= np.sqrt(law.density)
+            return fluid_parts(flow, linear.area, linear.inlet, 1.0, storage, line)
         zero = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
         parts = {name: np.zeros(zero[name[0]]) for name in POWERS}
         if flow.has_fluid:
@@ -92,10 +98,35 @@ class ValveFamily(PencilFamily):
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The full pencil, with the inlet velocity itself as unknown."""
         density, alpha, beta, law, loss_factor = condition
-        storage, pipe_length = law_parts(law)
-        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, pipe_length), storage=storage)
+        storage, line = law_parts(law)
+        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, **line), storage=storage)
 
 
-def law_parts(law: float | tuple[float, float]) -> tuple[float, float | None]:
-    """Blend of the continuity laws and length of the line, None without one, of a condition's law."""
-    return law if isinstance(law, tuple) else (float(law), None)
+class Waves(NamedTuple):
+    """The law of a fluid with an elastic line in front.
+
+    Waves tell fluids of different densities apart by more than their inertia, so the density is a part of it.
+    """
+
+    storage: float
+    pipe_length: float
+    wave_speed: float
+    density: float
+
+
+#: Blend of the continuity laws; with the length of a rigid line, m; with an elastic one.
+Law = float | tuple[float, float] | Waves
+
+
+def law_of(storage: float, pipe_length: float, wave_speed: float, density: float) -> Law:
+    """The law of a condition; a length, m, or wave speed, m/s, of 0 is none."""
+    if pipe_length and wave_speed:
+        return Waves(storage, pipe_length, wave_speed, density)
+    return (storage, pipe_length) if pipe_length else storage
+
+
+def law_parts(law: Law) -> tuple[float, dict[str, float]]:
+    """Blend of the continuity laws, and parameters of the line as `Conditions.of_line` has them, of a law."""
+    if isinstance(law, Waves):
+        return law.storage, {"pipe_length": law.pipe_length, "wave_speed": law.wave_speed}
+    return (law[0], {"pipe_length": law[1]}) if isinstance(law, tuple) else (float(law), {})

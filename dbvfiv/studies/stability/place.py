@@ -13,7 +13,7 @@ from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ...model.dynamics import Conditions
 from ..case import Case
-from .family import law_parts
+from .family import law_of, law_parts
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ class Place:
         Blend of the continuity laws, 0 quasi-steady, 1 storage.
     pipe_length : float, m
         Of the line in front; 0 without one.
+    wave_speed : float, m/s
+        In an elastic line; 0 without one.
     design : dict
         Values of those parameters of the design (`dbvfiv.case.parameters.DESIGN`) that are not the case's own.
     """
@@ -42,6 +44,7 @@ class Place:
     storage: float
     loss_factor: float = 0.0
     pipe_length: float = 0.0
+    wave_speed: float = 0.0
     design: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
@@ -57,6 +60,7 @@ class Place:
             storage,
             damping.loss_factor,
             case.upstream.length if case.has_line else 0.0,
+            case.upstream.wave_speed if case.has_waves else 0.0,
         )
 
     def at(self, **values: float) -> Place:
@@ -68,26 +72,28 @@ class Place:
     @property
     def condition(self) -> Condition:
         """(density, alpha, beta, law, loss factor), the law as `dbvfiv.studies.stability.family.ValveFamily` has it."""
-        law = (self.storage, self.pipe_length) if self.pipe_length else self.storage
+        law = law_of(self.storage, self.pipe_length, self.wave_speed, self.density)
         return Condition(self.density, self.alpha, self.beta, law, self.loss_factor)
 
     def under(self, condition: Condition) -> Place:
         """The same steady state under another condition."""
         density, alpha, beta, law, loss_factor = condition
-        storage, length = law_parts(law)
+        storage, line = law_parts(law)
         return self.at(
             density=density,
             alpha=alpha,
             beta=beta,
             storage=storage,
             loss_factor=loss_factor,
-            pipe_length=length or 0.0,
+            pipe_length=line.get("pipe_length", 0.0),
+            wave_speed=line.get("wave_speed", 0.0),
         )
 
     @property
     def conditions(self) -> Conditions:
         """What surrounds the structure there."""
-        return Conditions(self.density, self.alpha, self.beta, self.loss_factor, self.pipe_length or None)
+        line = self.pipe_length or None, self.wave_speed or None
+        return Conditions(self.density, self.alpha, self.beta, self.loss_factor, *line)
 
     def value(self, name: str) -> float:
         return float(self.design[name] if name in DESIGN else getattr(self, name))
@@ -110,6 +116,8 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
     }
     if case.has_line:
         given["pipe_length"] = case.upstream.length
+    if case.has_waves:
+        given["wave_speed"] = case.upstream.wave_speed
     given = {name: value for name, value in given.items() if not case.damping.lacks(name)}
     return {name: value for name, value in given.items() if name not in moved}
 
@@ -172,6 +180,12 @@ def require_parameter(case: Case, name: str) -> None:
         raise CaseError(
             "There is no pipe_length to change: the valve has no line in front; give upstream.length (drive.pressure "
             "is then that at its far end, see drive.at).",
+            key=PARAMETERS[name].key,
+        )
+    if name == "wave_speed" and not case.has_waves:
+        raise CaseError(
+            "There is no wave_speed to change: the valve has no elastic line in front; give upstream.length and "
+            "upstream.wave_speed.",
             key=PARAMETERS[name].key,
         )
     lacking = case.damping.lacks(name)

@@ -10,7 +10,6 @@ from ...model.lip import LipCentre
 from ...model.valve import QUARTERS
 from ...motion.equations import ValveMotion
 from ...motion.stepper import StepResult
-from ...motion.terms import Step
 
 
 class Reader:
@@ -35,9 +34,7 @@ class Reader:
     def first(self, state, inlet: float) -> dict[str, Any]:
         """Row of the start."""
         motion = self.motion
-        load = motion.load(
-            state.q, state.v, state.q, state.v, Step(1.0, state.speed, 0.0, state.psi_rate, inlet), state.speed
-        )
+        load = motion.load(state.q, state.v, state.q, state.v, motion.instant(state, inlet), state.speed)
         return self._row(state, load, 0.0, 0)
 
     def row(self, result: StepResult, h: float) -> dict[str, Any]:
