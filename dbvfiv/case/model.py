@@ -88,6 +88,12 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
+        if self.drive.kind == "flow" and self.upstream.is_elastic and not self.fluid.unsteady:
+            raise BrokenRule(
+                "upstream.wave_speed",
+                f"{self.upstream.wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
+                "give it with the unsteady law alone",
+            )
         self.upstream.check_roughness(2 * (self.valve.flange_radius - self.valve.flange_wall_deduction))
         return self
 
@@ -99,7 +105,7 @@ class Case(Section):
     @property
     def has_waves(self) -> bool:
         """Whether that pipe is elastic."""
-        return self.has_line and self.fluid.unsteady and self.upstream.is_elastic
+        return self.has_line and self.upstream.is_elastic
 
     @property
     def continuity(self) -> str:

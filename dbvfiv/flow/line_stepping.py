@@ -50,6 +50,12 @@ class LineState:
         """All numbers in one array."""
         return np.concatenate([self.velocity, self.pressure, self.velocity_rate, self.pressure_rate, self.books])
 
+    def changed(self, inner: np.ndarray) -> LineState:
+        """With a change (l,) of the law's unknowns, see `dbvfiv.flow.elastic_line.LineChannel`."""
+        k = len(self.pressure)
+        velocity = self.velocity + np.append(inner[1 : k + 1], inner[0])
+        return replace(self, velocity=velocity, pressure=self.pressure + inner[k + 1 :])
+
     @classmethod
     def unpacked(cls, numbers: np.ndarray) -> LineState:
         """Undo `packed`."""

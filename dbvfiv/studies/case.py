@@ -10,12 +10,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import create_model
+from pydantic import create_model, model_validator
 
 from ..case.load import key_path, read_case_file
 from ..case.model import Case as PhysicsCase
 from ..case.reference import page
-from ..case.section import Section, key
+from ..case.section import BrokenRule, Section, key
 from . import KINDS
 
 
@@ -34,6 +34,16 @@ class _CaseOfStudies(PhysicsCase):
         """
         alone = "pressure" in self.drive.model_fields_set and "pressures" not in self.steady.model_fields_set
         return (self.drive.pressure,) if alone else self.steady.pressures
+
+    @model_validator(mode="after")
+    def _steps_take_what_is_upstream(self) -> Self:
+        if self.has_waves and self.transient.coupling == "staggered":
+            raise BrokenRule(
+                "transient.coupling",
+                "'staggered' with an elastic line (upstream.wave_speed)",
+                "it must be 'monolithic' there, or the column rigid",
+            )
+        return self
 
     def replace(self, changes: Mapping[str, Any]) -> Self:
         made = super().replace(changes)

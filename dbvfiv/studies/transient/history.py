@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...flow.line_stepping import LineState
 from ...model.lip import LipCentre
 from ...model.valve import QUARTERS
 from ...motion.equations import ValveMotion
@@ -55,6 +56,8 @@ class Reader:
         if memory is not None:
             balance += memory.work.sum()
             by_group = {"branch_energy": QUARTERS * memory.stored, "branch_loss": QUARTERS * memory.loss}
+        if state.line is not None:
+            by_group |= self._of_line(state.line)
         return by_group | {
             "time": state.time,
             "inlet_pressure": load.inlet,
@@ -80,4 +83,15 @@ class Reader:
             "station_pressure": load.pressure,
             "station_area": area,
             "centre_line": np.where(self._moves, state.q[self._centre], 0.0),
+        }
+
+    def _of_line(self, line: LineState) -> dict[str, Any]:
+        kinetic, elastic = self.motion.waves.energies(line)
+        supply, lost, work = QUARTERS * line.books
+        return {
+            "line_kinetic_energy": QUARTERS * kinetic,
+            "line_elastic_energy": QUARTERS * elastic,
+            "line_supply": supply,
+            "line_dissipation": lost,
+            "line_work": work,
         }
