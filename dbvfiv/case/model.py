@@ -108,6 +108,16 @@ class Case(Section):
         return self.has_line and self.upstream.is_elastic
 
     @property
+    def has_pump(self) -> bool:
+        """Whether a pump feeds that pipe."""
+        return self.has_line and self.upstream.pump is not None
+
+    @property
+    def seeks_operating_point(self) -> bool:
+        """Whether the pressure is that at which valve and pump meet, and not known yet."""
+        return self.has_pump and "pressure" not in self.drive.model_fields_set
+
+    @property
     def continuity(self) -> str:
         """The continuity law in words; empty where none is needed: without flow, and in the steady law."""
         return f"{self.fluid.continuity} continuity" if self.drive.kind == "flow" and self.fluid.unsteady else ""
@@ -137,7 +147,11 @@ class Case(Section):
             As `dbvfiv.case.load.make_case` does.
         """
         data = self.to_dict()
+        if "drive.head" in changes and "drive.pressure" not in changes:
+            del data["drive"]["pressure"]  # which the head takes the place of
         changed = {put(type(self), data, dotted, value) for dotted, value in changes.items()}
+        if ("drive", "head") in changed:
+            changed.add(("drive", "pressure"))
         made = make_case(type(self), data, check_files=False)
         for name, before in self:  # a dictionary holds every key, but not all were given
             if isinstance(before, Section) and (name,) not in changed:

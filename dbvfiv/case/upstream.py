@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import StrictInt, model_validator
 
 from .parameters import PARAMETERS
+from .pump_table import PumpCurve
 from .quantity import Length, Number, Quantity
 from .section import BrokenRule, Section, key
 
@@ -63,6 +64,13 @@ class Upstream(Section):
         le=400,
     )
 
+    pump: PumpCurve | None = key(
+        None,
+        "Curve of a pump at the far end, in place of drive.pressure: a CSV file of flow and head (header flow [L/s], head "
+        "[m]; relative to the case file), or rows [[flow, head], ...] in m3/s and m or with units. Between rows the "
+        "monotone cubic of Fritsch and Carlson; no result is taken from beyond them.",
+    )
+
     @property
     def is_elastic(self) -> bool:
         """Whether waves run in the line."""
@@ -95,6 +103,14 @@ class Upstream(Section):
                 "roughness",
                 f"{1e3 * self.roughness:g} mm beside friction = {self.friction:g}",
                 "both say how rough the pipe is, so leave one of them out",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _pump_at_the_end_of_a_line(self) -> Upstream:
+        if self.pump is not None and not self.length > 0:
+            raise BrokenRule(
+                "pump", "given without a line", "it stands at the far end of one, so give upstream.length as well"
             )
         return self
 

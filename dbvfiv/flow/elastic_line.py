@@ -23,6 +23,7 @@ from .law import FlowLaw, FlowMotion, FlowParameter, Traceable
 from .line_elements import DEGREE, chain, element
 from .line_stepping import LineFluid
 from .terms.line import Line
+from .terms.pump import Pump
 
 #: Wavelengths that an element of degree 4 resolves: frequencies of waves are then 1.5e-4 too high, measured.
 RESOLVED = 0.5
@@ -44,13 +45,15 @@ class ElasticLine(Traceable):
         Its length, section, losses and far end.
     wave_speed : float, m/s
     elements : int, optional
+    pump : Pump, optional
+        At the far end.
     """
 
-    DATA = ("line", "wave_speed")
+    DATA = ("line", "wave_speed", "pump")
     STATIC = ("elements",)
 
-    def __init__(self, line: Line, wave_speed: float, elements: int | None = None):
-        self.line, self.wave_speed = line, float(wave_speed)
+    def __init__(self, line: Line, wave_speed: float, elements: int | None = None, pump: Pump | None = None):
+        self.line, self.wave_speed, self.pump = line, float(wave_speed), pump
         self.elements = default_elements(line.length, wave_speed) if elements is None else int(elements)
 
     @property
@@ -65,11 +68,14 @@ class ElasticLine(Traceable):
         nodes = np.append((starts + one.nodes[:-1]).ravel(), self.elements)
         return nodes / self.elements, (starts + one.points).ravel() / self.elements
 
-    def far_head(self, velocity, inlet_area, parameters):
+    def far_head(self, velocity, inlet_area, parameters, steady: bool = False):
         """Total pressure at the far end over the density, m2/s2, from the velocity there referred to the flange."""
         speed = self.line.section(inlet_area)[1] * velocity
         gained = jnp.minimum(speed, 0.0) if self.line.reservoir else speed
-        return parameters["inlet"] / parameters["density"] + 0.5 * gained**2
+        head = parameters["inlet"] / parameters["density"] + 0.5 * gained**2
+        if self.pump is None or steady:
+            return head
+        return head + self.pump.gain(velocity, inlet_area, parameters)
 
     def equations(self, velocity, rate, pressure, pressure_rate, inlet_area, parameters):
         """Momentum but for the flange's pressure, m2/s2, at all nodes; continuity, m2/s2, at the points; traceable.
@@ -99,7 +105,7 @@ class ElasticLine(Traceable):
         """pi (k,) of the steady flow with an inlet velocity."""
         diameter, ratio = self.line.section(inlet_area)
         lost = 0.5 * self.line.lost(diameter, parameters["pipe_length"]) * ratio**2 * velocity * jnp.abs(velocity)
-        head = self.far_head(velocity, inlet_area, parameters) - lost * self.places[1]
+        head = self.far_head(velocity, inlet_area, parameters, steady=True) - lost * self.places[1]
         return head / (ratio * parameters["wave_speed"])
 
 

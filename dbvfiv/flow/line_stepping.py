@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_banded
 
+from ..case.quantity import GRAVITY
 from .line_elements import DEGREE, chain, element
 from .reversed import ReversibleFluid
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from .channel import Channel
     from .elastic_line import ElasticLine
 
+QUARTERS = 4
 #: Newton steps within which velocities in the line must be found, and the relative size of the last one.
 _STEPS, _TOLERANCE = 40, 1e-14
 
@@ -82,7 +84,7 @@ class LineWaves:
         diameter, ratio = line.line.section(inlet_area)
         length = line.line.length
         self.ratio, self.density, self.area = float(ratio), density, float(inlet_area)
-        self.reservoir = line.line.reservoir
+        self.reservoir, self.pump = line.line.reservoir, line.pump
         self.speed, self.length, self.count = line.wave_speed, length / count, count
         self.lost = 0.5 * float(line.line.lost(diameter, length)) * self.ratio**2 / count
         self.nodes = chain(count)
@@ -133,6 +135,15 @@ class LineWaves:
 
     def far(self, velocity: float, inlet: float) -> tuple[float, float]:
         """Total pressure at the far end over the density, m2/s2, and its slope."""
+        head, slope = self._source(velocity, inlet)
+        if self.pump is None:
+            return head, slope
+        per_velocity = QUARTERS * self.area
+        lift, falling = self.pump.head_and_slope(per_velocity * velocity)
+        return head + GRAVITY * (lift - self.pump.reference), slope + GRAVITY * falling * per_velocity
+
+    def _source(self, velocity: float, inlet: float) -> tuple[float, float]:
+        """The same under the pressure of steady flow."""
         speed = self.ratio * velocity
         gained = min(speed, 0.0) if self.reservoir else speed
         return inlet / self.density + 0.5 * gained**2, self.ratio * gained
@@ -169,7 +180,7 @@ class LineWaves:
     def steady(self, velocity: float, inlet: float) -> LineState:
         """Uniform flow with an inlet velocity, m/s, under a pressure at the far end, Pa."""
         points = (np.arange(self.count)[:, None] + element().points).ravel() / self.count
-        head = self.far(velocity, inlet)[0] - self.lost * self.count * velocity * abs(velocity) * points
+        head = self._source(velocity, inlet)[0] - self.lost * self.count * velocity * abs(velocity) * points
         k = self.size - 1
         pressure = head / (self.ratio * self.speed)
         return LineState(np.full(k + 1, velocity), np.zeros(k + 1), pressure, np.zeros(k), np.zeros(3))

@@ -7,6 +7,7 @@ from ..flow import Channel, FlowLaw, UniformLoad
 from ..flow.elastic_line import ElasticLine, LineChannel
 from ..flow.terms import terms_of
 from ..flow.terms.line import Line
+from ..flow.terms.pump import Pump
 from ..geometry import ValveMesh, valve_mesh
 from ..materials.damping import relaxation_from_case
 from ..materials.library import law_from_case
@@ -51,5 +52,7 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
     if not case.has_waves:
         return rigid
     line = next(term for term in terms if isinstance(term, Line))
-    channel = Channel(mesh.z, floor, storage, terms=[term for term in terms if term is not line])
-    return LineChannel(channel, rigid, ElasticLine(line, case.upstream.wave_speed, case.upstream.elements))
+    pump = next((term for term in terms if isinstance(term, Pump)), None)
+    channel = Channel(mesh.z, floor, storage, terms=[term for term in terms if term not in (line, pump)])
+    waves = ElasticLine(line, case.upstream.wave_speed, case.upstream.elements, pump)
+    return LineChannel(channel, rigid, waves)

@@ -19,6 +19,7 @@ import numpy as np
 
 from eigen import CoupledPencil, Relaxation
 
+from ..errors import SolveError
 from ..flow import FlowLaw, FlowMotion
 from .valve import ValveModel
 
@@ -146,6 +147,23 @@ class LinearisedState:
             self._damped[key] = CoupledPencil(*wall, relaxation=relaxation)
         return self._damped[key]
 
+    def check_pump(self) -> None:
+        """Refuse a state whose flow the pump's table does not hold.
+
+        Raises
+        ------
+        SolveError
+        """
+        pump = self.model.pump
+        if pump is None:
+            return
+        flow = self.model.mass_flow(self.area, self.inlet) / self.model.case.fluid.density
+        if not pump.holds(flow):
+            raise SolveError(
+                f"At {self.inlet:.6g} Pa the valve takes {1e3 * flow:.4g} L/s, and the pump's table goes from "
+                f"{1e3 * pump.flow[0]:.4g} to {1e3 * pump.flow[-1]:.4g} L/s."
+            )
+
     def pencil(self, conditions: Conditions, fluid: bool = True, storage: float | None = None) -> CoupledPencil:
         """Pencil of small motions.
 
@@ -165,6 +183,7 @@ class LinearisedState:
         if not flow.unsteady:
             _, slope = flow.steady_operator(self.area, self.inlet)
             return damped.replace(A0=slope)
+        self.check_pump()
         parts = fluid_parts(flow, self.area, self.inlet, conditions.density, storage, conditions.of_line)
         return damped.replace(**parts)
 

@@ -20,6 +20,7 @@ import scipy.sparse as sp
 from ..case.model import Case
 from ..flow import RowAreas
 from ..flow.terms.line import Line
+from ..flow.terms.pump import Pump
 from ..geometry import ValveMesh
 from ..shell import Section, StepWall
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
@@ -97,6 +98,12 @@ class ValveModel:
         """The pipe in front of the valve, if there is one."""
         terms = getattr(self.flow, "terms", ())
         return next((term for term in terms if isinstance(term, Line)), None)
+
+    @property
+    def pump(self) -> Pump | None:
+        """The pump that feeds it, if there is one."""
+        terms = getattr(self.flow, "terms", ())
+        return next((term for term in terms if isinstance(term, Pump)), None)
 
     @property
     def stations(self) -> int:

@@ -43,7 +43,19 @@ class _CaseOfStudies(PhysicsCase):
                 "'staggered' with an elastic line (upstream.wave_speed)",
                 "it must be 'monolithic' there, or the column rigid",
             )
+        given = "pressures" if self.has_pump and self.transient.drive_table is not None else ""
+        if given or (self.has_pump and self.transient.ramp > 0):
+            raise BrokenRule(
+                "transient.drive_table" if given else "transient.ramp",
+                "given beside a pump",
+                "the pump's curve says what the pressure is; leave it out, or the pump",
+            )
         return self
+
+    def meets_pump(self, kind: str) -> bool:
+        """Whether a study asks for the operating point of valve and pump."""
+        listed = kind == "steady" and "pressures" in self.steady.model_fields_set
+        return self.seeks_operating_point and kind != "closure" and not listed
 
     def replace(self, changes: Mapping[str, Any]) -> Self:
         made = super().replace(changes)
@@ -52,7 +64,8 @@ class _CaseOfStudies(PhysicsCase):
 
     def _replace_list_by_pressure(self, changed: Collection[tuple[str, ...]]) -> None:
         """Let a drive.pressure that was changed by itself stand before the list, see `steady_pressures`."""
-        if ("drive", "pressure") in changed and ("steady", "pressures") not in changed:
+        driven = {("drive", "pressure"), ("drive", "head")} & set(changed)
+        if driven and ("steady", "pressures") not in changed:
             self.steady.model_fields_set.discard("pressures")
 
 

@@ -85,6 +85,7 @@ class ValveFamily(PencilFamily):
     def _computed(self, law: Law) -> dict[str, np.ndarray]:
         linear, flow, m = self.linear, self.linear.model.flow, len(self.linear.area)
         if flow.has_fluid and flow.unsteady:
+            linear.check_pump()
             storage, line = law_parts(law)
             if isinstance(law, Waves):  # so that the compressibility is that of the fluid
                 line["wave_speed"] *= np.sqrt(law.density)

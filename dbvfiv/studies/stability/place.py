@@ -182,6 +182,12 @@ def require_parameter(case: Case, name: str) -> None:
             "is then that at its far end, see drive.at).",
             key=PARAMETERS[name].key,
         )
+    if name == "density" and case.has_pump:
+        raise CaseError(
+            "Over the density a pump has no steady state to keep: its head is another pressure in another fluid; set "
+            "fluid.density for each, or give drive.pressure and no upstream.pump.",
+            key=PARAMETERS[name].key,
+        )
     if name == "wave_speed" and not case.has_waves:
         raise CaseError(
             "There is no wave_speed to change: the valve has no elastic line in front; give upstream.length and "
