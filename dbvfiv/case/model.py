@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Self
 
 from pydantic import ValidationInfo, model_validator
@@ -129,6 +129,13 @@ class Case(Section):
             return "static"
         return "in the reservoir" if self.drive.at == "reservoir" else "static at the far end of the line"
 
+    @classmethod
+    def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
+        """A head that is asked for stands in the place of a pressure that was there before."""
+        drive = data.get("drive")
+        if ("drive", "head") in changed and ("drive", "pressure") not in changed and isinstance(drive, dict):
+            drive.pop("pressure", None)
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""
         return self.model_dump(mode="json")
@@ -147,9 +154,8 @@ class Case(Section):
             As `dbvfiv.case.load.make_case` does.
         """
         data = self.to_dict()
-        if "drive.head" in changes and "drive.pressure" not in changes:
-            del data["drive"]["pressure"]  # which the head takes the place of
         changed = {put(type(self), data, dotted, value) for dotted, value in changes.items()}
+        self.make_way(data, changed)
         if ("drive", "head") in changed:
             changed.add(("drive", "pressure"))
         made = make_case(type(self), data, check_files=False)

@@ -82,7 +82,6 @@ class Drive(Section):
         lt=1,
     )
 
-
     @model_validator(mode="before")
     @classmethod
     def _head_is_a_pressure(cls, data: Any, info: ValidationInfo) -> Any:
@@ -112,9 +111,7 @@ class Drive(Section):
         density = (info.context or {}).get("density")
         if density is None:
             raise ValueError("and the density of the fluid is not known")
-        raise ValueError(
-            f"which is more than the {PARAMETERS['pressure'].high / 1e6:g} MPa that drive.pressure may be"
-        )
+        raise ValueError(f"which is more than the {PARAMETERS['pressure'].high / 1e6:g} MPa that drive.pressure may be")
 
 
 class Supports(Section):

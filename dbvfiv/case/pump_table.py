@@ -15,8 +15,9 @@ FLOW, HEAD = Quantity("m^3/s", "L/s"), Quantity("m", "m")
 
 
 def read_pump_table(path: Path) -> list[tuple[float, float]]:
-    """Rows of flow, m3/s, and head, m, of a CSV file as `dbvfiv.case.drive_table.read_drive_table` reads one; the header
-    names the units, ``flow [L/s], head [m]``. Plain numbers without a header are m3/s and m.
+    """Rows of flow, m3/s, and head, m, of a CSV file as `dbvfiv.case.drive_table.read_drive_table` reads one.
+
+    The header names the units, ``flow [L/s], head [m]``. Plain numbers without a header are m3/s and m.
 
     Raises
     ------
@@ -85,7 +86,7 @@ PumpCurve = Annotated[
     BeforeValidator(_read),
     Described(
         "file or list of pairs",
-        "a CSV file of flow and head, or at least two rows of a flow in m3/s and a head in m, flows increasing from 0 or "
-        'more, such as [[0, 12], ["50 L/s", "9 m"]]',
+        "a CSV file of flow and head, or at least two rows of a flow in m3/s and a head in m, flows increasing from 0 "
+        'or more, such as [[0, 12], ["50 L/s", "9 m"]]',
     ),
 ]

@@ -51,9 +51,9 @@ class Upstream(Section):
     )
     wave_speed: Annotated[float, PARAMETERS["wave_speed"].quantity] | None = key(
         None,
-        "Speed of pressure waves in the pipe, for an elastic line with reflections, friction and loss spread evenly over "
-        "it; where not given the fluid in it is a rigid column. Water in steel 1000 to 1300 m/s, in plastic 200 to 500, "
-        "less with gas in it; the same at every density that is asked for.",
+        "Speed of pressure waves in the pipe, for an elastic line with reflections, friction and loss spread evenly "
+        "over it; where not given the fluid in it is a rigid column. Water in steel 1000 to 1300 m/s, in plastic 200 "
+        "to 500, less with gas in it; the same at every density that is asked for.",
         **PARAMETERS["wave_speed"].limits,
     )
     elements: StrictInt | None = key(
@@ -66,9 +66,9 @@ class Upstream(Section):
 
     pump: PumpCurve | None = key(
         None,
-        "Curve of a pump at the far end, in place of drive.pressure: a CSV file of flow and head (header flow [L/s], head "
-        "[m]; relative to the case file), or rows [[flow, head], ...] in m3/s and m or with units. Between rows the "
-        "monotone cubic of Fritsch and Carlson; no result is taken from beyond them.",
+        "Curve of a pump at the far end, in place of drive.pressure: a CSV file of flow and head (header flow [L/s], "
+        "head [m]; relative to the case file), or rows [[flow, head], ...] in m3/s and m or with units. Between rows "
+        "the monotone cubic of Fritsch and Carlson; no result is taken from beyond them.",
     )
 
     @property

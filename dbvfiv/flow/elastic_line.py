@@ -167,9 +167,7 @@ class LineChannel(FlowLaw):
 
     def equations(self, motion: FlowMotion, parameters):
         (velocity, pressure), (rate, pressure_rate) = self.split(motion.inner), self.split(motion.inner_rate)
-        momentum, continuity = self.line.equations(
-            velocity, rate, pressure, pressure_rate, motion.area[-1], parameters
-        )
+        momentum, continuity = self.line.equations(velocity, rate, pressure, pressure_rate, motion.area[-1], parameters)
         density, inlet = parameters["density"], motion.inner[0]
         static = density * (-momentum[-1] - 0.5 * inlet**2)
         own = motion._replace(inner=motion.inner[:1], inner_rate=motion.inner_rate[:1])

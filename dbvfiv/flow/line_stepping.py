@@ -206,9 +206,7 @@ class LineWaves:
 
     def _masses(self) -> tuple[np.ndarray, np.ndarray]:
         """Banded mass of all nodes but the flange's, and the column (k + 1,) of that."""
-        whole = self._assembled(
-            np.broadcast_to(self.ratio * self.length * self._mass, (self.count, *self._mass.shape))
-        )
+        whole = self._assembled(np.broadcast_to(self.ratio * self.length * self._mass, (self.count, *self._mass.shape)))
         unit = np.zeros(self.size)
         unit[-1] = 1.0
         return whole[:, :-1], self.inertia(unit)
@@ -301,11 +299,13 @@ class LineStep:
         pressure = old.pressure - (self._kept[1] + waves.stretch(w)) / self._rate
         change, change_of_pressure = (w - old.velocity) / theta, (pressure - old.pressure) / theta
         power = waves.density * waves.area * h
-        work = power * np.array(
-            [waves.far(w[0], self.inlet)[0] * w[0], waves.friction(w) @ w, head * velocity]
-        )
+        work = power * np.array([waves.far(w[0], self.inlet)[0] * w[0], waves.friction(w) @ w, head * velocity])
         return LineState(
-            old.velocity + change, change / h, old.pressure + change_of_pressure, change_of_pressure / h, old.books + work
+            old.velocity + change,
+            change / h,
+            old.pressure + change_of_pressure,
+            change_of_pressure / h,
+            old.books + work,
         )
 
 

@@ -35,7 +35,9 @@ _RELAXING = (
     Column("branch_strength", "", "Its modulus over that of the slow law"),
 )
 #: There where waves run in the line.
-_LINE = (Column("line_places", "", "Where the velocities in an elastic line are, from its far end (0) to the flange (1)"),)
+_LINE = (
+    Column("line_places", "", "Where the velocities in an elastic line are, from its far end (0) to the flange (1)"),
+)
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ def test_the_curve_is_that_of_scipy_and_goes_on_along_its_tangent():
 
 @pytest.mark.parametrize("speed", [None, 500.0])
 def test_its_slope_stands_beside_the_velocity(speed):
-    """The linearised flow is that without a pump, plus rho g dH/dQ 4 A_in in every pressure; steady flow is the same."""
+    """The linearised flow is that without a pump, plus rho g dH/dQ 4 A_in in every pressure; steady flow is its own."""
     z, area = passage()
     given, pump = {"inlet": SUPPLY, "density": DENSITY}, Pump(FLOWS, HEADS, DENSITY, SUPPLY)
     line = Line(7.0, 0.2, 0.02)
@@ -61,7 +61,9 @@ def test_its_slope_stands_beside_the_velocity(speed):
         found, steep = waves.far(velocity, SUPPLY)
         d = 1e-6
         assert steep == pytest.approx((waves.far(velocity + d, SUPPLY)[0] - found) / d, rel=1e-5)
-        assert DENSITY * steep - slope == pytest.approx(DENSITY * LineWaves(law().line, area[-1], DENSITY).far(velocity, 0)[1])
+        assert DENSITY * steep - slope == pytest.approx(
+            DENSITY * LineWaves(law().line, area[-1], DENSITY).far(velocity, 0)[1]
+        )
 
 
 def test_other_densities_see_the_pressures_of_the_pump():

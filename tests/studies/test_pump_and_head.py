@@ -13,7 +13,13 @@ from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
 from dbvfiv.studies.case import load_case
 
-SMALL = {"mesh.around": 6, "mesh.along": 8, "upstream.length": 20.0, "upstream.diameter": 0.3, "upstream.friction": 0.02}
+SMALL = {
+    "mesh.around": 6,
+    "mesh.along": 8,
+    "upstream.length": 20.0,
+    "upstream.diameter": 0.3,
+    "upstream.friction": 0.02,
+}
 DAMPED = {"damping.alpha": 0.0, "damping.beta": 1e-3}
 ROWS = [[0, 3.0], [0.03, 2.6], [0.06, 1.8], [0.1, 0.3]]
 PUMP = {"upstream.pump": ROWS}

@@ -3,8 +3,9 @@
     P = P_0 + rho g [ H(Q) - H_0 ],      H_0 = P_0 / (rho g)
 
 P_0 is the pressure that the steady state was found at. At the operating point it is rho g H(Q) already; at another
-pressure the difference stands for a static lift that comes on top. H is the monotone cubic of Fritsch and Carlson (1980)
-through the rows of the pump's table, and goes on along its tangent beyond their ends, where no result is taken from.
+pressure the difference stands for a static lift that comes on top. H is the monotone cubic of Fritsch and Carlson
+(1980) through the rows of the pump's table, and goes on along its tangent beyond their ends, where no result is taken
+from.
 """
 
 from __future__ import annotations
