@@ -173,7 +173,8 @@ def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, fi
     if winding.number != listed_unstable(spectrum, winding) and np.isfinite(spectrum.band):
         # the spectrum, and the basis, speak for a band only; count in the same
         winding = counted(band=0.999 * spectrum.band)
-        if winding.number > listed_unstable(spectrum, winding) and spectrum.growth_rate[-1] > winding.line:
+        none_stable = not len(spectrum) or spectrum.growth_rate[-1] > winding.line
+        if winding.number > listed_unstable(spectrum, winding) and none_stable:
             band = SearchOptions() if options is None else options
             spectrum = leading_modes(
                 pencil, winding.number + 2, replace(band, max_frequency=spectrum.band), workspace=workspace

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
 from .relaxation import Relaxation
@@ -266,3 +267,22 @@ def _real_csr(name: str, value) -> sp.csr_matrix:
         matrix = matrix.copy()
         matrix.sum_duplicates()
     return matrix
+
+
+def fluid_zeros(S0: np.ndarray, S1: np.ndarray) -> np.ndarray:
+    """Finite zeros of det (S0 + s S1): the fluid's own swinging between walls that stand."""
+    values = la.eigvals(-S0, S1)
+    return values[np.isfinite(values)]
+
+
+def stable_fluid(S0: np.ndarray, S1: np.ndarray, line: float = 0.0) -> np.ndarray:
+    """Zeros of a stable polynomial that turns as det (S0 + s S1) does, relative to a line; none of one unknown.
+
+    They are those of the fluid alone, mirrored to the left of the line. What is divided by it varies as little as with
+    a single unknown, however many the fluid has.
+    """
+    if S0.shape[0] < 2:
+        return np.zeros(0, complex)
+    zeros = fluid_zeros(S0, S1) - line
+    least = 1e-6 * np.abs(zeros).max(initial=0.0)
+    return -np.maximum(np.abs(zeros.real), least) + 1j * zeros.imag

@@ -5,7 +5,8 @@ matter; then
 
     d(s) = det [ I - h A, -h B ; R, S ]
 
-is analytic right of the imaginary axis apart from unstable poles of the structure itself, and grows like s at most. Its
+is analytic right of the imaginary axis apart from unstable poles of the structure itself, and grows like a power of s,
+the number of inner unknowns with a rate; with several it is divided by a stable polynomial of the fluid alone. Its
 phase along the imaginary axis is followed for every condition, with points added where it turns fast. No eigenvalue of
 the coupled pencil is used except as a hint where to look.
 
@@ -18,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .pencil import fluid_zeros, stable_fluid
 from .reduction import POWERS, ReducedFamily
 from .structure_response import NEAR, RelaxingResponse, Response, response
 
@@ -79,9 +81,14 @@ class _Walk:
     def __init__(self, response: Response | RelaxingResponse, reduced: ReducedFamily, conditions):
         self.response, self.conditions = response, conditions
         self.root = np.sqrt([c.inertia for c in conditions])
-        self._known: dict[float, np.ndarray] = {}
+        self._known: dict[int, tuple[dict, dict]] = {}
         self._parts = [self._condensed(reduced.family.parts(c.law)) for c in conditions]
-        self.order = 1 if self._parts[0]["S0"].size else 0
+        first = reduced.family.parts(conditions[0].law)
+        self.inner = first["S0"].shape[0]
+        grows = int(((first["B1"] != 0).any(axis=0) | (first["S1"] != 0).any(axis=0)).sum())
+        # what the determinants are divided by, in z = s sqrt(inertia)
+        self._fluid = [stable_fluid(parts["S0"], parts["S1"]) for parts in self._parts]
+        self.order = np.array([grows - len(zeros) for zeros in self._fluid])
         self.omega = [np.zeros(0) for _ in conditions]
         self.phase = [np.zeros(0) for _ in conditions]
         self.points = 0
@@ -97,8 +104,8 @@ class _Walk:
             for name, value in parts.items():
                 value = Q.T @ value if name[0] in "AB" else value
                 made[name] = value @ P if name[0] in "AR" else value
-            self._known[key] = made
-        return self._known[key]
+            self._known[key] = parts, made  # an object that lives on keeps its id
+        return self._known[key][1]
 
     def _angles(self, cells: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Phase of d(i omega), for pairs of a cell and a frequency."""
@@ -113,7 +120,7 @@ class _Walk:
 
     def _chunk(self, cells, omega, inverse) -> np.ndarray:
         """Phase of det [h^-1 - A, -B; R, S]."""
-        r, b = inverse.shape[1], self.order
+        r, b = inverse.shape[1], self.inner
         z = (1j * omega * self.root[cells])[:, None, None]
         parts = (
             self._parts[0] if self._same else {name: np.stack([self._parts[i][name] for i in cells]) for name in POWERS}
@@ -130,7 +137,10 @@ class _Walk:
             matrix[:, r:, :r] = parts["R0"] + z * (parts["R1"] + z * parts["R2"])
             matrix[:, r:, r:] = parts["S0"] + z * parts["S1"]
             A = matrix
-        return np.angle(np.linalg.slogdet(A)[0])
+        angle = np.angle(np.linalg.slogdet(A)[0])
+        if b > 1:
+            angle -= np.array([np.angle(at - self._fluid[i]).sum() for i, at in zip(cells, z[:, 0, 0])])
+        return angle
 
     def _add(self, cells, omega):
         if not len(cells):
@@ -149,7 +159,7 @@ class _Walk:
         cells, omega = [], []
         for i, hint in enumerate(hints):
             own = [*base, *self._laden[i]]
-            for value in np.asarray(hint, complex):
+            for value in [*np.asarray(hint, complex), *self._own_zeros(i)]:
                 width, middle = max(abs(value.real), 1e-6 * abs(value)), abs(value.imag)
                 own += [
                     _shared(middle + f * width, 0.3 * width)
@@ -160,10 +170,17 @@ class _Walk:
             omega += own
         self._add(cells, omega)
 
+    def _own_zeros(self, cell: int) -> np.ndarray:
+        """Where the fluid alone would swing, near which phases turn fast where it has several unknowns."""
+        if self.inner < 2:
+            return np.zeros(0)
+        zeros = fluid_zeros(self._parts[cell]["S0"], self._parts[cell]["S1"])
+        return zeros[zeros.imag > 0] / self.root[cell]
+
     def refine(self, most_points):
         # a coupling that carries much added mass reaches its limit late
         for _ in range(5):
-            late = [i for i, phase in enumerate(self.phase) if abs(self._gap(phase[-1])) > LATE]
+            late = [i for i, phase in enumerate(self.phase) if abs(self._gap(i)) > LATE]
             self._add(late, [4.0 * self.omega[i][-1] for i in late])
         for _ in range(40):
             cells, middle = [], []
@@ -182,17 +199,17 @@ class _Walk:
                 return
             self._add(cells, middle)
 
-    def _gap(self, phase: float) -> float:
-        """Distance from the limit at infinity: a multiple of pi, and a quarter turn more for the inner unknown."""
-        return float(principal(2 * (phase - 0.5 * np.pi * self.order)) / 2)
+    def _gap(self, cell: int) -> float:
+        """Distance from the limit at infinity: a multiple of pi, and a quarter turn more for each inner unknown."""
+        return float(principal(2 * (self.phase[cell][-1] - 0.5 * np.pi * self.order[cell])) / 2)
 
     def counts(self):
         number, certain = [], []
         for i, (_omega, phase) in enumerate(zip(self.omega, self.phase)):
             steps = principal(np.diff(phase))
             turned = steps.sum()
-            gap = self._gap(phase[-1])
-            found = 0.5 * self.order - (turned - gap) / np.pi + self.response.unstable
+            gap = self._gap(i)
+            found = 0.5 * self.order[i] - (turned - gap) / np.pi + self.response.unstable
             number.append(int(round(found)))
             certain.append(
                 bool(

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from .condensation import condensed_matrix
 from .factorization import SingularShiftError, StructureMatrices, SuperluFactorization, is_positive_definite, superlu
 from .oscillators import Oscillators
-from .pencil import CoupledPencil, real_apply
+from .pencil import CoupledPencil, real_apply, stable_fluid
 from .relaxation import Relaxation
 
 #: Numbers at most in one stack of dense matrices.
@@ -45,6 +45,8 @@ class Determinant:
         The ratio grows like leading * s**degree; None if the leading coefficient vanishes.
     leading_phase : float
         0 or pi.
+    fluid : (k,) array
+        Zeros of what the ratio is divided by where the fluid has several unknowns, see `eigen.pencil.stable_fluid`.
     evaluations : int
 
     Raises
@@ -65,6 +67,7 @@ class Determinant:
             raise ValueError("The count needs a positive definite mass matrix.")
         self._prepare_reference()
         self._scale = None
+        self.fluid = stable_fluid(pencil.S0, pencil.S1, line)
         self.degree, self.leading_phase = self._at_infinity()
 
     def _prepare_reference(self):
@@ -138,7 +141,7 @@ class Determinant:
         leading = leading / columns
         if np.linalg.cond(leading) > 1e12:
             return None, 0.0
-        return int(grows.sum()), 0.0 if np.linalg.slogdet(leading)[0] > 0 else np.pi
+        return int(grows.sum()) - len(self.fluid), 0.0 if np.linalg.slogdet(leading)[0] > 0 else np.pi
 
     def reference_zeros(self) -> np.ndarray:
         """Eigenvalues of the reference in the upper half-plane, relative to the line.
@@ -183,7 +186,7 @@ class Determinant:
                 if z.size == 1:
                     return np.full(1, complex(np.nan, np.nan))
                 return np.concatenate([self._tried(z[[i]]) for i in range(z.size)])
-            return total + self._fluid_log(self.line + z, H)
+            return total + self._fluid_log(self.line + z, H) - np.log(z[:, None] - self.fluid).sum(axis=1)
 
     def _structure_at(self, z):
         """H at a stack of places, shape (k, m, m), and log det D - log det D_ref there."""

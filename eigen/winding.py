@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .pencil import CoupledPencil
+from .pencil import CoupledPencil, fluid_zeros
 from .response import Determinant
 
 MAX_PHASE = np.pi / 4  # largest accepted phase increment between neighbours
@@ -110,6 +110,9 @@ def unstable_count(
     dense = pencil.n <= Determinant.dense_below
     # a zero of the pencil can hide from a coarse walk only beside a zero of the reference
     hints = [complex(h) for h in hints] + [line + z for z in determinant.reference_zeros()]
+    if pencil.b > 1:
+        zeros = fluid_zeros(pencil.S0, pencil.S1)
+        hints += list(zeros[zeros.imag > 0])
     walk = _Walk(determinant, max_points or (4000 if dense else 300), band)
     walk.start(scale, hints)
     walk.refine()
@@ -228,7 +231,7 @@ class _Walk:
         length = np.concatenate([[1.0], length])  # the first interval begins at zero
         slope = np.abs(steps) / np.maximum(length, 1e-14)
         beside = np.maximum(np.concatenate([[0.0], slope[:-1]]), np.concatenate([slope[1:], [0.0]]))
-        power = 2.0 * (self.f.pencil.b + 1)  # a growth like a power of omega hides nothing
+        power = 2.0 * (self.f.pencil.b - len(self.f.fluid) + 1)  # a growth like a power of omega hides nothing
         near = (slope > power) | (np.arange(slope.size) == 0)
         return np.flatnonzero(
             (np.abs(steps.imag) > MAX_PHASE)

@@ -33,6 +33,24 @@ def read_drive_table(path: Path) -> list[tuple[float, float]]:
     ValueError
         With a clause that completes "drive_table is given as FILE, ...".
     """
+    rows = read_pairs(path, (_TIME, _PRESSURE), "a time and a pressure")
+    for (before, _), (after, _) in zip(rows, rows[1:]):
+        if not after > before:
+            raise ValueError(f"whose times do not increase at {after:g} s")
+    lowest = min(pressure for _, pressure in rows)
+    if lowest < 0:
+        raise ValueError(f"which holds a pressure of {lowest:g} Pa, and pressures must not be negative")
+    return rows
+
+
+def read_pairs(path: Path, kinds: tuple[Quantity, Quantity], words: str) -> list[tuple[float, float]]:
+    """Rows of two numbers with units, SI; `words` says what a row is.
+
+    Raises
+    ------
+    ValueError
+        With a clause that completes "KEY is given as FILE, ...".
+    """
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except (FileNotFoundError, NotADirectoryError):
@@ -41,27 +59,19 @@ def read_drive_table(path: Path) -> list[tuple[float, float]]:
         raise ValueError("which is not a text file") from None
     except (OSError, ValueError) as error:
         raise ValueError(f"which cannot be read ({getattr(error, 'strerror', None) or 'bad name'})") from None
-    units, rows = ["s", "Pa"], []
+    units, rows = [kind.si for kind in kinds], []
     for number, line in enumerate(text.splitlines(), 1):
-        words = _words(line.split("#")[0])
-        if not words:
+        found = _words(line.split("#")[0])
+        if not found:
             continue
-        if not rows and re.match(r"[A-Za-z]", words[0]):
-            units = _header_units(line.split("#")[0], number)
+        if not rows and re.match(r"[A-Za-z]", found[0]):
+            units = _header_units(line.split("#")[0], number, kinds)
             continue
-        if len(words) != 2:
-            raise ValueError(f"whose line {number} is not a time and a pressure")
-        rows.append(
-            tuple(_value(word, unit, kind, number) for word, unit, kind in zip(words, units, (_TIME, _PRESSURE)))
-        )
+        if len(found) != 2:
+            raise ValueError(f"whose line {number} is not {words}")
+        rows.append(tuple(_value(word, unit, kind, number) for word, unit, kind in zip(found, units, kinds)))
     if not rows:
         raise ValueError("which holds no rows")
-    for (before, _), (after, _) in zip(rows, rows[1:]):
-        if not after > before:
-            raise ValueError(f"whose times do not increase at {after:g} s")
-    lowest = min(pressure for _, pressure in rows)
-    if lowest < 0:
-        raise ValueError(f"which holds a pressure of {lowest:g} Pa, and pressures must not be negative")
     return rows
 
 
@@ -73,13 +83,13 @@ def _words(line: str) -> list[str]:
     return line.split()
 
 
-def _header_units(line: str, number: int) -> list[str]:
+def _header_units(line: str, number: int, kinds: tuple[Quantity, Quantity]) -> list[str]:
     found = _UNIT.findall(line)
     if not found:
-        return ["s", "Pa"]
+        return [kind.si for kind in kinds]
     if len(found) != 2:
         raise ValueError(f"whose line {number} names {len(found)} units and not two")
-    for unit, kind in zip(found, (_TIME, _PRESSURE)):
+    for unit, kind in zip(found, kinds):
         try:
             kind.parse(f"1 {unit}")
         except ValueError as error:

@@ -48,6 +48,7 @@ def read_case_file(model: type[Model], path: str | Path | None = None, overrides
     overridden = set()
     for override in overrides:
         overridden.add(_apply(model, data, override))
+    model.make_way(data, overridden)
     return make_case(model, data, folder=folder, source=name, text=text, overridden=overridden)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Self
 
 from pydantic import ValidationInfo, model_validator
@@ -92,6 +92,12 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
+        if self.drive.kind == "flow" and self.upstream.is_elastic and not self.fluid.unsteady:
+            raise BrokenRule(
+                "upstream.wave_speed",
+                f"{self.upstream.wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
+                "give it with the unsteady law alone",
+            )
         inlet = 2 * (self.valve.flange_radius - self.valve.flange_wall_deduction)
         self.upstream.check_roughness(inlet)
         self.downstream.check_pipe(inlet)
@@ -114,6 +120,21 @@ class Case(Section):
         return self.downstream.pressure if self.drive.kind == "flow" else 0.0
 
     @property
+    def has_waves(self) -> bool:
+        """Whether that pipe is elastic."""
+        return self.has_line and self.upstream.is_elastic
+
+    @property
+    def has_pump(self) -> bool:
+        """Whether a pump feeds that pipe."""
+        return self.has_line and self.upstream.pump is not None
+
+    @property
+    def seeks_operating_point(self) -> bool:
+        """Whether the pressure is that at which valve and pump meet, and not known yet."""
+        return self.has_pump and "pressure" not in self.drive.model_fields_set
+
+    @property
     def continuity(self) -> str:
         """The continuity law in words, and what is outside; empty where no law is needed: without flow, and in the
         steady law.
@@ -128,6 +149,13 @@ class Case(Section):
         if not self.has_line:
             return "static"
         return "in the reservoir" if self.drive.at == "reservoir" else "static at the far end of the line"
+
+    @classmethod
+    def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
+        """A head that is asked for stands in the place of a pressure that was there before."""
+        drive = data.get("drive")
+        if ("drive", "head") in changed and ("drive", "pressure") not in changed and isinstance(drive, dict):
+            drive.pop("pressure", None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""
@@ -148,6 +176,9 @@ class Case(Section):
         """
         data = self.to_dict()
         changed = {put(type(self), data, dotted, value) for dotted, value in changes.items()}
+        self.make_way(data, changed)
+        if ("drive", "head") in changed:
+            changed.add(("drive", "pressure"))
         made = make_case(type(self), data, check_files=False)
         for name, before in self:  # a dictionary holds every key, but not all were given
             if isinstance(before, Section) and (name,) not in changed:

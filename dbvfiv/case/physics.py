@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, field_validator
+from pydantic import Field, StrictBool, ValidationInfo, field_validator, model_validator
 
 from .parameters import PARAMETERS
-from .quantity import Density, Number, Pressure, Stiffness
-from .section import Section, key
+from .quantity import GRAVITY, Density, Number, Pressure, Quantity, Stiffness
+from .section import BrokenRule, Section, key
 
 #: A pressure that loads the valve: above zero, and within what the parameter may be.
 LoadPressure = Annotated[Pressure, Field(**PARAMETERS["pressure"].limits)]
@@ -60,6 +61,13 @@ class Drive(Section):
         ge=0,
         le=PARAMETERS["pressure"].high,
     )
+    head: Annotated[float, Quantity("m", "m")] | None = key(
+        None,
+        "The same as a head of the fluid, in place of pressure: rho g times it, with the density of the case. It is "
+        "turned into that pressure where the case is read, which stays where another density is asked for.",
+        gt=0,
+        le=1e7,
+    )
     at: Literal["reservoir", "line"] = key(
         "reservoir",
         "What drive.pressure is with a line upstream: that of a reservoir at rest at its far end, a total pressure "
@@ -74,6 +82,37 @@ class Drive(Section):
         ge=0,
         lt=1,
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _head_is_a_pressure(cls, data: Any, info: ValidationInfo) -> Any:
+        if not isinstance(data, Mapping) or data.get("head") is None:
+            return data
+        if "pressure" in data:
+            raise BrokenRule(
+                "head",
+                f"{data['head']!r} beside pressure = {data['pressure']!r}",
+                "both say what drives the flow, so leave one of them out",
+            )
+        try:
+            head = Quantity("m", "m").parse(data["head"])
+        except ValueError:
+            return data  # refused where it stands
+        density = (info.context or {}).get("density")
+        if density is None or not 0 < head <= PARAMETERS["pressure"].high / (density * GRAVITY):
+            return data
+        kept = {name: value for name, value in data.items() if name != "head"}
+        return kept | {"pressure": float(f"{density * GRAVITY * head:.15g}")}
+
+    @field_validator("head", mode="after")
+    @classmethod
+    def _head_was_turned(cls, head: float | None, info: ValidationInfo) -> None:
+        if head is None:
+            return None
+        density = (info.context or {}).get("density")
+        if density is None:
+            raise ValueError("and the density of the fluid is not known")
+        raise ValueError(f"which is more than the {PARAMETERS['pressure'].high / 1e6:g} MPa that drive.pressure may be")
 
 
 class Supports(Section):

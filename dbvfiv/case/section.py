@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -27,6 +28,10 @@ class Section(BaseModel):
     """A table of the case file: immutable, and closed to keys it does not know."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False, allow_inf_nan=False, validate_default=True)
+
+    @classmethod
+    def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
+        """Take out of plain data what a changed key stands in the place of."""
 
 
 def key(default: Any, description: str, **limits: Any) -> Any:

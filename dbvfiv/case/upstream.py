@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import model_validator
+from pydantic import StrictInt, model_validator
 
 from .parameters import PARAMETERS
+from .pump_table import PumpCurve
 from .quantity import Length, Number, Quantity
 from .section import BrokenRule, Section, key
 
@@ -48,6 +49,32 @@ class Upstream(Section):
         ge=0,
         le=1e6,
     )
+    wave_speed: Annotated[float, PARAMETERS["wave_speed"].quantity] | None = key(
+        None,
+        "Speed of pressure waves in the pipe, for an elastic line with reflections, friction and loss spread evenly "
+        "over it; where not given the fluid in it is a rigid column. Water in steel 1000 to 1300 m/s, in plastic 200 "
+        "to 500, less with gas in it; the same at every density that is asked for.",
+        **PARAMETERS["wave_speed"].limits,
+    )
+    elements: StrictInt | None = key(
+        None,
+        "Elements of an elastic line, of fourth degree: one resolves waves up to half a wavelength of it, 1.5e-4 too "
+        "high in frequency. Where not given as many as resolve 200 Hz, at most 16.",
+        ge=1,
+        le=400,
+    )
+
+    pump: PumpCurve | None = key(
+        None,
+        "Curve of a pump at the far end, in place of drive.pressure: a CSV file of flow and head (header flow [L/s], "
+        "head [m]; relative to the case file), or rows [[flow, head], ...] in m3/s and m or with units. Between rows "
+        "the monotone cubic of Fritsch and Carlson; no result is taken from beyond them.",
+    )
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether waves run in the line."""
+        return self.length > 0 and self.wave_speed is not None
 
     @property
     def has_friction(self) -> bool:
@@ -76,5 +103,21 @@ class Upstream(Section):
                 "roughness",
                 f"{1e3 * self.roughness:g} mm beside friction = {self.friction:g}",
                 "both say how rough the pipe is, so leave one of them out",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _pump_at_the_end_of_a_line(self) -> Upstream:
+        if self.pump is not None and not self.length > 0:
+            raise BrokenRule(
+                "pump", "given without a line", "it stands at the far end of one, so give upstream.length as well"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _elements_of_waves(self) -> Upstream:
+        if self.elements is not None and self.wave_speed is None:
+            raise BrokenRule(
+                "elements", f"{self.elements} without a wave_speed", "a rigid column has none, so give both or neither"
             )
         return self

@@ -48,6 +48,8 @@ def case_toml(case: Section, comments: bool = True) -> str:
     parts = [HEAD] if comments else [f"# dbvfiv {__version__}: every key of this case"]
     for name, field in type(case).model_fields.items():
         value = getattr(case, name)
+        if name == "drive" and getattr(case, "seeks_operating_point", False):
+            value = value.model_copy(update={"pressure": None})  # it is where valve and pump meet
         if comments:
             parts.append(f"\n# ---- {field.description}")
         if isinstance(value, tuple):

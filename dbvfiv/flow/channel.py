@@ -80,7 +80,7 @@ class Channel(FlowLaw):
         if twice:
             raise ValueError(f"Two parts of the flow have a parameter '{twice[0]}'.")
         parameters = self.values({"inlet": 0.0, "density": 1.0})
-        for term in self.terms:
+        for term in self.losses:
             for sign in (1.0, -1.0):
                 (head, momentum), (more_head, more_momentum) = (
                     [np.asarray(part(_trial(self.count, size), parameters)) for part in (term.head, term.momentum)]
@@ -95,6 +95,11 @@ class Channel(FlowLaw):
     @property
     def count(self) -> int:
         return len(self.step) + 1
+
+    @property
+    def losses(self) -> tuple[FlowTerm, ...]:
+        """Terms that steady flow sees."""
+        return tuple(term for term in self.terms if not term.drives)
 
     @property
     def parameters(self) -> tuple[FlowParameter, ...]:
@@ -136,9 +141,10 @@ class Channel(FlowLaw):
         """The streamline as terms see it; traceable."""
         return Stream(area, area_rate, speed, inner, above_floor(area, self.floor))
 
-    def term_heads(self, stream: Stream, parameters):
-        """Heads (m,) that the terms add; traceable."""
-        return sum((term.head(stream, parameters) for term in self.terms), jnp.zeros_like(stream.speed))
+    def term_heads(self, stream: Stream, parameters, terms: Sequence[FlowTerm] | None = None):
+        """Heads (m,) that the terms, or some of them, add; traceable."""
+        terms = self.terms if terms is None else terms
+        return sum((term.head(stream, parameters) for term in terms), jnp.zeros_like(stream.speed))
 
     def term_momenta(self, stream: Stream, parameters):
         """Momenta (m,) that the terms add; traceable."""
@@ -175,9 +181,9 @@ class Channel(FlowLaw):
         still = jnp.zeros_like(area)
         ratio = (open_[-1] / open_[0]) ** 2 - 1.0
         inlet, kinetic = parameters["inlet"] - self.back, total[-1]
-        if self.terms:
+        if self.losses:
             unit = self.stream(area, still, 1.0 / open_, 1.0 / open_[-1:])
-            lost = 2.0 * self.term_heads(unit, parameters)
+            lost = 2.0 * self.term_heads(unit, parameters, self.losses)
             total, ratio = total + lost, ratio + lost[0] * open_[-1] ** 2
         pressure = inlet * (total[0] - total) / (total[0] - kinetic)
         speed = jnp.sqrt(2.0 * inlet / (parameters["density"] * jnp.where(ratio > 0, ratio, 1.0)))

@@ -200,6 +200,10 @@ class FlowLaw(Traceable, ABC):
         """
         raise NotImplementedError(f"{type(self).__name__} has no evaluators for time steps.")
 
+    def resolved(self, given: Mapping[str, float]) -> float:
+        """Frequency up to which waves of the fluid are resolved, Hz, under given parameters; infinite without any."""
+        return np.inf
+
     # -- parameters
     # ----
 

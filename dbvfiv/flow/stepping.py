@@ -131,9 +131,12 @@ class MovingFluid:
         mean = -2.0 * c / (b + root) if b >= 0.0 else (root - b) / (2.0 * a)
         return float((mean - start) / theta)
 
-    def _searched(self, mid, new, inlet, old, theta, psi_weight, psi_known) -> float:
+    def _searched(self, mid, new, inlet, old, theta, psi_weight, psi_known, supply=None) -> float:
         """New inlet velocity at which the outlet pressure vanishes, next to the old one in the direction in which that
         misses it; arguments as `velocity` has them.
+
+        With a `supply`, which is anything with the method `at` of `dbvfiv.flow.line_stepping.LineStep`, the pressure at
+        the flange follows from the velocity there, and `inlet` comes on top.
         """
         still, unit = self._affine(*mid)
         start = (1.0 - theta) * old  # the velocity where the equations are met is start + theta times the new one
@@ -150,6 +153,10 @@ class MovingFluid:
                 value += self._terms(*mid, u)[0][0] + psi_weight * self._terms(*new, end)[1][0]
                 slope += self._term_slopes(*mid, u)[0][2][0]
                 slope += psi_weight * self._term_slopes(*new, end)[1][2][0] / theta
+            if supply is not None:
+                head, rise_of_head = supply.at(u)
+                value += 0.5 * u * u - head
+                slope += u - rise_of_head
             return value, slope
 
         return (_zero(missing, old) - start) / theta

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from .law import FlowParameter, Traceable
 
@@ -36,7 +36,15 @@ class FlowTerm(Traceable):
     The pressures become p_k - rho [head_k + d/dt momentum_k]. Heads go with the square of the speeds and momenta with
     the speeds themselves, so that equilibria do not depend on density; a head that opposes the flow either way goes
     with U|U|. Both methods are traceable by jax and return (m,) arrays, or one number for all stations.
+
+    Attributes
+    ----------
+    drives : bool
+        Whether its head is what the driving pressure of a steady state changes by when the flow does, as that of a
+        pump: it vanishes in steady flow, then, and need not go with the square of the speeds.
     """
+
+    drives: ClassVar[bool] = False
 
     @property
     def parameters(self) -> tuple[FlowParameter, ...]:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from ..case.model import Case
 from ..flow import Channel, FlowLaw, UniformLoad
+from ..flow.elastic_line import ElasticLine, LineChannel
 from ..flow.terms import terms_of
+from ..flow.terms.line import Line
+from ..flow.terms.pump import Pump
 from ..geometry import ValveMesh, valve_mesh
 from ..materials.damping import relaxation_from_case
 from ..materials.library import law_from_case
@@ -44,5 +47,13 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
         return UniformLoad(len(mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
     gap_area = mesh.rest_area[0] - mesh.wall_deduction[0]
     storage = 1.0 if case.fluid.continuity == "storage" else 0.0
-    floor, back = case.fluid.area_floor * gap_area, case.rest_pressure
-    return Channel(mesh.z, floor, storage, case.fluid.unsteady, terms_of(case), back=back)
+    terms, floor, back = terms_of(case), case.fluid.area_floor * gap_area, case.rest_pressure
+    rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, back=back)
+    if not case.has_waves:
+        return rigid
+    line = next(term for term in terms if isinstance(term, Line))
+    pump = next((term for term in terms if isinstance(term, Pump)), None)
+    rest = [term for term in terms if term not in (line, pump)]
+    channel = Channel(mesh.z, floor, storage, terms=rest, back=back)
+    waves = ElasticLine(line, case.upstream.wave_speed, case.upstream.elements, pump)
+    return LineChannel(channel, rigid, waves)

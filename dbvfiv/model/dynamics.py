@@ -20,6 +20,7 @@ import numpy as np
 from eigen import CoupledPencil, Relaxation
 from eigen.pencil import FLUID_PARTS
 
+from ..errors import SolveError
 from ..flow import FlowLaw, FlowMotion
 from .outside import AddedMass
 from .valve import ValveModel
@@ -43,6 +44,8 @@ class Conditions:
         Of the line in front, m; the case's own where it is not given, and of no effect without a line.
     tail_length : float, optional
         Of the pipe behind, m; likewise.
+    wave_speed : float, optional
+        In an elastic line, m/s; likewise.
     """
 
     density: float
@@ -51,17 +54,19 @@ class Conditions:
     loss_factor: float = 0.0
     pipe_length: float | None = None
     tail_length: float | None = None
+    wave_speed: float | None = None
 
     @classmethod
     def of(cls, case) -> Conditions:
         damping, length = case.damping, case.upstream.length if case.has_line else None
         behind = case.downstream.length if case.has_tail else None
-        return cls(case.fluid.density, damping.alpha, damping.beta, damping.loss_factor, length, behind)
+        speed = case.upstream.wave_speed if case.has_waves else None
+        return cls(case.fluid.density, damping.alpha, damping.beta, damping.loss_factor, length, behind, speed)
 
     @property
     def of_line(self) -> dict[str, float]:
         """Parameters of what is in front of the valve and behind it by their names; those not given left out."""
-        given = {"pipe_length": self.pipe_length, "tail_length": self.tail_length}
+        given = {"pipe_length": self.pipe_length, "tail_length": self.tail_length, "wave_speed": self.wave_speed}
         return {name: value for name, value in given.items() if value is not None}
 
 
@@ -156,6 +161,23 @@ class LinearisedState:
             self._damped[key] = CoupledPencil(*wall, relaxation=relaxation)
         return self._damped[key]
 
+    def check_pump(self) -> None:
+        """Refuse a state whose flow the pump's table does not hold.
+
+        Raises
+        ------
+        SolveError
+        """
+        pump = self.model.pump
+        if pump is None:
+            return
+        flow = self.model.mass_flow(self.area, self.inlet) / self.model.case.fluid.density
+        if not pump.holds(flow):
+            raise SolveError(
+                f"At {self.inlet:.6g} Pa the valve takes {1e3 * flow:.4g} L/s, and the pump's table goes from "
+                f"{1e3 * pump.flow[0]:.4g} to {1e3 * pump.flow[-1]:.4g} L/s."
+            )
+
     def pencil(self, conditions: Conditions, fluid: bool = True, storage: float | None = None) -> CoupledPencil:
         """Pencil of small motions.
 
@@ -182,6 +204,7 @@ class LinearisedState:
         """A0 to S1 of the flow alone at a density; of a steady flow A0 is all."""
         flow = self.model.flow
         if flow.unsteady:
+            self.check_pump()
             return fluid_parts(flow, self.area, self.inlet, density, storage, line)
         return self.no_flow() | {"A0": flow.steady_operator(self.area, self.inlet)[1]}
 

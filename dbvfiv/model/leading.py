@@ -27,6 +27,7 @@ class BandOrigin(Enum):
     NONE = "none"  #: no band: stiffness damping orders the modes
     ASKED = "asked"  #: named by who asks
     STRUCTURE = "structure"  #: holds as many structural frequencies as modes are wanted
+    LINE = "line"  #: what the elements of an elastic line resolve
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,11 @@ class LeadingSearch:
     @property
     def note(self) -> str | None:
         """What a reader of the result has to know about the band, in a sentence."""
+        if self.origin is BandOrigin.LINE:
+            return (
+                f"The elements of the line resolve waves up to {self.band:.4g} Hz, so the search covers the band up to "
+                "there; upstream.elements moves its end."
+            )
         if self.origin is not BandOrigin.STRUCTURE:
             return None
         why = "Loss factors damp all frequencies alike and" if self.creeps else "Without stiffness damping"
@@ -93,6 +99,7 @@ def select_search(
     conditions: Conditions,
     structural_frequencies: Callable[[int], np.ndarray],
     count: int,
+    resolved: float = np.inf,
 ) -> LeadingSearch:
     """How the leading modes of a state are searched for.
 
@@ -112,6 +119,8 @@ def select_search(
         fewer where there are no more. Called only where they decide. `eigen.lowest_frequencies` computes them.
     count : int
         Modes wanted, a conjugate pair being one.
+    resolved : float
+        Frequency, Hz, up to which the fluid's own waves are resolved; nothing is searched beyond it.
 
     Returns
     -------
@@ -125,6 +134,14 @@ def select_search(
     >>> select_search(SearchOptions(), Conditions(10.0, 0.0, 0.003), lambda n: np.zeros(0), 2).options.limit_point
     -333.3333333333333
     """
+    found = _select(options, conditions, structural_frequencies, count)
+    if found.band <= resolved:
+        return found
+    return replace(found, options=replace(found.options, max_frequency=resolved), origin=BandOrigin.LINE)
+
+
+def _select(options: SearchOptions, conditions: Conditions, structural_frequencies, count: int) -> LeadingSearch:
+    """As `select_search`, whatever is resolved."""
     asked = BandOrigin.NONE if options.max_frequency is None else BandOrigin.ASKED
     creeps = conditions.loss_factor > 0
     limit = None if creeps else limit_point(conditions.beta)

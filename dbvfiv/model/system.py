@@ -29,7 +29,7 @@ from .analytic import DAMPING, AnalyticResidual
 from .valve import ValveModel
 
 #: Names that no design parameter has, whether the flow law depends on them or not.
-CONDITIONS = ("inlet", "density", "storage", "pipe_length", "tail_length", *DAMPING, "loss_factor")
+CONDITIONS = ("inlet", "density", "storage", "pipe_length", "tail_length", "wave_speed", *DAMPING, "loss_factor")
 
 
 _MEMORY = (

@@ -20,6 +20,7 @@ import scipy.sparse as sp
 from ..case.model import Case
 from ..flow import RowAreas
 from ..flow.terms.line import Line
+from ..flow.terms.pump import Pump
 from ..flow.terms.tail import Tail
 from ..geometry import ValveMesh
 from ..shell import Section, StepWall
@@ -107,6 +108,12 @@ class ValveModel:
 
     def _term(self, kind: type):
         return next((term for term in getattr(self.flow, "terms", ()) if isinstance(term, kind)), None)
+
+    @property
+    def pump(self) -> Pump | None:
+        """The pump that feeds it, if there is one."""
+        terms = getattr(self.flow, "terms", ())
+        return next((term for term in terms if isinstance(term, Pump)), None)
 
     @property
     def stations(self) -> int:

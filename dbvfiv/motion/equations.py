@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..flow.line_stepping import LineFluid, LineInstant, LineState, LineStep, LineWaves
 from ..model import ValveModel
 from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
@@ -35,6 +36,8 @@ class ValveMotion:
         Smallest displacement that positions resolve, m.
     wall : WallMemory or None
         What the wall remembers; None where it is elastic.
+    waves : LineWaves or None
+        Of an elastic line.
     """
 
     def __init__(self, model: ValveModel, conditions: Conditions | None = None):
@@ -44,6 +47,7 @@ class ValveMotion:
         self.wall = WallMemory(model.shell, branches.strengths, branches.times) if branches else None
         self.moving_fluid = model.flow.unsteady
         self.fluid = model.flow.stepping(self.conditions.density) if self.moving_fluid else None
+        self.waves = self._waves()
         self.size = model.size
         self.resolution = float(np.finfo(float).eps * np.abs(model.shell.mesh.nodes).max())
         self.stations = model.stations
@@ -61,6 +65,12 @@ class ValveMotion:
             density = model.case.outside.density(self.conditions.density)
             self.outside = MovingOutside(model, density, self.length)
         self._rotations = np.flatnonzero(np.broadcast_to(np.arange(5) >= 3, free.shape)[free])
+
+    def _waves(self) -> LineWaves | None:
+        if not isinstance(self.fluid, LineFluid):
+            return None
+        rest = self.model.nodal(self.model.rest())
+        return self.fluid.waves(float(self.model.rows.areas(rest)[-1]))  # the flange is clamped
 
     # -- forces
     # ----
@@ -111,17 +121,18 @@ class ValveMotion:
         area, area_new, inlet = mid[0], new[0], step.inlet
         if self.moving_fluid:
             if speed is None:
-                speed = self.fluid.velocity(
-                    mid, new, inlet, step.speed, step.theta, step.psi_weight, float(step.psi_known[0])
-                )
+                speed = self._velocity(mid, new, step)
             mid_speed = step.speed + step.theta * (speed - step.speed)
             flow = self.fluid.state(*new, speed)
             psi_rate = step.psi_weight * flow.psi + step.psi_known
-            p = self.fluid.pressure(self.fluid.state(*mid, mid_speed), psi_rate, inlet)
+            flange, slope, line = inlet, 0.0, None
+            if step.line is not None:
+                flange, slope = self.fluid.flange(step.line, mid_speed)
+                line = step.line.end(mid_speed)
+            p = self.fluid.pressure(self.fluid.state(*mid, mid_speed), psi_rate, flange)
             outlet, p[0] = float(p[0]), 0.0
-            return Load(
-                model.pressure_force(nodal, p), outlet, p, area_new, flow.speed, flow.psi, psi_rate, inlet, mid_speed
-            )
+            moved = area_new, flow.speed, flow.psi, psi_rate, inlet, mid_speed
+            return Load(model.pressure_force(nodal, p), outlet, p, *moved, line, slope)
         p = model.flow.steady_pressure(area, inlet)
         speed = model.flow.inlet_velocity(area_new, inlet, self.conditions.density) if inlet > model.flow.back else 0.0
         zero = np.zeros(self.stations)
@@ -136,6 +147,17 @@ class ValveMotion:
             inlet,
             speed,
         )
+
+    def _velocity(self, mid: tuple, new: tuple, step: Step) -> float:
+        """Inlet velocity at the end of a step, m/s, at which the outlet pressure vanishes."""
+        known = step.speed, step.theta, step.psi_weight, float(step.psi_known[0])
+        if step.line is None:
+            return self.fluid.velocity(mid, new, step.inlet, *known)
+        return self.fluid.velocity_behind(step.line, mid, new, *known)
+
+    def line_step(self, old: LineState, h: float, theta: float, rate: float, inlet: float) -> LineStep:
+        """The elastic line in a step of length h, s; see `LineStep`."""
+        return LineStep(self.waves, old, h, theta, rate, inlet)
 
     def _passage(self, nodal: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Areas (m,) and their rates (m,)."""
@@ -205,7 +227,8 @@ class ValveMotion:
         found = self.fluid.pressure_slopes(
             mid, new, load.mid_speed, load.speed[-1], weights.theta, weights.velocity, weights.psi
         )
-        self._refactor_moving(values, forces, slope, *found)
+        by_area, by_speed = found
+        self._refactor_moving(values, forces, slope, by_area, by_speed + weights.theta * load.flange_slope)
         self._add_outside(weights.outside)
 
     def _add_outside(self, weight: float) -> None:
@@ -248,9 +271,11 @@ class ValveMotion:
             self._factor = CoupledFactor(pattern, model.station_forces(rest), model.rows.jacobian(rest), inner)
         return self._factor
 
-    def accelerations(self, q, v, speed: float, inlet: float, memory: Memory | None = None) -> tuple[np.ndarray, Load]:
+    def accelerations(
+        self, q, v, speed: float, inlet: float, memory: Memory | None = None, line: LineState | None = None
+    ) -> tuple[np.ndarray, Load]:
         """Accelerations (n,) that the equations ask for at positions, velocities and inlet velocity, and the fluid with
-        them; `memory` of a wall that has not relaxed.
+        them; `memory` of a wall that has not relaxed, `line` of an elastic one that does not flow steadily.
 
         The equations are linear in the accelerations and the rate of the inlet velocity: one solve.
         """
@@ -272,20 +297,38 @@ class ValveMotion:
         by_area, by_rate, by_speed = fluid.psi_slopes(area, rate, speed)
         bend = rows.second(model.nodal(v), model.nodal(v))
         known = by_area @ rate + by_rate @ bend
-        load = self.load(q, v, q, v, self._instant(speed, known, inlet), speed)
+        line = self.line_at(speed, inlet) if line is None else line
+        load = self.load(q, v, q, v, self._instant(speed, known, inlet, self._line_moving(line, inlet, 0.0)), speed)
         density = self.conditions.density
+        if line is not None:
+            by_speed = by_speed + self.waves.inertance
         self._refactor_moving(
             mass, model.station_forces(nodal).data, rows.jacobian(nodal).data, -density * by_rate, -density * by_speed
         )
         self._add_outside(1.0)
         a, speed_rate = self.solve(load.force - forces, -load.outlet)
+        if line is not None:
+            by_speed = by_speed - self.waves.inertance
         psi_rate = known + by_rate @ rows.second(self._position(nodal), model.nodal(a)) + by_speed * speed_rate
-        return a, self.load(q, v, q, v, self._instant(speed, psi_rate, inlet), speed)
+        line = self._line_moving(line, inlet, speed_rate)
+        return a, self.load(q, v, q, v, self._instant(speed, psi_rate, inlet, line), speed)
 
-    @staticmethod
-    def _instant(speed: float, psi_rate: np.ndarray, inlet: float) -> Step:
-        """A step of no length, with a given rate of psi."""
-        return Step(1.0, speed, 0.0, psi_rate, inlet)
+    def line_at(self, speed: float, inlet: float) -> LineState | None:
+        """An elastic line with a steady flow, or at rest without pressure where nothing flows; None without one."""
+        if self.waves is None:
+            return None
+        return self.waves.steady(speed, inlet) if speed else self.waves.at_rest()
+
+    def _line_moving(self, line: LineState | None, inlet: float, speed_rate: float) -> LineState | None:
+        return None if line is None else self.waves.moving(line, inlet, speed_rate)
+
+    def instant(self, state, inlet: float) -> Step:
+        """A step of no length at a state."""
+        return self._instant(state.speed, state.psi_rate, inlet, state.line)
+
+    def _instant(self, speed: float, psi_rate: np.ndarray, inlet: float, line: LineState | None = None) -> Step:
+        """A step of no length, with a given rate of psi and waves in an elastic line with their rates."""
+        return Step(1.0, speed, 0.0, psi_rate, inlet, None if line is None else LineInstant(self.waves, line))
 
     # -- energies
     # ----

@@ -50,10 +50,10 @@ class StaggeredMotion(ValveMotion):
         self._solver(0).refactor(values, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
         self._add_outside(weights.outside)
 
-    def accelerations(self, q, v, speed, inlet, memory=None):
+    def accelerations(self, q, v, speed, inlet, memory=None, line=None):
         self._frozen, self.moving_fluid = None, self.coupled_fluid
         try:
-            return super().accelerations(q, v, speed, inlet, memory)
+            return super().accelerations(q, v, speed, inlet, memory, line)
         finally:
             self.moving_fluid = False
             self.drop_factors()

@@ -124,7 +124,8 @@ def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, push:
     model = motion.model
     pencil = linearise(model, q, inlet).pencil(motion.conditions)
     try:
-        found, index = _find_mode(pencil, motion.conditions, push)
+        resolved = model.flow.resolved(motion.conditions.of_line)
+        found, index = _find_mode(pencil, motion.conditions, push, resolved)
     except (SingularShiftError, np.linalg.LinAlgError) as error:
         said = str(error).rstrip(".")
         raise SolveError(f"The mode to push along at {inlet:.6g} Pa was not found: {said}.") from error
@@ -134,13 +135,19 @@ def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, push:
     if abs(lip) < 1e-6 * np.abs(nodal[:, :3]).max():
         raise SolveError(f"Mode {push.mode} does not move the middle of the lip, so no push can be measured there.")
     shape = push.opening / lip * mode.q
-    flow = float((push.opening / lip * mode.u[0]).real) if motion.moving_fluid and len(mode.u) else 0.0
+    flow = (push.opening / lip * mode.u).real if motion.moving_fluid and len(mode.u) else np.zeros(1)
     eigenvalue = complex(mode.eigenvalue)
     return on_mode(motion, q, speed, inlet, shape, eigenvalue, flow), Kick(eigenvalue)
 
 
 def on_mode(
-    motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, shape: np.ndarray, eigenvalue: complex, flow: float
+    motion: ValveMotion,
+    q: np.ndarray,
+    speed: float,
+    inlet: float,
+    shape: np.ndarray,
+    eigenvalue: complex,
+    flow: np.ndarray,
 ) -> MotionState:
     """State that moves on a mode from its first instant; a wall that relaxes remembers having done so all along.
 
@@ -154,19 +161,22 @@ def on_mode(
     shape : (n,) complex array
         The mode, of the size it has at this instant.
     eigenvalue : complex, 1/s
-    flow : float
-        Change of the inlet velocity with it, m/s.
+    flow : (l,) array
+        Change of the fluid's own unknowns with it, the inlet velocity, m/s, before those of an elastic line.
     """
     moved = q + shape.real
     memory = None if motion.wall is None else motion.wall.on_mode(q, shape, eigenvalue, moved)
-    return consistent_state(motion, 0.0, moved, (eigenvalue * shape).real, speed + flow, inlet, memory)
+    line = None if motion.waves is None else motion.waves.steady(speed, inlet).changed(flow)
+    return consistent_state(motion, 0.0, moved, (eigenvalue * shape).real, speed + flow[0], inlet, memory, line)
 
 
-def _find_mode(pencil: CoupledPencil, conditions: Conditions, push: Push) -> tuple[Spectrum, int]:
+def _find_mode(
+    pencil: CoupledPencil, conditions: Conditions, push: Push, resolved: float = np.inf
+) -> tuple[Spectrum, int]:
     """Leading modes, by the rule of all studies, and the place of the one to push along among them."""
     count = max(push.count, push.mode)
     while True:
-        search = select_search(push.search, conditions, lambda n: lowest_frequencies(pencil, n), count)
+        search = select_search(push.search, conditions, lambda n: lowest_frequencies(pencil, n), count, resolved)
         found = leading_modes(pencil, count, search.options)
         oscillating = [i for i in range(len(found)) if found.eigenvalues[i].imag > 1e-6 * abs(found.eigenvalues[i])]
         if len(oscillating) >= push.mode:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..flow.line_stepping import LineState
 from ..shell import Memory
 
 
@@ -28,6 +29,8 @@ class MotionState:
         Integral of the flow's speed from the inlet, m2/s, and the scheme's value of its rate.
     memory : Memory or None
         What a wall that relaxes remembers.
+    line : LineState or None
+        Waves in an elastic line.
     """
 
     time: float
@@ -41,20 +44,30 @@ class MotionState:
     psi: np.ndarray
     psi_rate: np.ndarray
     memory: Memory | None = None
+    line: LineState | None = None
 
 
 def consistent_state(
-    motion, time: float, q, v, speed: float, inlet: float, memory: Memory | None = None
+    motion,
+    time: float,
+    q,
+    v,
+    speed: float,
+    inlet: float,
+    memory: Memory | None = None,
+    line: LineState | None = None,
 ) -> MotionState:
     """State at given positions, velocities and inlet velocity with the accelerations that the equations of motion ask
-    for; a wall that relaxes has done so unless its memory is given.
+    for; a wall that relaxes has done so unless its memory is given, and an elastic line flows steadily unless its state
+    is.
     """
     q, v = np.asarray(q, float), np.asarray(v, float)
     held = None
     if motion.wall is not None:
         memory = motion.wall.at(q) if memory is None else memory
         held = motion.wall.held(memory)
-    a, load = motion.accelerations(q, v, speed, inlet, memory)
+    waves = {} if line is None else {"line": line}
+    a, load = motion.accelerations(q, v, speed, inlet, memory, **waves)
     return MotionState(
         float(time),
         float(load.speed[-1]),
@@ -67,4 +80,5 @@ def consistent_state(
         load.psi,
         load.psi_rate,
         memory,
+        load.line,
     )

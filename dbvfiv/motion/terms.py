@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..flow.line_stepping import LineInstant, LineState, LineStep
+
 
 @dataclass(frozen=True)
 class Weights:
@@ -53,6 +55,8 @@ class Step:
         The rate of psi is psi_weight psi + psi_known, with the new psi.
     inlet : float
         Inlet pressure where the equations are met, Pa.
+    line : LineStep or LineInstant, optional
+        The waves in an elastic line, at whose far end `inlet` is then.
     """
 
     theta: float
@@ -60,6 +64,7 @@ class Step:
     psi_weight: float
     psi_known: np.ndarray
     inlet: float
+    line: LineStep | LineInstant | None = None
 
 
 @dataclass
@@ -82,6 +87,10 @@ class Load:
         Inlet pressure there, Pa.
     mid_speed : float
         Inlet velocity there, m/s.
+    line : LineState, optional
+        Waves in an elastic line at the end of the step.
+    flange_slope : float
+        Derivative of the pressure at the flange by the inlet velocity, both where the equations are met, Pa s/m.
     """
 
     force: np.ndarray
@@ -93,3 +102,5 @@ class Load:
     psi_rate: np.ndarray
     inlet: float
     mid_speed: float
+    line: LineState | None = None
+    flange_slope: float = 0.0

@@ -43,6 +43,7 @@ class Trial:
             rate / h,
             (1.0 - rate) * old.psi_rate - (rate / h) * old.psi,
             pressure(old.time + theta * h),
+            None if old.line is None else motion.line_step(old.line, h, theta, rate, pressure(old.time + theta * h)),
         )
 
         # stiffness damping is by the slow law, and its force is known apart only where there is some
@@ -113,4 +114,5 @@ class Trial:
             load.psi,
             rate,
             None if self.wall is None else self.motion.wall.advance(old.memory, self.q, self.h, self.scheme.now),
+            load.line,
         )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
+from ..flow.elastic_line import LineChannel
 from .layout import TEXT, Column, read_array, write_array
 
 if TYPE_CHECKING:
@@ -32,6 +33,10 @@ _RELAXING = (
     Column("branch_group", "", "Which of them each Maxwell branch belongs to, from 0", "i4"),
     Column("branch_time", "s", "Its relaxation time"),
     Column("branch_strength", "", "Its modulus over that of the slow law"),
+)
+#: There where waves run in the line.
+_LINE = (
+    Column("line_places", "", "Where the velocities in an elastic line are, from its far end (0) to the flange (1)"),
 )
 
 
@@ -58,6 +63,8 @@ class MeshData:
         Groups of layers that relax alike; none where the case leaves the wall elastic.
     branch_group, branch_time, branch_strength : (b,) arrays
         Maxwell branches: group, relaxation time (s), and modulus over that of the slow law.
+    line_places : (k + 1,) array
+        Where the velocities in an elastic line are; empty without one.
     """
 
     nodes: np.ndarray
@@ -75,6 +82,7 @@ class MeshData:
     branch_group: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
     branch_time: np.ndarray = field(default_factory=lambda: np.zeros(0))
     branch_strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    line_places: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, model: ValveModel) -> MeshData:
@@ -98,6 +106,7 @@ class MeshData:
             branch_group=group.astype(np.int32),
             branch_time=branches.times[time],
             branch_strength=branches.strengths[group, time],
+            line_places=model.flow.line.places[0] if isinstance(model.flow, LineChannel) else np.zeros(0),
         )
 
     @property
@@ -125,12 +134,13 @@ class MeshData:
 def write_mesh(file: h5py.File, mesh: MeshData) -> None:
     """Write a mesh into a result file."""
     group = file.create_group("mesh")
-    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ())):
+    lines = _LINE if len(mesh.line_places) else ()
+    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *lines):
         write_array(group, column, getattr(mesh, column.name))
 
 
 def read_mesh(file: h5py.File) -> MeshData:
     """Read the mesh of a result file."""
     group = file["mesh"]
-    columns = (*_COLUMNS, *(column for column in _RELAXING if column.name in group))
+    columns = (*_COLUMNS, *(column for column in (*_RELAXING, *_LINE) if column.name in group))
     return MeshData(**{column.name: read_array(group, column) for column in columns})

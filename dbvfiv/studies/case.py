@@ -10,12 +10,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import create_model
+from pydantic import create_model, model_validator
 
 from ..case.load import key_path, read_case_file
 from ..case.model import Case as PhysicsCase
 from ..case.reference import page
-from ..case.section import Section, key
+from ..case.section import BrokenRule, Section, key
 from . import KINDS
 
 
@@ -35,6 +35,28 @@ class _CaseOfStudies(PhysicsCase):
         alone = "pressure" in self.drive.model_fields_set and "pressures" not in self.steady.model_fields_set
         return (self.drive.pressure,) if alone else self.steady.pressures
 
+    @model_validator(mode="after")
+    def _steps_take_what_is_upstream(self) -> Self:
+        if self.has_waves and self.transient.coupling == "staggered":
+            raise BrokenRule(
+                "transient.coupling",
+                "'staggered' with an elastic line (upstream.wave_speed)",
+                "it must be 'monolithic' there, or the column rigid",
+            )
+        given = "pressures" if self.has_pump and self.transient.drive_table is not None else ""
+        if given or (self.has_pump and self.transient.ramp > 0):
+            raise BrokenRule(
+                "transient.drive_table" if given else "transient.ramp",
+                "given beside a pump",
+                "the pump's curve says what the pressure is; leave it out, or the pump",
+            )
+        return self
+
+    def meets_pump(self, kind: str) -> bool:
+        """Whether a study asks for the operating point of valve and pump."""
+        listed = kind == "steady" and "pressures" in self.steady.model_fields_set
+        return self.seeks_operating_point and kind != "closure" and not listed
+
     def replace(self, changes: Mapping[str, Any]) -> Self:
         made = super().replace(changes)
         made._replace_list_by_pressure({key_path(dotted) for dotted in changes})
@@ -42,7 +64,8 @@ class _CaseOfStudies(PhysicsCase):
 
     def _replace_list_by_pressure(self, changed: Collection[tuple[str, ...]]) -> None:
         """Let a drive.pressure that was changed by itself stand before the list, see `steady_pressures`."""
-        if ("drive", "pressure") in changed and ("steady", "pressures") not in changed:
+        driven = {("drive", "pressure"), ("drive", "head")} & set(changed)
+        if driven and ("steady", "pressures") not in changed:
             self.steady.model_fields_set.discard("pressures")
 
 

@@ -11,6 +11,7 @@ from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 from ..model import ValveModel
 from ..model.equilibria import find_equilibrium, redescribe, rest_state
+from ..model.operating_point import operating_pressure
 from ..model.state import SteadyState
 from ..observer import Observer
 from ..record.files import check_writable, kind_of
@@ -156,8 +157,18 @@ class Session:
         SolveError
             If nothing can be found at all.
         """
+        if self.case.meets_pump(kind):
+            return self._at_operating_point(kind, observer).perform(kind, output, observer, **choices)
         header = Header.of(kind, self.case, self.name)
         return self._run(kind, header, output, observer, None, choices)
+
+    def _at_operating_point(self, kind: str, observer: Observer | None) -> Session:
+        """The session of the case with the pressure at which valve and pump meet."""
+        pressure = operating_pressure(self.model, observer)
+        changes: dict[str, Any] = {"drive.pressure": pressure}
+        if kind == "steady":
+            changes["steady.pressures"] = [pressure]
+        return Session(self.case.replace(changes), self.name)
 
     def resume(self, known: Record, observer: Observer | None = None, **choices: Any) -> Any:
         """Go on with a run in its file; `known` is what it holds."""

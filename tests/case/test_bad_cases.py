@@ -185,7 +185,60 @@ BAD = {
     ),
     "gain in place of a loss": ("[upstream]\nlength = 20\nloss = -1", r"upstream\.loss.*at least 0"),
     "loss that is a length": ("[upstream]\nlength = 20\nloss = '3 m'", r"upstream\.loss.*not a plain number"),
-    "line with a wave speed": ("[upstream]\nlength = 20\nwave_speed = 1000", r"upstream\.wave_speed"),
+    "wave speed below zero": ("[upstream]\nlength = 20\nwave_speed = -1000", r"upstream\.wave_speed.*at least 1"),
+    "wave speed of nothing": ("[upstream]\nlength = 20\nwave_speed = 0", r"upstream\.wave_speed.*at least 1"),
+    "wave speed that is a length": ("[upstream]\nlength = 20\nwave_speed = '1 km'", r"upstream\.wave_speed.*velocity"),
+    "line of no elements": (
+        "[upstream]\nlength = 20\nwave_speed = 1000\nelements = 0",
+        r"upstream\.elements.*at least 1",
+    ),
+    "line of half an element": ("[upstream]\nlength = 20\nwave_speed = 1000\nelements = 1.5", r"upstream\.elements"),
+    "line of too many elements": (
+        "[upstream]\nlength = 20\nwave_speed = 1000\nelements = 100000",
+        r"upstream\.elements.*at most 400",
+    ),
+    "elements of a rigid column": (
+        "[upstream]\nlength = 20\nelements = 4",
+        r"upstream\.elements is 4 without a wave_speed.*give both or neither",
+    ),
+    "waves in the steady law": (
+        "[upstream]\nlength = 20\nwave_speed = 1000\n[fluid]\nunsteady = false",
+        r"upstream\.wave_speed is 1000 m/s with fluid\.unsteady = false",
+    ),
+    "waves in staggered steps": (
+        "[upstream]\nlength = 20\nwave_speed = 1000\n[transient]\ncoupling = 'staggered'",
+        r"transient\.coupling.*elastic line",
+    ),
+    "pump without a line": ("[upstream]\npump = [[0, 5], [0.1, 1]]", r"upstream\.pump is given without a line"),
+    "pump of one row": ("[upstream]\nlength = 20\npump = [[0, 5]]", r"upstream\.pump.*fewer than two rows"),
+    "pump that goes backwards": (
+        "[upstream]\nlength = 20\npump = [[0.1, 5], [0.0, 6]]",
+        r"upstream\.pump.*flows do not increase at 0 m3/s",
+    ),
+    "pump of negative flow": ("[upstream]\nlength = 20\npump = [[-0.1, 5], [0.1, 1]]", r"upstream\.pump.*negative"),
+    "pump that gives nothing": ("[upstream]\nlength = 20\npump = [[0, 0], [0.1, 0]]", r"upstream\.pump.*begin above 0"),
+    "pump of negative head": ("[upstream]\nlength = 20\npump = [[0, 5], [0.1, -1]]", r"upstream\.pump.*negative head"),
+    "pump in a file that is not there": (
+        "[upstream]\nlength = 20\npump = 'none.csv'",
+        r"upstream\.pump.*none\.csv.*does not exist",
+    ),
+    "pump of three columns": (
+        "[upstream]\nlength = 20\npump = [[0, 5, 1], [0.1, 1, 2]]",
+        r"upstream\.pump.*row 1 is not a flow and a head",
+    ),
+    "pump of pressures": (
+        "[upstream]\nlength = 20\npump = [[0, '5 kPa'], [0.1, 1]]",
+        r"upstream\.pump.*row 1 holds.*not a length",
+    ),
+    "pump that is a number": ("[upstream]\nlength = 20\npump = 5", r"upstream\.pump.*neither a file nor rows"),
+    "pump with a ramp": (
+        "[upstream]\nlength = 20\npump = [[0, 5], [0.1, 1]]\n[transient]\nramp = 0.1",
+        r"transient\.ramp is given beside a pump",
+    ),
+    "head and pressure": ("[drive]\nhead = '3 m'\npressure = '30 kPa'", r"drive\.head.*leave one of them out"),
+    "head below zero": ("[drive]\nhead = -3", r"drive\.head.*greater than 0"),
+    "head that is a pressure": ("[drive]\nhead = '3 kPa'", r"drive\.head.*not a length"),
+    "head of a deep sea": ("[drive]\nhead = '2000 m'", r"drive\.head.*more than the 10 MPa"),
     "pressure at no known place": ("[drive]\nat = 'pump'", r"drive\.at.*reservoir.*line"),
     "onset from a line of no length": (
         "[upstream]\nlength = 20\n[onset]\nover = 'pipe_length=0:20:5'",

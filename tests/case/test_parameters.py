@@ -51,16 +51,17 @@ def test_ranges_end_where_the_key_does():
 
 
 def test_groups():
-    assert SURROUNDINGS == ("density", "alpha", "beta", "loss_factor", "storage", "pipe_length", "tail_length")
+    lines = ("pipe_length", "tail_length", "wave_speed")
+    assert SURROUNDINGS == ("density", "alpha", "beta", "loss_factor", "storage", *lines)
     assert DESIGN == ("thickness", "angle", "strain")
-    assert SWEPT == ("pressure", "density", "alpha", "beta", "loss_factor", "pipe_length", "tail_length")
+    assert SWEPT == ("pressure", "density", "alpha", "beta", "loss_factor", *lines)
     assert SYSTEM_NAMES == ("inlet", *SURROUNDINGS)
     assert set(inspect.signature(Conditions).parameters) < set(SURROUNDINGS)
 
 
 def test_a_place_knows_every_parameter():
     place = Place.of(Case())
-    assert [place.value(name) for name in CONDITIONS] == [18e3, 1000.0, 5.0, 0.003, 0.0, 0.0, 0.0, 0.0]
+    assert [place.value(name) for name in CONDITIONS] == [18e3, 1000.0, 5.0, 0.003, 0.0, 0.0, 0.0, 0.0, 0.0]
     assert set(place.at(angle=30).mu()) == {*SYSTEM_NAMES, "angle"}
 
 
@@ -70,7 +71,7 @@ def test_words():
     assert PARAMETERS["thickness"].label == "Wall thickness factor"
     assert PARAMETERS["pressure"].text(6e3) == "6 kPa"
     assert PARAMETERS["beta"].text(0.003) == "β = 0.003 s"
-    assert listed(SWEPT) == "pressure, density, alpha, beta, loss_factor, pipe_length or tail_length"
+    assert listed(SWEPT) == "pressure, density, alpha, beta, loss_factor, pipe_length, tail_length or wave_speed"
     assert "strain (level of the rubbers)" in listed(notes=True)
 
 

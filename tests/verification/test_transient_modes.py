@@ -63,11 +63,12 @@ def three_routes(
     densities = density * np.array(
         [0.9, 0.95, 1.0, 1.05, 1.1]
     )  # judged at the ends and fed in the middle: the state itself is none of the checks
+    resolved = model.flow.resolved({})
     found = sweep(
         lambda d: state.pencil(Conditions(float(d), 0.0, BETA)),
         densities,
         4,
-        SearchOptions(limit_point=-1 / BETA),
+        SearchOptions(resolved if np.isfinite(resolved) else None, limit_point=-1 / BETA),
         checks=2,
     )
     reduced = found.eigenvalues[2][np.argmin(np.abs(found.eigenvalues[2] - eigenvalue))]

@@ -219,7 +219,7 @@ def _set_out(model: ContactValve, motion: ClosingMotion, turn: Turn) -> tuple[Fi
     state = consistent_state(motion, 0.0, q, np.zeros(model.size), speed, turn.pressure)
     rule = scheme("generalised-alpha", max(DAMPING, transient.numerical_damping))
     control = FixedSteps(Stepper(motion, rule, turn, StepOptions(backward=True)), ControlOptions(transient.step))
-    still = motion._instant(state.speed, state.psi_rate, turn.pressure)
+    still = motion.instant(state, turn.pressure)
     return control, state, motion.load(state.q, state.v, state.q, state.v, still, state.speed)
 
 

@@ -20,7 +20,8 @@ class ContactValve(ValveModel):
     """
 
     def __init__(self, case: Case):
-        super().__init__(case.replace({"supports.lip_stop": False}))
+        pump = {"upstream.pump": None} if case.has_pump else {}  # what reverses the pressure takes its place
+        super().__init__(case.replace({"supports.lip_stop": False} | pump))
         closure, nodes = case.closure, np.arange(len(self.mesh.nodes))
         law = ContactLaw(
             max(*closure.pressures, closure.open_pressure) / closure.contact_depth, ROUNDING * closure.contact_depth

@@ -158,7 +158,9 @@ def run_modes(
     with solving(state.pressure):
         # without stiffness damping the band follows from the structural frequencies
         basis = TransferBasis(pencil, modes=_BASIS if conditions.beta > 0 else max(_BASIS, options.count))
-        search = select_search(options.search, conditions, lambda n: basis.structural_frequencies[:n], options.count)
+        resolved = np.inf if without_fluid else model.flow.resolved(conditions.of_line)
+        lowest = lambda n: basis.structural_frequencies[:n]  # noqa: E731
+        search = select_search(options.search, conditions, lowest, options.count, resolved)
         certified = certified_spectrum(pencil, options.count, search.options, basis=basis)
     notes = search.notes
     certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))

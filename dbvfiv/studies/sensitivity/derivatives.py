@@ -198,7 +198,11 @@ def _value(model, pressure, conditions, name) -> float:
         return pressure
     if name in _OF_PENCIL:
         value = getattr(conditions, name)
-        own = {"pipe_length": model.case.upstream.length, "tail_length": model.case.downstream.length}
+        own = {
+            "pipe_length": model.case.upstream.length,
+            "tail_length": model.case.downstream.length,
+            "wave_speed": model.case.upstream.wave_speed,
+        }
         return own[name] if value is None else value
     if name == "storage":
         return 1.0 if model.case.fluid.continuity == "storage" else 0.0

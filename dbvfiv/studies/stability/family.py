@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,10 +11,6 @@ from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOpti
 
 from ...model.dynamics import Conditions, LinearisedState
 from ...model.leading import select_search
-
-#: Blend of the continuity laws; with the length of a line in front, m, and that of a pipe behind; and with the density
-#: outside over that inside where it does not follow it.
-Law = float | tuple[float, float] | tuple[float, float, float] | tuple[float, float, float, float]
 
 #: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
 _KEPT = 256
@@ -61,12 +58,14 @@ class ValveFamily(PencilFamily):
 
     def search(self, condition: Condition) -> SearchOptions:
         """What is searched in the spectrum: the rule that every study follows."""
-        key = condition.beta, condition.loss  # nothing else decides
+        line = law_parts(condition.law)[1]
+        key = condition.beta, condition.loss, *line.values()  # nothing else decides
         if key not in self._searches:
-            conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss)
+            conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss, **line)
             asked = SearchOptions(max_frequency=self.max_frequency)
             lowest = partial(self._lowest, workspace=self._workspace) if condition.loss else self._lowest
-            self._searches[key] = select_search(asked, conditions, lowest, self.modes).options
+            resolved = self.linear.model.flow.resolved(line)
+            self._searches[key] = select_search(asked, conditions, lowest, self.modes, resolved).options
         return self._searches[key]
 
     def relaxation(self, loss: float) -> Relaxation | None:
@@ -88,7 +87,10 @@ class ValveFamily(PencilFamily):
 
     def _computed(self, law: Law) -> dict[str, np.ndarray]:
         linear, flow = self.linear, self.linear.model.flow
-        parts = linear.flow_parts(1.0, *law_parts(law)) if flow.has_fluid else linear.no_flow()
+        storage, line = law_parts(law)
+        if "wave_speed" in line:  # so that the compressibility is that of the fluid
+            line["wave_speed"] *= np.sqrt(law.density)
+        parts = linear.flow_parts(1.0, storage, line) if flow.has_fluid else linear.no_flow()
         if linear.added is None:
             return parts
         return linear.added.parts(parts, outside_of(law) or 1.0)
@@ -100,26 +102,51 @@ class ValveFamily(PencilFamily):
         return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, **line), storage=storage)
 
 
-def law_of(storage: float, pipe_length: float, tail_length: float, outside: float = 0.0) -> Law:
-    """The law of a condition; a length of 0 m is none, or that of the case.
+class Surroundings(NamedTuple):
+    """The law of a condition where more than the blend of the continuity laws decides; 0 for what there is not.
 
-    `outside` is the density outside over that inside where it does not follow it: the coupling at unit density depends
-    on it.
+    Attributes
+    ----------
+    storage : float
+        Blend of the continuity laws.
+    pipe_length, tail_length : float, m
+        Of the lines in front and behind.
+    wave_speed, density : float, m/s, kg/m3
+        Of an elastic line in front. Waves tell fluids of different densities apart by more than their inertia, so the
+        density is a part of the law with them.
+    outside : float
+        Density outside over that inside where it does not follow it.
     """
-    if outside:
-        return storage, pipe_length, tail_length, outside
-    if tail_length:
-        return storage, pipe_length, tail_length
-    return (storage, pipe_length) if pipe_length else storage
+
+    storage: float
+    pipe_length: float = 0.0
+    tail_length: float = 0.0
+    wave_speed: float = 0.0
+    density: float = 0.0
+    outside: float = 0.0
+
+
+#: Blend of the continuity laws alone, or with what else decides.
+Law = float | Surroundings
+
+_OF_LINE = ("pipe_length", "tail_length", "wave_speed")
+
+
+def law_of(storage: float, density: float, **others: float) -> Law:
+    """The law of a condition; what else decides by the names of `Surroundings`, 0 for what there is not."""
+    if others.get("wave_speed"):
+        others["density"] = density
+    return Surroundings(storage, **others) if any(others.values()) else storage
 
 
 def law_parts(law: Law) -> tuple[float, dict[str, float]]:
     """Blend of the continuity laws, and parameters of the line as `Conditions.of_line` has them, of a law."""
     if not isinstance(law, tuple):
         return float(law), {}
-    return law[0], {name: value for name, value in zip(("pipe_length", "tail_length"), law[1:]) if value}
+    law = Surroundings(*law)
+    return law.storage, {name: getattr(law, name) for name in _OF_LINE if getattr(law, name)}
 
 
 def outside_of(law: Law) -> float:
     """Density outside over that inside of a law; 0 where it follows it."""
-    return law[3] if isinstance(law, tuple) and len(law) > 3 else 0.0
+    return Surroundings(*law).outside if isinstance(law, tuple) else 0.0

@@ -33,6 +33,8 @@ class Place:
         Of the line in front; 0 without one.
     tail_length : float, m
         Of the pipe behind; 0 without one.
+    wave_speed : float, m/s
+        In an elastic line; 0 without one.
     outside : float, kg/m3
         Density of the fluid outside where it is fixed; 0 where there is none or it follows `density`.
     design : dict
@@ -47,6 +49,7 @@ class Place:
     loss_factor: float = 0.0
     pipe_length: float = 0.0
     tail_length: float = 0.0
+    wave_speed: float = 0.0
     outside: float = 0.0
     design: Mapping[str, float] = field(default_factory=dict)
 
@@ -64,6 +67,7 @@ class Place:
             damping.loss_factor,
             case.upstream.length if case.has_line else 0.0,
             case.downstream.length if case.has_tail else 0.0,
+            case.upstream.wave_speed if case.has_waves else 0.0,
             case.outside.fixed_density,
         )
 
@@ -76,8 +80,9 @@ class Place:
     @property
     def condition(self) -> Condition:
         """(density, alpha, beta, law, loss factor), the law as `dbvfiv.studies.stability.family.ValveFamily` has it."""
+        given = {"pipe_length": self.pipe_length, "tail_length": self.tail_length, "wave_speed": self.wave_speed}
         ratio = self.outside / self.density if self.outside else 0.0
-        law = law_of(self.storage, self.pipe_length, self.tail_length, ratio)
+        law = law_of(self.storage, self.density, **given, outside=ratio)
         return Condition(self.density, self.alpha, self.beta, law, self.loss_factor)
 
     def under(self, condition: Condition) -> Place:
@@ -92,12 +97,13 @@ class Place:
             loss_factor=loss_factor,
             pipe_length=line.get("pipe_length", 0.0),
             tail_length=line.get("tail_length", 0.0),
+            wave_speed=line.get("wave_speed", 0.0),
         )
 
     @property
     def conditions(self) -> Conditions:
         """What surrounds the structure there."""
-        line = self.pipe_length or None, self.tail_length or None
+        line = self.pipe_length or None, self.tail_length or None, self.wave_speed or None
         return Conditions(self.density, self.alpha, self.beta, self.loss_factor, *line)
 
     def value(self, name: str) -> float:
@@ -123,6 +129,8 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
         given["pipe_length"] = case.upstream.length
     if case.has_tail and case.downstream.length:
         given["tail_length"] = case.downstream.length
+    if case.has_waves:
+        given["wave_speed"] = case.upstream.wave_speed
     given = {name: value for name, value in given.items() if not case.damping.lacks(name)}
     if case.outside.is_there:
         given["outside"] = case.outside.words
@@ -192,6 +200,18 @@ def require_parameter(case: Case, name: str) -> None:
     if name == "tail_length" and not case.has_tail:
         raise CaseError(
             "There is no tail_length to change: no pipe follows the valve; give downstream.pipe_diameter.",
+            key=PARAMETERS[name].key,
+        )
+    if name == "density" and case.has_pump:
+        raise CaseError(
+            "Over the density a pump has no steady state to keep: its head is another pressure in another fluid; set "
+            "fluid.density for each, or give drive.pressure and no upstream.pump.",
+            key=PARAMETERS[name].key,
+        )
+    if name == "wave_speed" and not case.has_waves:
+        raise CaseError(
+            "There is no wave_speed to change: the valve has no elastic line in front; give upstream.length and "
+            "upstream.wave_speed.",
             key=PARAMETERS[name].key,
         )
     lacking = case.damping.lacks(name)

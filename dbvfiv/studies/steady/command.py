@@ -31,7 +31,7 @@ def command(case: Case, pressures: Pressures = None) -> Request:
     """Equilibria of the coupled valve: flow, lip area, jet velocity, deflections, layer stresses.
 
     The pressures are those of --pressure; else steady.pressures of the case, or its drive.pressure where only that is
-    given, with --set for instance. Each state is found from the one before.
+    given, with --set for instance; else, with a pump, the operating point. Each state is found from the one before.
 
     Nothing is written unless asked for: -o keeps states, stations and layer stresses in a result file (an earlier
     result of that name is replaced), state by state, so that Ctrl-C keeps what is done and `dbvfiv resume` goes on.
@@ -39,6 +39,8 @@ def command(case: Case, pressures: Pressures = None) -> Request:
 
     dbvfiv steady cases/dbv12.toml -p "18 kPa" -p "36 kPa" -o dbv12.h5
     """
+    if not pressures and case.meets_pump("steady"):
+        return Request()
     return Request(
         {"steady.pressures": list(_read(pressures, case.fluid.density) if pressures else case.steady_pressures())}
     )

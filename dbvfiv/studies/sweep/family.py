@@ -184,7 +184,9 @@ class FluidFamily:
         return leading_modes(pencil, count, replace(asked, left=left))
 
     def _selected(self, value: float) -> LeadingSearch:
-        return select_search(self.options.search, self.conditions_at(value), self._lowest, self.options.count)
+        conditions = self.conditions_at(value)
+        resolved = self.linear.model.flow.resolved(conditions.of_line)
+        return select_search(self.options.search, conditions, self._lowest, self.options.count, resolved)
 
     def _lowest(self, count: int) -> np.ndarray:
         """Structural frequencies of the one state."""
@@ -262,9 +264,9 @@ class PressureFamily:
         pencil = linearise(self.model, self.known[value].q, value).pencil(self.conditions)
         if value not in self._bands:
             search, workspace = self.options.search, self.workspace
-            self._bands[value] = select_search(
-                search, self.conditions, lambda n: lowest_frequencies(pencil, n, workspace), self.options.count
-            )
+            lowest = lambda n: lowest_frequencies(pencil, n, workspace)  # noqa: E731
+            resolved = self.model.flow.resolved(self.conditions.of_line)
+            self._bands[value] = select_search(search, self.conditions, lowest, self.options.count, resolved)
         self._searches[pencil] = self._bands[value]
         return pencil
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from ...flow.line_stepping import LineState
 from ...model.lip import LipCentre
 from ...model.valve import QUARTERS
 from ...motion.equations import ValveMotion
 from ...motion.stepper import StepResult
-from ...motion.terms import Step
 
 
 class Reader:
@@ -35,9 +35,7 @@ class Reader:
     def first(self, state, inlet: float) -> dict[str, Any]:
         """Row of the start."""
         motion = self.motion
-        load = motion.load(
-            state.q, state.v, state.q, state.v, Step(1.0, state.speed, 0.0, state.psi_rate, inlet), state.speed
-        )
+        load = motion.load(state.q, state.v, state.q, state.v, motion.instant(state, inlet), state.speed)
         return self._row(state, load, 0.0, 0)
 
     def row(self, result: StepResult, h: float) -> dict[str, Any]:
@@ -60,6 +58,8 @@ class Reader:
         if memory is not None:
             balance += memory.work.sum()
             by_group = {"branch_energy": QUARTERS * memory.stored, "branch_loss": QUARTERS * memory.loss}
+        if state.line is not None:
+            by_group |= self._of_line(state.line)
         return by_group | {
             "time": state.time,
             "inlet_pressure": load.inlet,
@@ -87,4 +87,15 @@ class Reader:
             "station_pressure": load.pressure,
             "station_area": area,
             "centre_line": np.where(self._moves, state.q[self._centre], 0.0),
+        }
+
+    def _of_line(self, line: LineState) -> dict[str, Any]:
+        kinetic, elastic = self.motion.waves.energies(line)
+        supply, lost, work = QUARTERS * line.books
+        return {
+            "line_kinetic_energy": QUARTERS * kinetic,
+            "line_elastic_energy": QUARTERS * elastic,
+            "line_supply": supply,
+            "line_dissipation": lost,
+            "line_work": work,
         }

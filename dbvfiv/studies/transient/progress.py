@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...flow.line_stepping import LineState
 from ...motion.state import MotionState
 from ...record.record import Record
 from ...shell import Memory, WallMemory
@@ -56,7 +57,9 @@ class Progress:
         """A row of the table of restart points."""
         values = {c.name: getattr(self, c.name) for c in (*COUNTS, *BOOKS)}
         values["eigenvalue"] = [self.eigenvalue.real, self.eigenvalue.imag]
-        values |= {f.name: getattr(self.state, f.name) for f in fields(MotionState) if f.name != "memory"}
+        values |= {f.name: getattr(self.state, f.name) for f in fields(MotionState) if f.name not in ("memory", "line")}
+        if self.state.line is not None:
+            values["line"] = self.state.line.packed
         return values if self.state.memory is None else values | memory_row(self.state.memory)
 
     @classmethod
@@ -71,6 +74,8 @@ class Progress:
         if wall is not None:
             kept = [record.value(RESTART, c.name, at) for c in MEMORY_COLUMNS]
             state = replace(state, memory=wall.at(state.q, *kept))
+        if any(c.name == "line" for c in record.tables[RESTART].columns):
+            state = replace(state, line=LineState.unpacked(record.value(RESTART, "line", at)))
         return cls(
             state,
             int(values["steps"]),

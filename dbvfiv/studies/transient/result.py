@@ -21,7 +21,7 @@ from ..result import StudyResult
 from . import figures
 from .animation import animate
 from .assess import assess
-from .tables import HISTORY, PROFILES, RELAXING, SCALARS, STATE_COLUMNS, STATES
+from .tables import HISTORY, LINE, PROFILES, RELAXING, SCALARS, STATE_COLUMNS, STATES
 
 _NO_VERDICT = {
     "verdict": "undecided",
@@ -83,7 +83,7 @@ class TransientResult(StudyResult):
     ----------
     history : dict of str to array
         Columns of `dbvfiv.studies.transient.tables.SCALARS` and `PROFILES`, and of `RELAXING` where the wall relaxes,
-        for the groups of layers in `mesh.relaxing`; one row for each step.
+        for the groups of layers in `mesh.relaxing`, and of `LINE` behind an elastic line; one row for each step.
     states : sequence of TransientState
         Full states, `transient.save_every` apart, and the last one.
     verdict : dict
@@ -99,14 +99,18 @@ class TransientResult(StudyResult):
 
     @cached_property
     def history(self) -> dict[str, np.ndarray]:
-        columns = (*SCALARS, *PROFILES, *(RELAXING if self.mesh.relaxing else ()))
+        lines = LINE if len(self.mesh.line_places) else ()
+        columns = (*SCALARS, *PROFILES, *(RELAXING if self.mesh.relaxing else ()), *lines)
         return {c.name: self.record.column(HISTORY, c.name) for c in columns}
 
     def dissipated(self) -> dict[str, float]:
-        """Energy lost since the start, J: to Rayleigh damping and, where the wall relaxes, in its groups of layers."""
+        """Energy lost since the start, J: to Rayleigh damping and, where there are any, in groups of layers that relax
+        and in an elastic line.
+        """
         h = self.history
         lost = zip(self.mesh.relaxing, h["branch_loss"][-1]) if self.mesh.relaxing else ()
-        return {"Rayleigh damping": float(h["dissipation"][-1])} | {name: float(value) for name, value in lost}
+        losses = {"Rayleigh damping": float(h["dissipation"][-1])} | {name: float(value) for name, value in lost}
+        return losses | ({"line": float(h["line_dissipation"][-1])} if "line_dissipation" in h else {})
 
     @cached_property
     def states(self) -> StateList:

@@ -154,6 +154,11 @@ class Runner:
         try:
             while not stopped and progress.state.time < self.options.end:
                 row = self._step(progress)
+                gone = self._beyond_pump(progress.state)
+                if gone:
+                    failures.append(gone)
+                    self.record.fail(gone)
+                    break
                 if progress.steps == judged:
                     verdict = self._verdict(progress)
                     certain = verdict.name if verdict.decided else ""
@@ -243,6 +248,20 @@ class Runner:
         self.record.note("verdict", **verdict.summary())
         self.record.progress(f"{verdict.name}{'' if verdict.decided else '?'} at {state.time:.4g} s")
         return verdict
+
+    def _beyond_pump(self, state: MotionState) -> str:
+        """Sentence where the flow has left the pump's table; empty otherwise."""
+        pump = self.model.pump
+        if pump is None or not self.motion.moving_fluid:
+            return ""
+        velocity = state.speed if state.line is None else float(state.line.velocity[0])
+        flow = QUARTERS * float(self.model.mesh.rest_area[-1] - self.model.mesh.wall_deduction[-1]) * velocity
+        if pump.holds(flow):
+            return ""
+        return (
+            f"At {state.time:.6g} s the flow at the pump is {1e3 * flow:.4g} L/s, and its table goes from "
+            f"{1e3 * pump.flow[0]:.4g} to {1e3 * pump.flow[-1]:.4g} L/s; the run ends there."
+        )
 
     def _failed(self, progress: Progress, failure: StepFailure) -> str:
         time, smallest = progress.state.time, self.options.control.step * self.options.control.smallest

@@ -64,6 +64,14 @@ RELAXING = (
     Column("branch_energy", "J", "Energy that the Maxwell branches of each group of layers hold"),
     Column("branch_loss", "J", "Energy that they have dissipated since the start"),
 )
+#: Energy of an elastic line, of the whole valve, there where the case has one.
+LINE = (
+    Column("line_kinetic_energy", "J", "Kinetic energy of the fluid in the line"),
+    Column("line_elastic_energy", "J", "Energy of its compression and of the pipe's wall"),
+    Column("line_supply", "J", "Energy taken in at the far end of the line since the start"),
+    Column("line_dissipation", "J", "Energy lost to friction and losses in the line since the start"),
+    Column("line_work", "J", "Energy that left it at the flange since the start, by pressure and velocity head"),
+)
 #: Full states.
 STATE_COLUMNS = (
     Column("time", "s", "Time"),
@@ -94,6 +102,8 @@ MEMORY_COLUMNS = (
     Column("branch_loss", "J", "What of it they have dissipated"),
     Column("branch_energy", "J", "Energy that they hold"),
 )
+#: Waves in an elastic line, as `dbvfiv.flow.line_stepping.LineState` packs them.
+LINE_COLUMNS = (Column("line", "m/s, m/s^2, J", "Velocities, scaled pressures, their rates and books of energy"),)
 #: How far a run has come.
 COUNTS = (
     Column("steps", "", "Steps made", "i8"),
@@ -121,8 +131,11 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     if groups:
         motion["branches"] = (*points, len(mesh.branch_time), 8)
         motion["stretch"] = (*points, len(np.unique(mesh.branch_time)), 8)
-    history = (*SCALARS, *PROFILES, *(RELAXING if groups else ()))
-    restart = (*COUNTS, *BOOKS, *MOTION_COLUMNS, *(MEMORY_COLUMNS if groups else ()))
+    waves = len(mesh.line_places)
+    if waves:
+        motion["line"] = (4 * waves + 1,)
+    history = (*SCALARS, *PROFILES, *(RELAXING if groups else ()), *(LINE if waves else ()))
+    restart = (*COUNTS, *BOOKS, *MOTION_COLUMNS, *(MEMORY_COLUMNS if groups else ()), *(LINE_COLUMNS if waves else ()))
     return (
         TableSpec(HISTORY, history, by_row | by_group | {"centre_line": (stations,)}, chunk=512),
         TableSpec(STATES, STATE_COLUMNS, by_row | {"nodal": (nodes, 5), "nodal_rate": (nodes, 5)}),

@@ -1,0 +1,86 @@
+"""A pump at the far end of the line: what its head falls by as the flow rises, in place of a fixed pressure.
+
+    P = P_0 + rho g [ H(Q) - H_0 ],      H_0 = P_0 / (rho g)
+
+P_0 is the pressure that the steady state was found at. At the operating point it is rho g H(Q) already; at another
+pressure the difference stands for a static lift that comes on top. H is the monotone cubic of Fritsch and Carlson
+(1980) through the rows of the pump's table, and goes on along its tangent beyond their ends, where no result is taken
+from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from ...case.quantity import GRAVITY
+from ..term import FlowTerm
+
+_QUARTERS = 4
+
+
+class Pump(FlowTerm):
+    """A pump's curve.
+
+    Parameters
+    ----------
+    flow : sequence of float, m3/s
+        Increasing.
+    head : sequence of float, m
+    density : float
+        Of the fluid it pumps, kg/m3.
+    pressure : float
+        P_0, Pa.
+    """
+
+    DATA = ("flow", "heads", "series", "density", "reference")
+    drives = True
+
+    def __init__(self, flow: Sequence[float], head: Sequence[float], density: float, pressure: float):
+        self.flow, self.heads, self.density = np.asarray(flow, float), np.asarray(head, float), float(density)
+        self.reference = pressure / (density * GRAVITY)
+        inside = PchipInterpolator(self.flow, self.heads)
+        ends = [(float(inside(q)), float(inside(q, 1))) for q in self.flow[[0, -1]]]
+        before, after = ([0.0, 0.0, slope, value] for value, slope in ends)
+        self.series = np.column_stack([before, inside.c, after])
+
+    def curve(self, flow):
+        """Head, m, of a flow, m3/s; traceable."""
+        place = jnp.searchsorted(self.flow, flow, side="right")
+        from_row = flow - jnp.asarray(self.flow)[jnp.maximum(place - 1, 0)]
+        a, b, c, d = jnp.asarray(self.series)[:, place]
+        return ((a * from_row + b) * from_row + c) * from_row + d
+
+    def head_and_slope(self, flow: float) -> tuple[float, float]:
+        """Head, m, and its slope, s/m2, of a flow, m3/s, in plain numbers."""
+        place = int(np.searchsorted(self.flow, flow, side="right"))
+        x = flow - self.flow[max(place - 1, 0)]
+        a, b, c, d = self.series[:, place]
+        return ((a * x + b) * x + c) * x + d, (3 * a * x + 2 * b) * x + c
+
+    def holds(self, flow: float) -> bool:
+        """Whether a flow, m3/s, is within the table."""
+        return bool(self.flow[0] <= flow <= self.flow[-1])
+
+    def gain(self, velocity, inlet_area, parameters):
+        """P - P_0 over the density, m2/s2, from the velocity at the far end referred to the inlet's section.
+
+        Flow and head of a fluid of another density are those of the same pressures.
+        """
+        size = self.density / parameters["density"]
+        flow = _QUARTERS * inlet_area * velocity / jnp.sqrt(size)
+        return size * GRAVITY * (self.curve(flow) - self.reference)
+
+    def head(self, stream, parameters):
+        return -self.gain(stream.inner[0], stream.area[-1], parameters)
+
+
+def from_case(case) -> Pump | None:
+    """The pump of a case, or None where it has none."""
+    if not case.has_pump:
+        return None
+    flow, head = zip(*case.upstream.pump, strict=True)
+    return Pump(flow, head, case.fluid.density, case.drive.pressure)

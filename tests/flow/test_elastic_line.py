@@ -1,0 +1,240 @@
+"""Waves in a line: organ pipe, water hammer, friction against characteristics, rigid limit, steps against the law."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+import pytest
+import scipy.linalg as la
+
+from dbvfiv.flow import Channel, FlowMotion
+from dbvfiv.flow.elastic_line import ElasticLine, LineChannel, default_elements
+from dbvfiv.flow.line_elements import element
+from dbvfiv.flow.line_stepping import LineInstant, LineState, LineStep, LineWaves
+from dbvfiv.flow.terms.line import Line
+from tests.flow.test_channel import FLOOR, passage
+
+jax.config.update("jax_enable_x64", True)
+DENSITY, SUPPLY = 998.0, 18e3
+QUARTER = 0.012
+
+
+def line_of(length=20.0, speed=1000.0, elements=6, **keys) -> ElasticLine:
+    return ElasticLine(Line(length, keys.pop("diameter", None), **keys), speed, elements)
+
+
+def behind(line: ElasticLine, storage=0.0) -> LineChannel:
+    z, _ = passage()
+    return LineChannel(Channel(z, FLOOR, storage), Channel(z, FLOOR, storage, terms=[line.line]), line)
+
+
+def shut_frequencies(line: ElasticLine) -> np.ndarray:
+    """Angular frequencies of a lossless line with a pressure at its far end and no flow at the flange."""
+    k = line.size // 2
+    given = {"inlet": 0.0, "density": DENSITY, "pipe_length": line.line.length, "wave_speed": line.wave_speed}
+
+    def residual(x, rate):
+        velocity, velocity_rate = (np.zeros(k + 1), np.zeros(k + 1))
+        velocity, velocity_rate = (jax.numpy.append(part[:k], 0.0) for part in (x, rate))
+        momentum, continuity = line.equations(velocity, velocity_rate, x[k:], rate[k:], QUARTER, given)
+        return jax.numpy.concatenate([momentum[:-1], continuity])
+
+    zero = np.zeros(2 * k)
+    stiffness, mass = jax.jit(jax.jacfwd(residual, (0, 1)))(zero, zero)
+    values = la.eigvals(-np.asarray(stiffness), np.asarray(mass))
+    assert np.abs(values.real).max() < 1e-9 * np.abs(values).max()  # energy is conserved
+    return np.sort(values.imag[values.imag > 0])
+
+
+def test_organ_pipe():
+    """c/(4 L) (2 n + 1) with an open and a shut end, errors by the eighth power of the element's length; a half of a
+    wavelength in an element leaves 1.5e-4, which is what `resolved` says.
+    """
+    exact = 0.5 * np.pi * 1000.0 / 20.0 * (2 * np.arange(40) + 1)
+    errors = []
+    for elements in (2, 4, 8):
+        line = line_of(elements=elements, diameter=0.3)
+        found = shut_frequencies(line)
+        assert len(found) == 4 * elements  # no mode too many
+        errors.append(found[:4] / exact[:4] - 1)
+    assert np.log2(errors[0][1:] / errors[1][1:]) == pytest.approx(8.0, abs=1.0)
+    assert np.log2(errors[1][1:] / errors[2][1:]) == pytest.approx(8.0, abs=0.3)
+    inside = 2 * np.pi * behind(line).resolved({}) >= exact
+    assert inside.sum() == 8 and np.abs(found[:8] / exact[:8] - 1).max() < 2e-4
+
+
+def test_as_many_elements_as_resolve_two_hundred_hertz():
+    assert default_elements(20.0, 1000.0) == 8
+    assert default_elements(0.1, 1000.0) == 2 and default_elements(1000.0, 1000.0) == 16
+
+
+@pytest.mark.parametrize("storage", [0.0, 1.0])
+def test_the_rigid_column_is_the_limit_of_a_fast_line(storage):
+    """Eliminated at a frequency, the line's own unknowns leave the rigid column's operators but for (s/c)^2."""
+    keys = {"friction": 0.02, "loss": 1.5, "diameter": 0.2, "reservoir": False}
+    z, area = passage()
+    given, s = {"inlet": SUPPLY, "density": DENSITY}, 20.0 + 250.0j
+    rigid = Channel(z, FLOOR, storage, terms=[Line(7.0, **keys)]).linearise_still(area, given)
+    expected = np.array([rigid.S0 + s * rigid.S1, rigid.B0[5:6] + s * rigid.B1[5:6]]).ravel()
+    gaps = []
+    for speed in (1e4, 1e5, 1e6):
+        law = behind(line_of(7.0, speed, **keys), storage)
+        found = law.linearise_still(area, given)
+        S, B = found.S0 + s * found.S1, found.B0 + s * found.B1
+        own = la.solve(S[1:, 1:], -S[1:, :1])
+        got = np.array([S[0, 0] + S[:1, 1:] @ own[:, 0], B[5, 0] + B[5:6, 1:] @ own[:, 0]]).ravel()
+        gaps.append(np.abs(got / expected - 1).max())
+        assert law.steady_pressure(area, SUPPLY) == pytest.approx(
+            Channel(z, FLOOR, storage, terms=[Line(7.0, **keys)]).steady_pressure(area, SUPPLY), rel=1e-13
+        )
+    print(gaps)
+    assert gaps[0] / gaps[1] == pytest.approx(100, rel=0.05) and gaps[1] / gaps[2] == pytest.approx(100, rel=0.2)
+    assert gaps[2] < 0.5 * (abs(s) * 7.0 / 1e6) ** 2  # tanh(x)/x = 1 - x^2/3 + ...
+
+
+def test_steady_flow_meets_the_equations():
+    z, area = passage()
+    for reservoir in (True, False):
+        law = behind(line_of(7.0, 800.0, friction=0.02, loss=3.0, diameter=0.2, reservoir=reservoir), 1.0)
+        given = {"inlet": SUPPLY, "density": DENSITY}
+        inner = law.steady_inner(area, given)
+        pressure, rest = law.evaluate(FlowMotion.still(area, inner), given)
+        assert np.abs(rest).max() < 1e-9 * SUPPLY
+        assert pressure == pytest.approx(law.steady_pressure(area, SUPPLY), rel=1e-10, abs=1e-6)
+        assert np.ptp(inner[: 1 + law.line.size // 2]) == 0.0
+
+
+def wave_run(waves: LineWaves, state: LineState, step: float, count: int, flange, inlet: float):
+    """March a line whose flow at the flange is given; total pressures there, Pa, halfway through the steps."""
+    pressures, states = [], [state]
+    for i in range(count):
+        now = LineStep(waves, states[-1], step, 0.5, 1.0, inlet)
+        velocity = 0.5 * (flange(i * step) + flange((i + 1) * step))
+        pressures.append(waves.density * now.at(velocity)[0])
+        states.append(now.end(velocity))
+    return np.array(pressures), states
+
+
+def test_water_hammer():
+    """A flow that is stopped raises the pressure by rho c dU at the flange, for 2 L/c, and lowers it as much for the
+    next 2 L/c (Joukowsky 1898).
+    """
+    length, speed, velocity = 20.0, 1000.0, 0.5
+    stop, step = 0.4 * length / speed, length / speed / 200
+    waves = LineWaves(line_of(length, speed, 24), QUARTER, DENSITY)
+    flange = lambda t: 0.5 * velocity * (1.0 + np.cos(np.pi * min(1.0, t / stop)))  # noqa: E731
+    start = waves.moving(waves.steady(velocity, SUPPLY), SUPPLY, 0.0)
+    pressure, states = wave_run(waves, start, step, 1600, flange, SUPPLY)
+    rise = (pressure - SUPPLY) / (DENSITY * speed * velocity)  # the velocity head is a part of 4000
+    time = (np.arange(1600) + 0.5) * step * speed / length
+    for low, high, sign in [(0.5, 1.9, 1), (2.5, 3.9, -1), (4.5, 5.9, 1), (6.5, 7.9, -1)]:
+        plateau = rise[(time > low) & (time < high)]
+        assert np.mean(plateau) == pytest.approx(sign, abs=2e-3)
+        assert np.abs(plateau - sign).max() < 0.01
+    energies = np.array([sum(waves.energies(s)) for s in states])
+    books = np.array([s.books for s in states])
+    gained = energies - energies[0] - (books[:, 0] - books[:, 1] - books[:, 2])
+    assert np.abs(gained).max() < 1e-11 * energies.max()
+    assert books[-1, 1] == 0.0
+
+
+def characteristics(length, speed, loss, velocity, supply, nodes, count):
+    """Sudden stop by the method of characteristics: heads over density at the flange; friction by the trapezoidal rule
+    along them.
+    """
+    dt = length / (nodes - 1) / speed
+    w = np.full(nodes, velocity)
+    h = supply - 0.5 * loss * velocity * abs(velocity) * np.linspace(0, 1, nodes)
+    drag = 0.5 * loss / length
+    out = []
+    for _ in range(count):
+        new_w, new_h = w.copy(), h.copy()
+        for _ in range(3):  # the friction at the new instant is iterated
+            mean = 0.5 * (drag * w[:-1] * np.abs(w[:-1]) + drag * new_w[1:] * np.abs(new_w[1:]))
+            back = 0.5 * (drag * w[1:] * np.abs(w[1:]) + drag * new_w[:-1] * np.abs(new_w[:-1]))
+            right = w[:-1] + h[:-1] / speed - dt * mean  # arrives at 1..
+            left = w[1:] - h[1:] / speed - dt * back  # arrives at ..n-2
+            new_w[1:-1], new_h[1:-1] = 0.5 * (right[:-1] + left[1:]), 0.5 * speed * (right[:-1] - left[1:])
+            new_h[0], new_w[0] = supply, left[0] + supply / speed
+            new_w[-1], new_h[-1] = 0.0, speed * right[-1]
+        w, h = new_w, new_h
+        out.append(h[-1])
+    return np.array(out), dt
+
+
+def test_friction_wears_a_blow_down_as_by_characteristics():
+    """A line that loses much: mean pressures over each half period at the shut flange within 0.1 % of the blow."""
+    length, speed, velocity, loss = 20.0, 1000.0, 1.0, 400.0
+    expected, dt = characteristics(length, speed, loss, velocity, SUPPLY / DENSITY, 801, 6400)
+    waves = LineWaves(line_of(length, speed, 24, loss=loss, reservoir=False), QUARTER, DENSITY)
+    waves.far = lambda velocity, inlet: (inlet / DENSITY, 0.0)  # a total pressure, as the other solution has it
+    step = length / speed / 400
+    start = waves.steady(velocity, SUPPLY)
+    flange = lambda t: velocity if t == 0.0 else 0.0  # noqa: E731
+    pressure, states = wave_run(waves, waves.moving(start, SUPPLY, 0.0), step, 3200, flange, SUPPLY)
+    ours, theirs = pressure / DENSITY, expected
+    half = 2 * length / speed
+    mean = lambda x, d, i: x[int(round((i + 0.05) * half / d)) : int(round((i + 0.95) * half / d))].mean()  # noqa: E731
+    steps = [(mean(ours, step, i), mean(theirs, dt, i)) for i in range(4)]
+    print(steps)
+    for found, other in steps:
+        assert found == pytest.approx(other, abs=0.001 * speed * velocity)
+    worn = abs(steps[3][1] - SUPPLY / DENSITY) / abs(steps[0][1] - SUPPLY / DENSITY)
+    assert worn < 0.8  # it does wear down
+    energies, books = np.array([sum(waves.energies(s)) for s in states]), np.array([s.books for s in states])
+    gained = energies - energies[0] - (books[:, 0] - books[:, 1] - books[:, 2])
+    assert np.abs(gained).max() < 1e-11 * energies.max() and np.all(np.diff(books[:, 1]) >= 0)
+
+
+@pytest.mark.parametrize("reservoir", [True, False])
+def test_what_a_step_solves_is_the_law(reservoir):
+    """Rates and pressures of a step, put into the law's own equations; and the impedance against differences."""
+    _, area = passage()
+    line = line_of(7.0, 800.0, 3, friction=0.03, loss=2.0, diameter=0.2, reservoir=reservoir)
+    law, rng = behind(line), np.random.default_rng(3)
+    waves = LineWaves(line, area[-1], DENSITY)
+    k = line.size // 2
+    old = LineState(
+        *(rng.standard_normal(n) * size for n, size in ((k + 1, 1.0), (k + 1, 30.0), (k, 0.3), (k, 30.0))), np.zeros(3)
+    )
+    theta, rate, h = 0.6, 1.1, 2e-3
+    step = LineStep(waves, old, h, theta, rate, SUPPLY)
+    velocity = -0.4
+    head, slope = step.at(velocity)
+    new = step.end(velocity)
+    mid = [a + theta * (b - a) for a, b in ((old.velocity, new.velocity), (old.pressure, new.pressure))]
+    both = ((old.velocity_rate, new.velocity_rate), (old.pressure_rate, new.pressure_rate))
+    rates = [(1 - rate) * before + rate * after for before, after in both]
+    assert mid[0][-1] == pytest.approx(velocity, rel=1e-12)
+    given = law.values({"inlet": SUPPLY, "density": DENSITY})
+    momentum, continuity = line.equations(mid[0], rates[0], mid[1], rates[1], area[-1], given)
+    size = np.abs(waves.inertia(rates[0])).max()
+    assert np.abs(np.asarray(momentum)[:-1]).max() < 1e-11 * size and np.abs(continuity).max() < 1e-10 * size
+    assert -momentum[-1] == pytest.approx(head, rel=1e-11)
+    d = 1e-5
+    assert slope == pytest.approx((step.at(velocity + d)[0] - step.at(velocity - d)[0]) / (2 * d), rel=1e-6)
+    for name in ("velocity", "pressure_rate", "books"):
+        assert np.array_equal(getattr(LineState.unpacked(new.packed), name), getattr(new, name))
+    # one instant: rates from the equations, and the flange's pressure falls by the inertance
+    moved = [waves.moving(old, SUPPLY, x) for x in (0.0, 5.0)]
+    heads = [LineInstant(waves, state).at(velocity)[0] for state in moved]
+    assert heads[0] - heads[1] == pytest.approx(5.0 * waves.inertance, rel=1e-10)
+    momentum, continuity = line.equations(
+        moved[1].velocity, moved[1].velocity_rate, old.pressure, moved[1].pressure_rate, area[-1], given
+    )
+    assert np.abs(np.asarray(momentum)[:-1]).max() < 1e-10 * size and np.abs(continuity).max() < 1e-10 * size
+
+
+def test_a_rigid_column_of_its_length_where_the_step_is_long():
+    """Over a step that is long against L/c the impedance is that of the rigid column."""
+    line = line_of(7.0, 1e5, 2)
+    waves = LineWaves(line, QUARTER, DENSITY)
+    step = LineStep(waves, waves.at_rest(), 1e-2, 0.5, 1.0, 0.0)
+    assert step.at(0.1)[1] == pytest.approx(-7.0 / 5e-3, rel=1e-3)
+
+
+def test_the_element():
+    one = element(4)
+    assert one.mass.sum() == pytest.approx(1.0, rel=1e-14) and one.weights.sum() == pytest.approx(1.0, rel=1e-14)
+    assert one.value @ one.nodes**4 == pytest.approx(one.points**4, rel=1e-12)
+    assert one.slope @ one.nodes**4 == pytest.approx(4 * one.points**3, rel=1e-12)

@@ -1,0 +1,118 @@
+"""A pump at the far end of the line: its curve, its slope in the linearised flow, the valve of one degree behind it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator
+
+from dbvfiv.case.quantity import GRAVITY
+from dbvfiv.flow import Channel
+from dbvfiv.flow.elastic_line import ElasticLine, LineChannel
+from dbvfiv.flow.line_stepping import LineWaves
+from dbvfiv.flow.terms.line import Line
+from dbvfiv.flow.terms.pump import Pump
+from eigen import CoupledPencil, certified_spectrum, leading_modes
+from tests.flow.test_channel import FLOOR, passage
+from tests.flow.test_line import DAMPING, INLET, LENGTH, LIP, MASS, STIFFNESS, WIDTH
+from tests.verification.critical import hopf
+
+DENSITY, SUPPLY = 998.0, 18e3
+FLOWS, HEADS = np.array([0.0, 0.02, 0.05, 0.09]), np.array([3.0, 2.8, 1.9, 0.4])
+
+
+def test_the_curve_is_that_of_scipy_and_goes_on_along_its_tangent():
+    pump, known = Pump(FLOWS, HEADS, DENSITY, SUPPLY), PchipInterpolator(FLOWS, HEADS)
+    for flow in np.linspace(0.0, 0.09, 37):
+        head, slope = pump.head_and_slope(flow)
+        assert head == pytest.approx(float(known(flow)), rel=1e-13)
+        assert slope == pytest.approx(float(known(flow, 1)), rel=1e-11, abs=1e-10)
+        assert float(pump.curve(flow)) == pytest.approx(head, rel=1e-13)
+    assert pump.head_and_slope(0.1)[0] == pytest.approx(HEADS[-1] + 0.01 * float(known(0.09, 1)), rel=1e-12)
+    assert pump.head_and_slope(-0.1)[0] == pytest.approx(HEADS[0] - 0.1 * float(known(0.0, 1)), rel=1e-12)
+    assert pump.holds(0.0) and pump.holds(0.09) and not pump.holds(0.0901)
+
+
+@pytest.mark.parametrize("speed", [None, 500.0])
+def test_its_slope_stands_beside_the_velocity(speed):
+    """The linearised flow is that without a pump, plus rho g dH/dQ 4 A_in in every pressure; steady flow is its own."""
+    z, area = passage()
+    given, pump = {"inlet": SUPPLY, "density": DENSITY}, Pump(FLOWS, HEADS, DENSITY, SUPPLY)
+    line = Line(7.0, 0.2, 0.02)
+
+    def law(*pumps):
+        rigid = Channel(z, FLOOR, 0.4, terms=[line, *pumps])
+        if speed is None:
+            return rigid
+        return LineChannel(Channel(z, FLOOR, 0.4), rigid, ElasticLine(line, speed, 3, *pumps))
+
+    ours, theirs = (x.linearise_still(area, given) for x in (law(pump), law()))
+    velocity = law().inlet_velocity(area, SUPPLY, DENSITY)
+    assert law(pump).inlet_velocity(area, SUPPLY, DENSITY) == velocity
+    slope = DENSITY * GRAVITY * pump.head_and_slope(4 * area[-1] * velocity)[1] * 4 * area[-1]
+    assert slope < 0
+    place = (0, 0) if speed is None else (1, 1)  # the velocity at the far end and its equation
+    sign = 1 if speed is None else -1
+    assert ours.S0[place] - theirs.S0[place] == pytest.approx(sign * slope, rel=1e-10)
+    if speed is None:
+        assert ours.B0[1:] - theirs.B0[1:] == pytest.approx(np.full((len(area) - 1, 1), slope), rel=1e-9)
+    else:
+        waves = LineWaves(law(pump).line, area[-1], DENSITY)
+        found, steep = waves.far(velocity, SUPPLY)
+        d = 1e-6
+        assert steep == pytest.approx((waves.far(velocity + d, SUPPLY)[0] - found) / d, rel=1e-5)
+        assert DENSITY * steep - slope == pytest.approx(
+            DENSITY * LineWaves(law().line, area[-1], DENSITY).far(velocity, 0)[1]
+        )
+
+
+def test_other_densities_see_the_pressures_of_the_pump():
+    """At unit density, with velocities scaled by the root of it, the law is the same: what families of pencils use."""
+    z, area = passage()
+    law = Channel(z, FLOOR, 1.0, terms=[Line(7.0, 0.2, 0.02), Pump(FLOWS, HEADS, DENSITY, SUPPLY)])
+    own, unit = (law.linearise_still(area, {"inlet": SUPPLY, "density": rho}) for rho in (DENSITY, 1.0))
+    root = np.sqrt(DENSITY)
+    for name, power in {"A0": 0, "A1": 1, "A2": 2, "B0": 1, "B1": 2, "S0": 1, "S1": 2}.items():
+        assert getattr(own, name) == pytest.approx(getattr(unit, name) * root**power, rel=1e-9, abs=1e-6)
+
+
+def plug(face: float, steep: float) -> tuple[CoupledPencil, float, float]:
+    """The plug of `tests.flow.test_line` behind a pump of a straight curve, Pa s/m in the velocity; with B and r."""
+    area = np.array([LIP, INLET])
+    bare = Channel(np.array([0.0, 1e-13]), 1e-9, terms=[Line(LENGTH, reservoir=False)])
+    given = {"inlet": SUPPLY, "density": DENSITY}
+    velocity = bare.inlet_velocity(area, **given)
+    flow, unit = 4 * INLET * velocity, DENSITY * GRAVITY
+    flows = np.array([0.5, 1.5]) * flow
+    heads = SUPPLY / unit - steep * (flows / (4 * INLET) - velocity) / unit
+    pump = Pump(flows, heads, DENSITY, SUPPLY)
+    channel = Channel(np.array([0.0, 1e-13]), 1e-9, terms=[Line(LENGTH, reservoir=False), pump])
+    parts = channel.linearise_still(area, given).parts()
+    pencil = CoupledPencil(M=[[MASS]], C=[[DAMPING]], K=[[STIFFNESS]], G=[[0.0, face]], J=[[-WIDTH], [0.0]], **parts)
+    ratio = INLET / LIP
+    rate = (velocity * (ratio**2 - 1.0) + steep / DENSITY) / LENGTH
+    return pencil, face * WIDTH * DENSITY * (ratio * velocity) ** 2 / LIP, rate
+
+
+@pytest.mark.parametrize("steep", [0.0, 2e4, 2e6])
+def test_a_steep_pump_changes_the_onset_as_the_closed_form_says(steep):
+    """(m s^2 + c s + k)(s + r) = B (s + d): the pump adds its slope to r and to d; with d = 0 the known onset."""
+    m, c, k = MASS, DAMPING, STIFFNESS
+    lost = steep / DENSITY / LENGTH
+    pencil, strength, rate = plug(2e-6, steep)
+    roots = np.roots([m, c + m * rate, k + c * rate - strength, k * rate - strength * lost])
+    found = leading_modes(pencil, 3).eigenvalues
+    for root in roots[roots.imag >= 0]:
+        assert np.abs(found - root).min() < 1e-8 * abs(root)
+    _, unit, r = plug(1.0, steep)
+    # omega^2 = k r - B d over c + m r, and k + c r - B
+    onset = (k * r * m - (k + c * r) * (c + m * r)) / (m * lost - (c + m * r))
+    omega2 = (k * r - onset * lost) / (c + m * r)
+    if omega2 > 0:
+        strength, omega = hopf(lambda s: plug(s / unit, steep)[0], 0.1 * onset, 3.0 * onset)
+        assert strength == pytest.approx(onset, rel=1e-7) and omega**2 == pytest.approx(omega2, rel=1e-7)
+        if not steep:
+            assert onset == pytest.approx(k + c * r - m * k * r / (c + m * r), rel=1e-9)
+        assert certified_spectrum(plug(1.01 * onset / unit, steep)[0], 2).unstable_count == 2
+        assert certified_spectrum(plug(0.99 * onset / unit, steep)[0], 2).unstable_count == 0
+    print(steep, onset, omega2)

@@ -1,0 +1,114 @@
+"""Pumps and heads in cases: operating points, modes at them, runs in time, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
+
+import dbvfiv
+from dbvfiv.case import CaseError
+from dbvfiv.case.quantity import GRAVITY
+from dbvfiv.errors import SolveError
+from dbvfiv.studies.case import load_case
+
+SMALL = {
+    "mesh.around": 6,
+    "mesh.along": 8,
+    "upstream.length": 20.0,
+    "upstream.diameter": 0.3,
+    "upstream.friction": 0.02,
+}
+DAMPED = {"damping.alpha": 0.0, "damping.beta": 1e-3}
+ROWS = [[0, 3.0], [0.03, 2.6], [0.06, 1.8], [0.1, 0.3]]
+PUMP = {"upstream.pump": ROWS}
+
+
+def load(*keys):
+    changes = SMALL | DAMPED
+    for some in keys:
+        changes = changes | some
+    return dbvfiv.load(None, changes)
+
+
+@pytest.fixture(scope="module")
+def operating():
+    (state,) = load(PUMP).steady().states
+    return state
+
+
+def test_the_operating_point_is_where_the_curves_cross(operating):
+    """Against a hand calculation: flows over pressure without a pump, by a cubic through states around."""
+    curve = PchipInterpolator(*np.array(ROWS).T)
+    assert operating.hydraulics.supply_head == pytest.approx(float(curve(operating.volume_flow)), rel=1e-9)
+    pressures = operating.pressure * np.array([0.9, 0.97, 1.03, 1.1])
+    flows = [load().steady(pressure=float(p)).volume_flow for p in pressures]
+    flow = np.poly1d(np.polyfit(pressures, flows, 3))
+    crossing = brentq(lambda p: p - 1000.0 * GRAVITY * curve(flow(p)), pressures[0], pressures[-1])
+    assert operating.pressure == pytest.approx(crossing, rel=1e-6)
+
+
+def test_a_list_of_pressures_is_what_was_asked_for(operating):
+    found = load(PUMP).steady(pressure=["5 kPa", "10 kPa"])
+    assert [state.pressure for state in found.states] == [5e3, 1e4]
+    assert found.states[0].volume_flow == pytest.approx(load().steady(pressure="5 kPa").volume_flow, rel=1e-9)
+
+
+def test_the_command_line_gives_the_operating_point(command_line, operating, tmp_path):
+    (tmp_path / "pump.csv").write_text("flow [L/s], head [m]\n0, 3\n30, 2.6\n60, 1.8\n100, 0.3\n")
+    options = [f"--set={key}={value}" for key, value in (SMALL | DAMPED).items()]
+    out = command_line("steady", *options, f"--set=upstream.pump={tmp_path / 'pump.csv'}").out
+    assert f"{operating.pressure / 1e3:.6g}" in out
+
+
+@pytest.mark.parametrize("waves", [{}, {"upstream.wave_speed": 1000.0, "mesh.along": 12, "mesh.around": 8}])
+def test_modes_see_the_slope_and_sweeps_keep_the_pressure(waves):
+    point = load(waves, PUMP).steady().states[0].pressure
+    fixed = load(waves, {"drive.pressure": point, "modes.count": 2}).modes()
+    found = load(waves, PUMP, {"sweep.checks": 2}).sweep("beta=0.5 ms:2 ms:3", count=2)
+    middle = load(waves, PUMP, {"damping.beta": found.values[1]}).modes(count=2)
+    assert middle.modes[0].growth_rate != pytest.approx(fixed.modes[0].growth_rate, rel=1e-3)
+    growth = max(b.growth_rate[1] for b in found.branches if np.isfinite(b.growth_rate[1]))
+    assert growth == pytest.approx(middle.modes[0].growth_rate, rel=1e-6, abs=1e-8)
+
+
+def test_a_run_stays_at_the_operating_point_and_comes_back_to_it(operating):
+    steady = {"transient.start": "steady", "transient.step": 4e-3}
+    run = load(PUMP, steady, {"transient.duration": 0.04}).transient()
+    assert np.abs(run.history["mass_flow"] / operating.mass_flow - 1).max() < 1e-9
+    low = {"drive.pressure": 0.97 * operating.pressure, "transient.duration": 0.4}
+    away = load(PUMP, low, steady).transient().history["mass_flow"] / operating.mass_flow - 1
+    slowest = load(PUMP).modes(count=1).modes[0]
+    assert slowest.frequency == 0 and away[0] < -0.01
+    assert away[-1] / away[50] == pytest.approx(np.exp(0.2 * slowest.growth_rate), rel=0.02)
+
+
+def test_a_flow_beyond_the_table_is_told():
+    with pytest.raises(SolveError, match="pump's table goes from 0 to 10 L/s.*no operating point"):
+        load({"upstream.pump": [[0, 10.0], [0.01, 9.0]]}).modes(count=2)
+    with pytest.raises(SolveError, match="takes .* L/s, and the pump's table goes from"):
+        load(PUMP, {"drive.pressure": 80e3}).modes(count=2)
+    above = [[row[0] + 0.01, row[1]] for row in ROWS]
+    found = load({"upstream.pump": above}, {"transient.duration": 0.01}).transient()
+    assert found.failures and "table goes from 10 to" in found.failures[0]
+
+
+def test_what_has_no_meaning_with_a_pump_is_refused():
+    with pytest.raises(CaseError, match="Over the density a pump has no steady state to keep"):
+        load(PUMP).sweep("density=100:1000:3")
+    with pytest.raises(CaseError, match=r"transient\.ramp is given beside a pump"):
+        load(PUMP, {"transient.ramp": 0.1})
+    with pytest.raises(CaseError, match=r"no wave_speed to change"):
+        load().sweep("wave_speed=100:1000:3")
+
+
+def test_a_head_is_another_way_to_give_the_pressure():
+    case = load_case(None, ["drive.head=3 m", "fluid.density=800"])
+    assert case.drive.pressure == pytest.approx(800 * GRAVITY * 3, rel=1e-14) and case.drive.head is None
+    assert case.steady_pressures() == (case.drive.pressure,)
+    other = case.replace({"drive.head": 2.0})
+    assert other.drive.pressure == pytest.approx(800 * GRAVITY * 2, rel=1e-14)
+    assert other.steady_pressures() == (other.drive.pressure,)
+    assert case.replace({"fluid.density": 1.2}).drive.pressure == case.drive.pressure
+    assert type(case).from_dict(case.to_dict()) == case
