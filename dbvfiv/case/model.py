@@ -88,6 +88,7 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
+        self.mesh.check_positions(self.valve.length)
         self.upstream.check_roughness(2 * (self.valve.flange_radius - self.valve.flange_wall_deduction))
         return self
 

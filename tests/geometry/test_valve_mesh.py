@@ -8,7 +8,8 @@ import pytest
 from dbvfiv.case.key_points import POINTS, PROFILES
 from dbvfiv.case.model import Case
 from dbvfiv.geometry import surface_of, valve_mesh
-from dbvfiv.geometry.valve_mesh import grading, row_positions, wall_deduction
+from dbvfiv.geometry.divisions import row_division
+from dbvfiv.geometry.valve_mesh import grading, wall_deduction
 from dbvfiv.model.build import build_shell
 
 VALVE = Case().valve

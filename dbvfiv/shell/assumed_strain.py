@@ -1,0 +1,148 @@
+"""In-plane strains of the element: sixteen numbers sampled from its shape, and constant maps from them to its points.
+
+The covariant Green-Lagrange strains of a bilinear element are combinations of six products of its position,
+s_k = x' H_k x / 2 less their value at rest: along its four edges, the shear at its centre, and the product x_d . x_d of
+its distortion vector. Their change along the director, x' H_k d, gives the bending strains. Whatever is assumed about
+the strains is a constant matrix on these numbers, so the energy stays a function of the nodal unknowns alone: no inner
+unknowns, no strain under rigid motion, a symmetric tangent.
+
+``MITC4``
+    The products as they are.
+``MITC4+``
+    x_d . x_d is replaced by what the other five say of it in a flat element, by which warped elements bend without
+    stretching (Ko, Lee & Bathe 2016, Computers and Structures 169, 57-68; 2017, 182, 404-418). Flat ones stay as
+    they are.
+``MITC4+EAS``
+    On top of it four enhanced membrane modes (Simo & Rifai 1990, Int. J. Num. Meth. Eng. 29, 1595-1638), by which flat
+    elements bend in their plane. They are condensed once, with the stiffness of the wall at rest: exactly for linear
+    walls; for rubber it is one of many admissible assumed strains, the same at all states.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .reference import GAUSS, ReferenceGeometry, strain_map
+
+MITC4, MITC4_PLUS, ENHANCED = "MITC4", "MITC4+", "MITC4+EAS"
+ELEMENTS = (ENHANCED, MITC4_PLUS, MITC4)
+
+#: Half the vectors along the edges 01, 32 (first direction) and 03, 12 (second), the two directions at the centre
+#: x_r, x_s, and the distortion x_d, from the nodes (7, 4).
+VECTORS = 0.25 * np.array(
+    [
+        [-2.0, 2.0, 0.0, 0.0],
+        [0.0, 0.0, 2.0, -2.0],
+        [-2.0, 0.0, 0.0, 2.0],
+        [0.0, -2.0, 2.0, 0.0],
+        [-1.0, 1.0, 1.0, -1.0],
+        [-1.0, -1.0, 1.0, 1.0],
+        [1.0, -1.0, 1.0, -1.0],
+    ]
+)
+#: H_k (6, 4, 4), symmetric.
+PRODUCTS = np.array(
+    [np.outer(v, v) for v in VECTORS[:4]]
+    + [np.outer(VECTORS[4], VECTORS[5]) + np.outer(VECTORS[5], VECTORS[4]), np.outer(VECTORS[6], VECTORS[6])]
+)
+
+
+def _bilinear() -> np.ndarray:
+    """(4, 3, 6): strains [11, 22, 2 * 12] of a bilinear element at its points from the six products."""
+    r, s = GAUSS.T
+    zero = np.zeros(4)
+    first = [0.5 * (1 - s), 0.5 * (1 + s), zero, zero, zero, s**2 - 1]
+    second = [zero, zero, 0.5 * (1 - r), 0.5 * (1 + r), zero, r**2 - 1]
+    shear = [-0.5 * r, 0.5 * r, -0.5 * s, 0.5 * s, zero + 1, 2 * r * s]
+    return np.stack([np.stack(row, axis=1) for row in (first, second, shear)], axis=1)
+
+
+BILINEAR = _bilinear()
+#: Enhanced modes at the points in natural coordinates (4, 3, 4).
+_MODES = np.stack([np.array([[r, 0, 0, 0], [0, s, 0, 0], [0, 0, r, s]]) for r, s in GAUSS])
+
+
+def rest_products(x: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """(ne, 12): the six products and their change along the directors, from positions and directors (ne, 4, 3)."""
+    u, v = np.einsum("ma,eai->emi", VECTORS, x), np.einsum("ma,eai->emi", VECTORS, d)
+    dot = lambda a, b: np.einsum("emi,emi->em", a, b)  # noqa: E731
+    r, s = slice(4, 5), slice(5, 6)
+    membrane = [0.5 * dot(u[:, :4], u[:, :4]), dot(u[:, r], u[:, s]), 0.5 * dot(u[:, 6:], u[:, 6:])]
+    bending = [dot(u[:, :4], v[:, :4]), dot(u[:, r], v[:, s]) + dot(u[:, s], v[:, r]), dot(u[:, 6:], v[:, 6:])]
+    return np.concatenate(membrane + bending, axis=1)
+
+
+def inplane_map(mesh, geometry: ReferenceGeometry, section, element: str) -> np.ndarray:
+    """(ne, 4, 6, 12): covariant strain coefficients c0 (3) and c1 (3) at the points from `rest_products`.
+
+    Raises
+    ------
+    ValueError
+        If there is no element of that name.
+    """
+    if element not in ELEMENTS:
+        raise ValueError(f"The element is '{element}', but only {', '.join(ELEMENTS)} exist.")
+    x = mesh.nodes[mesh.quads]
+    tied = np.broadcast_to(BILINEAR, (len(x), 4, 3, 6))
+    if element != MITC4:
+        tied = tied @ _tying(x)[:, None]
+    count = len(tied)
+    whole = np.zeros((count, 4, 6, 12))
+    whole[:, :, :3, :6] = whole[:, :, 3:, 6:] = tied
+    if element == ENHANCED:
+        whole[:, :, :3] += _enhancement(x, geometry, section, whole)
+    return whole
+
+
+def _tying(x: np.ndarray) -> np.ndarray:
+    """(ne, 6, 6): products with the sixth from the other five, exact where the element is flat."""
+    u = np.einsum("ma,eai->emi", VECTORS[4:], x)
+    basis, distortion = u[:, :2], u[:, 2]
+    metric = np.einsum("eai,ebi->eab", basis, basis)
+    c = np.linalg.solve(metric, np.einsum("eai,ei->ea", basis, distortion)[..., None])[..., 0]
+    a, b = c.T
+    rest = 1.0 - a**2 - b**2  # positive in every convex element
+    row = np.stack([-a - a**2, a - a**2, -b - b**2, b - b**2, -2 * a * b], axis=1) / (2 * rest[:, None])
+    out = np.tile(np.eye(6), (len(x), 1, 1))
+    out[:, 5, :5], out[:, 5, 5] = row, 0.0
+    return out
+
+
+def local_map(geometry: ReferenceGeometry) -> np.ndarray:
+    """(ne, 4, 6, 6): membrane and bending strains in local axes from the covariant coefficients c0 and c1."""
+    out = np.zeros((len(geometry.q), 4, 6, 6))
+    out[:, :, :3, :3] = out[:, :, 3:, 3:] = geometry.q
+    out[:, :, 3:, :3] = -geometry.qk
+    return out
+
+
+def _enhancement(x, geometry: ReferenceGeometry, section, compatible: np.ndarray) -> np.ndarray:
+    """(ne, 4, 3, 12): what the enhanced modes add to c0, at their amplitudes of least energy of the wall at rest."""
+    u = np.einsum("ma,eai->emi", VECTORS[4:6], x)
+    normal = np.cross(u[:, 0], u[:, 1])
+    size = np.linalg.norm(normal, axis=1)
+    # axes at the centre: the means of those at the points, so that constant stress in local axes does no work
+    first = geometry.axes[:, :, 0].mean(axis=1)
+    normal /= size[:, None]
+    first -= np.einsum("ei,ei->e", first, normal)[:, None] * normal
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    axes = np.stack([first, np.cross(normal, first)], axis=1)
+    dual = np.linalg.inv(np.einsum("eci,edi->ecd", u, u)) @ u
+    turned = strain_map(np.einsum("eai,eci->eac", axes, dual))
+    modes = (size[:, None] / geometry.area)[..., None, None] * (turned[:, None] @ _MODES)  # local, (ne, 4, 3, 4)
+    covariant = np.linalg.solve(geometry.q, modes)
+    local = local_map(geometry)
+    strained = np.concatenate([modes, -geometry.qk @ covariant], axis=2)  # (ne, 4, 6, 4)
+    pull = np.einsum("ep,epia,eij->epaj", geometry.area, strained, wall_at_rest(section, geometry.thickness))
+    stiffness = np.einsum("epaj,epjb->eab", pull, strained)
+    load = np.einsum("epaj,epjk->eak", pull, local @ compatible)
+    amplitude = -np.linalg.solve(stiffness, load)
+    return covariant @ amplitude[:, None]
+
+
+def wall_at_rest(section, thickness: np.ndarray) -> np.ndarray:
+    """(ne, 6, 6) stiffness of the wall at rest against membrane strain and curvature."""
+    unit = section.plane_stiffness
+    h = np.asarray(thickness)[:, None, None]
+    power = np.array([1, 1, 1, 2, 2, 2])[:, None] + np.array([0, 0, 0, 1, 1, 1])
+    return unit * h**power
