@@ -125,8 +125,8 @@ def strain_energy(
     stiffness, points, constants, scales = wall
     x = np.empty((4, 3))
     d = np.empty((4, 3))
-    u = np.empty((7, 3))
-    v = np.empty((7, 3))
+    u = np.empty((3, 3))
+    v = np.empty((3, 3))
     z = np.empty(16)
     strain = np.empty(8)
     stress = np.empty(8)

@@ -1,21 +1,27 @@
-"""In-plane strains of the element: sixteen numbers sampled from its shape, and constant maps from them to its points.
+"""In-plane strains of the element: twelve numbers sampled from its shape, and constant maps from them to its points.
 
-The covariant Green-Lagrange strains of a bilinear element are combinations of six products of its position,
-s_k = x' H_k x / 2 less their value at rest: along its four edges, the shear at its centre, and the product x_d . x_d of
-its distortion vector. Their change along the director, x' H_k d, gives the bending strains. Whatever is assumed about
-the strains is a constant matrix on these numbers, so the energy stays a function of the nodal unknowns alone: no inner
-unknowns, no strain under rigid motion, a symmetric tangent.
+With x_r, x_s the tangents at the centre of a bilinear element and x_d its distortion, the tangents anywhere are
+x_r + s x_d and x_s + r x_d, so its covariant Green-Lagrange strains are combinations of six products z_k = x' H_k x / 2,
+less their value at rest: x_r.x_r/2, x_s.x_s/2, x_r.x_s, x_r.x_d, x_s.x_d and x_d.x_d/2. Their change along the
+directors, x' H_k d, gives the bending strains. Whatever is assumed about the strains is a constant matrix on these
+numbers, so the energy stays a function of the nodal unknowns alone: no inner unknowns, no strain under rigid motion, a
+symmetric tangent.
 
 ``MITC4``
     The products as they are.
 ``MITC4+``
-    x_d . x_d is replaced by what the other five say of it in a flat element, by which warped elements bend without
-    stretching (Ko, Lee & Bathe 2016, Computers and Structures 169, 57-68; 2017, 182, 404-418). Flat ones stay as
-    they are.
+    x_d.x_d is replaced by what the other five say of it in a flat element, by which warped elements bend without
+    stretching (Ko, Lee & Bathe 2016, Computers and Structures 169, 57-68; 2017, 182, 404-418; here from the centre
+    instead of the edges, which is the same for small displacements). Small displacements of flat elements give the
+    same as before, homogeneous strains of any size too.
 ``MITC4+EAS``
     On top of it four enhanced membrane modes (Simo & Rifai 1990, Int. J. Num. Meth. Eng. 29, 1595-1638), by which flat
     elements bend in their plane. They are condensed once, with the stiffness of the wall at rest: exactly for linear
     walls; for rubber it is one of many admissible assumed strains, the same at all states.
+
+Enhanced elements are known to buckle by themselves under pressure along their short side (Sussman & Bathe 2014,
+Computers and Structures 140, 14-22): the enhancement takes away the stiffness against the hourglass motion x_d, and the
+product x_d.x_d, squared strains of that motion, keeps its geometric stiffness. Without that product both are gone.
 """
 
 from __future__ import annotations
@@ -27,33 +33,30 @@ from .reference import GAUSS, ReferenceGeometry, strain_map
 MITC4, MITC4_PLUS, ENHANCED = "MITC4", "MITC4+", "MITC4+EAS"
 ELEMENTS = (ENHANCED, MITC4_PLUS, MITC4)
 
-#: Half the vectors along the edges 01, 32 (first direction) and 03, 12 (second), the two directions at the centre
-#: x_r, x_s, and the distortion x_d, from the nodes (7, 4).
-VECTORS = 0.25 * np.array(
-    [
-        [-2.0, 2.0, 0.0, 0.0],
-        [0.0, 0.0, 2.0, -2.0],
-        [-2.0, 0.0, 0.0, 2.0],
-        [0.0, -2.0, 2.0, 0.0],
-        [-1.0, 1.0, 1.0, -1.0],
-        [-1.0, -1.0, 1.0, 1.0],
-        [1.0, -1.0, 1.0, -1.0],
-    ]
-)
-#: H_k (6, 4, 4), symmetric.
-PRODUCTS = np.array(
-    [np.outer(v, v) for v in VECTORS[:4]]
-    + [np.outer(VECTORS[4], VECTORS[5]) + np.outer(VECTORS[5], VECTORS[4]), np.outer(VECTORS[6], VECTORS[6])]
-)
+#: Tangents at the centre x_r, x_s and distortion x_d from the nodes (3, 4).
+VECTORS = 0.25 * np.array([[-1.0, 1.0, 1.0, -1.0], [-1.0, -1.0, 1.0, 1.0], [1.0, -1.0, 1.0, -1.0]])
+#: The two vectors of each product and its factor.
+PAIRS = np.array([[0, 0], [1, 1], [0, 1], [0, 2], [1, 2], [2, 2]])
+FACTORS = np.where(PAIRS[:, 0] == PAIRS[:, 1], 0.5, 1.0)
+
+
+def _matrices() -> np.ndarray:
+    """H_k (6, 4, 4), symmetric."""
+    first, second = VECTORS[PAIRS[:, 0]], VECTORS[PAIRS[:, 1]]
+    one = FACTORS[:, None, None] * first[:, :, None] * second[:, None, :]
+    return one + one.transpose(0, 2, 1)
+
+
+PRODUCTS = _matrices()
 
 
 def _bilinear() -> np.ndarray:
     """(4, 3, 6): strains [11, 22, 2 * 12] of a bilinear element at its points from the six products."""
     r, s = GAUSS.T
-    zero = np.zeros(4)
-    first = [0.5 * (1 - s), 0.5 * (1 + s), zero, zero, zero, s**2 - 1]
-    second = [zero, zero, 0.5 * (1 - r), 0.5 * (1 + r), zero, r**2 - 1]
-    shear = [-0.5 * r, 0.5 * r, -0.5 * s, 0.5 * s, zero + 1, 2 * r * s]
+    zero, one = np.zeros(4), np.ones(4)
+    first = [one, zero, zero, s, zero, s**2]
+    second = [zero, one, zero, zero, r, r**2]
+    shear = [zero, zero, one, r, s, 2 * r * s]
     return np.stack([np.stack(row, axis=1) for row in (first, second, shear)], axis=1)
 
 
@@ -65,11 +68,9 @@ _MODES = np.stack([np.array([[r, 0, 0, 0], [0, s, 0, 0], [0, 0, r, s]]) for r, s
 def rest_products(x: np.ndarray, d: np.ndarray) -> np.ndarray:
     """(ne, 12): the six products and their change along the directors, from positions and directors (ne, 4, 3)."""
     u, v = np.einsum("ma,eai->emi", VECTORS, x), np.einsum("ma,eai->emi", VECTORS, d)
-    dot = lambda a, b: np.einsum("emi,emi->em", a, b)  # noqa: E731
-    r, s = slice(4, 5), slice(5, 6)
-    membrane = [0.5 * dot(u[:, :4], u[:, :4]), dot(u[:, r], u[:, s]), 0.5 * dot(u[:, 6:], u[:, 6:])]
-    bending = [dot(u[:, :4], v[:, :4]), dot(u[:, r], v[:, s]) + dot(u[:, s], v[:, r]), dot(u[:, 6:], v[:, 6:])]
-    return np.concatenate(membrane + bending, axis=1)
+    i, j = PAIRS.T
+    dot = lambda a, b: FACTORS * np.einsum("eki,eki->ek", a, b)  # noqa: E731
+    return np.concatenate([dot(u[:, i], u[:, j]), dot(u[:, i], v[:, j]) + dot(v[:, i], u[:, j])], axis=1)
 
 
 def inplane_map(mesh, geometry: ReferenceGeometry, section, element: str) -> np.ndarray:
@@ -95,16 +96,18 @@ def inplane_map(mesh, geometry: ReferenceGeometry, section, element: str) -> np.
 
 
 def _tying(x: np.ndarray) -> np.ndarray:
-    """(ne, 6, 6): products with the sixth from the other five, exact where the element is flat."""
-    u = np.einsum("ma,eai->emi", VECTORS[4:], x)
+    """(ne, 6, 6): products with the sixth from the other five, exact where a flat element is strained homogeneously.
+
+    With x_d = a x_r + b x_s, small or homogeneous strains have x_d.x_d/2 = a x_r.x_d + b x_s.x_d - a^2 x_r.x_r/2 - b^2
+    x_s.x_s/2 - a b x_r.x_s, all as changes from rest; of a warped element a and b are those of the part of x_d in the
+    plane of x_r and x_s.
+    """
+    u = np.einsum("ma,eai->emi", VECTORS, x)
     basis, distortion = u[:, :2], u[:, 2]
     metric = np.einsum("eai,ebi->eab", basis, basis)
-    c = np.linalg.solve(metric, np.einsum("eai,ei->ea", basis, distortion)[..., None])[..., 0]
-    a, b = c.T
-    rest = 1.0 - a**2 - b**2  # positive in every convex element
-    row = np.stack([-a - a**2, a - a**2, -b - b**2, b - b**2, -2 * a * b], axis=1) / (2 * rest[:, None])
+    a, b = np.linalg.solve(metric, np.einsum("eai,ei->ea", basis, distortion)[..., None])[..., 0].T
     out = np.tile(np.eye(6), (len(x), 1, 1))
-    out[:, 5, :5], out[:, 5, 5] = row, 0.0
+    out[:, 5] = np.stack([-(a**2), -(b**2), -a * b, a, b, 0 * a], axis=1)
     return out
 
 
@@ -118,7 +121,7 @@ def local_map(geometry: ReferenceGeometry) -> np.ndarray:
 
 def _enhancement(x, geometry: ReferenceGeometry, section, compatible: np.ndarray) -> np.ndarray:
     """(ne, 4, 3, 12): what the enhanced modes add to c0, at their amplitudes of least energy of the wall at rest."""
-    u = np.einsum("ma,eai->emi", VECTORS[4:6], x)
+    u = np.einsum("ma,eai->emi", VECTORS[:2], x)
     normal = np.cross(u[:, 0], u[:, 1])
     size = np.linalg.norm(normal, axis=1)
     # axes at the centre: the means of those at the points, so that constant stress in local axes does no work

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..materials.incompressible import mooney_rivlin_energy
 from ..materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, linear_elastic_energy
-from .assumed_strain import VECTORS
+from .assumed_strain import FACTORS, PAIRS, VECTORS
 from .reference import SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE, ReferenceGeometry, strain_map, thickness_over_radius
 from .rotation import director
 from .section import Section
@@ -128,14 +128,9 @@ def strains_of_shape(x, d, element, layers, metric):
 def inplane_products(x, d):
     """(12,): the six products of positions and their change along the directors, both (4, 3); see `assumed_strain`."""
     u, v = VECTORS @ x, VECTORS @ d
-    return jnp.concatenate(
-        [
-            0.5 * jnp.sum(u[:4] * u[:4], axis=1),
-            jnp.stack([u[4] @ u[5], 0.5 * (u[6] @ u[6])]),
-            jnp.sum(u[:4] * v[:4], axis=1),
-            jnp.stack([u[4] @ v[5] + u[5] @ v[4], u[6] @ v[6]]),
-        ]
-    )
+    i, j = PAIRS.T
+    products = FACTORS * jnp.sum(u[i] * u[j], axis=1)
+    return jnp.concatenate([products, FACTORS * jnp.sum(u[i] * v[j] + v[i] * u[j], axis=1)])
 
 
 def _half_metric(a):

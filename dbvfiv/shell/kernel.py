@@ -14,13 +14,15 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .assumed_strain import PRODUCTS, VECTORS
+from .assumed_strain import FACTORS, PAIRS, PRODUCTS, VECTORS
 from .kernel_rubber import FAST
 from .kernel_section import section_stress, section_tangent
 from .kernel_strain import numbers_of, strains_at
 from .reference import SHEAR_EDGES
 
 _VECTORS = np.ascontiguousarray(VECTORS)
+_PAIRS = np.ascontiguousarray(PAIRS)
+_FACTORS = np.ascontiguousarray(FACTORS)
 _PRODUCTS = np.ascontiguousarray(PRODUCTS)
 _EDGES = np.ascontiguousarray(SHEAR_EDGES)
 
@@ -40,22 +42,26 @@ def _add_stress(inplane, across, weight, stress, w):
 
 @numba.njit(fastmath=FAST, inline="always")
 def _forces(w, u, v, x, d, fu, fv, fx, fd):
-    """Forces on positions and directors (4, 3) from those on the numbers; fu and fv are workspace (7, 3)."""
-    for i in range(3):
-        for k in range(4):
-            fu[k, i] = w[k] * u[k, i] + w[6 + k] * v[k, i]
-            fv[k, i] = w[6 + k] * u[k, i]
-        fu[4, i] = w[4] * u[5, i] + w[10] * v[5, i]
-        fu[5, i] = w[4] * u[4, i] + w[10] * v[4, i]
-        fv[4, i] = w[10] * u[5, i]
-        fv[5, i] = w[10] * u[4, i]
-        fu[6, i] = w[5] * u[6, i] + w[11] * v[6, i]
-        fv[6, i] = w[11] * u[6, i]
+    """Forces on positions and directors (4, 3) from those on the numbers; fu and fv are workspace (3, 3)."""
+    for m in range(3):
+        for i in range(3):
+            fu[m, i] = 0.0
+            fv[m, i] = 0.0
+    for k in range(6):
+        a = _PAIRS[k, 0]
+        b = _PAIRS[k, 1]
+        membrane = _FACTORS[k] * w[k]
+        bending = _FACTORS[k] * w[6 + k]
+        for i in range(3):
+            fu[a, i] += membrane * u[b, i] + bending * v[b, i]
+            fu[b, i] += membrane * u[a, i] + bending * v[a, i]
+            fv[a, i] += bending * u[b, i]
+            fv[b, i] += bending * u[a, i]
     for a in range(4):
         for i in range(3):
             fx[a, i] = 0.0
             fd[a, i] = 0.0
-        for m in range(7):
+        for m in range(3):
             share = _VECTORS[m, a]
             for i in range(3):
                 fx[a, i] += share * fu[m, i]
@@ -89,17 +95,17 @@ def _add_to_nodes(quad, fx, fd, director1, out):
 
 @numba.njit(inline="always")
 def _workspace():
-    """Positions, directors and forces on both (4, 3), vectors and forces on them (7, 3), numbers and forces (16,),
+    """Positions, directors and forces on both (4, 3), vectors and forces on them (3, 3), numbers and forces (16,),
     strains and resultants (8,).
     """
     x = np.empty((4, 3))
     d = np.empty((4, 3))
     fx = np.empty((4, 3))
     fd = np.empty((4, 3))
-    u = np.empty((7, 3))
-    v = np.empty((7, 3))
-    fu = np.empty((7, 3))
-    fv = np.empty((7, 3))
+    u = np.empty((3, 3))
+    v = np.empty((3, 3))
+    fu = np.empty((3, 3))
+    fv = np.empty((3, 3))
     z = np.empty(16)
     w = np.empty(16)
     strain = np.empty(8)
@@ -183,23 +189,19 @@ def _add_tangent(inplane, across, weight, tangent, product, kz):
 def _slopes(quad, u, v, x, d, director1, by_x, by_d, bz):
     """Slope bz (16, 20) of the numbers by the element's unknowns; by_x and by_d (16, 4, 3) are workspace."""
     for a in range(4):
-        p = _VECTORS[4, a]
-        q = _VECTORS[5, a]
-        t = _VECTORS[6, a]
-        for i in range(3):
-            for k in range(4):
-                s = _VECTORS[k, a]
-                by_x[k, a, i] = s * u[k, i]
-                by_x[6 + k, a, i] = s * v[k, i]
-            by_x[4, a, i] = p * u[5, i] + q * u[4, i]
-            by_x[10, a, i] = p * v[5, i] + q * v[4, i]
-            by_x[5, a, i] = t * u[6, i]
-            by_x[11, a, i] = t * v[6, i]
-            for e in range(4):
-                by_x[12 + e, a, i] = 0.0
-                by_d[12 + e, a, i] = 0.0
-            for k in range(6):
+        for k in range(6):
+            first = _PAIRS[k, 0]
+            second = _PAIRS[k, 1]
+            p = _FACTORS[k] * _VECTORS[first, a]
+            q = _FACTORS[k] * _VECTORS[second, a]
+            for i in range(3):
+                by_x[k, a, i] = p * u[second, i] + q * u[first, i]
+                by_x[6 + k, a, i] = p * v[second, i] + q * v[first, i]
                 by_d[6 + k, a, i] = by_x[k, a, i]
+        for e in range(12, 16):
+            for i in range(3):
+                by_x[e, a, i] = 0.0
+                by_d[e, a, i] = 0.0
     for e in range(4):
         a = _EDGES[e, 0]
         b = _EDGES[e, 1]

@@ -44,8 +44,8 @@ def slow_resultants(
     thickness = reference[5]
     x = np.empty((4, 3))
     d = np.empty((4, 3))
-    u = np.empty((7, 3))
-    v = np.empty((7, 3))
+    u = np.empty((3, 3))
+    v = np.empty((3, 3))
     z = np.empty(16)
     e = np.empty(5)
     s = np.empty(5)

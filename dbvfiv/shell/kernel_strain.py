@@ -9,11 +9,13 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .assumed_strain import VECTORS
+from .assumed_strain import FACTORS, PAIRS, VECTORS
 from .kernel_rubber import FAST
 from .reference import SHEAR_EDGES
 
 _VECTORS = np.ascontiguousarray(VECTORS)
+_PAIRS = np.ascontiguousarray(PAIRS)
+_FACTORS = np.ascontiguousarray(FACTORS)
 _EDGES = np.ascontiguousarray(SHEAR_EDGES)
 
 
@@ -29,8 +31,8 @@ def gather(quad, nodes, displacement, director, x, d):
 
 @numba.njit(fastmath=FAST, inline="always")
 def vectors(x, d, u, v):
-    """Vectors of the element (7, 3), of its positions and of its directors."""
-    for m in range(7):
+    """Tangents and distortion (3, 3) of the positions and of the directors of an element."""
+    for m in range(3):
         for i in range(3):
             u[m, i] = 0.0
             v[m, i] = 0.0
@@ -44,16 +46,16 @@ def vectors(x, d, u, v):
 @numba.njit(fastmath=FAST, inline="always")
 def numbers(x, d, u, v, products, shear, z):
     """The sixteen numbers z less their values at rest, `products` (12,) and `shear` (4,)."""
-    for k in range(12):
-        z[k] = -products[k]
-    for i in range(3):
-        for k in range(4):
-            z[k] += 0.5 * u[k, i] * u[k, i]
-            z[6 + k] += u[k, i] * v[k, i]
-        z[4] += u[4, i] * u[5, i]
-        z[10] += u[4, i] * v[5, i] + u[5, i] * v[4, i]
-        z[5] += 0.5 * u[6, i] * u[6, i]
-        z[11] += u[6, i] * v[6, i]
+    for k in range(6):
+        a = _PAIRS[k, 0]
+        b = _PAIRS[k, 1]
+        product = 0.0
+        change = 0.0
+        for i in range(3):
+            product += u[a, i] * u[b, i]
+            change += u[a, i] * v[b, i] + v[a, i] * u[b, i]
+        z[k] = _FACTORS[k] * product - products[k]
+        z[6 + k] = _FACTORS[k] * change - products[6 + k]
     for g in range(4):
         a = _EDGES[g, 0]
         b = _EDGES[g, 1]
