@@ -250,7 +250,7 @@ class Mesh(Section):
         "does (uniform).",
     )
     row_grading: Number = key(
-        0.3, "Length of the rows at a joint at which the surface turns by 20 degrees over that far from it.", ge=0.05, le=1.0
+        0.4, "Length of the rows at a joint at which the surface turns by 20 degrees over that far from it.", ge=0.05, le=1.0
     )
     breaks: tuple[Length, ...] = key((), "Further axial positions to put a row on, from the lip; not with uniform rows.")
     row_positions: tuple[Length, ...] = key(
@@ -258,10 +258,14 @@ class Mesh(Section):
         "Axial positions of all rows from the lip (0) to the flange, in place of rows and breaks; where along is not "
         "one less than their number, along rows are spread as these are.",
     )
-    columns: Literal["breaks", "uniform"] = key(
-        "breaks",
-        "A column of nodes on the edge of the loaded columns and of those with a lip stop, or even columns whatever "
-        "these do.",
+    columns: Literal["graded", "breaks", "uniform"] = key(
+        "graded",
+        "Columns of nodes on the edge of the loaded columns, of those with a lip stop and of the bend at the side of "
+        "the lip, and closer in that bend (graded); evenly between them (breaks); or even columns whatever these do "
+        "(uniform).",
+    )
+    column_grading: Number = key(
+        1 / 3, "Length of the columns in the bend at the side of the lip over that beside it.", ge=0.05, le=1.0
     )
 
     def check_positions(self, length: float) -> None:

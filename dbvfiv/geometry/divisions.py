@@ -12,7 +12,11 @@ from .surface import Surface
 #: Angle between two pieces of the surface from which their joint counts in full, rad; below it in proportion.
 FULL_KINK = np.radians(20.0)
 #: Distance from a joint, in walls, over which the rows grow to their length away from it.
-REACH = 3.0
+REACH = 1.5
+#: Turn of the lip's section that counts as its bend, rad.
+BEND = np.radians(5.0)
+#: A break of the load this near the bend, in the parameter of the grading, stands for it too.
+NEAR = 0.05
 _FINE = 4001
 
 
@@ -48,10 +52,45 @@ def row_division(valve: Valve, mesh: Mesh, surface: Surface) -> Division:
     return divide(joints, breaks, mesh.along, law)
 
 
-def column_division(mesh: Mesh, breaks) -> Division:
+def column_division(mesh: Mesh, surface: Surface, breaks) -> Division:
     """Positions of the columns in the parameter of the grading, 0 at the centre, 1 at the side edge."""
-    breaks = () if mesh.columns == "uniform" else [c for c in breaks if 0.0 < c < 1.0]
-    return divide(np.array([0.0, 1.0]), breaks, mesh.around)
+    ends = np.array([0.0, 1.0])
+    if mesh.columns == "uniform":
+        return divide(ends, (), mesh.around)
+    bend = inverse_grading(bend_of_lip(surface), mesh.grading)
+    breaks = [c for c in breaks if 0.0 < c < 1.0]
+    near = [c for c in breaks if abs(c - bend) < NEAR]
+    bend = near[0] if near else bend
+    if bend < 1.0 and not near:
+        breaks.append(bend)
+    if mesh.columns == "breaks" or not bend < 1.0:
+        return divide(ends, breaks, mesh.around)
+    law = np.array([0.0, bend, 1.0]), np.array([0.0, bend, bend + (1.0 - bend) / mesh.column_grading])
+    return divide(ends, breaks, mesh.around, law)
+
+
+def bend_of_lip(surface: Surface) -> float:
+    """Normalised arc length at which the section of the lip has turned by 5 degrees from its direction at the centre."""
+    s = np.linspace(0.0, 1.0, 2001)
+    steps = np.diff(surface.section(surface.breaks[0], s)[:, :2], axis=0)
+    turned = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    past = np.abs(turned - turned[0]) > BEND
+    return float(s[int(np.argmax(past))]) if past.any() else 1.0
+
+
+def grading(columns: np.ndarray, ratio: float) -> np.ndarray:
+    """Normalised arc length at the column parameters: element lengths fall geometrically from 1 to `ratio`.
+
+    A continuous law, so that meshes of twice the elements contain the nodes of the coarser ones.
+    """
+    if abs(ratio - 1.0) < 1e-9:
+        return np.asarray(columns, float)
+    return (1.0 - ratio ** np.asarray(columns, float)) / (1.0 - ratio)
+
+
+def inverse_grading(s: float, ratio: float) -> float:
+    """Column parameter at a normalised arc length."""
+    return s if abs(ratio - 1.0) < 1e-9 else float(np.log1p(-s * (1.0 - ratio)) / np.log(ratio))
 
 
 def divide(joints, breaks, count: int, law=None) -> Division:

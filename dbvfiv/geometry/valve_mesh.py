@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.valve import Mesh, Valve
-from .divisions import column_division, row_division
+from .divisions import column_division, grading, row_division
 from .surface import Surface, surface_of
 
 
@@ -72,7 +72,7 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=()) -> ValveMesh:
         If the mesh has fewer elements along than the surface has pieces.
     """
     surface = surface_of(valve)
-    along, across = row_division(valve, mesh, surface), column_division(mesh, column_breaks)
+    along, across = row_division(valve, mesh, surface), column_division(mesh, surface, column_breaks)
     z, columns = along.positions, across.positions
     s = grading(columns, mesh.grading)
     points = np.stack([surface.section(level, s) for level in z])
@@ -97,16 +97,6 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=()) -> ValveMesh:
         missed_rows=along.missed,
         missed_columns=across.missed,
     )
-
-
-def grading(columns: np.ndarray, ratio: float) -> np.ndarray:
-    """Normalised arc length at the column parameters: element lengths fall geometrically from 1 to `ratio`.
-
-    A continuous law, so that meshes of twice the elements contain the nodes of the coarser ones.
-    """
-    if abs(ratio - 1.0) < 1e-9:
-        return np.asarray(columns, float)
-    return (1.0 - ratio ** np.asarray(columns, float)) / (1.0 - ratio)
 
 
 def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
