@@ -250,9 +250,14 @@ class Mesh(Section):
         "does (uniform).",
     )
     row_grading: Number = key(
-        0.4, "Length of the rows at a joint at which the surface turns by 20 degrees over that far from it.", ge=0.05, le=1.0
+        0.4,
+        "Length of the rows at a joint at which the surface turns by 20 degrees over that far from it.",
+        ge=0.05,
+        le=1.0,
     )
-    breaks: tuple[Length, ...] = key((), "Further axial positions to put a row on, from the lip; not with uniform rows.")
+    breaks: tuple[Length, ...] = key(
+        (), "Further axial positions to put a row on, from the lip; not with uniform rows."
+    )
     row_positions: tuple[Length, ...] = key(
         (),
         "Axial positions of all rows from the lip (0) to the flange, in place of rows and breaks; where along is not "
@@ -273,7 +278,9 @@ class Mesh(Section):
         outside = next((z for z in self.breaks if not 0 < z < length), None)
         if outside is not None:
             raise BrokenRule(
-                "mesh.breaks", f"a list with {outside:g} m", f"a row lies between the lip, 0 m, and the flange, {length:g} m"
+                "mesh.breaks",
+                f"a list with {outside:g} m",
+                f"a row lies between the lip, 0 m, and the flange, {length:g} m",
             )
         if not self.row_positions:
             return

@@ -35,7 +35,9 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
         material_axis=(0.0, 0.0, 1.0),
         planes=[(mesh.rows[:, 0], 0), (mesh.rows[:, -1], 1)],
     )
-    return mesh, Shell(surface, section or build_section(case), free_unknowns(mesh), case.shell.metric, case.mesh.element)
+    return mesh, Shell(
+        surface, section or build_section(case), free_unknowns(mesh), case.shell.metric, case.mesh.element
+    )
 
 
 def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:

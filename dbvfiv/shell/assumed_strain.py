@@ -10,18 +10,20 @@ symmetric tangent.
 ``MITC4``
     The products as they are.
 ``MITC4+``
-    x_d.x_d is replaced by what the other five say of it in a flat element, by which warped elements bend without
-    stretching (Ko, Lee & Bathe 2016, Computers and Structures 169, 57-68; 2017, 182, 404-418; here from the centre
-    instead of the edges, which is the same for small displacements). Small displacements of flat elements give the
-    same as before, homogeneous strains of any size too.
+    The strains along the edges are kept, and inside x_d.x_d is replaced by what the others say of it in a flat
+    element, by which warped elements bend without stretching (Ko, Lee & Bathe 2016, Computers and Structures 169,
+    57-68; 2017, 182, 404-418). Flat elements stay as they are for small displacements, and for homogeneous strains of
+    any size.
 ``MITC4+EAS``
     On top of it four enhanced membrane modes (Simo & Rifai 1990, Int. J. Num. Meth. Eng. 29, 1595-1638), by which flat
     elements bend in their plane. They are condensed once, with the stiffness of the wall at rest: exactly for linear
     walls; for rubber it is one of many admissible assumed strains, the same at all states.
 
 Enhanced elements are known to buckle by themselves under pressure along their short side (Sussman & Bathe 2014,
-Computers and Structures 140, 14-22): the enhancement takes away the stiffness against the hourglass motion x_d, and the
-product x_d.x_d, squared strains of that motion, keeps its geometric stiffness. Without that product both are gone.
+Computers and Structures 140, 14-22): the enhancement takes away the stiffness against the hourglass motion x_d, and
+x_d.x_d in the strains along the edges, squared strains of that motion, keeps its geometric stiffness. So the edges give
+way to the centre, in whose strains there is no x_d.x_d, where warping is small beside the wall and cannot lock: x_d.x_d
+counts by its share w = y^2/(y^2 + h^2/12), y the part of x_d normal to the element and h the wall.
 """
 
 from __future__ import annotations
@@ -84,31 +86,35 @@ def inplane_map(mesh, geometry: ReferenceGeometry, section, element: str) -> np.
     if element not in ELEMENTS:
         raise ValueError(f"The element is '{element}', but only {', '.join(ELEMENTS)} exist.")
     x = mesh.nodes[mesh.quads]
-    tied = np.broadcast_to(BILINEAR, (len(x), 4, 3, 6))
-    if element != MITC4:
-        tied = tied @ _tying(x)[:, None]
-    count = len(tied)
-    whole = np.zeros((count, 4, 6, 12))
+    tied = BILINEAR if element == MITC4 else _tied(x, geometry.thickness)
+    whole = np.zeros((len(x), 4, 6, 12))
     whole[:, :, :3, :6] = whole[:, :, 3:, 6:] = tied
     if element == ENHANCED:
         whole[:, :, :3] += _enhancement(x, geometry, section, whole)
     return whole
 
 
-def _tying(x: np.ndarray) -> np.ndarray:
-    """(ne, 6, 6): products with the sixth from the other five, exact where a flat element is strained homogeneously.
+def _tied(x: np.ndarray, thickness: np.ndarray) -> np.ndarray:
+    """(ne, 4, 3, 6): covariant strains at the points from the products, free of x_d.x_d in flat elements.
 
-    With x_d = a x_r + b x_s, small or homogeneous strains have x_d.x_d/2 = a x_r.x_d + b x_s.x_d - a^2 x_r.x_r/2 - b^2
-    x_s.x_s/2 - a b x_r.x_s, all as changes from rest; of a warped element a and b are those of the part of x_d in the
-    plane of x_r and x_s.
+    With x_d = a x_r + b x_s + y n, small or homogeneous strains of a flat element have x_d.x_d/2 = a x_r.x_d + b
+    x_s.x_d - a^2 e_r - b^2 e_s - a b x_r.x_s, all as changes from rest, e_r and e_s those of x_r.x_r/2 and x_s.x_s/2.
+    Those take up the share w of what x_d.x_d/2 differs from that, so that for w = 1 they are means of both edges.
     """
     u = np.einsum("ma,eai->emi", VECTORS, x)
     basis, distortion = u[:, :2], u[:, 2]
     metric = np.einsum("eai,ebi->eab", basis, basis)
-    a, b = np.linalg.solve(metric, np.einsum("eai,ei->ea", basis, distortion)[..., None])[..., 0].T
-    out = np.tile(np.eye(6), (len(x), 1, 1))
-    out[:, 5] = np.stack([-(a**2), -(b**2), -a * b, a, b, 0 * a], axis=1)
-    return out
+    plane = np.linalg.solve(metric, np.einsum("eai,ei->ea", basis, distortion)[..., None])[..., 0]
+    normal = distortion - np.einsum("ea,eai->ei", plane, basis)
+    a, b = plane.T
+    y2 = np.einsum("ei,ei->e", normal, normal)
+    w = y2 / (y2 + thickness**2 / 12)
+    back = w * (a**2 + b**2)
+    inner = np.stack([-(a**2), -(b**2), -a * b, a, b, -back], axis=1) / (1 - back)[:, None]
+    share = w[:, None] * np.array([1.0, 1.0, 0.0])
+    out = np.tile(BILINEAR, (len(x), 1, 1, 1))
+    out[..., 5] = share[:, None]
+    return out + (BILINEAR[..., 5] - share[:, None])[..., None] * inner[:, None, None]
 
 
 def local_map(geometry: ReferenceGeometry) -> np.ndarray:

@@ -153,9 +153,7 @@ def roof(element: str, n: int, distort=regular) -> float:
     free[np.ix_(crown, [0, 4])] = False
     free[np.ix_(middle, [1, 3])] = False
     section = isotropic_section(4.32e8, 0.0, 0.25)
-    shell = build(
-        patch, section, free, element, h=0.25, material_axis=(0.0, 1.0, 0.0), directors=directors
-    )
+    shell = build(patch, section, free, element, h=0.25, material_axis=(0.0, 1.0, 0.0), directors=directors)
     load = np.zeros((len(patch.nodes), 5))
     np.add.at(load[:, 2], patch.quads, -90.0 * shell.geometry.area @ SHAPE)
     return -solved(shell, load)[patch.index[-1, 0], 2] / 0.3024
