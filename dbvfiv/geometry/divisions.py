@@ -9,10 +9,10 @@ import numpy as np
 from ..case.valve import Mesh, Valve
 from .surface import Surface
 
-#: Angle between two pieces of the surface from which their joint counts in full, rad; below it in proportion.
-FULL_KINK = np.radians(20.0)
-#: Distance from a joint, in walls, over which the rows grow to their length away from it.
-REACH = 1.5
+#: Angles between two pieces of the surface up to which their joint counts for nothing and from which in full, rad.
+NO_KINK, FULL_KINK = np.radians(5.0), np.radians(20.0)
+#: Distance from a joint, over the length of the valve, over which the rows grow to their length away from it.
+REACH = 0.04
 #: Turn of the lip's section that counts as its bend, rad.
 BEND = np.radians(5.0)
 #: A break of the load this near the bend, in the parameter of the grading, stands for it too.
@@ -48,7 +48,7 @@ def row_division(valve: Valve, mesh: Mesh, surface: Surface) -> Division:
         return divide(given[[0, -1]], (), mesh.along, (given, np.arange(len(given), dtype=float)))
     wall = [step.to for step in valve.wall_map] if valve.wall == "measured" else []
     breaks = [z for z in (*mesh.breaks, *wall) if joints[0] < z < joints[-1]]
-    law = _row_law(valve, mesh, surface) if mesh.rows == "graded" else None
+    law = _row_law(mesh, surface) if mesh.rows == "graded" else None
     return divide(joints, breaks, mesh.along, law)
 
 
@@ -70,7 +70,7 @@ def column_division(mesh: Mesh, surface: Surface, breaks) -> Division:
 
 
 def bend_of_lip(surface: Surface) -> float:
-    """Normalised arc length at which the section of the lip has turned by 5 degrees from its direction at the centre."""
+    """Normalised arc length at which the section of the lip has turned by 5 degrees from where it began."""
     s = np.linspace(0.0, 1.0, 2001)
     steps = np.diff(surface.section(surface.breaks[0], s)[:, :2], axis=0)
     turned = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
@@ -152,13 +152,12 @@ def _share(lengths: np.ndarray, count: int) -> np.ndarray:
     return counts * (count // base)
 
 
-def _row_law(valve: Valve, mesh: Mesh, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+def _row_law(mesh: Mesh, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """How many rows lie up to an axial position: `mesh.row_grading` is their length at a full kink over that away."""
     z = np.linspace(surface.breaks[0], surface.breaks[-1], _FINE)
-    density = np.ones_like(z)
+    density, reach = np.ones_like(z), REACH * (z[-1] - z[0])
     for joint, angle in zip(surface.breaks[1:-1], kinks(surface)):
-        reach = REACH * valve.thickness_at(joint)
-        share = min(1.0, angle / FULL_KINK)
+        share = min(1.0, max(0.0, (angle - NO_KINK) / (FULL_KINK - NO_KINK)))
         near = 1.0 + share * (1.0 / mesh.row_grading - 1.0) * np.exp(-np.abs(z - joint) / reach)
         density = np.maximum(density, near)
     return z, np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))]) * (z[1] - z[0])

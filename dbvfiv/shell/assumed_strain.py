@@ -1,8 +1,8 @@
 """In-plane strains of the element: twelve numbers sampled from its shape, and constant maps from them to its points.
 
 With x_r, x_s the tangents at the centre of a bilinear element and x_d its distortion, the tangents anywhere are
-x_r + s x_d and x_s + r x_d, so its covariant Green-Lagrange strains are combinations of six products z_k = x' H_k x / 2,
-less their value at rest: x_r.x_r/2, x_s.x_s/2, x_r.x_s, x_r.x_d, x_s.x_d and x_d.x_d/2. Their change along the
+x_r + s x_d and x_s + r x_d, so its covariant Green-Lagrange strains are combinations of six products x' H_k x / 2 less
+their value at rest: x_r.x_r/2, x_s.x_s/2, x_r.x_s, x_r.x_d, x_s.x_d and x_d.x_d/2. Their change along the
 directors, x' H_k d, gives the bending strains. Whatever is assumed about the strains is a constant matrix on these
 numbers, so the energy stays a function of the nodal unknowns alone: no inner unknowns, no strain under rigid motion, a
 symmetric tangent.

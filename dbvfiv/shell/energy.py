@@ -1,7 +1,8 @@
 """The element is its energy: the one definition of the shell's mechanics, differentiated automatically.
 
 Strains are covariant Green-Lagrange coefficients of a first-order (thick shell) kinematics x(t) = x + t d, with the
-transverse shear of Dvorkin & Bathe (1984) and in-plane strains as `assumed_strain` has them. Two through-thickness treatments:
+transverse shear of Dvorkin & Bathe (1984) and in-plane strains as `assumed_strain` has them. Two through-thickness
+treatments:
 
 ``first-order``
     Mid-surface metric and area; E(t) = c0 + t (c1 - sym(kappa c0)), Budiansky-Sanders' best first-order theory.

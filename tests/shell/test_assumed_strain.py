@@ -135,7 +135,6 @@ def test_no_buckling_by_itself_under_pressure_along_short_sides(element):
     free[np.ix_(np.concatenate([patch.index[0], patch.index[-1]]), [0])] = False
     free[patch.index[[0, -1], 0], 1] = False
     section = isotropic_section(1e6, 0.0, 0.01)
-    shell = Shell(mesh, section, free, element=element)
     nodal = np.zeros((mesh.node_count, 5))
     nodal[:, 0] = -0.2 * mesh.nodes[:, 0]
     held = Shell(mesh, section, element=element)
