@@ -144,8 +144,8 @@ def grid_study(pressures, **changes) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.parametrize("level", ["10 %", "20 %"])
 def test_grids(level):
-    """Measured wall: the flow changes by 0.1 % from 28 x 48 to 56 x 96; with even rows and columns and the plain element
-    it was 0.3 %, from 14 x 24 on 1 %.
+    """Measured wall: from 28 x 48 to 56 x 96 the flow changes by 0.1 %; with even rows and columns and the plain
+    element it was 0.3 %, and 1 % from 14 x 24 on.
     """
     print(f"\n{level} set")
     found = grid_study(PRESSURES, materials__strain_level=level)
