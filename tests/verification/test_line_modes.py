@@ -23,7 +23,7 @@ from eigen import SearchOptions, TransferBasis, certified_spectrum, leading_mode
 from tests.small_valves import FORMER
 from tests.verification.test_transient_modes import QUASI, STORAGE, errors, three_routes
 
-SMALL = {"mesh.around": 8, "mesh.along": 12}
+SMALL = {"mesh.around": 8, "mesh.along": 12, **FORMER}
 WATER = {"drive.pressure": 500.0, "damping.alpha": 0.0, "damping.beta": 4e-4}
 LENGTHS = [0.5, 2.0, 10.0, 100.0]
 
