@@ -1,4 +1,4 @@
-"""A valve on a mesh on which a step takes a millisecond."""
+"""A valve on a mesh on which a step takes a millisecond, and the mesh of earlier versions for what was tuned on it."""
 
 from functools import cache
 from types import MappingProxyType
@@ -6,6 +6,10 @@ from types import MappingProxyType
 import dbvfiv
 from dbvfiv.model import ValveModel
 from dbvfiv.motion.start import steady_positions
+
+#: Rows and columns at even distances; with the element of earlier versions too.
+EVEN = MappingProxyType({"mesh.rows": "uniform", "mesh.columns": "uniform"})
+FORMER = MappingProxyType({"mesh.element": "MITC4", **EVEN})
 
 
 @cache

@@ -159,6 +159,8 @@ def allowed_words(field: FieldInfo) -> str:
     if kind == "file":
         return "the name of a file that can be read"
     if kind.startswith("list of"):
+        if not _limits(field.metadata).get("min_length"):
+            return f"a list of {DIMENSION[quantity.si]}s"
         words = _bounds(_item_limits(field.annotation), quantity)
         return f"a list of at least one {DIMENSION[quantity.si]}, each {words}"
     if kind == "true or false":

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.valve import Mesh, Valve
+from .divisions import column_division, grading, row_division
 from .surface import Surface, surface_of
 
 
@@ -34,6 +35,8 @@ class ValveMesh:
         nodes.
     wall_deduction : (rows,) array, m2
         Area taken by the wall (Th. 4.12-4.14), less the initial gap.
+    missed_rows, missed_columns : arrays
+        Breaks, in m and in the parameter of the grading, inside elements because there are too few of them.
     """
 
     nodes: np.ndarray
@@ -46,6 +49,8 @@ class ValveMesh:
     element_columns: np.ndarray
     rest_area: np.ndarray
     wall_deduction: np.ndarray
+    missed_rows: np.ndarray
+    missed_columns: np.ndarray
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -53,8 +58,13 @@ class ValveMesh:
         return self.rows.shape[1] - 1, self.rows.shape[0] - 1
 
 
-def valve_mesh(valve: Valve, mesh: Mesh) -> ValveMesh:
+def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=()) -> ValveMesh:
     """Mesh a valve.
+
+    Parameters
+    ----------
+    column_breaks : sequence of float
+        Where load or supports change along the section, in the parameter of the grading.
 
     Raises
     ------
@@ -62,8 +72,8 @@ def valve_mesh(valve: Valve, mesh: Mesh) -> ValveMesh:
         If the mesh has fewer elements along than the surface has pieces.
     """
     surface = surface_of(valve)
-    z = row_positions(surface, mesh.along)
-    columns = np.linspace(0.0, 1.0, mesh.around + 1)
+    along, across = row_division(valve, mesh, surface), column_division(mesh, surface, column_breaks)
+    z, columns = along.positions, across.positions
     s = grading(columns, mesh.grading)
     points = np.stack([surface.section(level, s) for level in z])
     points[:, 0, 0] = 0.0
@@ -84,33 +94,9 @@ def valve_mesh(valve: Valve, mesh: Mesh) -> ValveMesh:
         element_columns=np.tile(np.stack([columns[:-1], columns[1:]], axis=1), (mesh.along, 1)),
         rest_area=np.array([surface.area(level) for level in z]),
         wall_deduction=wall_deduction(valve, z, surface),
+        missed_rows=along.missed,
+        missed_columns=across.missed,
     )
-
-
-def grading(columns: np.ndarray, ratio: float) -> np.ndarray:
-    """Normalised arc length at the column parameters: element lengths fall geometrically from 1 to `ratio`.
-
-    A continuous law, so that meshes of twice the elements contain the nodes of the coarser ones.
-    """
-    if abs(ratio - 1.0) < 1e-9:
-        return np.asarray(columns, float)
-    return (1.0 - ratio ** np.asarray(columns, float)) / (1.0 - ratio)
-
-
-def row_positions(surface: Surface, along: int) -> np.ndarray:
-    """Axial positions of the rows: each piece of the surface gets elements by its length, at least one."""
-    breaks = surface.breaks
-    lengths = np.diff(breaks)
-    if along < len(lengths):
-        raise ValueError(f"mesh.along is {along}, but the surface has {len(lengths)} pieces and each needs an element.")
-    share = along * lengths / lengths.sum()
-    counts = np.maximum(1, np.floor(share + 1e-9).astype(int))
-    while counts.sum() < along:
-        counts[np.argmax(share - counts)] += 1
-    while counts.sum() > along:
-        counts[np.argmin(np.where(counts > 1, share - counts, np.inf))] -= 1
-    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks[:-1], breaks[1:], counts)]
-    return np.concatenate([*parts, breaks[-1:]])
 
 
 def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:

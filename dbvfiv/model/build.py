@@ -30,7 +30,7 @@ def build_section(case: Case) -> Section:
 
 def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, Shell]:
     """Mesh and shell of a case; `section` in place of the case's own wall."""
-    mesh = valve_mesh(case.valve, case.mesh)
+    mesh = valve_mesh(case.valve, case.mesh, (1.0 - case.drive.unloaded_edge, 0.5))
     surface = ShellMesh.build(
         mesh.nodes,
         mesh.quads,
@@ -38,7 +38,9 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
         material_axis=(0.0, 0.0, 1.0),
         planes=[(mesh.rows[:, 0], 0), (mesh.rows[:, -1], 1)],
     )
-    return mesh, Shell(surface, section or build_section(case), free_unknowns(mesh), case.shell.metric)
+    return mesh, Shell(
+        surface, section or build_section(case), free_unknowns(mesh), case.shell.metric, case.mesh.element
+    )
 
 
 def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:

@@ -231,6 +231,12 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
             f"{xb:.3f} m, z {za:.3f} to {zb:.3f} m): "
             "the inner face folds over itself there and first-order shell theory is only an approximation."
         )
+    if len(model.mesh.missed_rows):
+        places = ", ".join(f"{z:g}" for z in np.sort(model.mesh.missed_rows))
+        yield (
+            f"{model.mesh.shape[1]} elements along are too few for a row on every step of the wall and every break "
+            f"asked for: those at z = {places} m fall inside elements; raise mesh.along."
+        )
 
 
 def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str]:

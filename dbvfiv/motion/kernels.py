@@ -7,7 +7,7 @@ import numpy as np
 
 from ..shell.kernel_rubber import FAST
 from ..shell.kernel_section import linear_response, point_strain
-from ..shell.kernel_strain import edge_shears, gather, strains_at
+from ..shell.kernel_strain import numbers_of, strains_at
 
 
 @numba.njit(cache=True, fastmath=FAST)
@@ -121,23 +121,22 @@ def strain_energy(
     wall,
 ):
     """Strain energy, J; arguments as `dbvfiv.shell.kernel.shell_force` has them."""
-    area, thickness = reference[6:]
+    area, thickness = reference[4:]
     stiffness, points, constants, scales = wall
     x = np.empty((4, 3))
     d = np.empty((4, 3))
-    basis = np.empty((2, 3))
-    turn = np.empty((2, 3))
-    edge = np.empty(4)
+    u = np.empty((3, 3))
+    v = np.empty((3, 3))
+    z = np.empty(16)
     strain = np.empty(8)
     stress = np.empty(8)
     e = np.empty(5)
     total = 0.0
     for el in range(quads.shape[0]):
-        gather(quads[el], nodes, displacement, director, x, d)
-        edge_shears(x, d, edge)
+        numbers_of(el, quads[el], nodes, displacement, director, reference, x, d, u, v, z)
         h = thickness[el]
         for point in range(4):
-            strains_at(el, point, x, d, edge, reference, basis, turn, strain)
+            strains_at(el, point, reference, z, strain)
             linear_response(stiffness, h, strain, stress)
             density = 0.0
             for i in range(8):

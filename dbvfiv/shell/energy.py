@@ -1,7 +1,8 @@
 """The element is its energy: the one definition of the shell's mechanics, differentiated automatically.
 
 Strains are covariant Green-Lagrange coefficients of a first-order (thick shell) kinematics x(t) = x + t d, with the
-transverse shear of Dvorkin & Bathe (1984). Two through-thickness treatments:
+transverse shear of Dvorkin & Bathe (1984) and in-plane strains as `assumed_strain` has them. Two through-thickness
+treatments:
 
 ``first-order``
     Mid-surface metric and area; E(t) = c0 + t (c1 - sym(kappa c0)), Budiansky-Sanders' best first-order theory.
@@ -19,6 +20,7 @@ import numpy as np
 
 from ..materials.incompressible import mooney_rivlin_energy
 from ..materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, linear_elastic_energy
+from .assumed_strain import FACTORS, PAIRS, VECTORS
 from .reference import SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE, ReferenceGeometry, strain_map, thickness_over_radius
 from .rotation import director
 from .section import Section
@@ -39,16 +41,20 @@ def section_arrays(section: Section, geometry: ReferenceGeometry, metric: str) -
     return {key: jnp.asarray(value) for key, value in data.items()}
 
 
-def element_arrays(mesh, geometry: ReferenceGeometry, section: Section, metric: str) -> dict:
-    """Arrays with a leading element axis that `element_energy` is mapped over."""
+def element_arrays(
+    mesh, geometry: ReferenceGeometry, section: Section, metric: str, inplane: np.ndarray, products: np.ndarray
+) -> dict:
+    """Arrays with a leading element axis that `element_energy` is mapped over; `inplane` and `products` as
+    `assumed_strain` has them.
+    """
     data = {
         "x": mesh.nodes[mesh.quads],
         "director": mesh.directors[mesh.quads],
         "frame": mesh.frames[mesh.quads],
         "h": geometry.thickness,
         "area": geometry.area,
-        "m0": geometry.metric0,
-        "m1": geometry.metric1,
+        "inplane": inplane,
+        "products": products,
         "s0": geometry.shear0,
     }
     if metric == FIRST_ORDER:
@@ -98,10 +104,8 @@ def shape(unknowns, element):
 
 def strains_of_shape(x, d, element, layers, metric):
     """`local_strains` from positions and directors (4, 3) of the nodes; but for a constant a quadratic form of them."""
-    basis = jnp.einsum("pac,ai->pci", SLOPE, x)
-    turn = jnp.einsum("pac,ai->pci", SLOPE, d)
-    c0 = _voigt(basis, basis, 0.5) - element["m0"]
-    c1 = _voigt(basis, turn, 1.0) - element["m1"]
+    covariant = jnp.einsum("pij,j->pi", element["inplane"], inplane_products(x, d) - element["products"])
+    c0, c1 = covariant[:, :3], covariant[:, 3:]
     edge = 0.25 * jnp.sum(
         (x[SHEAR_EDGES[:, 1]] - x[SHEAR_EDGES[:, 0]]) * (d[SHEAR_EDGES[:, 1]] + d[SHEAR_EDGES[:, 0]]), axis=1
     )
@@ -114,21 +118,26 @@ def strains_of_shape(x, d, element, layers, metric):
         plane = membrane[:, None] + t[None, :, None] * bending[:, None]
         across = jnp.broadcast_to(jnp.einsum("pac,pc->pa", element["p"], gamma)[:, None], plane.shape[:2] + (2,))
     else:
-        c2 = _voigt(turn, turn, 0.5) - element["m2"]
+        turn = jnp.einsum("pac,ai->pci", SLOPE, d)
+        c2 = _half_metric(turn) - element["m2"]
         cov = c0[:, None] + t[None, :, None] * c1[:, None] + (t**2)[None, :, None] * c2[:, None]
         plane = jnp.einsum("plij,plj->pli", element["q"], cov)
         across = jnp.einsum("plac,pc->pla", element["p"], gamma)
     return jnp.concatenate([plane, across], axis=-1)
 
 
-def _voigt(a, b, factor):
-    """Symmetric products of two pairs of vectors (4, 2, 3) as [11, 22, 12 + 21], scaled so that a = b gives metric
-    strains.
-    """
-    cross = jnp.einsum("pi,pi->p", a[:, 0], b[:, 1]) + jnp.einsum("pi,pi->p", a[:, 1], b[:, 0])
-    return factor * jnp.stack(
-        [jnp.einsum("pi,pi->p", a[:, 0], b[:, 0]), jnp.einsum("pi,pi->p", a[:, 1], b[:, 1]), cross], axis=-1
-    )
+def inplane_products(x, d):
+    """(12,): the six products of positions and their change along the directors, both (4, 3); see `assumed_strain`."""
+    u, v = VECTORS @ x, VECTORS @ d
+    i, j = PAIRS.T
+    products = FACTORS * jnp.sum(u[i] * u[j], axis=1)
+    return jnp.concatenate([products, FACTORS * jnp.sum(u[i] * v[j] + v[i] * u[j], axis=1)])
+
+
+def _half_metric(a):
+    """Half the metric of pairs of vectors (4, 2, 3) as [11, 22, 2 * 12]."""
+    product = 0.5 * jnp.einsum("pci,pdi->pcd", a, a)
+    return jnp.stack([product[:, 0, 0], product[:, 1, 1], 2 * product[:, 0, 1]], axis=-1)
 
 
 def material_strains(strains, layers):
@@ -208,12 +217,12 @@ class EnergyFunctions:
     does not compile anew.
     """
 
-    def __init__(self, mesh, geometry: ReferenceGeometry, section: Section, metric: str = FIRST_ORDER):
+    def __init__(self, mesh, geometry: ReferenceGeometry, section: Section, metric: str, inplane, products):
         if metric not in (FIRST_ORDER, TRUE_METRIC):
             raise ValueError(f"The shell metric is '{metric}', but only '{FIRST_ORDER}' and '{TRUE_METRIC}' exist.")
         self.metric = metric
         self.kinds = tuple(int(kind) for kind in section.kinds)
-        self.elements = element_arrays(mesh, geometry, section, metric)
+        self.elements = element_arrays(mesh, geometry, section, metric, inplane, products)
         self.layers = section_arrays(section, geometry, metric)
 
     def energy(self, unknowns):

@@ -12,7 +12,7 @@ import numpy as np
 
 from .kernel_rubber import FAST
 from .kernel_section import add_point_stress, linear_response
-from .kernel_strain import edge_shears, gather, strains_at
+from .kernel_strain import numbers_of, strains_at
 
 
 @numba.njit(cache=True, fastmath=FAST)
@@ -41,21 +41,20 @@ def slow_resultants(
     member : (k,) int array
         The group of each of these points; negative for none.
     """
-    thickness = reference[7]
+    thickness = reference[5]
     x = np.empty((4, 3))
     d = np.empty((4, 3))
-    basis = np.empty((2, 3))
-    turn = np.empty((2, 3))
-    edge = np.empty(4)
+    u = np.empty((3, 3))
+    v = np.empty((3, 3))
+    z = np.empty(16)
     e = np.empty(5)
     s = np.empty(5)
     for el in range(quads.shape[0]):
-        gather(quads[el], nodes, q, director, x, d)
-        edge_shears(x, d, edge)
+        numbers_of(el, quads[el], nodes, q, director, reference, x, d, u, v, z)
         h = thickness[el]
         for point in range(4):
             strain = strain_out[el, point]
-            strains_at(el, point, x, d, edge, reference, basis, turn, strain)
+            strains_at(el, point, reference, z, strain)
             slow = slow_out[el, point]
             for g in range(stiffness.shape[0]):
                 linear_response(stiffness[g], h, strain, slow[g])

@@ -1,16 +1,22 @@
-"""Compiled kinematics of one element: covariant bases, edge shears and strains, as `energy.py` defines them."""
+"""Compiled kinematics of one element: its shape, the sixteen numbers its strains depend on, and strains from them.
+
+The numbers are the six in-plane products of `assumed_strain`, their change along the directors (six), and the
+transverse shears at the edges (four); `energy.py` defines the same.
+"""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
 
+from .assumed_strain import FACTORS, PAIRS, VECTORS
 from .kernel_rubber import FAST
-from .reference import SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE
+from .reference import SHEAR_EDGES
 
-_SLOPE = np.ascontiguousarray(SLOPE)
+_VECTORS = np.ascontiguousarray(VECTORS)
+_PAIRS = np.ascontiguousarray(PAIRS)
+_FACTORS = np.ascontiguousarray(FACTORS)
 _EDGES = np.ascontiguousarray(SHEAR_EDGES)
-_EDGE_WEIGHTS = np.ascontiguousarray(SHEAR_WEIGHTS)
 
 
 @numba.njit(fastmath=FAST, inline="always")
@@ -24,71 +30,65 @@ def gather(quad, nodes, displacement, director, x, d):
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def bases(point, x, d, basis, turn):
-    """Covariant base vectors and director derivatives at one point, each (2, 3)."""
-    for c in range(2):
+def vectors(x, d, u, v):
+    """Tangents and distortion (3, 3) of the positions and of the directors of an element."""
+    for m in range(3):
         for i in range(3):
-            basis[c, i] = 0.0
-            turn[c, i] = 0.0
+            u[m, i] = 0.0
+            v[m, i] = 0.0
         for a in range(4):
-            slope = _SLOPE[point, a, c]
+            w = _VECTORS[m, a]
             for i in range(3):
-                basis[c, i] += slope * x[a, i]
-                turn[c, i] += slope * d[a, i]
+                u[m, i] += w * x[a, i]
+                v[m, i] += w * d[a, i]
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def edge_shears(x, d, edge):
-    """Covariant transverse shears (4,) at the middles of the edges (MITC4)."""
+def numbers(x, d, u, v, products, shear, z):
+    """The sixteen numbers z less their values at rest, `products` (12,) and `shear` (4,)."""
+    for k in range(6):
+        a = _PAIRS[k, 0]
+        b = _PAIRS[k, 1]
+        product = 0.0
+        change = 0.0
+        for i in range(3):
+            product += u[a, i] * u[b, i]
+            change += u[a, i] * v[b, i] + v[a, i] * u[b, i]
+        z[k] = _FACTORS[k] * product - products[k]
+        z[6 + k] = _FACTORS[k] * change - products[6 + k]
     for g in range(4):
         a = _EDGES[g, 0]
         b = _EDGES[g, 1]
         total = 0.0
         for i in range(3):
             total += (x[b, i] - x[a, i]) * (d[b, i] + d[a, i])
-        edge[g] = 0.25 * total
+        z[12 + g] = 0.25 * total - shear[g]
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def strains(point, basis, turn, edge, shear0, metric0, metric1, q, qk, p, strain):
-    """Section strains in local axes: membrane (3), bending (3), transverse shear (2)."""
-    c00 = -metric0[0]
-    c01 = -metric0[1]
-    c02 = -metric0[2]
-    c10 = -metric1[0]
-    c11 = -metric1[1]
-    c12 = -metric1[2]
-    for i in range(3):
-        c00 += 0.5 * basis[0, i] * basis[0, i]
-        c01 += 0.5 * basis[1, i] * basis[1, i]
-        c02 += basis[0, i] * basis[1, i]
-        c10 += basis[0, i] * turn[0, i]
-        c11 += basis[1, i] * turn[1, i]
-        c12 += basis[0, i] * turn[1, i] + basis[1, i] * turn[0, i]
-    for i in range(3):
-        strain[i] = q[i, 0] * c00 + q[i, 1] * c01 + q[i, 2] * c02
-        strain[3 + i] = q[i, 0] * c10 + q[i, 1] * c11 + q[i, 2] * c12 - qk[i, 0] * c00 - qk[i, 1] * c01 - qk[i, 2] * c02
-    g0 = _EDGE_WEIGHTS[point, 0] * (edge[0] - shear0[0]) + _EDGE_WEIGHTS[point, 1] * (edge[1] - shear0[1])
-    g1 = _EDGE_WEIGHTS[point, 2] * (edge[2] - shear0[2]) + _EDGE_WEIGHTS[point, 3] * (edge[3] - shear0[3])
-    strain[6] = p[0, 0] * g0 + p[0, 1] * g1
-    strain[7] = p[1, 0] * g0 + p[1, 1] * g1
+def strains(inplane, across, z, strain):
+    """Section strains in local axes: membrane (3), bending (3), transverse shear (2), by the maps of one point."""
+    for i in range(6):
+        total = 0.0
+        for k in range(12):
+            total += inplane[i, k] * z[k]
+        strain[i] = total
+    for i in range(2):
+        total = 0.0
+        for g in range(4):
+            total += across[i, g] * z[12 + g]
+        strain[6 + i] = total
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def strains_at(el, point, x, d, edge, reference, basis, turn, strain):
-    """Bases and section strains at one point of an element; `reference` as `dbvfiv.shell.shell.Shell` holds it."""
-    shear0, metric0, metric1, q, qk, p = reference[:6]
-    bases(point, x, d, basis, turn)
-    strains(
-        point,
-        basis,
-        turn,
-        edge,
-        shear0[el],
-        metric0[el, point],
-        metric1[el, point],
-        q[el, point],
-        qk[el, point],
-        p[el, point],
-        strain,
-    )
+def numbers_of(el, quad, nodes, displacement, director, reference, x, d, u, v, z):
+    """Shape and numbers of an element; `reference` as `dbvfiv.shell.shell.Shell` holds it."""
+    gather(quad, nodes, displacement, director, x, d)
+    vectors(x, d, u, v)
+    numbers(x, d, u, v, reference[0][el], reference[1][el], z)
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def strains_at(el, point, reference, z, strain):
+    """Section strains at one point of an element."""
+    strains(reference[2][el, point], reference[3][el, point], z, strain)

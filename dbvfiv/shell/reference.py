@@ -35,8 +35,8 @@ class ReferenceGeometry:
     q : (ne, 4, 3, 3), qk : (ne, 4, 3, 3)
     p : (ne, 4, 2, 2)
         Transverse shear: gamma_local[a] = p[a, alpha] gamma[alpha].
-    metric0 : (ne, 4, 3), metric1 : (ne, 4, 3), shear0 : (ne, 4)
-        Reference values that the strains are measured from; `shear0` per shear edge.
+    shear0 : (ne, 4)
+        Reference values of the shears at the edges.
     curvature : (ne, 4, 2, 2)
         Mixed curvature kappa[gamma, beta]: covariant derivative beta of the director against basis vector gamma.
     axes : (ne, 4, 3, 3)
@@ -49,8 +49,6 @@ class ReferenceGeometry:
     q: np.ndarray
     qk: np.ndarray
     p: np.ndarray
-    metric0: np.ndarray
-    metric1: np.ndarray
     shear0: np.ndarray
     curvature: np.ndarray
     axes: np.ndarray
@@ -113,7 +111,6 @@ def reference_geometry(mesh: ShellMesh) -> ReferenceGeometry:
     p = np.einsum("epai,epci->epac", axes[:, :, :2], dual)
     kappa = np.einsum("epgi,epbi->epgb", dual, turn)
     q = strain_map(p)
-    mixed = np.einsum("epci,epdi->epcd", basis, turn)
     edge = 0.25 * np.einsum(
         "egi,egi->eg",
         x[:, SHEAR_EDGES[:, 1]] - x[:, SHEAR_EDGES[:, 0]],
@@ -125,13 +122,18 @@ def reference_geometry(mesh: ShellMesh) -> ReferenceGeometry:
         q=q,
         qk=q @ curvature_map(kappa),
         p=p,
-        metric0=np.stack([0.5 * metric[..., 0, 0], 0.5 * metric[..., 1, 1], metric[..., 0, 1]], axis=-1),
-        metric1=np.stack([mixed[..., 0, 0], mixed[..., 1, 1], mixed[..., 0, 1] + mixed[..., 1, 0]], axis=-1),
         shear0=edge,
         curvature=kappa,
         axes=axes,
         position=np.einsum("pa,eai->epi", SHAPE, x),
     )
+
+
+def shear_map(geometry: ReferenceGeometry) -> np.ndarray:
+    """(ne, 4, 2, 4): transverse shears in local axes at the points from those at the edges."""
+    covariant = np.zeros((4, 2, 4))
+    covariant[:, 0, :2], covariant[:, 1, 2:] = SHEAR_WEIGHTS[:, :2], SHEAR_WEIGHTS[:, 2:]
+    return geometry.p @ covariant
 
 
 def thickness_over_radius(geometry: ReferenceGeometry) -> np.ndarray:

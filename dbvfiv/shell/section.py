@@ -194,6 +194,17 @@ class Section:
         return total
 
     @cached_property
+    def plane_stiffness(self) -> np.ndarray:
+        """(6, 6) stiffness of all layers at rest, rows and scaling as those of `linear_stiffness`; rubber answers as
+        an incompressible material of shear modulus 2 (C10 + C01) does in plane stress.
+        """
+        total = self.linear_stiffness[:6, :6].copy()
+        for (zeta, weight), (c10, c01, _) in zip(*self.rubber_points[:2]):
+            rubber = 2 * (c10 + c01) * np.array([[4.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 1.0]])
+            total += weight * np.kron(np.array([[1.0, zeta], [zeta, zeta**2]]), rubber)
+        return total
+
+    @cached_property
     def rubber_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points (k, 2), constants (k, 3) and shear scale (k,) of the points that carry rubber."""
         chosen = self.kinds == RUBBER

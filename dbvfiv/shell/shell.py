@@ -7,11 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from .assumed_strain import ENHANCED, inplane_map, local_map, rest_products
 from .energy import FIRST_ORDER, EnergyFunctions
 from .kernel import shell_force, shell_tangent
 from .mass import assemble_mass, convective_inertia, mass_integrals
 from .mesh import ShellMesh
-from .reference import reference_geometry, thickness_over_radius
+from .reference import reference_geometry, shear_map, thickness_over_radius
 from .relaxed_forms import relaxed_force_form
 from .rotation import director_derivatives
 from .section import Section
@@ -46,11 +47,15 @@ class Shell:
     metric : "first-order" or "true"
         Through-thickness treatment, see `dbvfiv.shell.energy`. Only the first-order treatment has a compiled element
         loop; the other is evaluated by automatic differentiation of its energy, several times slower.
+    element : str
+        What is assumed about the in-plane strains, see `dbvfiv.shell.assumed_strain`.
 
     All states are vectors of the free unknowns (n,): displacements in m, rotations in rad. Forces are in N and N m.
     """
 
-    def __init__(self, mesh: ShellMesh, section: Section, free=None, metric: str = FIRST_ORDER):
+    def __init__(
+        self, mesh: ShellMesh, section: Section, free=None, metric: str = FIRST_ORDER, element: str = ENHANCED
+    ):
         self.mesh = mesh
         self.section = section
         free = np.ones((mesh.node_count, 5), bool) if free is None else np.asarray(free, bool)
@@ -58,7 +63,11 @@ class Shell:
         self.metric = metric
         self.geometry = reference_geometry(mesh)
         g = self.geometry
-        self._reference = (g.shear0, g.metric0, g.metric1, g.q, g.qk, g.p, g.area, g.thickness)
+        self.element = element
+        self._inplane = inplane_map(mesh, g, section, element)
+        self._products = rest_products(mesh.nodes[mesh.quads], mesh.directors[mesh.quads])
+        local = np.ascontiguousarray(local_map(g) @ self._inplane)
+        self._reference = (self._products, g.shear0, local, shear_map(g), g.area, g.thickness)
         self._wall = section.wall()
         self._integrals = mass_integrals(g, section)
         self._frames = np.ascontiguousarray(mesh.frames)
@@ -70,7 +79,8 @@ class Shell:
     @cached_property
     def energies(self) -> EnergyFunctions:
         """The automatically differentiated definition on this mesh."""
-        return EnergyFunctions(self.mesh, self.geometry, self.section, self.metric)
+        parts = (self.mesh, self.geometry, self.section, self.metric)
+        return EnergyFunctions(*parts, self._inplane, self._products)
 
     def directors(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Directors (nn, 3), first (nn, 2, 3) and second (nn, 3, 3) derivatives for nodal unknowns (nn, 5)."""

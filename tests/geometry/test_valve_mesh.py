@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import numpy as np
 import pytest
 
 from dbvfiv.case.key_points import POINTS, PROFILES
 from dbvfiv.case.model import Case
 from dbvfiv.geometry import surface_of, valve_mesh
-from dbvfiv.geometry.valve_mesh import grading, row_positions, wall_deduction
+from dbvfiv.geometry.divisions import grading
+from dbvfiv.geometry.valve_mesh import wall_deduction
 from dbvfiv.model.build import build_shell
 
 VALVE = Case().valve
 
 
-def mesh_of(around=8, along=16, **valve):
-    case = Case().replace(
-        {"mesh.around": around, "mesh.along": along} | {f"valve.{key}": value for key, value in valve.items()}
-    )
+EVEN = MappingProxyType({"mesh.rows": "uniform", "mesh.columns": "uniform"})
+
+
+def mesh_of(around=8, along=16, more=MappingProxyType({}), **valve):
+    changes = {"mesh.around": around, "mesh.along": along} | dict(more)
+    case = Case().replace(changes | {f"valve.{key}": value for key, value in valve.items()})
     return valve_mesh(case.valve, case.mesh)
 
 
@@ -56,7 +61,7 @@ def test_smooth_saddle_meets_its_ends_without_a_kink():
 
 
 def test_elements_shrink_to_half_towards_the_side_edge():
-    mesh = mesh_of(28, 48)
+    mesh = mesh_of(28, 48, more={"mesh.columns": "uniform"})
     lip = mesh.nodes[mesh.rows[-1]]  # a circle: equal angles are equal lengths
     lengths = np.diff(np.arctan2(lip[:, 0], lip[:, 1]))
     ratios = lengths[1:] / lengths[:-1]
@@ -73,25 +78,11 @@ def test_finer_meshes_hold_the_nodes_of_coarser_ones(ratio):
 
 
 def test_refined_valve_meshes_are_nested():
-    meshes = [mesh_of(14 * k, 24 * k) for k in (1, 2, 4)]
+    meshes = [mesh_of(14 * k, 24 * k, more=EVEN) for k in (1, 2, 4)]
     for coarse, fine in zip(meshes[:-1], meshes[1:]):
         assert fine.z[::2] == pytest.approx(coarse.z, abs=1e-15)
         assert fine.nodes[fine.rows[::2, ::2]] == pytest.approx(coarse.nodes[coarse.rows], abs=1e-14)
         assert fine.rest_area[::2] == pytest.approx(coarse.rest_area, rel=1e-14)
-
-
-def test_rows_lie_on_the_joints():
-    for along in (6, 7, 16, 24, 33, 48):
-        z = row_positions(surface_of(VALVE), along)
-        assert len(z) == along + 1 and np.all(np.diff(z) > 0)
-        for joint in (0.0, 0.21, 0.49, 0.56):
-            assert np.min(np.abs(z - joint)) < 1e-12
-    assert np.diff(row_positions(surface_of(VALVE), 48)) == pytest.approx(0.56 / 48, rel=1e-9)
-
-
-def test_fewer_rows_than_pieces_is_refused():
-    with pytest.raises(ValueError, match="mesh.along is 2"):
-        row_positions(surface_of(VALVE), 2)
 
 
 def test_symmetry_planes_are_exact():
@@ -154,8 +145,8 @@ def test_key_points_reproduce_the_parametric_surface(tmp_path):
     corner = 0.125 / length
     s = np.concatenate([np.linspace(0, corner, 8), np.linspace(corner, 1, 8)[1:]])
     path = key_point_file(tmp_path / "points.txt", surface, s)
-    given = mesh_of(16, 32, key_points=str(path))
-    own = mesh_of(16, 32)
+    given = mesh_of(16, 32, EVEN, key_points=str(path))
+    own = mesh_of(16, 32, EVEN)
     assert given.z == pytest.approx(own.z, abs=1e-12)
     # nodes may slide in the surface: a saddle profile is taken at its own equal arc lengths, a ruled one at those of
     # its ends

@@ -7,8 +7,9 @@ import pytest
 
 from dbvfiv.model import ValveModel
 from dbvfiv.studies.case import Case
+from tests.small_valves import EVEN
 
-SMALL = {"mesh.around": 6, "mesh.along": 12}
+SMALL = {"mesh.around": 6, "mesh.along": 12, **EVEN}  # noise at the nodes would turn narrow columns inside out
 
 
 def build(**changes) -> ValveModel:

@@ -10,13 +10,18 @@ import pytest
 from dbvfiv.model import ValveModel
 from dbvfiv.model.analytic import AnalyticResidual
 from dbvfiv.studies.case import load_case
+from tests.small_valves import EVEN
 
 STEPS = {2: 1e-3, 3: 1e-2}
 
 
 @pytest.fixture(scope="module")
 def residual():
-    return AnalyticResidual(ValveModel(load_case(None, ["mesh.around=6", "mesh.along=8"])))
+    return AnalyticResidual(
+        ValveModel(
+            load_case(None, ["mesh.around=6", "mesh.along=8", *(f"{key}={value}" for key, value in EVEN.items())])
+        )
+    )
 
 
 @pytest.fixture(scope="module")

@@ -109,10 +109,15 @@ def test_unit_columns_sum_to_the_force(model, make_state):
 
 def test_side_edge_of_the_duckbill_is_unloaded(make_model):
     """Nothing on the last 3 of 28 columns beside the side edge of the duckbill (App. A), the same width on any mesh."""
-    model = make_model(mesh__around=28, mesh__along=12)
+    model = make_model(mesh__around=28, mesh__along=12, mesh__columns="uniform")
     loaded = model.loaded.reshape(12, 28)
     duckbill = model.mesh.element_z.reshape(12, 28)[:, 0] < 0.21
     assert np.all(loaded[~duckbill] == 1.0)
     assert np.all(loaded[duckbill, :25] == 1.0) and np.all(loaded[duckbill, 25:] == 0.0)
-    halves = make_model(mesh__around=14, mesh__along=12).loaded.reshape(12, 14)[0]
+    halves = make_model(mesh__around=14, mesh__along=12, mesh__columns="uniform").loaded.reshape(12, 14)[0]
     assert halves == pytest.approx([1.0] * 12 + [0.5, 0.0], abs=1e-12)
+    for around in (7, 14, 30):  # a column of nodes on the edge: no element is loaded in part
+        model = make_model(mesh__around=around, mesh__along=12, mesh__columns="graded")
+        loaded = model.loaded.reshape(12, around)[0]
+        assert set(loaded) == {0.0, 1.0}
+        assert model.mesh.columns[np.count_nonzero(loaded)] == pytest.approx(25 / 28, abs=1e-14)

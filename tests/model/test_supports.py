@@ -29,7 +29,7 @@ def test_symmetry_planes_stay_planes(model, make_state):
 @pytest.mark.parametrize("columns, count", [("inner-half", 3), ("all", 6)])
 def test_stops_of_the_duckbill(make_model, columns, count):
     """Rows up to the joint; columns of the inner half, or all but the side edge, which has no y displacement."""
-    model = make_model(supports__lip_stop_columns=columns)
+    model = make_model(supports__lip_stop_columns=columns, mesh__columns="uniform")
     rows = np.count_nonzero(model.mesh.z <= 0.21 + 1e-9)
     assert len(model.stops.unknowns) == rows * count
 

@@ -8,6 +8,7 @@ from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.stepper import StepFailure, StepOptions, Stepper
+from tests.small_valves import FORMER
 
 TIGHT = StepOptions(tolerance=1e-9, floor=1e-13)
 
@@ -89,7 +90,7 @@ def test_a_free_swing_keeps_its_energy(valve, open_state):
 
 def test_slamming_lips_are_survived(valve):
     """Light fluid at 6 kPa, suddenly applied: lips shut and pressures spike within steps."""
-    motion = ValveMotion(valve({"fluid.density": 1.2, "damping.alpha": 0.0}))
+    motion = ValveMotion(valve({"fluid.density": 1.2, "damping.alpha": 0.0, **FORMER}))
     rest = np.zeros(motion.size)
     state = consistent_state(motion, 0.0, rest, rest, 0.0, 6e3)
     state, results, stepper, control = advance(motion, state, 5e-4, 200, 6e3, nd=0.1, options=StepOptions())

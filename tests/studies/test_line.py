@@ -10,6 +10,7 @@ from dbvfiv.case import CaseError
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.studies.stability.place import Place, is_surrounding
 from dbvfiv.studies.stability.walk import StabilityWalk
+from tests.small_valves import FORMER
 
 SMALL = {"mesh.around": 6, "mesh.along": 8}
 LINE = {"upstream.length": 20.0, "upstream.diameter": "300 mm", "upstream.loss": 1.5}
@@ -97,7 +98,7 @@ def test_friction_moves_the_steady_state_with_the_length():
 
 def test_onset_over_the_length_whether_or_not_the_steady_state_is_found_anew():
     keys = {"drive.pressure": 2e3, "fluid.density": 100.0, "damping.alpha": 0.0, "damping.beta": 1e-3}
-    keys |= {"onset.coarse_mesh": 0}
+    keys |= {"onset.coarse_mesh": 0, **FORMER}  # the mesh that has its onset at these lengths
     found = [load(LINE, keys, more).onset("pipe_length=60:400:3:log") for more in ({}, {"upstream.friction": 1e-9})]
     ((one,), (other,)) = (result.points for result in found)
     assert one["confirmed"] and other["confirmed"] and one["criticality"] == other["criticality"] is not None

@@ -20,9 +20,10 @@ from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import Case
 from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, TransferBasis, certified_spectrum, leading_modes
+from tests.small_valves import FORMER
 from tests.verification.test_transient_modes import QUASI, STORAGE, errors, three_routes
 
-SMALL = {"mesh.around": 8, "mesh.along": 12}
+SMALL = {"mesh.around": 8, "mesh.along": 12, **FORMER}
 WATER = {"drive.pressure": 500.0, "damping.alpha": 0.0, "damping.beta": 4e-4}
 LENGTHS = [0.5, 2.0, 10.0, 100.0]
 
@@ -72,12 +73,16 @@ def test_a_model_of_a_length_is_the_model_at_that_length():
 
 @pytest.mark.slow
 def test_water_flutters_behind_a_long_pipe_under_the_quasi_steady_law():
-    """Growth rates and frequencies of the design's probes, 28 x 48, within 10 %."""
+    """Growth rates and frequencies of the design's probes, 28 x 48, within 10 % with the mesh and element that they
+    were made with; graded mesh and enhanced element, nearer to the limit, move them by up to 1.1 1/s.
+    """
     probes = {0.5: (-7.9, 39.1), 2.0: (-1.8, None), 10.0: (1.8, 40.3), 100.0: (2.8, None)}
-    for at in ("line", "reservoir"):
-        model = ValveModel(Case().replace(WATER | {"upstream.length": 1.0, "drive.at": at}))
+    better = {0.5: (-8.25, 38.84), 2.0: (-1.37, 39.34), 10.0: (2.80, 40.06), 100.0: (3.95, 40.36)}
+    cases = [(at, mesh) for at in ("line", "reservoir") for mesh in (FORMER, {})]
+    for at, mesh in cases:
+        model = ValveModel(Case().replace(WATER | {"upstream.length": 1.0, "drive.at": at} | dict(mesh)))
         linear = linearise(model, LoadPath(model).go_to(500.0).q, 500.0)
-        for length, (growth, frequency) in probes.items():
+        for length, (growth, frequency) in (probes if mesh else better).items():
             found = leading_modes(linear.pencil(Conditions(1000.0, 0.0, 4e-4, 0.0, length)), 4).eigenvalues
             mode = next(x for x in found if x.imag > 0)
             print(f"{at} {length:g} m: {mode.real:+.3f} 1/s at {mode.imag / 2 / np.pi:.3f} Hz")

@@ -22,7 +22,7 @@ def pressure(stretch: float) -> float:
     return 4 * H * (1 / stretch - stretch**-7) * (RUBBER.c10 + stretch**2 * RUBBER.c01)
 
 
-def octant(n: int) -> Shell:
+def octant(n: int, element: str = "MITC4+EAS") -> Shell:
     """An eighth of the unit sphere in three patches of n by n elements around its middle."""
     corners = np.eye(3)
     middle = np.ones(3) / 3
@@ -57,7 +57,7 @@ def octant(n: int) -> Shell:
     for corner in np.flatnonzero((nodes == 0.0).sum(axis=1) == 2):
         free[corner, 3:] = False
     mesh = ShellMesh(nodes, quads, directors, frames, np.full(len(quads), H), np.array([0.6, 0.5, 0.62]))
-    return Shell(mesh, Section((Layer(RUBBER, H),)), free)
+    return Shell(mesh, Section((Layer(RUBBER, H),)), free, element=element)
 
 
 def blow(shell: Shell, pressures) -> np.ndarray:

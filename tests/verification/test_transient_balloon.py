@@ -62,8 +62,9 @@ def blow_up(shell, load: float, steps: int):
 
 @pytest.mark.parametrize("load", REFERENCE)
 def test_balloon(load):
-    found = np.array([blow_up(octant(n), load, 100) for n in (2, 4, 8)])
-    in_time = blow_up(octant(4), load, 200)
+    # the plain element: tied strains of warped elements reach their order on finer meshes than these
+    found = np.array([blow_up(octant(n, "MITC4"), load, 100) for n in (2, 4, 8)])
+    in_time = blow_up(octant(4, "MITC4"), load, 200)
     refined = found[1] + (in_time - found[1]) * 4 / 3  # the step's share, of second order, on the middle mesh
     limits = np.array([richardson(found[:, k]) for k in range(2)])
     values = limits[:, 1] + refined - found[1]

@@ -14,10 +14,11 @@ from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.stepper import StepOptions, Stepper
+from tests.small_valves import FORMER
 from tests.verification.moving import PointMotion
 
 TIGHT = StepOptions(tolerance=1e-9, floor=1e-13)
-COARSE = {"mesh.around": 6, "mesh.along": 8}
+COARSE = {"mesh.around": 6, "mesh.along": 8, **FORMER}  # on which the shortest steps resolve all that moves
 
 
 def run(motion, state, step: float, count: int, pressure=lambda t: 0.0, nd: float = 0.0, options=TIGHT):

@@ -18,6 +18,7 @@ from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.studies.case import Case
 from tests.shell.structures import richardson
+from tests.small_valves import FORMER
 
 PRESSURES = (18e3, 29e3, 36e3)
 PUBLISHED = np.array([47.88, 75.52, 90.82])
@@ -54,14 +55,16 @@ def test_discharge(level):
 
 @pytest.mark.parametrize("level", ["10 %", "20 %"])
 def test_largest_displacement_is_at_the_joint(level):
-    """In the middle (x = 0), within one element of the line z = 0.21 m where duckbill and saddle join (Th. 7)."""
+    """In the middle (x = 0), close to the line z = 0.21 m where duckbill and saddle join (Th. 7): 15 mm before it, a
+    distance that even rows of 12 mm could not resolve.
+    """
     for state in reference(level):
         x, _, z = state.max_displacement_position
         print(
             f"\n{level} {state.pressure / 1e3:.0f} kPa: {state.max_displacement * 1e3:.2f} mm at x {x:.4f}, z {z:.4f} m"
         )
         assert x == 0.0
-        assert abs(z - 0.21) <= 0.56 / 48 * (1 + 1e-9)
+        assert 0.19 < z <= 0.21
     assert 0.055 < reference(level)[-1].max_displacement < 0.07  # 0.058 and 0.062 m at 36 kPa; published 0.069
 
 
@@ -143,16 +146,13 @@ def grid_study(pressures, **changes) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.parametrize("level", ["10 %", "20 %"])
 def test_grids(level):
-    """Measured wall: the flow changes by 0.3 % from 28 x 48 to 56 x 96, at a low order.
-
-    The thickness is taken at element centres, and its step at z = 0.30 m falls between rows of these grids, at another
-    share of an element on each: an error of first order and changing sign. The walls below show the order of everything
-    else.
+    """Measured wall: from 28 x 48 to 56 x 96 the flow changes by 0.1 %; with even rows and columns and the plain
+    element it was 0.3 %, and 1 % from 14 x 24 on.
     """
     print(f"\n{level} set")
     found = grid_study(PRESSURES, materials__strain_level=level)
-    assert np.all(np.abs(found[2] / found[1] - 1) < 0.005)
-    assert np.all(np.abs(found[2] / found[0] - 1) < 0.02)
+    assert np.all(np.abs(found[2] / found[1] - 1) < 0.003)
+    assert np.all(np.abs(found[2] / found[0] - 1) < 0.01)
 
 
 STEP_ON_A_ROW = [
@@ -166,12 +166,13 @@ STEP_ON_A_ROW = [
 @pytest.mark.slow
 @pytest.mark.parametrize("wall", ["averaged", "step on a row"])
 def test_grids_without_a_step_inside_elements(wall):
-    """Averaged wall, or the step moved to 0.28 m: second order or better, with the fold of the side edge and the kinks
-    of the saddle in place.
+    """Even rows and the plain element, averaged wall or the step moved to 0.28 m: second order or better, with the fold
+    of the side edge and the kinks of the saddle in place.
     """
     print(f"\n{wall}")
     changes = {"valve__wall": "uniform"} if wall == "averaged" else {"valve__wall_map": STEP_ON_A_ROW}
-    for column in grid_study((18e3, 36e3), **changes).T:
+    former = {key.replace(".", "__"): value for key, value in FORMER.items()}
+    for column in grid_study((18e3, 36e3), **changes, **former).T:
         order, limit = richardson(column)
         assert order > 1.6
         assert column[1] == pytest.approx(limit, rel=0.01)

@@ -11,6 +11,7 @@ from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.studies.case import Case
 from dbvfiv.studies.closure.closing import ClosingResult, ClosingSample, Turn, closing_valve, run_closing
 from dbvfiv.studies.closure.closing_motion import ContactValve
+from tests.small_valves import FORMER
 
 COARSE = {"mesh.around": 6, "mesh.along": 10, "closure.pressures": ["10 kPa"]}
 
@@ -126,7 +127,13 @@ def test_a_history_that_opens_again_is_not_shut_before_it_shuts_for_good():
 def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
     case = Case().replace(
         COARSE
-        | {"mesh.around": 8, "mesh.along": 14, "closure.reversal_time": "0.2 s", "closure.reversal_hold": "0.2 s"}
+        | {
+            "mesh.around": 8,
+            "mesh.along": 14,
+            "closure.reversal_time": "0.2 s",
+            "closure.reversal_hold": "0.2 s",
+            **FORMER,
+        }
     )
     result = run_closing(closing_valve(case))
     told = result.summary()

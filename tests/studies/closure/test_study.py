@@ -19,8 +19,14 @@ from dbvfiv.studies.closure.opening import Opening, opening
 from dbvfiv.studies.closure.path import ClosureOptions, ClosurePath
 from dbvfiv.studies.closure.remarks import start_warnings
 from dbvfiv.studies.session import Session
+from tests.small_valves import EVEN
 
-COARSE = {"mesh.around": 8, "mesh.along": 14, "closure.max_step": "4 kPa", "closure.pressures": ["7 kPa", "28 kPa"]}
+COARSE = EVEN | {
+    "mesh.around": 8,
+    "mesh.along": 14,
+    "closure.max_step": "4 kPa",
+    "closure.pressures": ["7 kPa", "28 kPa"],
+}
 
 
 @pytest.fixture(scope="module")

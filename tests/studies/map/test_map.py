@@ -30,6 +30,7 @@ from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SingularShiftError
 from eigen.phase_count import PhaseCounts
+from tests.small_valves import FORMER
 
 AXES = {
     "map.x": "pressure=1000:12000:6",
@@ -261,7 +262,7 @@ def test_workers_find_the_same_digits_also_when_they_go_on(case, whole, tmp_path
 def test_a_map_interrupted_in_its_curves_ends_with_the_same_curves(coarse_case, tmp_path):
     """Columns that a round of the curves had found do not change what that round asks for."""
     axes = {"map.x": "pressure=500:30000:4", "map.y": "density=1:1000:10:log", "map.checks": 1}
-    case = coarse_case.replace(axes | {"damping.beta": 0.001})
+    case = coarse_case.replace(axes | {"damping.beta": 0.001} | dict(FORMER))  # whose curves need three rounds
     whole, path = run_map(case), tmp_path / "map.h5"
     stop = 2 * len(whole.columns) // 3
     assert not Valve(case, "valve").map(output=path, observer=_StopAfter(stop)).complete

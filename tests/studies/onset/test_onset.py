@@ -11,6 +11,13 @@ from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.onset.run import run_onset
 from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
 from dbvfiv.studies.stability.place import Place
+from tests.small_valves import FORMER
+
+
+@pytest.fixture(scope="module")
+def coarse_case(coarse_case):
+    """On the mesh that these densities and bands were chosen on."""
+    return coarse_case.replace(FORMER)
 
 
 @pytest.fixture(scope="module")

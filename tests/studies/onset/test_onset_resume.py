@@ -19,6 +19,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.studies.onset.point import OnsetPoint, OnsetSample
 from dbvfiv.studies.session import load_result
+from tests.small_valves import FORMER
 
 
 def onset(case, name="case", output=None, observer=None):
@@ -34,7 +35,8 @@ RANGE = "pressure=4 kPa:12 kPa:5"
 
 @pytest.fixture(scope="module")
 def case(coarse_case):
-    return coarse_case.replace({"onset.over": RANGE, "onset.normal_form": False, "fluid.density": 4.0})
+    """On the mesh that the range was chosen on."""
+    return coarse_case.replace({"onset.over": RANGE, "onset.normal_form": False, "fluid.density": 4.0, **FORMER})
 
 
 class Watch(Observer):
@@ -161,7 +163,14 @@ if __name__ == "__main__":
 def test_a_killed_run_goes_on(whole, tmp_path):
     path, script = tmp_path / "onset.h5", tmp_path / "go.py"
     script.write_text(_RUN)
-    settings = ["mesh.around=8", "mesh.along=16", "damping.alpha=0", "onset.normal_form=false", "fluid.density=4"]
+    settings = [
+        *(f"{k}={v}" for k, v in FORMER.items()),
+        "mesh.around=8",
+        "mesh.along=16",
+        "damping.alpha=0",
+        "onset.normal_form=false",
+        "fluid.density=4",
+    ]
     process = subprocess.Popen(
         [sys.executable, str(script), "onset", "--over", RANGE, *(f"--set={s}" for s in settings), "-o", str(path)],
         cwd=os.getcwd(),

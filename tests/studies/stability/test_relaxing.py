@@ -13,17 +13,20 @@ from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import certified_spectrum
+from tests.small_valves import FORMER
 
 LAWS = pytest.mark.parametrize("continuity", ["quasi-steady", "storage"])
 
 
 @pytest.fixture(scope="module")
 def lossy_case():
+    """On the mesh that its densities and loss factors were chosen on."""
     return load_case(
         None,
         [
             "mesh.around=8",
             "mesh.along=14",
+            *(f"{key}={value}" for key, value in FORMER.items()),
             "damping.model='loss factor'",
             "fluid.density=20",
             "drive.pressure=6000",

@@ -1,0 +1,153 @@
+"""The element's assumed in-plane strains: against textbook elements, and what they must keep whatever they assume."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbvfiv.shell import Layer, Section, Shell, ShellMesh
+from dbvfiv.shell.assumed_strain import ELEMENTS, ENHANCED, MITC4_PLUS
+from tests.shell.structures import (
+    grid,
+    isotropic_section,
+    mixed_section,
+    random_state,
+    rectangle,
+    rigid_motion,
+    rotation_about,
+)
+from tests.shell.test_element_loop import assembled, difference, unit_direction
+
+CORNERS = np.array([[0.0, 0.0], [1.1, 0.1], [1.3, 0.9], [0.2, 0.7]])
+
+
+def textbook_stiffness(corners, plane, enhanced: bool) -> np.ndarray:
+    """(8, 8) stiffness of a bilinear plane element, unknowns x then y of each node, with the four enhanced modes of
+    Simo & Rifai (1990) condensed.
+    """
+    g = 1 / np.sqrt(3)
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+
+    def jacobian(r, s):
+        slope = 0.25 * np.stack([signs[:, 0] * (1 + signs[:, 1] * s), signs[:, 1] * (1 + signs[:, 0] * r)])
+        return slope, slope @ corners  # rows: derivatives by r and s
+
+    centre = jacobian(0, 0)[1]
+    (a, b), (c, d) = np.linalg.inv(centre)
+    # strains [11, 22, 2 12] in space from covariant ones, with the rows of J^-1 at the centre
+    turn = np.array([[a * a, b * b, a * b], [c * c, d * d, c * d], [2 * a * c, 2 * b * d, a * d + b * c]])
+    k, coupling, inner = np.zeros((8, 8)), np.zeros((4, 8)), np.zeros((4, 4))
+    for r, s in g * signs:
+        slope, jac = jacobian(r, s)
+        det = np.linalg.det(jac)
+        by_xy = np.linalg.solve(jac, slope)
+        strain = np.zeros((3, 8))
+        strain[0, 0::2], strain[1, 1::2] = by_xy[0], by_xy[1]
+        strain[2, 0::2], strain[2, 1::2] = by_xy[1], by_xy[0]
+        modes = np.linalg.det(centre) / det * turn @ np.array([[r, 0, 0, 0], [0, s, 0, 0], [0, 0, r, s]])
+        k += det * strain.T @ plane @ strain
+        coupling += det * modes.T @ plane @ strain
+        inner += det * modes.T @ plane @ modes
+    return k - coupling.T @ np.linalg.solve(inner, coupling) if enhanced else k
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_flat_element_is_the_textbook_one(element):
+    """In its plane a flat quadrilateral is the bilinear element, or the one of Simo and Rifai."""
+    nodes = np.column_stack([CORNERS, np.zeros(4)])
+    mesh = ShellMesh.build(nodes, np.array([[0, 1, 2, 3]]), 0.01, material_axis=(1.0, 0.3, 0.0))
+    shell = Shell(mesh, isotropic_section(1e6, 0.3, 0.01), element=element)
+    stiffness = shell.dofs.matrix(shell.force_and_tangent(np.zeros(20))[1]).toarray()
+    own = stiffness.reshape(4, 5, 4, 5)[:, :2, :, :2].reshape(8, 8)
+    plane = 1e6 / (1 - 0.09) * np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])
+    expected = 0.01 * textbook_stiffness(CORNERS, plane, element == ENHANCED)
+    assert np.abs(own - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_loop_is_the_energy(mesh, element):
+    shell = Shell(mesh, mixed_section(), element=element)
+    q = shell.dofs.restrict(random_state(shell.mesh, 31, 0.02, 0.1))
+    expected_force, expected_tangent = assembled(shell, q)
+    force, data = shell.force_and_tangent(q)
+    assert np.abs(force - expected_force).max() < 1e-12 * np.abs(expected_force).max()
+    assert np.abs(shell.dofs.matrix(data).toarray() - expected_tangent).max() < 1e-12 * np.abs(expected_tangent).max()
+    direction = unit_direction(shell, 32)
+    slope = difference(shell.force, q, direction, 2e-4)
+    assert np.linalg.norm(shell.dofs.matrix(data) @ direction - slope) < 1e-7 * np.linalg.norm(slope)
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_rigid_motion_is_free_of_strain(mesh, element):
+    shell = Shell(mesh, mixed_section(), element=element)
+    q = shell.dofs.restrict(rigid_motion(mesh, rotation_about((1, 2, -1), 2.5), (0.1, -0.2, 0.3)))
+    assert np.abs(shell.strains(q)).max() < 2e-14
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_homogeneous_strains_of_any_size(element):
+    """Stretched and sheared by half and turned: the strains of a distorted plate are those of the deformation."""
+    patch = rectangle(4, 3, 1.0, 0.6)
+    inner = patch.index[1:-1, 1:-1].ravel()
+    patch.nodes[inner, :2] += np.random.default_rng(3).uniform(-0.06, 0.06, (len(inner), 2))
+    mesh = ShellMesh.build(patch.nodes, patch.quads, 0.01, material_axis=(1.0, 0, 0))
+    shell = Shell(mesh, Section((Layer(mixed_section().layers[0].law, 0.01),)), element=element)
+    gradient = np.array([[1.5, 0.4], [-0.1, 0.8]])
+    nodal = np.zeros((mesh.node_count, 5))
+    nodal[:, :2] = mesh.nodes[:, :2] @ (gradient - np.eye(2)).T
+    green = 0.5 * (gradient.T @ gradient - np.eye(2))
+    strain = shell.strains(nodal.ravel())[..., :3]
+    assert np.abs(strain - [green[0, 0], green[1, 1], 2 * green[0, 1]]).max() < 1e-13
+
+
+def test_enhanced_modes_do_no_work_on_constant_stress(mesh):
+    """The sum over an element of what the modes add to the strains in local axes vanishes, so patch tests hold."""
+    wall = mixed_section()
+    plain, rich = (Shell(mesh, wall, element=e) for e in (MITC4_PLUS, ENHANCED))
+    added = rich._reference[2][:, :, :3] - plain._reference[2][:, :, :3]
+    total = np.einsum("ep,epik->eik", plain.geometry.area, added)
+    size = np.einsum("ep,epik->eik", plain.geometry.area, np.abs(added))
+    assert np.abs(total).max() < 1e-13 * size.max()
+
+
+def test_enhancement_only_takes_stiffness_away():
+    """Of a warped patch of a linear material: the modes lie at their least energy."""
+    patch = grid(4, 6, lambda u, v: (0.4 * u, 0.5 * v + 0.05 * u**2, 0.4 * (u - 0.3) * (v - 0.6) + 0.1 * u**2))
+    mesh = ShellMesh.build(patch.nodes, patch.quads, 0.012, material_axis=(0.3, 1.0, 0.1))
+    k = []
+    for element in (MITC4_PLUS, ENHANCED):
+        shell = Shell(mesh, isotropic_section(1e6, 0.4, 0.012), element=element)
+        k.append(shell.dofs.matrix(shell.force_and_tangent(np.zeros(shell.size))[1]).toarray())
+    taken = np.linalg.eigvalsh(k[0] - k[1])
+    assert taken[0] > -1e-10 * np.abs(k[0]).max()
+    assert taken[-1] > 1e-3 * np.abs(k[0]).max()
+
+
+@pytest.mark.parametrize("element", [MITC4_PLUS, ENHANCED])
+def test_no_buckling_by_itself_under_pressure_along_short_sides(element):
+    """Slender elements pressed by 20 % along their short sides, held in their plane, stay stable (Sussman & Bathe 2014
+    show that enhanced elements with the squared hourglass strain do not).
+    """
+    patch = rectangle(24, 2, 1.0, 0.5)  # elements 0.042 by 0.25
+    mesh = ShellMesh.build(patch.nodes, patch.quads, 0.01, material_axis=(1.0, 0, 0))
+    free = np.ones((mesh.node_count, 5), bool)
+    free[:, 2:] = False
+    free[np.ix_(np.concatenate([patch.index[0], patch.index[-1]]), [0])] = False
+    free[patch.index[[0, -1], 0], 1] = False
+    section = isotropic_section(1e6, 0.0, 0.01)
+    nodal = np.zeros((mesh.node_count, 5))
+    nodal[:, 0] = -0.2 * mesh.nodes[:, 0]
+    held = Shell(mesh, section, element=element)
+    data = held.force_and_tangent(held.dofs.restrict(nodal))[1]
+    keep = free.ravel()
+    matrix = held.dofs.matrix(data).toarray()[np.ix_(keep, keep)]
+    # the strip as a beam of stiffness EI = E h w^3 / 12 buckles at 4 pi^2 EI / L^2 between ends that do not turn:
+    # 4 pi^2 / 12 w^2 = 0.82 of E h w, far above 0.2
+    assert np.linalg.eigvalsh(matrix)[0] > 0
+
+
+def test_unknown_element_is_refused():
+    patch = rectangle(1, 1, 1.0, 1.0)
+    mesh = ShellMesh.build(patch.nodes, patch.quads, 0.01, material_axis=(1.0, 0, 0))
+    with pytest.raises(ValueError, match="The element is 'S4R'"):
+        Shell(mesh, isotropic_section(1e6, 0.0, 0.01), element="S4R")

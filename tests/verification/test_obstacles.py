@@ -1,0 +1,74 @@
+"""Linear obstacle course: what each problem reaches on 4 x 4 to 32 x 32 elements, regular and skewed.
+
+Two targets are out of reach for four-node elements of this kind, whoever wrote them, and are asserted where they
+stand: a row of trapezoids under bending in its plane (no element with two unknowns a node that passes the patch test
+bends freely as a trapezoid: MacNeal 1987, Int. J. Num. Meth. Eng. 24, 1793-1799), and the cylinder pinched by point
+forces, whose 16 x 16 mesh does not resolve the dent.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.shell.structures import observed_order
+from tests.verification import obstacles
+
+ELEMENT = "MITC4+EAS"
+COURSE = {
+    "Cook's panel": (obstacles.cook, (2, 4, 8, 16)),
+    "hemisphere": (obstacles.hemisphere, (4, 8, 16, 32)),
+    "skewed hemisphere": (lambda e, n: obstacles.hemisphere(e, n, obstacles.skewed(n)), (4, 8, 16, 32)),
+    "roof": (obstacles.roof, (4, 8, 16, 32)),
+    "skewed roof": (lambda e, n: obstacles.roof(e, n, obstacles.skewed(n)), (4, 8, 16, 32)),
+    "twisted beam in its plane": (lambda e, n: obstacles.twisted_beam(e, 2 * n, max(n // 4, 1)), (4, 8, 16)),
+    "twisted beam across": (lambda e, n: obstacles.twisted_beam(e, 2 * n, max(n // 4, 1), load=2), (4, 8, 16)),
+    "thin twisted beam in its plane": (lambda e, n: obstacles.twisted_beam(e, 2 * n, n // 4, 0.0032), (4, 8, 16)),
+    "thin twisted beam across": (lambda e, n: obstacles.twisted_beam(e, 2 * n, n // 4, 0.0032, 2), (4, 8, 16)),
+}
+
+
+@pytest.mark.parametrize("name", COURSE)
+def test_obstacle(name):
+    """Within 2 % of the published value at 16 (Cook, roof, hemisphere n x n; beams 2 n x n/4)."""
+    problem, meshes = COURSE[name]
+    values = np.array([problem(ELEMENT, n) for n in meshes])
+    plain = np.array([problem("MITC4", n) for n in meshes])
+    steps = np.abs(np.diff(values))
+    print(f"\n{name}: {dict(zip(meshes, np.round(values, 4)))}, orders {np.round(observed_order(steps), 2)}")
+    print(f"  MITC4: {dict(zip(meshes, np.round(plain, 4)))}")
+    assert values[meshes.index(16)] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("shape, least", [("rectangles", 0.95), ("parallelograms", 0.62), ("trapezoids", 0.05)])
+def test_beam_of_six_elements(shape, least):
+    """MacNeal's slender cantilever loaded in its plane; 0.09, 0.03 and 0.03 with the plain element."""
+    coarse, fine = (obstacles.straight_beam(ELEMENT, shape, 6 * k, k) for k in (1, 2))
+    plain = obstacles.straight_beam("MITC4", shape)
+    print(f"\n{shape}: 6 x 1 {coarse:.4f}, 12 x 2 {fine:.4f}, MITC4 6 x 1 {plain:.4f}")
+    assert coarse > least and fine > coarse - 1e-3
+    assert coarse > 1.8 * plain
+    assert obstacles.straight_beam(ELEMENT, shape, load=2) == pytest.approx(1.0, abs=0.04)  # across
+
+
+@pytest.mark.parametrize("skew", [False, True])
+def test_pinched_cylinder(skew):
+    """The dent under the point force is what is still missing at 16 x 16; its error falls as that of the best four-node
+    elements do.
+    """
+    meshes = (4, 8, 16, 32)
+    distort = obstacles.skewed if skew else lambda n: obstacles.regular
+    values = np.array([obstacles.pinched_cylinder(ELEMENT, n, distort(n)) for n in meshes])
+    print(f"\npinched cylinder, skewed {skew}: {np.round(values, 4)}, orders {np.round(observed_order(1 - values), 2)}")
+    assert np.all(np.diff(values) > 0)
+    assert values[2] > 0.9 and values[3] == pytest.approx(1.0, abs=0.02)
+
+
+def test_cantilever_bent_in_its_plane():
+    """Rectangles, one to eight across: within 1 % of beam theory on each, where the plain element needs eight."""
+    values, plain = (
+        np.array([obstacles.straight_beam(e, "rectangles", 6 * k, k) for k in (1, 2, 4, 8)]) for e in (ELEMENT, "MITC4")
+    )
+    print(f"\nin-plane cantilever {np.round(values, 4)}, MITC4 {np.round(plain, 4)}")
+    assert values == pytest.approx(1.0, abs=0.01)
+    assert np.all(np.abs(values - 1) < np.abs(plain - 1))
