@@ -76,9 +76,9 @@ RINGING = {
 BLOCK, BLOCKS = 200, 5
 
 
-def _block(model: ValveModel, first) -> tuple[float, int, object]:
+def block(model: ValveModel, first, steps: int = BLOCK) -> tuple[float, int, object]:
     """Processor time and residuals of a block of steps with their history and file, and the state at its end."""
-    case = model.case.replace({"transient.duration": first.time + BLOCK * 1e-4})
+    case = model.case.replace({"transient.duration": first.time + steps * 1e-4})
     with tempfile.TemporaryDirectory() as folder:
         mesh = MeshData.of(model)
         path = Path(folder) / "run.h5"
@@ -102,7 +102,7 @@ def time_steps_relaxing():
         states[name] = Runner(model, RunOptions.of(warm), case=warm).start().progress.state
     for _ in range(BLOCKS):
         for name, model in models.items():
-            taken, residuals[name], states[name] = _block(model, states[name])
+            taken, residuals[name], states[name] = block(model, states[name])
             spent[name].append(taken)
     times = {name: 1e3 * np.median(values) / BLOCK for name, values in spent.items()}
     branches = states["loss factor"].memory.branches

@@ -22,6 +22,7 @@ import scipy.sparse.linalg as spla
 from eigen import CoupledPencil, SingularShiftError, Workspace
 
 from ..case.model import Case
+from ..errors import CaseError, SolveError
 from ..flow.outside import BODY, ROOM, Panels, PotentialFlow, Surroundings
 from ..flow.outside.surfaces import arc, end_face, extruded, pipe, ring_face, stretched, strip
 from ..geometry import ValveMesh
@@ -103,7 +104,7 @@ class OutsideFluid:
 
     Raises
     ------
-    ValueError
+    CaseError
         If the pipe around the valve does not clear its outer face at rest.
     """
 
@@ -116,7 +117,9 @@ class OutsideFluid:
         self.radius = None if diameter is None else 0.5 * diameter
         rest = shell.dofs.expand(np.zeros(shell.size))
         points, _ = self.face.points(rest)
-        self._check_clearance(points)
+        sentence = self._check_clearance(points)
+        if sentence:
+            raise CaseError(sentence, "outside.pipe_diameter")
         self._at_rest = points[mesh.rows]
         self._workspace = Workspace()
 
@@ -126,20 +129,29 @@ class OutsideFluid:
         closed = BODY if self.radius is None else ROOM
         return PotentialFlow(surroundings(self._at_rest, self.radius), closed=closed)
 
-    def _check_clearance(self, points: np.ndarray) -> None:
+    def _check_clearance(self, points: np.ndarray) -> str:
+        """What is wrong with the pipe around the valve, in a sentence; empty where it clears the outer face."""
         widest = float(np.hypot(points[:, 0], points[:, 1]).max())
-        if self.radius is not None and widest >= self.radius:
-            raise ValueError(
-                f"outside.pipe_diameter is {2e3 * self.radius:g} mm; the valve's outer face reaches "
-                f"{2e3 * widest:.4g} mm, so it must be larger."
-            )
+        if self.radius is None or widest < self.radius:
+            return ""
+        return (
+            f"outside.pipe_diameter is {2e3 * self.radius:g} mm; the valve's outer face reaches {2e3 * widest:.4g} mm, "
+            "so it must be larger."
+        )
 
     def panels(self, q: np.ndarray) -> Panels:
         """Outer faces of the elements at a state, in their order; behind them what closes the end of the tube, and
         last the opening between the lips where that is open.
+
+        Raises
+        ------
+        SolveError
+            If the wall touches the pipe around it.
         """
         points, directors = self.face.points(self.shell.dofs.expand(q))
-        self._check_clearance(points)
+        sentence = self._check_clearance(points)
+        if sentence:
+            raise SolveError(f"The wall touches the pipe around it: {sentence}")
         quads = self.shell.mesh.quads
         wall = Panels.of(points[quads], directors[quads])
         outer, middle = points[self._edge], np.array([1.0, 0.0, 1.0])
