@@ -128,7 +128,22 @@ class LinearisedState:
     @cached_property
     def relaxing(self) -> tuple:
         """K_g (n, n): material part of the tangent of each group of layers that relax alike."""
+        return self.relaxing_of_wall()
+
+    def relaxing_of_wall(self) -> tuple:
         return self.model.relaxing_stiffness(self.q)
+
+    def fluid_parts(self, density: float, storage: float | None = None, line: Mapping[str, float] = {}):
+        """What the unsteady fluid answers to `slope`, as `fluid_parts`."""
+        return fluid_parts(self.model.flow, self.area, self.inlet, density, storage, line)
+
+    def steady_parts(self) -> dict[str, np.ndarray]:
+        """The same of a fluid without inertia."""
+        return {"A0": self.model.flow.steady_operator(self.area, self.inlet)[1]}
+
+    def nodal(self, q: np.ndarray) -> np.ndarray:
+        """Nodal displacements and rotations (nn, 5) of unknowns (n,)."""
+        return self.model.nodal(q)
 
     def relaxation(self, loss_factor: float) -> Relaxation | None:
         """What relaxes of the stiffness with a factor on all loss factors; None where nothing does."""
@@ -163,10 +178,8 @@ class LinearisedState:
         if not fluid or not flow.has_fluid:
             return CoupledPencil(damped.M, damped.C, damped.K, relaxation=damped.relaxation)
         if not flow.unsteady:
-            _, slope = flow.steady_operator(self.area, self.inlet)
-            return damped.replace(A0=slope)
-        parts = fluid_parts(flow, self.area, self.inlet, conditions.density, storage, conditions.of_line)
-        return damped.replace(**parts)
+            return damped.replace(**self.steady_parts())
+        return damped.replace(**self.fluid_parts(conditions.density, storage, conditions.of_line))
 
 
 def fluid_parts(
