@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.symmetry import SYMMETRIES
+from tests.model.test_relaxing_wall import relaxing_valve
 from tests.small_valves import find_open_state, make_valve
 from tests.systems.whole_valve import whole_valve
 
@@ -55,6 +56,19 @@ def test_the_whole_valve_falls_into_the_four_classes(model, state, whole, classe
             block = (beside.T @ matrix @ basis).toarray()
             expected = 4 * getattr(classes[name], part).toarray() if name == other else 0.0
             assert np.abs(block - expected).max() < 1e-11 * size, (name, other)
+
+
+def test_what_relaxes_falls_into_the_four_classes():
+    model = relaxing_valve(mesh__around=6, mesh__along=8)
+    state = find_open_state()
+    whole = whole_valve(model, state, PRESSURE)
+    assert len(whole.relaxing) == 2
+    for symmetry in SYMMETRIES.values():
+        basis = whole.basis(symmetry.free_unknowns(model.mesh), symmetry.signs)
+        linear = linearise_class(model, state, PRESSURE, symmetry)
+        for matrix, ours in zip(whole.relaxing, linear.relaxing, strict=True):
+            expected = (basis.T @ matrix @ basis).toarray()
+            assert np.abs(4 * ours.toarray() - expected).max() < 1e-11 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("part", ["structure", "stiffness"])

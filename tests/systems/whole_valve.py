@@ -16,13 +16,14 @@ from dbvfiv.shell.pressure import pressure_stiffness
 
 @dataclass(frozen=True)
 class Whole:
-    """Matrices (n, n) of the whole valve: mass, structure, and structure less follower stiffness; what its points come
-    from; numbers (np, 5) of its unknowns.
+    """Matrices (n, n) of the whole valve: mass, structure, structure less follower stiffness, and what relaxes; what
+    its points come from; numbers (np, 5) of its unknowns.
     """
 
     mass: sp.csr_matrix
     structure: sp.csr_matrix
     stiffness: sp.csr_matrix
+    relaxing: tuple[sp.csr_matrix, ...]
     valve: WholeValve
     index: np.ndarray
 
@@ -60,6 +61,7 @@ def whole_valve(model: ValveModel, q: np.ndarray, inlet: float) -> Whole:
     section = model.shell.section
     mirrored = Section(tuple(replace(layer, angle=-layer.angle) for layer in section.layers), section.points_per_layer)
     mass = structure = follower = 0
+    relaxing = [0] * len(section.relaxing)
     for sign, wall in ((1, section), (-1, mirrored)):
         own = images == sign
         surface = ShellMesh.build(
@@ -72,12 +74,13 @@ def whole_valve(model: ValveModel, q: np.ndarray, inlet: float) -> Whole:
         state, dofs = shell.dofs.restrict(full), shell.dofs
         mass = mass + dofs.matrix(shell.mass(state))
         structure = structure + dofs.matrix(shell.force_and_tangent(state)[1])
+        relaxing = [part + dofs.matrix(added) for part, added in zip(relaxing, shell.relaxing_tangents(state))]
         values = np.zeros(len(dofs.pattern[1]))
         nodes, loaded = pressure[model.station_of_node][valve.node], model.loaded[valve.cell[own]]
         pressure_stiffness(surface.quads, surface.nodes, full, nodes, loaded, dofs.slots, 1.0, values)
         follower = follower + dofs.matrix(values)
     structure = structure + _stops(model, q, valve, dofs.index)
-    return Whole(mass, structure, (structure - follower).tocsr(), valve, dofs.index)
+    return Whole(mass, structure, (structure - follower).tocsr(), tuple(relaxing), valve, dofs.index)
 
 
 def _stops(model, q, valve, index) -> sp.csr_matrix:
