@@ -9,7 +9,7 @@ import numpy as np
 from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, Workspace, lowest_frequencies
 from eigen.reduction import POWERS
 
-from ...model.dynamics import Conditions, LinearisedState, fluid_parts
+from ...model.dynamics import Conditions, LinearisedState
 from ...model.leading import select_search
 
 #: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
@@ -84,14 +84,14 @@ class ValveFamily(PencilFamily):
         return self._parts[law]
 
     def _computed(self, law: Law) -> dict[str, np.ndarray]:
-        linear, flow, m = self.linear, self.linear.model.flow, len(self.linear.area)
-        if flow.has_fluid and flow.unsteady:
-            return fluid_parts(flow, linear.area, linear.inlet, 1.0, *law_parts(law))
-        zero = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
-        parts = {name: np.zeros(zero[name[0]]) for name in POWERS}
+        linear, flow, m = self.linear, self.linear.model.flow, self.linear.forces.shape[1]
+        found = {}
         if flow.has_fluid:
-            parts["A0"] = flow.steady_operator(linear.area, linear.inlet)[1]
-        return parts
+            found = linear.fluid_parts(1.0, *law_parts(law)) if flow.unsteady else linear.steady_parts()
+        if len(found) == len(POWERS):
+            return found
+        zero = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
+        return {name: np.zeros(zero[name[0]]) for name in POWERS} | found
 
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The full pencil, with the inlet velocity itself as unknown."""
