@@ -131,6 +131,8 @@ class ColumnSolver:
             If the stiffness is singular, or a full pencil has no usable shift.
         """
         conditions = [Condition(*c) for c in conditions]
+        if not family.forces.shape[1]:
+            return self._uncoupled(family, conditions)
         reduction = self.reduction(family)
         if len(conditions) < 3:
             return self._directly(reduction, conditions)
@@ -201,6 +203,22 @@ class ColumnSolver:
             _enter(column, i, spectrum)
         return self._recounted(column, family, conditions, np.flatnonzero(~column.certified))
 
+    def _uncoupled(self, family: PencilFamily, conditions) -> Column:
+        """A structure that nothing couples: its full spectra and counts, each once for every damping."""
+        column, known = _blank(len(conditions), _uncounted(family, conditions)), {}
+        for i, condition in enumerate(conditions):
+            key = condition.alpha, condition.beta, condition.loss
+            if key not in known:
+                asked = family.pencil(condition), 6, family.search(condition)
+                known[key] = certified_spectrum(*asked, workspace=self._workspace)
+            found = known[key]
+            modes = found.spectrum
+            if condition.loss:
+                modes = modes.select(np.flatnonzero(family.reach(condition).is_mode(modes.eigenvalues)))
+            _enter(column, i, modes)
+            _vouch(column, i, found.certificate)
+        return column
+
     def _repaired(self, column: Column, family, conditions, cells) -> Column:
         for i in cells:
             try:
@@ -222,10 +240,8 @@ class ColumnSolver:
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue
             if len(found.spectrum):
-                own = found.certificate
                 _enter(column, i, found.spectrum)
-                column.unstable[i], column.counted[i], column.certain[i] = own.unstable, own.counted, own.certain
-                column.line[i], column.band[i] = own.line, own.band
+                _vouch(column, i, found.certificate)
         return column
 
 
@@ -329,6 +345,12 @@ def _enter(column: Column, cell: int, spectrum) -> None:
     inside = np.flatnonzero(spectrum.frequency <= column.band[cell])
     column.leading[cell] = spectrum.eigenvalues[:KEPT]
     column.unstable[cell] = spectrum.select(inside).count_right_of(column.line[cell])
+
+
+def _vouch(column: Column, cell: int, own) -> None:
+    """Put the certificate of a full pencil into a cell."""
+    column.unstable[cell], column.counted[cell], column.certain[cell] = own.unstable, own.counted, own.certain
+    column.line[cell], column.band[cell] = own.line, own.band
 
 
 def _blank(cells: int, counts: _Counts) -> Column:

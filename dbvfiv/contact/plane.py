@@ -134,9 +134,20 @@ class PlaneContact:
         """Add force and symmetric tangent values on the shell's pattern; `second` (nn, 3, 3) as `Shell.directors`
         returns.
         """
+        self.add_force(force, nodal, directors, first, multiplier)
+        block = self.tangent_blocks(nodal, directors, first, second, multiplier)
+        slots = self._slots
+        keep = slots >= 0
+        data[slots[keep]] += block[keep]
+
+    def tangent_blocks(self, nodal, directors, first, second, multiplier, closing: bool = True) -> np.ndarray:
+        """Tangent (k, 3, 3) of each contact node in its displacement across the plane and its rotations.
+
+        `closing` is False for motions in which what lies beyond the plane moves along, so that no gap changes to first
+        order; a contact force then still turns with the wall.
+        """
         _, pressure, stiffness = self.law.respond(self.gap(nodal, directors), multiplier)
-        slope = self._slope(first)
-        _add(force, self._unknowns, -(self.area * pressure)[:, None] * slope)
+        slope = self._slope(first) if closing else np.zeros((self.count, 3))
         block = (self.area * stiffness)[:, None, None] * slope[:, :, None] * slope[:, None, :]
         # The gap bends with the rotations: -pressure * d2 gap, d2 gap = -depth * d2 director.
         bend = (self.area * pressure * self.depth)[:, None] * second[self.nodes][:, :, self.axis]
@@ -144,9 +155,7 @@ class PlaneContact:
         block[:, 2, 2] += bend[:, 1]
         block[:, 1, 2] += bend[:, 2]
         block[:, 2, 1] += bend[:, 2]
-        slots = self._slots
-        keep = slots >= 0
-        data[slots[keep]] += block[keep]
+        return block
 
     def _slope(self, first: np.ndarray) -> np.ndarray:
         """(k, 3) derivative of the gaps with respect to displacement and rotations."""

@@ -95,6 +95,15 @@ class ValveSkin:
         """(n, 4, 3) m, corners of the quadrilaterals."""
         return self.points(nodal)[self.quads]
 
+    def moving_corners(self, steady: np.ndarray, motion: np.ndarray, parity: np.ndarray) -> np.ndarray:
+        """(n, 4, 3) m, corners of a motion (nn, 5) about a symmetric state (nn, 5); `parity` (np,) are its factors at
+        the points of mirrored quarters.
+        """
+        points = self.points(steady + motion)
+        if np.any(parity < 0):
+            points = np.where(np.tile(parity, 2)[:, None] < 0, self.points(steady - motion), points)
+        return points[self.quads]
+
     def means(self, field: np.ndarray) -> np.ndarray:
         """(n,) mean over each quadrilateral of a field (nn,) of the quarter's nodes."""
         both = np.tile(field[self.valve.node], 2)

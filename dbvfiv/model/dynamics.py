@@ -138,12 +138,28 @@ class LinearisedState:
     @cached_property
     def relaxing(self) -> tuple:
         """K_g (n, n): material part of the tangent of each group of layers that relax alike."""
+        return self.relaxing_of_wall()
+
+    def relaxing_of_wall(self) -> tuple:
         return self.model.relaxing_stiffness(self.q)
 
     @cached_property
     def coupling(self) -> tuple:
         """G and J with what couples the fluid outside behind what couples the flow."""
         return (self.forces, self.slope) if self.added is None else self.added.coupling(self.forces, self.slope)
+
+    def fluid_parts(self, density: float, storage: float | None = None, line: Mapping[str, float] = {}):
+        """What the unsteady fluid answers to `slope`, as `fluid_parts`."""
+        self.check_pump()
+        return fluid_parts(self.model.flow, self.area, self.inlet, density, storage, line)
+
+    def steady_parts(self) -> dict[str, np.ndarray]:
+        """The same of a fluid without inertia."""
+        return {"A0": self.model.flow.steady_operator(self.area, self.inlet)[1]}
+
+    def nodal(self, q: np.ndarray) -> np.ndarray:
+        """Nodal displacements and rotations (nn, 5) of unknowns (n,)."""
+        return self.model.nodal(q)
 
     def relaxation(self, loss_factor: float) -> Relaxation | None:
         """What relaxes of the stiffness with a factor on all loss factors; None where nothing does."""
@@ -202,15 +218,12 @@ class LinearisedState:
 
     def flow_parts(self, density: float, storage: float | None = None, line: dict | None = None) -> dict:
         """A0 to S1 of the flow alone at a density; of a steady flow A0 is all."""
-        flow = self.model.flow
-        if flow.unsteady:
-            self.check_pump()
-            return fluid_parts(flow, self.area, self.inlet, density, storage, line)
-        return self.no_flow() | {"A0": flow.steady_operator(self.area, self.inlet)[1]}
+        moving = self.model.flow.unsteady
+        return self.no_flow() | (self.fluid_parts(density, storage, line or {}) if moving else self.steady_parts())
 
     def no_flow(self) -> dict:
         """A0 to S1 of a flow that does nothing."""
-        m = len(self.area)
+        m = self.forces.shape[1]
         shapes = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
         return {name: np.zeros(shapes[name[0]]) for name in FLUID_PARTS}
 

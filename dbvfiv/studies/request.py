@@ -24,6 +24,14 @@ LawOption = Annotated[
         help="Continuity law in place of fluid.continuity: quasi-steady, storage, or both side by side.",
     ),
 ]
+ClassesOption = Annotated[
+    str | None,
+    typer.Option(
+        "--symmetry",
+        metavar="CLASSES",
+        help="SS, the class of the model, or all: also sway in y (SA), sideways in x (AS) and twist (AA).",
+    ),
+]
 
 
 @dataclass(frozen=True)

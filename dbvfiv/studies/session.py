@@ -27,6 +27,7 @@ from .study import Study, find_study, nothing_to_resume
 KEYWORDS = {row.name: row.key for row in PARAMETERS.values() if row.swept} | {
     "continuity": "fluid.continuity",
     "in_vacuo": "modes.in_vacuo",
+    "symmetry": "modes.symmetry",
     "max_frequency": "modes.max_frequency",
 }
 

@@ -18,7 +18,7 @@ def test_modes_json(command_line):
     document = json.loads(outcome.out)
     modes = document["modes"]
     assert len(modes) == 4 and all(
-        set(mode) == {"growth_rate", "frequency", "damping_ratio", "residual"} for mode in modes
+        set(mode) == {"growth_rate", "frequency", "damping_ratio", "residual", "symmetry"} for mode in modes
     )
     assert [m["growth_rate"] for m in modes] == sorted((m["growth_rate"] for m in modes), reverse=True)
     assert all(m["frequency"] >= 0 and m["residual"] < 1e-8 for m in modes)

@@ -4,6 +4,7 @@ shape.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,7 +28,7 @@ class Buckling:
     pressure : float, Pa
         Critical pressure.
     q, shape : (n,) arrays
-        The state, and the shape it buckles into, largest entry one.
+        The state, and the shape it buckles into, largest entry one; the shape in the unknowns of its class of motion.
     eigenvalue : float, 1/s2
         Lowest stiffness eigenvalue in magnitude there.
     """
@@ -51,6 +52,8 @@ class BucklingWatch:
     found : list of Buckling
     before : (pressure, unknowns) or None
         Last equilibrium, of those seen, before the first that was found by this watch.
+    spectrum : callable, optional
+        From unknowns and pressure to the eigenvalues that are watched; those within the model's symmetry by default.
     """
 
     pressed: PressedShell
@@ -58,11 +61,12 @@ class BucklingWatch:
     eigenvalues: int = 4
     found: list[Buckling] = field(default_factory=list)
     before: tuple[float, np.ndarray] | None = None
+    spectrum: Callable[[np.ndarray, float], StiffnessSpectrum] | None = None
     _stable: tuple[float, np.ndarray, float] | None = field(default=None, repr=False)
 
     def see(self, pressure: float, q: np.ndarray) -> StiffnessSpectrum:
         """Stiffness eigenvalues of the next equilibrium; locates where the lowest has passed zero since the last."""
-        spectrum = stiffness_spectrum(self.pressed, q, pressure, self.eigenvalues)
+        spectrum = self._spectrum(q, pressure)
         if spectrum.lowest > 0:
             self._stable = (pressure, q, spectrum.lowest)
         elif self._stable is not None:
@@ -81,6 +85,11 @@ class BucklingWatch:
         """The path has jumped: the next equilibrium does not follow from the last."""
         self._stable = None
 
+    def _spectrum(self, q: np.ndarray, pressure: float) -> StiffnessSpectrum:
+        if self.spectrum is not None:
+            return self.spectrum(q, pressure)
+        return stiffness_spectrum(self.pressed, q, pressure, self.eigenvalues)
+
     def _locate(self, low: float, start: np.ndarray, at_low: float, high: float, at_high: float) -> Buckling:
         """The state between two pressures where the lowest eigenvalue vanishes, by the secant rule kept within its
         bracket.
@@ -89,7 +98,7 @@ class BucklingWatch:
         while True:
             aim = low + (high - low) * min(max(at_low / (at_low - at_high), 0.02), 0.98)
             steps.reach(aim)
-            spectrum = stiffness_spectrum(self.pressed, steps.q, aim, self.eigenvalues)
+            spectrum = self._spectrum(steps.q, aim)
             if abs(spectrum.lowest) <= TOLERANCE * scale or abs(high - low) <= 1e-11 * abs(high):
                 return Buckling("bifurcation", float(aim), steps.q, spectrum.shape, spectrum.lowest)
             if spectrum.lowest > 0:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ...case.quantity import number_or_text
-from ..request import Request
+from ..request import ClassesOption, Request
 
 ORDER = 35
 
@@ -27,6 +27,7 @@ def command(
             "--in-time", help="Also turn the drive from closure.open_pressure to as much back pressure in time."
         ),
     ] = False,
+    symmetry: ClassesOption = None,
 ) -> Request:
     """Back pressure: does the valve shut, where and how firmly, what stays open, how far is the wall from buckling?
 
@@ -34,9 +35,10 @@ def command(
     and the last one before a limit is listed too. The safety factor refers to closure.rated_pressure, or to the largest
     of the pressures. closure.supports chooses contact of the inner faces or the simplified supports of the thesis,
     closure.start = "open" turns a flow back first, slowly; --in-time does so with the inertia of wall and fluid and
-    tells the closing time.
+    tells the closing time. --symmetry all also watches for buckling into motions that the model's symmetry leaves out.
 
     dbvfiv closure cases/closure.toml -o closure.h5 --plots figures
     """
     changes = {"closure.pressures": [number_or_text(text) for text in pressures] if pressures else None}
+    changes["closure.symmetry"] = symmetry
     return Request(changes, {"in_time": in_time or None, "compare": compare or None})

@@ -48,6 +48,11 @@ class Keys(Section):
         0.2, "A section counts as shut when less than this fraction of the lip's opening at rest is left.", ge=0, lt=1
     )
     eigenvalues: StrictInt = key(4, "Lowest eigenvalues of the tangent stiffness to follow.", ge=1, le=100)
+    symmetry: Literal["SS", "all"] = key(
+        "SS",
+        "Classes of motion watched for buckling: SS is that of the model, all adds those in which the lips sway in y "
+        "(SA), the valve sways sideways in x (AS) and twists (AA).",
+    )
     balance_tolerance: Number = key(
         0.0,
         "Largest error of the energy balance over the work; load steps that miss it are halved as often as "

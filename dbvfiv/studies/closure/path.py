@@ -15,9 +15,11 @@ from continuation import NotConverged
 from ...errors import SolveError
 from ...model.load_steps import LoadStepOptions, LoadSteps
 from ...model.newton import NewtonOptions
+from ...model.symmetry import ALL
 from ...observer import Observer
 from .arclength import arclength_path
 from .buckling import Buckling, BucklingWatch
+from .classes import ClassWatch
 from .energy import EnergyLedger
 from .model import ClosureModel
 from .opening import FACES, opening
@@ -50,6 +52,8 @@ class ClosureOptions:
         How many stiffness eigenvalues to follow.
     arclength : bool
         Go on past limit points.
+    classes : bool
+        Watch for buckling into the classes of motion that the model's symmetry leaves out.
     """
 
     newton: NewtonOptions = NewtonOptions()
@@ -60,6 +64,7 @@ class ClosureOptions:
     eigenvalues: int = 4
     arclength: bool = True
     balance_tolerance: float = 0.0
+    classes: bool = False
 
     @classmethod
     def of(cls, case) -> ClosureOptions:
@@ -73,6 +78,7 @@ class ClosureOptions:
             eigenvalues=closure.eigenvalues,
             arclength=closure.arclength,
             balance_tolerance=closure.balance_tolerance,
+            classes=closure.symmetry == ALL,
         )
 
 
@@ -108,6 +114,7 @@ class ClosurePath:
         self.points: list[PathPoint] = []
         self.before_limit: ClosureState | None = None
         self.watch = BucklingWatch(pressed, steps, options.eigenvalues)
+        self.classes = ClassWatch.of(self.model, steps, options.eigenvalues, options.classes)
         self.beyond_limit = self._met = False
         self.energy = EnergyLedger(pressed, options.balance_tolerance)
         self.energy.begin(self.steps.q, 0.0)
@@ -139,6 +146,7 @@ class ClosurePath:
         self.model.pressed.multiplier = at.multiplier
         self.beyond_limit = at.beyond_limit
         self.watch.resume(at.pressure, at.q, at.eigenvalue, at.buckling)
+        self.classes.resume(at.pressure, at.q)
         self._met = bool(at.buckling)
         self.energy.begin(at.q, at.pressure, at.slope)
         self.energy.totals = at.energy
@@ -174,6 +182,7 @@ class ClosurePath:
             iterations, updates = iterations + last.iterations, updates + 1
         self.energy.settle()
         spectrum = self.watch.see(target, self.steps.q)
+        self.classes.see(target, self.steps.q)
         self._tell()
         return describe_closure(
             self.model,
@@ -197,6 +206,7 @@ class ClosurePath:
     def _accepted(self, pressure: float, q: np.ndarray) -> None:
         self.energy.add(q, pressure, self.steps.slope)
         self.points.append(self._point(pressure, q, float(self.watch.see(pressure, q).values.real[0])))
+        self.classes.see(pressure, q)
         self._tell()
 
     def _tell(self) -> None:
@@ -225,6 +235,7 @@ class ClosurePath:
             self.buckling.append(Buckling("limit point", limit.pressure, limit.q, limit.shape, limit.eigenvalue))
         self.beyond_limit = self.beyond_limit or bool(path.limits)
         self.watch.forget()
+        self.classes.forget()
         self._tell()
         self.steps.q, self.steps.pressure, self.steps.slope = path.q, path.pressure, None
         if not path.reached:

@@ -17,6 +17,7 @@ def verdict(result: ClosureResult) -> list[str]:
     return [
         *_balances(result),
         *_buckling(result),
+        *(part.sentence for part in result.classes),
         *([] if safety is None else [safety.sentence]),
         *([] if result.closing is None else _closing(result.closing)),
     ]

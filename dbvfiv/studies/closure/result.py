@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...drawing import layers
+from ...model.symmetry import EQUILIBRIA
 from ...record.header import Header
 from ...record.layout import Column
 from ...record.record import Record, plain
@@ -22,6 +23,7 @@ from ..result import StudyResult
 from ..session import Session
 from ..state import State, states_of
 from . import curves, figures
+from .class_result import ClassBuckling, first_buckling, read_classes
 from .closing import ClosingResult, ClosingSample, Turn
 from .columns import (
     BUCKLED,
@@ -133,6 +135,11 @@ class ClosureResult(StudyResult):
         return tuple(SimpleNamespace(**row) for row, _ in self._rows(BUCKLING, BUCKLED))
 
     @cached_property
+    def classes(self) -> tuple[ClassBuckling, ...]:
+        """Classes of motion other than that of the path, where they were watched."""
+        return read_classes(self.record, self.table(PATH))
+
+    @cached_property
     def opened(self) -> tuple[State, ...]:
         return states_of(self, OPENED)
 
@@ -193,8 +200,13 @@ class ClosureResult(StudyResult):
             "points": [state.summary() for state in self.states],
             "before_limit": None if self.before_limit is None else self.before_limit.summary(),
             "closing_pressure": self.closing_pressure,
-            "buckling": [{"kind": b.kind, "pressure": b.pressure, "eigenvalue": b.eigenvalue} for b in self.buckling],
+            "buckling": [
+                {"kind": b.kind, "pressure": b.pressure, "eigenvalue": b.eigenvalue, "symmetry": EQUILIBRIA}
+                for b in self.buckling
+            ],
             "critical_pressure": self.critical_pressure,
+            "first_buckling": first_buckling(self.critical_pressure, self.classes),
+            "classes": [part.summary() for part in self.classes],
             "safety": None if self.safety is None else self.safety.summary(),
             "softest": {"pressure": softest.pressure, "lowest_stiffness_eigenvalue": softest.lowest_eigenvalue}
             if softest

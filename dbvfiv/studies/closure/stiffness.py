@@ -63,15 +63,22 @@ class StiffnessSpectrum:
 def stiffness_spectrum(
     pressed: PressedShell, q: np.ndarray, pressure: float, count: int = 4, tolerance: float = 1e-8
 ) -> StiffnessSpectrum:
-    """Eigenvalues nearest to zero by shift-and-invert Arnoldi (ARPACK) with sparse LU factors.
+    """Eigenvalues nearest to zero of a state (n,) at a pressure, Pa; see `spectrum_of`."""
+    matrix = pressed.shell.dofs.matrix
+    return spectrum_of(
+        matrix(pressed.tangent(q, pressure).stiffness), matrix(pressed.mass(q)), pressure, count, tolerance
+    )
+
+
+def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: float = 1e-8) -> StiffnessSpectrum:
+    """Eigenvalues nearest to zero of two sparse matrices (n, n) by shift-and-invert Arnoldi (ARPACK) with sparse LU
+    factors.
 
     Raises
     ------
     SolveError
         If the eigenvalues did not converge, or did not to the accuracy asked for.
     """
-    matrix = pressed.shell.dofs.matrix
-    stiffness, mass = matrix(pressed.tangent(q, pressure).stiffness), matrix(pressed.mass(q))
     symmetric = (0.5 * (stiffness + stiffness.T)).tocsr()
     symmetric.sort_indices()
     try:

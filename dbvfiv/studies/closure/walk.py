@@ -9,10 +9,12 @@ import numpy as np
 
 from ...errors import SolveError
 from ...model.equilibria import model_warnings, state_warnings
+from ...model.symmetry import SYMMETRIES
 from ...record.record import GrowingRecord
 from ...record.states import LAYERS
 from ...shell.recovery import layer_fields
 from .buckling import Buckling
+from .class_result import BUCKLED_CLASS, LOWEST
 from .columns import BUCKLED, BUCKLING, FIELDS, MOST_EIGENVALUES, PATH, POINT, STATES, SUMMARY, valid_rows, void_rows
 from .model import ClosureModel
 from .opening import opening
@@ -38,6 +40,7 @@ class ClosureWalk:
         self.states, self.points, self.buckling = (prefix + table for table in (STATES, PATH, BUCKLING))
         self.path = ClosurePath(model, ClosureOptions.of(model.case), record, self._follow)
         self._kept = {self.points: 0, self.buckling: 0}  # of what this walk has found
+        self._classes_kept, self._class_buckling_kept = 0, {}
         self._limit_kept = False
 
     def go(self, pressures: Sequence[float]) -> None:
@@ -79,6 +82,7 @@ class ClosureWalk:
 
     def _follow(self, path: ClosurePath) -> None:
         """Keep what is new on the path."""
+        self._follow_classes(path)
         for table, found, row_of in (
             (self.points, path.points, self._point_row),
             (self.buckling, path.buckling, self._buckling_row),
@@ -90,6 +94,24 @@ class ClosureWalk:
             self._limit_kept = True
             self.record.append(self.states, self._state_row(path.before_limit) | self._no_restart())
             self.record.item(path.before_limit)
+
+    def _follow_classes(self, path: ClosurePath) -> None:
+        """Keep what is new of the classes of motion that the path does not have."""
+        for pressure, lowest in path.classes.lowest[self._classes_kept :]:
+            self.record.note(LOWEST, table=self.points, pressure=pressure, lowest=lowest)
+        self._classes_kept = len(path.classes.lowest)
+        for name, watch in path.classes.watches.items():
+            for found in watch.found[self._class_buckling_kept.get(name, 0) :]:
+                self.record.note(
+                    BUCKLED_CLASS,
+                    table=self.points,
+                    symmetry=name,
+                    kind=found.kind,
+                    pressure=found.pressure,
+                    eigenvalue=found.eigenvalue,
+                )
+                self._say([f"The wall buckles at {found.pressure:.6g} Pa in class {name}: {SYMMETRIES[name].words}."])
+            self._class_buckling_kept[name] = len(watch.found)
 
     def _reached(self, state: ClosureState) -> None:
         """Keep a state with what it takes to go on from it; what led to it is kept already."""

@@ -9,7 +9,7 @@ import typer
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
 from ..case import Case
-from ..request import Request
+from ..request import ClassesOption, Request
 from ..stability.fixed import refuse_moved
 
 ORDER = 30
@@ -36,6 +36,7 @@ def command(
     workers: Annotated[
         int | None, typer.Option("--workers", "-w", metavar="N", min=1, help="Processes that share the columns.")
     ] = None,
+    symmetry: ClassesOption = None,
 ) -> Request:
     """Growth rate of the leading mode over two parameters, with the exact onset curves.
 
@@ -43,6 +44,8 @@ def command(
     disagree it is uncertain, and hatched. Some cells are solved again with the full matrices (map.checks). Columns are
     put in where onsets appear or vanish (map.refine), and until the onset curves are known between them too; every
     point of a curve is neutral by the full matrices (map.curve).
+
+    With --symmetry all the cells are asked in every class of motion too, and the most unstable one is named.
 
     With -o every finished column is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash. Under mpiexec with
     mpi4py the columns are shared among its processes.
@@ -59,5 +62,6 @@ def command(
         "map.y": y,
         "map.continuity": "both" if both else None,
         "map.workers": workers,
+        "map.symmetry": symmetry,
     }
     return Request(changes)

@@ -26,6 +26,12 @@ class Keys(Section):
     checks: StrictInt = key(4, "Cells compared with the full pencil, spread over the map.", ge=0, le=1000)
     workers: StrictInt = key(1, "Processes that share the columns.", ge=1, le=1024)
 
+    symmetry: Literal["SS", "all"] = key(
+        "SS",
+        "Classes of motion looked at: SS is that of the model, all adds those in which the lips sway in y (SA), the "
+        "valve sways sideways in x (AS) and twists (AA), cell by cell.",
+    )
+
     @property
     def axes(self) -> tuple[Axis, Axis]:
         """The parsed ranges."""

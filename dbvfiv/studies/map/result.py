@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ..result import StudyResult
 from ..stability.place import describe_fixed, fixed_conditions
-from . import figures
+from . import classes, figures
 from .checks import Check
 from .column import MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, linked
@@ -77,12 +77,20 @@ class MapResult(StudyResult):
             "warnings": list(self.warnings),
             "interrupted": not self.complete,
         }
-        document = shared | pictures[0]
+        document = shared | pictures[0] | {"classes": [classes.summary_of(note) for note in self.classes]}
         if len(pictures) > 1:
             document["laws"] = pictures
         return document
 
+    @cached_property
+    def classes(self) -> list[dict[str, Any]]:
+        """Cells in the other classes of motion, where they were asked for; see `dbvfiv.studies.map.classes`."""
+        notes = {note["symmetry"]: note for note in self.record.notes(classes.NOTE)}
+        return list(notes.values())
+
     def _picture(self, law: int) -> dict[str, Any]:
+        tables = self.grid("growth_rate")[law], self.grid("frequency")[law]
+        leading = {"leading": classes.leading_of(*tables, self.classes)} if self.classes else {}
         mine = [curve for curve in self.curves if curve.law == law]
         return {
             "continuity": LAWS.get(self.plan.laws[law], self.plan.laws[law]),
@@ -94,7 +102,7 @@ class MapResult(StudyResult):
             "onset_curves": [curve.points() for curve in mine],
             "onset_frequencies": [curve.frequency.tolist() for curve in mine],
             "onset_curves_exact": [bool(curve.exact) for curve in mine],
-        }
+        } | leading
 
     def shortfall(self) -> str | None:
         gaps = len(self.failures)
@@ -108,6 +116,7 @@ class MapResult(StudyResult):
         for i in range(len(self.plan.laws)):
             lines.append(self._cells_line(i))
             lines += [self._curve_line(curve) for curve in self.curves if curve.law == i]
+        lines += [self._class_line(note) for note in self.classes]
         if self.checks:
             worst = max(check.error for check in self.checks)
             agreeing = sum(check.agrees for check in self.checks)
@@ -129,6 +138,14 @@ class MapResult(StudyResult):
             + (f", {direct} solved directly" if direct else "")
             + (f", {gaps} in gaps" if gaps else "")
             + "."
+        )
+
+    @staticmethod
+    def _class_line(note: dict[str, Any]) -> str:
+        unstable, certified = np.array(note["unstable"]), np.array(note["certified"], bool)
+        return (
+            f"class {note['symmetry']} ({note['motion']}): {int(((unstable > 0) & certified).sum())} cells unstable, "
+            f"{int(((unstable == 0) & certified).sum())} stable, {int(certified.sum())} of {unstable.size} certified."
         )
 
     def _curve_line(self, curve: OnsetCurve) -> str:

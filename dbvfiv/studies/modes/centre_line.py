@@ -12,6 +12,7 @@ from ...drawing.faces import faces
 from ...drawing.style import COMPUTED, REST, new_figure, phase_looks
 from ...drawing.views import mark_pieces
 from ...drawing.waves import wave_content
+from ...model.symmetry import SYMMETRIES
 from .plane import conditions, mode_title
 from .shapes import drawn_amplitude
 
@@ -25,9 +26,11 @@ _STILL = 0.02
 
 
 def draw(result: ModesResult, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Figures of modes, each with its name: of the first three modes, or of one."""
+    """Figures of modes, each with its name: of the first three modes, or of one. In a motion that is antisymmetric
+    about it the line x = 0 does not swing in y.
+    """
     chosen = result.modes[:_DRAWN] if mode is None else [result.mode(mode)]
-    for each in chosen:
+    for each in (mode for mode in chosen if SYMMETRIES[mode.symmetry].signs[0] > 0):
         yield f"centre-line-{each.number}", lambda each=each: centre_line(result, each)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -120,6 +121,38 @@ class Certificate:
         """From a note of a record and the curve."""
         names = cls.__dataclass_fields__.keys() - {"frequency", "phase"}
         return cls(**{name: note[name] for name in names}, frequency=frequency, phase=phase)
+
+    @classmethod
+    def joined(cls, parts: Mapping[str, Certificate]) -> Certificate:
+        """Of several classes of motion by their names: counts add up, and what holds for all of them holds. The
+        curve is that of the first.
+        """
+        each = list(parts.values())
+        if len(each) == 1:
+            return each[0]
+        stable = (
+            False if any(c.stable is False for c in each) else None if any(c.stable is None for c in each) else True
+        )
+        incomplete = [c.status for c in each if c.status != "complete"]
+        return cls(
+            stable=stable,
+            agrees=all(c.agrees for c in each),
+            unstable_count=sum(c.unstable_count for c in each),
+            unstable_count_independent=sum(c.unstable_count_independent for c in each),
+            statement=" ".join(f"In {name}: {c.statement[0].lower()}{c.statement[1:]}" for name, c in parts.items()),
+            certain=all(c.certain for c in each),
+            line=max(c.line for c in each),
+            counted_up_to=min(c.counted_up_to for c in each),
+            distance=max(c.distance for c in each),
+            response_error=max((c.response_error for c in each if c.response_error >= 0), default=float("nan")),
+            status=incomplete[0] if incomplete else "complete",
+            asked=sum(c.asked for c in each),
+            complete_above=max(c.complete_above for c in each),
+            band=min(c.band for c in each),
+            rejected=sum(c.rejected for c in each),
+            frequency=each[0].frequency,
+            phase=each[0].phase,
+        )
 
     def verdict(self, conditions: str = "") -> str:
         """One sentence for people, with the words behind "stable" that say under which conditions."""

@@ -37,6 +37,14 @@ def command(
             help="Leave the flow out: the structure under its steady pressures, with any fluid outside.",
         ),
     ] = False,
+    symmetry: Annotated[
+        str | None,
+        typer.Option(
+            "--symmetry",
+            metavar="CLASS",
+            help="Class of motion: SS opens and closes the lips, SA sways them in y, AS in x, AA twists; or all.",
+        ),
+    ] = None,
     animate: Annotated[
         list[int] | None,
         typer.Option(
@@ -49,9 +57,9 @@ def command(
     stable.
 
     The number of unstable eigenvalues is counted twice, in the list of modes and by the winding of the determinant
-    along the imaginary axis; both eigenvalues of a pair count. The model has one quarter of the valve, so all modes are
-    symmetric about both planes. With --law both the other continuity law is asked too, and where both disagree about
-    stable or not the result says so.
+    along the imaginary axis; both eigenvalues of a pair count. Modes are symmetric about both planes unless --symmetry
+    asks for another class of motion; the lowest mode of a valve is often sway, SA. With --law both the other continuity
+    law is asked too, and where both disagree about stable or not the result says so.
 
     dbvfiv modes cases/dbv12.toml -p "6 kPa" --density 10 --set damping.alpha=0 -o modes.h5 --plots figures --animate 1
     """
@@ -66,5 +74,6 @@ def command(
         "fluid.density": number_or_text(density),
         "modes.count": count,
         "modes.in_vacuo": in_vacuo or None,
+        "modes.symmetry": symmetry,
     } | law_changes(law, "modes")
     return Request(changes, further=further)

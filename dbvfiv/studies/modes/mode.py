@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...model.symmetry import EQUILIBRIA, SYMMETRIES
 from ...record.layout import Column
 from ..state import State
 from .run import FoundModes
@@ -52,6 +53,8 @@ class ModeShape:
     pressure : (m,) complex, Pa per m
         NaN in vacuo.
     inlet_velocity : complex, m/s per m
+    symmetry : str
+        Class of motion, see `dbvfiv.model.symmetry`.
     """
 
     number: int
@@ -63,6 +66,7 @@ class ModeShape:
     area: np.ndarray = field(repr=False)
     pressure: np.ndarray = field(repr=False)
     inlet_velocity: complex = field(repr=False)
+    symmetry: str = EQUILIBRIA
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.number}: growth {self.growth_rate:+.5g} 1/s at {self.frequency:.5g} Hz>"
@@ -97,12 +101,14 @@ class ModeShape:
     def drawn_amplitude(self, state: State) -> float:
         """Largest displacement, m, at which the mode shows well and the centre line of the duckbill stays open."""
         mesh = state.results.mesh
+        largest = _DRAWN * float(np.ptp(mesh.z))
+        if not SYMMETRIES[self.symmetry].moves_lips_apart:
+            return largest
         line = mesh.rows[:, 0]
         height = mesh.nodes[line, 1] + state.nodal[line, 1]
         swing = np.abs(self.shape[line, 1])
         moving = swing > 1e-3
         room = float(np.min(_OPEN * height[moving] / swing[moving])) if moving.any() else np.inf
-        largest = _DRAWN * float(np.ptp(mesh.z))
         return min(largest, room) if room > 0.05 * largest else 0.2 * largest
 
     def summary(self) -> dict[str, Any]:
@@ -112,6 +118,7 @@ class ModeShape:
             "frequency": self.frequency,
             "damping_ratio": self.damping_ratio,
             "residual": self.residual,
+            "symmetry": self.symmetry,
         }
 
 

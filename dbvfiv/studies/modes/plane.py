@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...drawing.style import DANGER, STABLE, UNSTABLE, driven, new_figure
+from ...model.symmetry import EQUILIBRIA
 
 if TYPE_CHECKING:
     from .result import ModesResult
@@ -58,7 +59,7 @@ def eigenvalues(result: ModesResult) -> Figure:
         colour = UNSTABLE if mode.growth_rate > result.certificate.line else STABLE
         axes.plot(mode.growth_rate, mode.frequency, "o", color=colour, ms=7, clip_on=False, zorder=3)
         axes.annotate(
-            str(mode.number),
+            str(mode.number) + class_of(mode),
             (mode.growth_rate, mode.frequency),
             (6, 5),
             textcoords="offset points",
@@ -94,9 +95,15 @@ def in_vacuo(result: ModesResult) -> bool:
 def mode_title(mode) -> str:
     """Number, growth rate and frequency of a mode."""
     growth = f"{mode.growth_rate:+.4g} 1/s".replace("-", "\N{MINUS SIGN}")
+    name = f"Mode {mode.number}{class_of(mode)}"
     if mode.frequency == 0:
-        return f"Mode {mode.number}: {growth}, no oscillation"
-    return f"Mode {mode.number}: {mode.frequency:.4g} Hz, {growth}"
+        return f"{name}: {growth}, no oscillation"
+    return f"{name}: {mode.frequency:.4g} Hz, {growth}"
+
+
+def class_of(mode) -> str:
+    """Class of motion as it stands behind the number of a mode; nothing for that of the equilibria."""
+    return "" if mode.symmetry == EQUILIBRIA else f" {mode.symmetry}"
 
 
 def _rays(axes, left: float, top: float) -> None:

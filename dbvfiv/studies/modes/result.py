@@ -10,6 +10,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from ...errors import CaseError
+from ...model.symmetry import EQUILIBRIA, SYMMETRIES
 from ...record.mesh import MeshData
 from ...record.states import state_table
 from ...record.table import TableSpec
@@ -26,6 +27,8 @@ from .mode import MODE, ModeShape
 from .steps import cycle_steps, mode_steps
 
 STATE, MODES, COUNT = "state", "modes", "count"
+#: What a note of a certificate says about the rows that belong to it, and the table they stand in.
+COUNTED = (("modes", MODES), ("points", COUNT))
 HEAD = (
     "  mode   growth rate    frequency   damping ratio   residual",
     "                 1/s           Hz",
@@ -63,13 +66,35 @@ class ModesResult(StudyResult):
     @cached_property
     def modes(self) -> tuple[ModeShape, ...]:
         (_, table, _) = tables_of(self.mesh)
-        return tuple(ModeShape(number=i + 1, **row) for i, row in enumerate(self.record.table_rows(table)))
+        rows, classes = self.record.table_rows(table), []
+        for note in self._certified:
+            count = note.get("modes", len(rows))
+            classes += [note.get("symmetry", EQUILIBRIA)] * count
+        classes += [EQUILIBRIA] * (len(rows) - len(classes))
+        order = range(len(rows))
+        if len(set(classes)) > 1:
+            order = sorted(order, key=lambda i: (-rows[i]["growth_rate"], rows[i]["angular_frequency"]))
+        return tuple(ModeShape(number=n + 1, **rows[i], symmetry=classes[i]) for n, i in enumerate(order))
+
+    @property
+    def _certified(self) -> list[dict[str, Any]]:
+        return self.record.notes("certificate")
+
+    @cached_property
+    def certificates(self) -> dict[str, Certificate]:
+        """One for each class of motion that was searched, by its name."""
+        found, first = {}, 0
+        for note in self._certified:
+            last = first + note.get("points", self.record.rows(COUNT))
+            curve = (self.record.column(COUNT, c.name)[first:last] for c in CURVE)
+            found[note.get("symmetry", EQUILIBRIA)] = Certificate.read(note, *curve)
+            first = last
+        return found
 
     @cached_property
     def certificate(self) -> Certificate | None:
-        """None if the run ended before it had one."""
-        notes = self.record.notes("certificate")
-        return Certificate.read(notes[-1], *(self.record.column(COUNT, c.name) for c in CURVE)) if notes else None
+        """Of all classes searched; None if the run ended before it had one."""
+        return Certificate.joined(self.certificates) if self.certificates else None
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -82,10 +107,13 @@ class ModesResult(StudyResult):
     @property
     def verdict(self) -> str:
         """One sentence for people, which names the continuity law and what is outside."""
+        return self.certificate.verdict(self.law)
+
+    @property
+    def law(self) -> str:
+        """What a verdict stands under: the continuity law, and what is outside; in vacuo the latter alone."""
         case = self.case
-        if case.modes.in_vacuo or not case.continuity:
-            return self.certificate.verdict(case.outside.words)
-        return self.certificate.verdict(f"under {case.continuity}")
+        return case.outside.words if case.modes.in_vacuo or not case.continuity else f"under {case.continuity}"
 
     @cached_property
     def other_law(self) -> other_law.OtherLaw | None:
@@ -129,9 +157,21 @@ class ModesResult(StudyResult):
             "unstable_count_independent": self.certificate.unstable_count_independent,
             "stable": self.stable,
             "certificate": self.certificate.summary(),
+            "classes": [self._class_summary(name, found) for name, found in self.certificates.items()],
             "notes": list(self.notes),
             "warnings": list(self.warnings),
         } | both
+
+    @staticmethod
+    def _class_summary(name: str, found: Certificate) -> dict[str, Any]:
+        return {
+            "symmetry": name,
+            "motion": SYMMETRIES[name].words,
+            "unstable_count": found.unstable_count,
+            "unstable_count_independent": found.unstable_count_independent,
+            "stable": found.stable,
+            "certificate": found.summary(),
+        }
 
     def lines(self) -> list[str]:
         if self.certificate is None:
@@ -140,10 +180,15 @@ class ModesResult(StudyResult):
             f"{m.number:6d}{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:16.4f}{m.residual:11.1e}"
             for m in self.modes
         ]
-        notes = [f"Note: {note}" for note in self.notes]
+        head, notes = HEAD, [f"Note: {note}" for note in self.notes]
+        if self.case.modes.symmetry != EQUILIBRIA:
+            head = (f"{HEAD[0]}   class", HEAD[1])
+            rows = [f"{row}{mode.symmetry:>8}" for row, mode in zip(rows, self.modes)]
+            words = ", ".join(f"{name}: {SYMMETRIES[name].words}" for name in self.certificates)
+            notes = [f"Classes: {words}.", *notes]
         other = self.other_law
         if other is None:
-            return [*HEAD, *rows, "", self.verdict, *notes]
+            return [*head, *rows, "", self.verdict, *notes]
         table = other_law.side_by_side(self.case.fluid.continuity, [mode.summary() for mode in self.modes], other)
         return [*table, "", self.verdict, other.verdict, self.comparison, *notes]
 

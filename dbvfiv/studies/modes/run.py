@@ -18,10 +18,12 @@ from eigen import (
 
 from ...errors import CaseError
 from ...model import ValveModel
-from ...model.dynamics import Conditions, linearise
+from ...model.classes import linearise_class
+from ...model.dynamics import Conditions
 from ...model.equilibria import require_equilibrium
 from ...model.leading import select_search
 from ...model.state import SteadyState
+from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...observer import Observer
 from ..solving import solving
 
@@ -73,10 +75,11 @@ class FoundModes:
         Displacements and rotations of the nodes, the largest displacement being 1 and real.
     areas, pressures : (k, m) complex
         Changes of the row areas (m2, a quarter) and station pressures (Pa) for a largest displacement of 1 m; no
-        pressures in vacuo.
+        pressures in vacuo, and none of either to first order but in the class of the equilibria.
     inlet_velocities : (k,) complex, m/s
         Likewise.
     notes : tuple of str
+    symmetry : Symmetry
     """
 
     model: ValveModel
@@ -89,6 +92,7 @@ class FoundModes:
     pressures: np.ndarray
     inlet_velocities: np.ndarray
     notes: tuple[str, ...] = ()
+    symmetry: Symmetry = SYMMETRIES[EQUILIBRIA]
 
     @property
     def spectrum(self) -> Spectrum:
@@ -117,8 +121,9 @@ def run_modes(
     options: ModesOptions | None = None,
     observer: Observer | None = None,
     storage: float | None = None,
+    symmetry: Symmetry = SYMMETRIES[EQUILIBRIA],
 ) -> FoundModes:
-    """Leading modes of a steady state.
+    """Leading modes of a steady state in one class of motion.
 
     Parameters
     ----------
@@ -131,6 +136,8 @@ def run_modes(
     observer : Observer, optional
     storage : float, optional
         Blend of the continuity laws in place of the model's own.
+    symmetry : Symmetry, optional
+        The class; that of the equilibria by default.
 
     Raises
     ------
@@ -152,7 +159,7 @@ def run_modes(
         )
     observer.begin("modes", 1)
     observer.progress("linearising")
-    linear = linearise(model, state.q, state.pressure)
+    linear = linearise_class(model, state.q, state.pressure, symmetry)
     pencil = linear.pencil(conditions, not without_fluid, storage)
     observer.progress("searching")
     with solving(state.pressure):
@@ -174,7 +181,7 @@ def run_modes(
             ),
         )
     notes = (*notes, *certified.spectrum.notes)
-    result = _described(model, state, conditions, without_fluid, certified, pencil, linear, notes)
+    result = _described(model, state, conditions, without_fluid, certified, pencil, linear, notes, symmetry)
     observer.item(result)
     if result.stable is None:
         observer.warn(certified.statement)
@@ -183,24 +190,17 @@ def run_modes(
 
 
 def _described(
-    model, state, conditions, in_vacuo, certified: CertifiedSpectrum, pencil: CoupledPencil, linear, notes
+    model, state, conditions, in_vacuo, certified: CertifiedSpectrum, pencil: CoupledPencil, linear, notes, symmetry
 ) -> FoundModes:
     """Shapes, areas and pressures of the eigenvectors, scaled to a largest displacement of 1."""
     spectrum = certified.spectrum
     shapes, scales = [], []
     for q in spectrum.q.T:
-        nodal = model.nodal(q)
+        nodal = linear.nodal(q)
         scales.append(_largest(nodal))
         shapes.append(nodal / scales[-1])
     scale = np.array(scales, complex).reshape(len(spectrum))
-    change = linear.slope @ spectrum.q
-    stations = 0 if in_vacuo else len(change)
-    pressure = np.zeros((stations, len(spectrum)), complex)
-    for i, value in enumerate(spectrum.eigenvalues if stations else ()):
-        by_area, by_velocity, _, _ = pencil.fluid_at(value)
-        # behind the stations stands what couples the fluid outside
-        by_area, by_velocity = by_area[:stations, :stations], by_velocity[:stations]
-        pressure[:, i] = by_area @ change[:, i] + by_velocity @ spectrum.u[:, i]
+    change, pressure = _changes(model, pencil, linear, spectrum, symmetry, in_vacuo)
     velocity = spectrum.u[0] if pencil.b else np.zeros(len(spectrum), complex)
     return FoundModes(
         model,
@@ -213,7 +213,25 @@ def _described(
         pressures=(pressure / scale).T,
         inlet_velocities=velocity / scale,
         notes=tuple(notes),
+        symmetry=symmetry,
     )
+
+
+def _changes(model, pencil: CoupledPencil, linear, spectrum, symmetry, in_vacuo) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of areas (m, k) and pressures (m or 0, k) of the eigenvectors."""
+    if symmetry.name != EQUILIBRIA:
+        return np.zeros((model.stations, len(spectrum)), complex), np.zeros(
+            (0 if in_vacuo else model.stations, len(spectrum)), complex
+        )
+    change = linear.slope @ spectrum.q
+    stations = 0 if in_vacuo else len(change)
+    pressure = np.zeros((stations, len(spectrum)), complex)
+    for i, value in enumerate(spectrum.eigenvalues if stations else ()):
+        by_area, by_velocity, _, _ = pencil.fluid_at(value)
+        # behind the stations stands what couples the fluid outside
+        by_area, by_velocity = by_area[:stations, :stations], by_velocity[:stations]
+        pressure[:, i] = by_area @ change[:, i] + by_velocity @ spectrum.u[:, i]
+    return change, pressure
 
 
 def _ties_by_frequency(spectrum: Spectrum) -> Spectrum:

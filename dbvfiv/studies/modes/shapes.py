@@ -15,6 +15,7 @@ from ...drawing.axes import colour_bar, headline
 from ...drawing.faces import ValveSkin, faces
 from ...drawing.style import UNSTABLE, new_figure
 from ...drawing.views import COLOURS, frame, shaded
+from ...model.symmetry import SYMMETRIES
 from .plane import conditions, mode_title
 
 if TYPE_CHECKING:
@@ -76,11 +77,13 @@ class ModeSurface:
         self.mode = mode
         self.amplitude = drawn_amplitude(result.state, mode)
         self.steady = result.state.nodal
+        self.parity = SYMMETRIES[mode.symmetry].parity(self.skin.valve.sign)
         self.colours = COLOURS(self.skin.means(mode.amplitude))
 
     def corners(self, phase: float) -> np.ndarray:
         """(n, 4, 3) mm, in the order axis of the valve, width, opening."""
-        return self.skin.corners(self.steady + self.amplitude * self.mode.at_phase(phase))[:, :, [2, 0, 1]] * 1e3
+        motion = self.amplitude * self.mode.at_phase(phase)
+        return self.skin.moving_corners(self.steady, motion, self.parity)[:, :, [2, 0, 1]] * 1e3
 
     def limits(self) -> np.ndarray:
         """(2, 3) mm, corners of a box that holds the whole cycle."""
@@ -108,7 +111,10 @@ class ModeSurface:
 def drawn_amplitude(state: State, mode: ModeShape) -> float:
     """Largest displacement, m, at which a mode shows well and the inner faces of the lips do not cross."""
     mesh = state.results.mesh
-    line = mesh.rows[:, 0]
+    symmetry = SYMMETRIES[mode.symmetry]
+    if not symmetry.moves_lips_apart:
+        return mode.drawn_amplitude(state)
+    line = mesh.rows[:, 0] if symmetry.signs[0] > 0 else mesh.rows.ravel()  # a sideways sway leaves x = 0 in place
     height = faces(mesh, state.nodal)[0][line, 1]
     swing = np.abs(mode.shape[line, 1])
     chosen = (swing > 1e-3) & (height > 0)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...model.symmetry import SYMMETRIES
 from ...record.fields import motion
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
@@ -31,10 +32,10 @@ class _ModeSteps(Sequence):
 
     def __getitem__(self, number):
         mode, valve, mesh = self.result.modes[number], self.valve, self.result.mesh
-        shape = mode.shape[:, :3]
+        shape, parity = mode.shape[:, :3], SYMMETRIES[mode.symmetry].parity(valve.sign)[:, None]
         points = motion(mesh, valve, self.result.state.nodal) | {
-            "mode_real": valve.vectors(shape.real),
-            "mode_imag": valve.vectors(shape.imag),
+            "mode_real": valve.vectors(shape.real) * parity,
+            "mode_imag": valve.vectors(shape.imag) * parity,
             "mode_amplitude": mode.amplitude[valve.node],
         }
         ones = np.ones(len(valve.quads))
@@ -64,7 +65,12 @@ class _CycleSteps(Sequence):
         share = range(self.phases + 1)[number] / self.phases
         mode, state, mesh = self.mode, self.result.state, self.result.mesh
         moved = mode.at_phase(2 * np.pi * share) * mode.drawn_amplitude(state)
-        points = motion(mesh, self.valve, state.nodal + moved) | {"oscillation": self.valve.vectors(moved[:, :3])}
+        parity = SYMMETRIES[mode.symmetry].parity(self.valve.sign)[:, None]
+        points = motion(mesh, self.valve, state.nodal + moved)
+        if np.any(parity < 0):
+            opposite = motion(mesh, self.valve, state.nodal - moved)
+            points = {name: np.where(parity < 0, opposite[name], field) for name, field in points.items()}
+        points |= {"oscillation": self.valve.vectors(moved[:, :3]) * parity}
         value = share / mode.frequency if mode.frequency > 0 else share
         return Step(value, points, {"thickness": self.valve.cells(mesh.thickness)})
 

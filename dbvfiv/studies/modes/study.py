@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from ...errors import CaseError
 from ...model.state import SteadyState
+from ...model.symmetry import EQUILIBRIA, Symmetry, chosen_symmetries
 from ...record.record import GrowingRecord
 from ...record.states import state_row
+from ..case import Case
 from ..session import Session
 from ..stability.laws import STORAGE, other_law, require_two_laws
 from ..study import Study
 from .certificate import CURVE, Certificate
 from .mode import rows_of
 from .other_law import NOTE, note_of
-from .result import COUNT, MODES, STATE, ModesResult, tables_of
+from .result import COUNT, COUNTED, MODES, STATE, ModesResult, tables_of
 from .run import ModesOptions, run_modes
 
 
@@ -21,13 +24,16 @@ def run(session: Session, record: GrowingRecord) -> None:
     both = case.modes.continuity == "both"
     if both:
         require_two_laws(case, "modes", "modes.in_vacuo leaves the fluid out" if case.modes.in_vacuo else "")
-    wanted = [not record.notes("certificate"), both and not record.notes(NOTE)]
-    if not any(wanted):
+        _require_one_class(case)
+    done = {note.get("symmetry", EQUILIBRIA) for note in record.notes("certificate")}
+    missing = [symmetry for symmetry in chosen_symmetries(case.modes.symmetry) if symmetry.name not in done]
+    further = both and not record.notes(NOTE)
+    if not (missing or further):
         return
     state = session.equilibrium(record)
-    if wanted[0]:
-        _keep(session, record, state)
-    if wanted[1]:
+    for symmetry in missing:
+        _keep(session, record, state, symmetry)
+    if further:
         law = other_law(case)
         found = run_modes(
             session.model, state, options=ModesOptions.of(case), observer=record, storage=float(law == STORAGE)
@@ -35,22 +41,47 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.note(NOTE, **note_of(found, law))
 
 
-def _keep(session: Session, record: GrowingRecord, state: SteadyState) -> None:
-    """Modes under the case's own law."""
+def _require_one_class(case: Case) -> None:
+    """Refuse to compare laws where they do not differ.
+
+    Raises
+    ------
+    CaseError
+    """
+    if case.modes.symmetry != EQUILIBRIA:
+        raise CaseError(
+            f"modes.continuity is given as 'both' with modes.symmetry = {case.modes.symmetry!r}, but the laws differ "
+            f"in class {EQUILIBRIA} alone, since no other motion changes areas; modes.symmetry must be {EQUILIBRIA!r} "
+            "then.",
+            key="modes.continuity",
+        )
+
+
+def _keep(session: Session, record: GrowingRecord, state: SteadyState, symmetry: Symmetry) -> None:
+    """Modes of a class under the case's own law; rows that an interrupted attempt kept of it stay."""
     model = session.model
-    found = run_modes(model, state, options=ModesOptions.of(session.case), observer=record)
+    found = run_modes(model, state, options=ModesOptions.of(session.case), observer=record, symmetry=symmetry)
+    before = record.notes("certificate")
+    modes, points = (sum(note.get(name, record.rows(table)) for note in before) for name, table in COUNTED)
     if not record.rows(STATE):
         record.append(STATE, state_row(model, state))
-    for row in rows_of(found)[record.rows(MODES) :]:
+    rows = rows_of(found)
+    for row in rows[record.rows(MODES) - modes :]:
         record.append(MODES, row)
     said = {note["text"] for note in record.notes("remark")}
     for sentence in found.notes:
         if sentence not in said:
             record.note("remark", text=sentence)
     certificate = Certificate.of(found)
-    if not record.rows(COUNT):
+    if record.rows(COUNT) == points:
         record.extend(COUNT, {column.name: getattr(certificate, column.name) for column in CURVE})
-    record.note("certificate", **certificate.note())
+    record.note(
+        "certificate",
+        **certificate.note(),
+        symmetry=symmetry.name,
+        modes=len(rows),
+        points=len(certificate.frequency),
+    )
 
 
 STUDY = Study("modes", tables_of, run, ModesResult)

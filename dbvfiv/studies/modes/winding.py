@@ -10,22 +10,25 @@ from matplotlib.figure import Figure
 
 from ...drawing.axes import log_axis
 from ...drawing.style import COMPUTED, STABLE, UNSTABLE, new_figure
+from ...model.symmetry import EQUILIBRIA
 from .plane import conditions
 
 if TYPE_CHECKING:
+    from .certificate import Certificate
     from .result import ModesResult
 
 
 def draw(result: ModesResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of modes, each with its name."""
-    yield "winding", lambda: winding(result)
+    for name, certificate in result.certificates.items():
+        ending = "" if name == EQUILIBRIA else f"-{name}"
+        yield f"winding{ending}", lambda name=name, certificate=certificate: winding(result, name, certificate)
 
 
-def winding(result: ModesResult) -> Figure:
+def winding(result: ModesResult, symmetry: str, certificate: Certificate) -> Figure:
     """Winding of the determinant from zero frequency up: it ends at the number of eigenvalues to the right, and rises
-    past those that are unstable.
+    past those that are unstable; of one class of motion.
     """
-    certificate = result.certificate
     figure = new_figure(7.0, 4.4)
     axes = figure.add_subplot()
     number = certificate.unstable_count_independent
@@ -39,30 +42,33 @@ def winding(result: ModesResult) -> Figure:
     log_axis(axes.xaxis, *certificate.frequency[[1, -1]])
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, -0.25), max(high, number + 0.1 * max(1.0, high - low)))
-    levels = _mark_modes(axes, result)
+    which = "" if symmetry == EQUILIBRIA else f" in class {symmetry}"
+    levels = _mark_modes(axes, result, symmetry, certificate)
     if np.isfinite(certificate.counted_up_to):
         right = axes.get_xlim()[1]
         axes.axvspan(certificate.counted_up_to, right, color="0.93", lw=0, zorder=0, label="not counted")
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=3)
     axes.set_xlabel("Frequency on the imaginary axis, Hz")
     axes.set_ylabel("Winding of the determinant, half turns")
-    axes.set_title(f"Independent count {conditions(result)}", loc="left", fontweight="bold", pad=6 + 11 * levels)
+    axes.set_title(f"Independent count{which} {conditions(result)}", loc="left", fontweight="bold", pad=6 + 11 * levels)
+    verdict = certificate.verdict(result.law)
     beginning = f" The curve begins at {start:g}, half the degree of the determinant." if start else ""
-    figure.supxlabel(f"{result.verdict}\nNumbers: modes found by the search.{beginning}", x=0.01, ha="left", fontsize=9)
+    figure.supxlabel(f"{verdict}\nNumbers: modes found by the search.{beginning}", x=0.01, ha="left", fontsize=9)
     return figure
 
 
-def _mark_modes(axes, result: ModesResult) -> int:
+def _mark_modes(axes, result: ModesResult, symmetry: str, certificate: Certificate) -> int:
     """Lines at the frequencies of the modes, their numbers above the frame, staggered where they are close; how many
     rows of numbers that takes.
     """
     step = np.diff(np.log10(axes.get_xlim()))[0] / 35
     last, level, highest = -np.inf, 0, 0
-    for mode in sorted((m for m in result.modes if m.frequency > 0), key=lambda m: m.frequency):
+    modes = [m for m in result.modes if m.frequency > 0 and m.symmetry == symmetry]
+    for mode in sorted(modes, key=lambda m: m.frequency):
         place = np.log10(mode.frequency)
         level = (level + 1) % 4 if place - last < step else 0
         last, highest = place, max(highest, level)
-        colour = UNSTABLE if mode.growth_rate > result.certificate.line else STABLE
+        colour = UNSTABLE if mode.growth_rate > certificate.line else STABLE
         axes.axvline(mode.frequency, color=colour, lw=1.0, alpha=0.5, zorder=0)
         axes.annotate(
             str(mode.number),

@@ -9,7 +9,7 @@ import typer
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
 from ..case import Case
-from ..request import DensityOption, LawOption, PressureOption, Request
+from ..request import ClassesOption, DensityOption, LawOption, PressureOption, Request
 from ..stability.fixed import refuse_moved
 from ..stability.laws import law_changes
 
@@ -29,6 +29,7 @@ def command(
     pressure: PressureOption = None,
     density: DensityOption = None,
     law: LawOption = None,
+    symmetry: ClassesOption = None,
 ) -> Request:
     """Every onset along one parameter: value, frequency, super- or subcritical, uncertainty of the mesh.
 
@@ -37,6 +38,9 @@ def command(
     coefficient (onset.normal_form), and found again on a coarser mesh for an uncertainty (onset.coarse_mesh).
 
     With --law both the other continuity law is scanned too, and what both disagree about is said.
+
+    With --symmetry all the motions that are not symmetric about both planes are looked at too, and each onset names its
+    class.
 
     With -o every value of the scan and every onset is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash.
 
@@ -47,5 +51,6 @@ def command(
         "drive.pressure": number_or_text(pressure),
         "fluid.density": number_or_text(density),
         "onset.over": over,
+        "onset.symmetry": symmetry,
     }
     return Request(changes | law_changes(law, "onset"))

@@ -79,6 +79,12 @@ def _draw_scan(result: OnsetResult, values: np.ndarray, top, bottom) -> float:
     top.plot(values, growth[:, 0], ".-", color=COMPUTED, label="leading mode")
     changes = np.flatnonzero(_jumps(frequency[:, 0]))
     bottom.plot(np.insert(values, changes, np.nan), np.insert(frequency[:, 0], changes, np.nan), ".-", color=COMPUTED)
+    for part, style in zip(result.classes, ("--", "-.", ":")):
+        scan, scale = part["scan"], PARAMETERS[result.parameter].scale
+        places, rates = np.array(scan["values"]) / scale, np.array(scan["growth_rate"])
+        look = {"ls": style, "color": ACCENT, "lw": 1.2}
+        top.plot(places, np.where(rates > low, rates, np.nan), label=f"class {part['symmetry']}", **look)
+        bottom.plot(places, scan["frequency"], **look)
     top.axhline(0.0, color="0.25", lw=1.0)
     return low
 

@@ -37,6 +37,12 @@ class Keys(Section):
 
     continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
 
+    symmetry: Literal["SS", "all"] = key(
+        "SS",
+        "Classes of motion looked at: SS is that of the model, all adds those in which the lips sway in y (SA), the "
+        "valve sways sideways in x (AS) and twists (AA).",
+    )
+
     @property
     def axis(self) -> Axis:
         """The parsed range."""

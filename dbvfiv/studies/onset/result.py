@@ -11,11 +11,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
+from ...model.symmetry import EQUILIBRIA
 from ..result import StudyResult
 from ..stability.crossings import WATCHED
 from ..stability.laws import compare_ranges
 from ..stability.place import describe_fixed, fixed_conditions
-from . import figures, other_law
+from . import classes, figures, other_law
 from .intervals import Interval, known_intervals, uncertain_intervals
 from .point import FINE, OnsetSample
 from .rows import read_points, read_samples
@@ -50,7 +51,24 @@ class OnsetResult(StudyResult):
 
     @cached_property
     def points(self) -> tuple[dict[str, Any], ...]:
-        return tuple(read_points(self.record))
+        return tuple(classes.merge_points(self._own_points, self._own_intervals(True), self.classes))
+
+    @cached_property
+    def _own_points(self) -> list[dict[str, Any]]:
+        """Those within the symmetry of the model."""
+        return read_points(self.record)
+
+    @cached_property
+    def classes(self) -> list[dict[str, Any]]:
+        """Onsets in the other classes of motion, where they were asked for; see `dbvfiv.studies.onset.classes`."""
+        notes = {note["symmetry"]: note for note in self.record.notes(classes.NOTE)}
+        return [{name: value for name, value in note.items() if name != "what"} for note in notes.values()]
+
+    @cached_property
+    def leading(self) -> dict[str, Any]:
+        """Growth rate, frequency and class of the most unstable motion at the values that all classes were asked at."""
+        own = (self.values, self.growth_rates[:, 0], self.frequencies[:, 0], self.certified)
+        return classes.leading_of(*own, self.classes)
 
     @cached_property
     def _scan(self) -> list[OnsetSample]:
@@ -84,20 +102,24 @@ class OnsetResult(StudyResult):
     @property
     def unstable_intervals(self) -> list[Interval]:
         """Where the state is known to be unstable within the range scanned."""
-        return self._intervals(True)
+        parts = [self._own_intervals(True), *(part["unstable"] for part in self.classes)]
+        return classes.joined_stretches(parts) if self.classes else parts[0]
 
     @property
     def stable_intervals(self) -> list[Interval]:
-        """Where it is known to be stable."""
-        return self._intervals(False)
+        """Where it is known to be stable, in all classes that were asked for."""
+        parts = [self._own_intervals(False), *(part["stable"] for part in self.classes)]
+        return classes.common_stretches(parts) if self.classes else parts[0]
 
     @property
     def uncertain_intervals(self) -> list[Interval]:
         """Where neither is claimed."""
-        return uncertain_intervals(self.values, self.certified)
+        own = uncertain_intervals(self.values, self.certified)
+        parts = [own, *(part["uncertain"] for part in self.classes)]
+        return classes.joined_stretches(parts) if self.classes else own
 
-    def _intervals(self, unstable: bool) -> list[Interval]:
-        edges = [point["value"] for point in self.points if point["edge"]]
+    def _own_intervals(self, unstable: bool) -> list[Interval]:
+        edges = [point["value"] for point in self._own_points if point["edge"]]
         return known_intervals(self.values, self.growth_rates[:, 0], self.certified, edges, unstable)
 
     @cached_property
@@ -112,7 +134,7 @@ class OnsetResult(StudyResult):
         if self.other_law is None:
             return []
         own = self.case.fluid.continuity
-        return other_law.disagreements(own, self.stable_intervals, self.unstable_intervals, self.other_law)
+        return other_law.disagreements(own, self._own_intervals(False), self._own_intervals(True), self.other_law)
 
     @property
     def comparison(self) -> str | None:
@@ -133,6 +155,8 @@ class OnsetResult(StudyResult):
                 "frequency": self.frequencies[:, 0].tolist(),
                 "certified": self.certified.tolist(),
             },
+            "leading": self.leading,
+            "classes": self.classes,
             "fixed": fixed_conditions(self.case, self.parameter),
             "failures": list(self.failures),
             "warnings": list(self.warnings),
@@ -160,6 +184,7 @@ class OnsetResult(StudyResult):
             f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  "
             f"{'':<28}{'below, 1/s':>11}{'above, 1/s':>11}"
         )
+        head += "  class" if self.classes else ""
         return [fixed, head, *(self._line(point) for point in points)]
 
     def _other_lines(self) -> list[str]:
@@ -178,14 +203,15 @@ class OnsetResult(StudyResult):
         scanned = f"from {low:.6g} to {high:.6g} {row.shown_unit}".rstrip()
         if not self.complete:
             return f"No onset has been located yet: the search ended early, after {len(self.values)} values {scanned}."
-        if not len(self.values) or not self.certified.all():
-            sure = int(self.certified.sum())
+        sure = sum(self.leading["certified"])
+        if not len(self.values) or not (self.certified.all() and all(self.leading["certified"])):
             return (
                 f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values {scanned} carry a "
                 "certificate."
             )
-        state = "unstable" if self.growth_rates[0, 0] > 0 else "stable"
-        return f"No onset: the valve is {state} {scanned}."
+        state = "unstable" if self.leading["growth_rate"][0] > 0 else "stable"
+        which = f" in classes {', '.join([EQUILIBRIA, *(c['symmetry'] for c in self.classes)])}" if self.classes else ""
+        return f"No onset: the valve is {state} {scanned}{which}."
 
     def _line(self, point: dict[str, Any]) -> str:
         scale = PARAMETERS[self.parameter].scale
@@ -197,5 +223,5 @@ class OnsetResult(StudyResult):
         mark = "" if point["confirmed"] else "  not confirmed"
         return (
             f"{point['value'] / scale:16.8g} {spread} {point['frequency']:8.3f}  "
-            f"{words:<28}{below:11.4g}{above:11.4g}{mark}"
+            f"{words:<28}{below:11.4g}{above:11.4g}{mark}" + (f"  {point['symmetry']}" if self.classes else "")
         )

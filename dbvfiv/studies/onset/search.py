@@ -10,6 +10,7 @@ import numpy as np
 from eigen import Certificate
 
 from ...errors import CaseError, SolveError
+from ...model.symmetry import EQUILIBRIA, SYMMETRIES
 from ...observer import Observer
 from ..case import Case
 from ..stability.crossings import WATCHED, Crossing, Sample, Scan, locate
@@ -42,6 +43,8 @@ class OnsetOptions:
     normal_form : bool
     coarse_mesh : float
         Elements of the second mesh over those of the first; 0 for no uncertainty.
+    symmetry : str
+        Class of the motions, see `dbvfiv.model.symmetry`.
     """
 
     parameter: str
@@ -50,6 +53,7 @@ class OnsetOptions:
     tolerance: float = 1e-9
     normal_form: bool = True
     coarse_mesh: float = 0.5
+    symmetry: str = EQUILIBRIA
 
     @classmethod
     def of(cls, case: Case) -> OnsetOptions:
@@ -94,7 +98,7 @@ class OnsetSearch:
     ):
         self.case, self.options, self.mesh = case, options, mesh
         self.observer = observer or Observer()
-        self.walk = walk or StabilityWalk(case, self.observer)
+        self.walk = walk or StabilityWalk(case, self.observer, symmetry=SYMMETRIES[options.symmetry])
         self.base = place or Place.of(case)
         known = list(known)
         self._samples = {item.value: item for item in known if isinstance(item, OnsetSample) and item.mesh == mesh}

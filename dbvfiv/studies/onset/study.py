@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ...errors import CaseError
+from ...model.symmetry import EQUILIBRIA, chosen_symmetries
 from ...observer import Observers
 from ...record.record import GrowingRecord
 from ..case import Case
@@ -10,10 +13,13 @@ from ..session import Session
 from ..stability.laws import other_law, require_two_laws
 from ..stability.walk import StabilityWalk
 from ..study import Study
+from .classes import NOTE as CLASS
+from .classes import note_of_class
 from .other_law import NOTE, note_of
 from .result import OnsetResult
 from .rows import KeepItems, known_items, tables_of
 from .run import run_onset
+from .search import OnsetOptions
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -23,16 +29,18 @@ def run(session: Session, record: GrowingRecord) -> None:
     both = session.case.onset.continuity == "both"
     if both:
         _require_two_laws(session.case)
+    walk = StabilityWalk(session.case, record, session.model)
     found = run_onset(
         session.case,
         observer=Observers(KeepItems(record), record),
         known=known_items(record, session.case),
-        walk=StabilityWalk(session.case, record, session.model),
+        walk=walk,
     )
     for sentence in found.failures:
         record.fail(sentence)
     if found.interrupted:
         raise KeyboardInterrupt
+    _look_at_classes(session, record, walk)
     if both and not record.notes(NOTE):
         record.progress("the other continuity law")
         other = session.replace({"fluid.continuity": other_law(session.case)})
@@ -40,6 +48,26 @@ def run(session: Session, record: GrowingRecord) -> None:
         if found.interrupted:
             raise KeyboardInterrupt
         record.note(NOTE, **note_of(found))
+
+
+def _look_at_classes(session: Session, record: GrowingRecord, walk: StabilityWalk) -> None:
+    """Onsets in the other classes of motion, where they are asked for. Cycles that leave the symmetry have normal forms
+    of their own, which are not looked for.
+    """
+    done = {note["symmetry"] for note in record.notes(CLASS)}
+    for symmetry in chosen_symmetries(session.case.onset.symmetry):
+        if symmetry.name in {EQUILIBRIA, *done}:
+            continue
+        record.progress(f"class {symmetry.name}: {symmetry.words}")
+        options = replace(OnsetOptions.of(session.case), normal_form=False, symmetry=symmetry.name)
+        found = run_onset(session.case, options, walk=walk.in_class(symmetry))
+        for sentence in found.failures:
+            record.fail(f"In class {symmetry.name}: {sentence}")
+        for sentence in found.warnings:
+            record.warn(f"In class {symmetry.name}: {sentence}")
+        if found.interrupted:
+            raise KeyboardInterrupt
+        record.note(CLASS, **note_of_class(found))
 
 
 def _require_two_laws(case: Case) -> None:

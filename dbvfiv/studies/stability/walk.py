@@ -5,7 +5,7 @@ known.
 from __future__ import annotations
 
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,8 +13,9 @@ from eigen import Column, ColumnSolver, SearchOptions, Workspace
 
 from ...errors import SolveError
 from ...model import ValveModel
-from ...model.dynamics import linearise
+from ...model.classes import linearise_class
 from ...model.equilibria import LoadPath, SteadyOptions
+from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...observer import Observer
 from ..case import Case
 from .family import ValveFamily
@@ -65,10 +66,18 @@ class StabilityWalk:
     observer : Observer, optional
     model : ValveModel, optional
         Of the case, where it is at hand.
+    symmetry : Symmetry, optional
+        Class of the motions; that of the equilibria by default.
     """
 
-    def __init__(self, case: Case, observer: Observer | None = None, model: ValveModel | None = None):
-        self.case = case
+    def __init__(
+        self,
+        case: Case,
+        observer: Observer | None = None,
+        model: ValveModel | None = None,
+        symmetry: Symmetry = SYMMETRIES[EQUILIBRIA],
+    ):
+        self.case, self.symmetry = case, symmetry
         self._recalled: list[Place] = []
         self._workspace = Workspace()  # for structural frequencies
         self.observer = observer or Observer()
@@ -127,7 +136,14 @@ class StabilityWalk:
 
     def apart(self) -> StabilityWalk:
         """A walk that knows no states yet, on the model of this one."""
-        return StabilityWalk(self.case, self.observer, self._built[()].model if () in self._built else None)
+        model = self._built[()].model if () in self._built else None
+        return StabilityWalk(self.case, self.observer, model, self.symmetry)
+
+    def in_class(self, symmetry: Symmetry) -> StabilityWalk:
+        """A walk for the motions of another class about the steady states of this one."""
+        other = StabilityWalk(self.case, self.observer, symmetry=symmetry)
+        other._built = {key: replace(built, solver=ColumnSolver()) for key, built in self._built.items()}
+        return other
 
     def _reach(self, place: Place) -> np.ndarray:
         built = self.built(place)
@@ -160,7 +176,8 @@ class StabilityWalk:
         """
         key = (place.pressure, self._key(place))
         if self._last is None or self._last[0] != key:
-            linear = linearise(self.built(place).model, self.equilibrium(place), place.pressure)
+            model = self.built(place).model
+            linear = linearise_class(model, self.equilibrium(place), place.pressure, self.symmetry)
             modes = self.case.modes
             self._last = (key, ValveFamily(linear, modes.max_frequency, modes.count, self._workspace))
         return self._last[1]

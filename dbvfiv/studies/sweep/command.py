@@ -27,6 +27,10 @@ def command(
     count: Annotated[
         int | None, typer.Option("--count", "-n", metavar="N", help="How many leading modes to follow.")
     ] = None,
+    symmetry: Annotated[
+        str | None,
+        typer.Option("--symmetry", metavar="CLASS", help="Class of motion: SS, SA, AS or AA; see dbvfiv modes."),
+    ] = None,
 ) -> Request:
     """Damping and frequency of the leading modes, followed along a parameter of load, fluid or damping.
 
@@ -39,6 +43,7 @@ def command(
     changes = {
         "sweep.over": over,
         "sweep.count": count,
+        "sweep.symmetry": symmetry,
         "drive.pressure": number_or_text(pressure),
         "fluid.density": number_or_text(density),
     }

@@ -25,10 +25,12 @@ from eigen.left import biorthogonalise, left_by_inverse_iteration
 
 from ...case.axis import Axis
 from ...model import ValveModel
-from ...model.dynamics import Conditions, LinearisedState, linearise
+from ...model.classes import linearise_class
+from ...model.dynamics import Conditions
 from ...model.equilibria import LoadPath, SteadyOptions
 from ...model.leading import LeadingSearch, select_search
 from ...model.state import SteadyState
+from ...model.symmetry import SYMMETRIES
 from ...observer import Observer
 
 #: Static corrections below this share of the largest are left to the eigenvectors of the check points, which gives a
@@ -96,7 +98,7 @@ class FluidFamily:
         self, model: ValveModel, state: SteadyState, axis: Axis, conditions: Conditions, options, observer: Observer
     ):
         self.state, self.axis, self.conditions, self.options, self.observer = state, axis, conditions, options, observer
-        self.linear = linearise(model, state.q, state.pressure)
+        self.linear = linearise_class(model, state.q, state.pressure, SYMMETRIES[options.symmetry])
         self.pressure = state.pressure
         self.done: tuple[Check, ...] = ()
         self.notes: tuple[str, ...] = ()
@@ -125,17 +127,15 @@ class FluidFamily:
             places.append(_farthest(values, [*self.errors, *places]))
             fresh += 1
         linear = self.linear
-        self.small = LinearisedState(
-            linear.model,
-            linear.q,
-            linear.inlet,
-            basis.project(linear.mass),
-            basis.project(linear.structure),
-            basis.project(linear.stiffness),
-            basis.V.T @ linear.forces,
-            linear.slope @ basis.V,
-            linear.area,
-            None if linear.added is None else linear.added.projected(basis.V),
+        self.small = replace(
+            linear,
+            mass=basis.project(linear.mass),
+            structure=basis.project(linear.structure),
+            stiffness=basis.project(linear.stiffness),
+            forces=basis.V.T @ linear.forces,
+            slope=linear.slope @ basis.V,
+            added=None if linear.added is None else linear.added.projected(basis.V),
+            _damped={},
         )
         # what relaxes would be computed on the elements otherwise
         vars(self.small)["relaxing"] = tuple(basis.project(part) for part in linear.relaxing)
@@ -261,7 +261,8 @@ class PressureFamily:
                 if near.pressure != self.path.pressure:
                     self.path.q, self.path.pressure, self.path.slope = near.q, near.pressure, None
             self.known[value] = self.path.go_to(value)
-        pencil = linearise(self.model, self.known[value].q, value).pencil(self.conditions)
+        symmetry = SYMMETRIES[self.options.symmetry]
+        pencil = linearise_class(self.model, self.known[value].q, value, symmetry).pencil(self.conditions)
         if value not in self._bands:
             search, workspace = self.options.search, self.workspace
             lowest = lambda n: lowest_frequencies(pencil, n, workspace)  # noqa: E731

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import StrictInt
 
 from ...case.axis import Axis, Range, parse_axis
@@ -20,6 +22,12 @@ class Keys(Section):
     tolerance: Number = key(1e-6, "Accepted relative error of the eigenvalues on the reduced basis.", gt=0, le=1e-2)
     least_confidence: Number = key(
         0.6, "A step is halved while the match of a leading mode is less certain than this.", gt=0, lt=1
+    )
+
+    symmetry: Literal["SS", "SA", "AS", "AA"] = key(
+        "SS",
+        "Class of motion followed: SS opens and closes the lips, SA sways them together in y, AS sideways in x, AA "
+        "twists.",
     )
 
     @property

@@ -218,6 +218,7 @@ class SweepResult(StudyResult):
     def summary(self) -> dict[str, Any]:
         return {
             "parameter": self.parameter,
+            "symmetry": self.case.sweep.symmetry,
             "values": self.values.tolist(),
             "branches": [branch.summary() for branch in self.branches],
             "unstable_count": self.unstable_count.tolist(),

@@ -18,6 +18,7 @@ from ...model.dynamics import Conditions
 from ...model.equilibria import require_equilibrium
 from ...model.leading import growth_floor
 from ...model.state import SteadyState
+from ...model.symmetry import EQUILIBRIA
 from ...observer import Observer
 from ..solving import solving
 from .family import Check, Family, FluidFamily, PressureFamily
@@ -46,6 +47,8 @@ class SweepOptions:
         A step is halved while the match of a leading mode is less certain.
     search : SearchOptions
         For full solves.
+    symmetry : str
+        Class of the motions, see `dbvfiv.model.symmetry`.
     """
 
     count: int = 6
@@ -54,6 +57,7 @@ class SweepOptions:
     tolerance: float = 1e-6
     least_confidence: float = 0.6
     search: SearchOptions = field(default_factory=SearchOptions)
+    symmetry: str = EQUILIBRIA
 
     @classmethod
     def of(cls, case) -> SweepOptions:
@@ -66,6 +70,7 @@ class SweepOptions:
             tolerance=sweep.tolerance,
             least_confidence=sweep.least_confidence,
             search=search,
+            symmetry=sweep.symmetry,
         )
 
 

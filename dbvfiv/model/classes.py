@@ -1,0 +1,116 @@
+"""Small motions of every class about a steady state: the same quarter with other unknowns.
+
+Element integrals are those of the model; only their numbering differs (`dbvfiv.model.symmetry`). Stops stand between
+the lips, so they act on motions that are symmetric about y = 0 and not on those in which both lips move together. Areas
+do not change to first order but in the class of the equilibria, so what is left of the fluid is the follower stiffness
+of its steady pressures, and a plug that sways with the wall (`dbvfiv.flow.plug`). A twist meets no inner fluid.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import SolveError
+from ..flow.plug import centroid_matrix, centroid_slope, plug_parts
+from ..shell import Shell
+from ..shell.pressure import pressure_stiffness
+from .dynamics import LinearisedState, linearise
+from .symmetry import EQUILIBRIA, ClassDofs, Symmetry
+from .valve import ValveModel
+
+
+@dataclass(frozen=True)
+class LinearisedClass(LinearisedState):
+    """Matrices of a class that is not that of the equilibria, with the contract of `LinearisedState`.
+
+    `forces` and `slope` belong to the displacements of the sections' centroids along the axis of sway, not to areas;
+    they are empty for a twist.
+
+    Attributes
+    ----------
+    symmetry : Symmetry
+    shell : Shell
+        With the unknowns of the class, counted from the state.
+    """
+
+    symmetry: Symmetry = None
+    shell: Shell = None
+
+    def relaxing_of_wall(self) -> tuple[sp.csr_matrix, ...]:
+        values = self.shell.relaxing_tangents(np.zeros(self.shell.size))
+        return tuple(self.shell.dofs.matrix(part) for part in values)
+
+    def fluid_parts(self, density, storage=None, line=None) -> dict[str, np.ndarray]:
+        """A0 to A2 of the plug; neither the continuity law nor a line matters, since no area changes."""
+        flow = self.model.flow
+        if self.symmetry.sway_axis is None or not flow.has_fluid:
+            return {}
+        velocity = flow.inlet_velocity(self.area, self.inlet, density)
+        passage = np.asarray(flow.open_area(self.area)), np.asarray(flow.velocities(self.area, velocity))
+        return plug_parts(self.model.mesh.z, *passage, density, flow.unsteady)
+
+    def steady_parts(self) -> dict[str, np.ndarray]:
+        return self.fluid_parts(1.0)  # the centrifugal force, which depends on the pressure alone
+
+    def nodal(self, q: np.ndarray) -> np.ndarray:
+        return self.shell.dofs.small(q)
+
+
+def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Symmetry) -> LinearisedState:
+    """Linearise the motions of a class about a steady state at an inlet pressure, Pa."""
+    if symmetry.name == EQUILIBRIA:
+        return linearise(model, q, inlet)
+    if model.outside is not None:
+        raise SolveError(
+            f"With fluid outside, motions of class {symmetry.name} are not known: its added mass is that of symmetric "
+            "motions. Ask for the class SS, or leave out outside.fluid."
+        )
+    nodal = model.nodal(q)
+    shell = shell_of_class(model.shell, symmetry.free_unknowns(model.mesh), nodal)
+    dofs, still = shell.dofs, np.zeros(shell.size)
+    area = model.rows.areas(nodal)
+    _, structure = shell.force_and_tangent(still)
+    if symmetry.moves_lips_apart:
+        add_stops(structure, model, q, dofs)
+    stiffness = structure.copy()
+    pressure = model.flow.steady_pressure(area, inlet)[model.station_of_node]
+    surface = shell.mesh
+    pressure_stiffness(surface.quads, surface.nodes, nodal, pressure, model.loaded, dofs.slots, -1.0, stiffness)
+    forces, slope = sway_of_sections(model, nodal, symmetry, dofs)
+    matrices = [dofs.matrix(values) for values in (shell.mass(still), structure, stiffness)]
+    return LinearisedClass(model, q, inlet, *matrices, forces, slope, area, symmetry=symmetry, shell=shell)
+
+
+def shell_of_class(shell: Shell, free: np.ndarray, nodal: np.ndarray) -> Shell:
+    """The same shell with other free unknowns (nn, 5), counted from a state (nn, 5)."""
+    kept = shell.__dict__.setdefault("_classes", {})
+    key = free.tobytes()
+    if key not in kept:
+        kept[key] = ClassDofs(free, shell.mesh.quads, nodal)
+    other = copy(shell)
+    other.dofs = kept[key].at(nodal)
+    return other
+
+
+def add_stops(structure: np.ndarray, model: ValveModel, q: np.ndarray, dofs: ClassDofs) -> None:
+    """Add the stiffness of the stops that touch to values (nnz,) of a class in which the lips move apart."""
+    nodes = np.nonzero(model.shell.dofs.free)[0][model.stops.unknowns]
+    unknowns = dofs.index[nodes, 1]
+    moving = unknowns >= 0
+    structure[dofs.diagonal_slots[unknowns[moving]]] += model.stops.tangent(q)[moving]
+
+
+def sway_of_sections(model: ValveModel, nodal: np.ndarray, symmetry: Symmetry, dofs: ClassDofs):
+    """G (n, m) and J (m, n) = G' between the unknowns and the displacements of the sections' centroids."""
+    axis, flow = symmetry.sway_axis, model.flow
+    if axis is None or not flow.has_fluid:
+        return sp.csr_matrix((dofs.size, 0)), sp.csr_matrix((0, dofs.size))
+    rows = model.mesh.rows
+    points = (model.mesh.nodes[:, :2] + nodal[:, :2])[rows]
+    slope = centroid_slope(points, axis, flow.floor)
+    matrix = centroid_matrix(slope, rows, dofs.index)
+    return matrix.T.tocsr(), matrix

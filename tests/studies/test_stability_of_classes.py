@@ -1,0 +1,157 @@
+"""Onsets, maps, sweeps and back pressure in all classes of motion."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
+from dbvfiv.model.symmetry import SYMMETRIES
+from dbvfiv.studies.closure.classes import ClassStiffness
+from dbvfiv.studies.closure.model import closure_model
+from dbvfiv.studies.map.classes import leading_of as leading_of_map
+from dbvfiv.studies.onset.classes import common_stretches, joined_stretches, leading_of, merge_points
+
+OTHERS = ["SA", "AS", "AA"]
+SMALL = {"mesh.around": 8, "mesh.along": 14, "drive.pressure": "6 kPa", "damping.alpha": 0}
+
+
+def make(**changes):
+    return dbvfiv.load(dbvfiv.load().case.replace(SMALL | {k.replace("__", "."): v for k, v in changes.items()}))
+
+
+@pytest.fixture(scope="module")
+def onset():
+    plain = {"onset__coarse_mesh": 0, "onset__normal_form": False}
+    return make(onset__symmetry="all", onset__over="density=1:1000:5:log", **plain).onset()
+
+
+def test_onset_names_the_most_unstable_class(onset):
+    said = json.loads(json.dumps(onset.summary()))
+    assert [part["symmetry"] for part in said["classes"]] == OTHERS
+    assert {point["symmetry"] for point in said["points"]} == {"SS"}
+    leading = said["leading"]
+    assert leading["values"] == list(onset.case.onset.axis.values) and all(leading["certified"])
+    assert leading["symmetry"][0] == "SS" and leading["symmetry"][-1] == "SA"
+    for value, growth, name in zip(leading["values"], leading["growth_rate"], leading["symmetry"]):
+        found = make().modes("6 kPa", density=value, count=3, symmetry=name)
+        assert found.modes[0].growth_rate == pytest.approx(growth, rel=1e-6)
+    rates = [[part["scan"]["growth_rate"][0], *[leading["growth_rate"][0]]] for part in said["classes"]]
+    assert all(own < most for own, most in rates)
+    assert "class" in onset.lines()[1] and onset.lines()[2].endswith("SS")
+
+
+def test_stretches_are_those_of_all_classes(onset):
+    (edge,) = [point["value"] for point in onset.points if point["edge"]]
+    low, high = onset.values[[0, -1]]
+    assert onset.unstable_intervals == [(low, edge)]
+    assert onset.stable_intervals == [(edge, high)]
+
+
+def test_onsets_come_back_from_a_file(onset, tmp_path):
+    stored = dbvfiv.load_result(onset.save(tmp_path / "onset.h5"))
+    assert stored.summary() == onset.summary() and stored.lines() == onset.lines()
+    assert "onset" in dict(stored.drawers())
+
+
+def test_a_crossing_inside_what_another_class_has_unstable_is_no_edge():
+    own = [{"value": 3.0, "edge": True}, {"value": 8.0, "edge": True}]
+    other = {"symmetry": "SA", "points": [{"value": 5.0, "edge": True}], "unstable": [[5.0, 9.0]]}
+    points = merge_points(own, [(0.0, 3.0), (8.0, 9.0)], [other])
+    assert [(p["value"], p["symmetry"], p["edge"]) for p in points] == [
+        (3.0, "SS", True),
+        (5.0, "SA", True),
+        (8.0, "SS", False),
+    ]
+    assert joined_stretches([[(0.0, 3.0), (8.0, 9.0)], [(5.0, 9.0)]]) == [(0.0, 3.0), (5.0, 9.0)]
+    assert common_stretches([[(3.0, 8.0)], [(0.0, 5.0)]]) == [(3.0, 5.0)]
+    assert common_stretches([[(3.0, 8.0)], []]) == []
+
+
+def test_leading_takes_the_largest_growth_rate():
+    scan = {"values": [1.0, 2.0, 2.5], "growth_rate": [-3.0, 1.0, 0.0], "frequency": [5.0, 6.0, 0.0]}
+    part = {"symmetry": "AS", "scan": scan | {"certified": [True, False, True]}}
+    found = leading_of(*np.array([[1.0, 2.0], [-1.0, -2.0], [7.0, 8.0]]), [True, True], [part])
+    assert found["symmetry"] == ["SS", "AS"] and found["growth_rate"] == [-1.0, 1.0]
+    assert found["certified"] == [True, False] and found["frequency"] == [7.0, 6.0]
+    grid = {"symmetry": "AA", "growth_rate": [[0.0, 1.0]], "frequency": [[2.0, 3.0]]}
+    cells = leading_of_map(np.array([[-1.0, np.nan]]), np.array([[9.0, np.nan]]), [grid])
+    assert cells["symmetry"] == [["AA", None]] and cells["growth_rate"][0][0] == 0.0 and cells["frequency"][0][0] == 2.0
+
+
+def test_maps_hold_every_class():
+    ranges = {"map__x": "pressure=3e3:9e3:3", "map__y": "density=1:1000:4:log", "map__curve": False, "map__refine": 0}
+    found = make(map__symmetry="all", map__checks=0, **ranges).map()
+    said = json.loads(json.dumps(found.summary()))
+    assert [part["symmetry"] for part in said["classes"]] == OTHERS
+    assert all(np.all(part["certified"]) for part in said["classes"])
+    rates = np.stack([said["growth_rate"], *(part["growth_rate"] for part in said["classes"])])
+    assert np.allclose(said["leading"]["growth_rate"], rates.max(axis=0))
+    names = np.array(list(SYMMETRIES))[rates.argmax(axis=0)]
+    assert np.array_equal(names, said["leading"]["symmetry"]) and {"SS", "SA"} <= set(names.ravel())
+    alone = make().modes("6 kPa", density=1000, symmetry="AS", count=2).modes[0]
+    assert said["classes"][1]["growth_rate"][3][1] == pytest.approx(alone.growth_rate, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["SA", "AA"])
+@pytest.mark.parametrize("over", ["density=10:1000:3:log", "pressure=6e3:10e3:2"])
+def test_sweeps_follow_one_class(name, over):
+    found = make(sweep__symmetry=name).sweep(over, count=2)
+    assert found.certified and found.summary()["symmetry"] == name
+    density = 10.0 if "density" in over else None
+    modes = make().modes("6 kPa", symmetry=name, count=2, **({"density": density} if density else {}))
+    assert found.branches[0].growth_rate[0] == pytest.approx(modes.modes[0].growth_rate, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def closures():
+    case = {"closure__pressures": ["2 kPa", "4 kPa"]}
+    return {name: make(**case, closure__symmetry=name).closure() for name in ("SS", "all")}
+
+
+def test_back_pressure_is_watched_in_every_class(closures):
+    """The path is the same to the last digit; each class has its own lowest eigenvalue along it."""
+    plain, watched = (closures[name].summary() for name in ("SS", "all"))
+    assert watched["points"] == plain["points"] and watched["path"] == plain["path"]
+    assert plain["classes"] == [] and [part["symmetry"] for part in watched["classes"]] == OTHERS
+    for part in watched["classes"]:
+        assert set(watched["path"]["pressure"]) <= set(part["path"]["pressure"])
+        assert part["critical_pressure"] is None and min(part["path"]["lowest_eigenvalue"]) > 0
+    assert watched["first_buckling"] is None
+    lines = "\n".join(closures["all"].lines())
+    assert all(f"class {name}" in lines for name in OTHERS)
+
+
+@pytest.mark.parametrize("supports", ["contact", "held-lips"])
+def test_the_symmetric_class_is_the_tangent_of_the_path(supports):
+    """Contact and stops included, at a state in which the walls press on each other."""
+    case = make(closure__supports=supports).case
+    model = closure_model(case)
+    steps = LoadSteps(model.pressed, LoadStepOptions(first_step=50.0))
+    steps.reach(4e3)
+    q, touching = steps.q, int(model.pressed.contact_state(steps.q).touching.sum())
+    assert touching or supports == "held-lips"
+    stiffness, mass = ClassStiffness.of(model, SYMMETRIES["SS"]).matrices(q, 4e3)
+    matrix = model.shell.dofs.matrix
+    expected = matrix(model.pressed.tangent(q, 4e3).stiffness)
+    assert abs(stiffness - expected).max() < 1e-12 * abs(expected).max()
+    assert abs(mass - matrix(model.pressed.mass(q))).max() == 0.0
+    # lips that move together feel no spring of the contact: one of each node that touches
+    of_class = ClassStiffness.of(model, SYMMETRIES["SA"])
+    springs = replace(of_class, closing=True).matrices(q, 4e3)[0] - of_class.matrices(q, 4e3)[0]
+    values = np.linalg.eigvalsh(springs.toarray())
+    assert np.count_nonzero(values > 1e-9 * np.abs(values).max(initial=1.0)) == touching
+
+
+def test_the_lowest_stiffness_at_rest_is_that_of_the_modes(closures):
+    """Without pressure the stiffness eigenvalues are the squares of the angular frequencies at rest."""
+    part = closures["all"].summary()["classes"][0]
+    rest = make().modes(0, in_vacuo=True, symmetry="SA", count=1, beta=0).modes[0]
+    low, mid = part["path"]["lowest_eigenvalue"][:2]
+    p = part["path"]["pressure"][:2]
+    at_rest = low - (mid - low) / (p[1] - p[0]) * p[0]
+    assert at_rest == pytest.approx(rest.angular_frequency**2, rel=0.05)
