@@ -140,14 +140,10 @@ class PlaneContact:
         keep = slots >= 0
         data[slots[keep]] += block[keep]
 
-    def tangent_blocks(self, nodal, directors, first, second, multiplier, closing: bool = True) -> np.ndarray:
-        """Tangent (k, 3, 3) of each contact node in its displacement across the plane and its rotations.
-
-        `closing` is False for motions in which what lies beyond the plane moves along, so that no gap changes to first
-        order; a contact force then still turns with the wall.
-        """
+    def tangent_blocks(self, nodal, directors, first, second, multiplier) -> np.ndarray:
+        """Tangent (k, 3, 3) of each contact node in its displacement across the plane and its rotations."""
         _, pressure, stiffness = self.law.respond(self.gap(nodal, directors), multiplier)
-        slope = self._slope(first) if closing else np.zeros((self.count, 3))
+        slope = self._slope(first)
         block = (self.area * stiffness)[:, None, None] * slope[:, :, None] * slope[:, None, :]
         # The gap bends with the rotations: -pressure * d2 gap, d2 gap = -depth * d2 director.
         bend = (self.area * pressure * self.depth)[:, None] * second[self.nodes][:, :, self.axis]

@@ -9,10 +9,11 @@ of its steady pressures, and a plug that sways with the wall (`dbvfiv.flow.plug`
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import block_diag
 
 from ..errors import SolveError
 from ..flow.plug import centroid_matrix, centroid_slope, plug_parts
@@ -35,17 +36,31 @@ class LinearisedClass(LinearisedState):
     symmetry : Symmetry
     shell : Shell
         With the unknowns of the class, counted from the state.
+    added : (k, k) array
+        Added mass of the last k of the coupled displacements, see `added_mass`.
     """
 
     symmetry: Symmetry = None
     shell: Shell = None
+    added: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def relaxing_of_wall(self) -> tuple[sp.csr_matrix, ...]:
         values = self.shell.relaxing_tangents(np.zeros(self.shell.size))
         return tuple(self.shell.dofs.matrix(part) for part in values)
 
     def fluid_parts(self, density, storage=None, line=None) -> dict[str, np.ndarray]:
-        """A0 to A2 of the plug; neither the continuity law nor a line matters, since no area changes."""
+        """A0 to A2 of the plug and of what is added; neither the continuity law nor a line matters, since no area
+        changes.
+        """
+        parts, k = self._plug(density), len(self.added)
+        if k and self.model.flow.unsteady:
+            parts = {name: block_diag(part, np.zeros((k, k))) for name, part in parts.items()}
+            whole = np.zeros((self.forces.shape[1],) * 2)
+            whole[-k:, -k:] = self.added
+            parts["A2"] = parts.get("A2", 0.0) - whole
+        return parts
+
+    def _plug(self, density: float) -> dict[str, np.ndarray]:
         flow = self.model.flow
         if self.symmetry.sway_axis is None or not flow.has_fluid:
             return {}
@@ -80,9 +95,13 @@ def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Sy
     pressure = model.flow.steady_pressure(area, inlet)[model.station_of_node]
     surface = shell.mesh
     pressure_stiffness(surface.quads, surface.nodes, nodal, pressure, model.loaded, dofs.slots, -1.0, stiffness)
-    forces, slope = sway_of_sections(model, nodal, symmetry, dofs)
+    slope, added = sway_of_sections(model, nodal, symmetry, dofs), added_mass(model, nodal, symmetry, dofs)
+    if added is not None:
+        slope = sp.vstack([slope, added[0]]).tocsr()
+    mass = {} if added is None else {"added": added[1]}
     matrices = [dofs.matrix(values) for values in (shell.mass(still), structure, stiffness)]
-    return LinearisedClass(model, q, inlet, *matrices, forces, slope, area, symmetry=symmetry, shell=shell)
+    coupled = slope.T.tocsr(), slope, area
+    return LinearisedClass(model, q, inlet, *matrices, *coupled, symmetry=symmetry, shell=shell, **mass)
 
 
 def shell_of_class(shell: Shell, free: np.ndarray, nodal: np.ndarray) -> Shell:
@@ -104,13 +123,19 @@ def add_stops(structure: np.ndarray, model: ValveModel, q: np.ndarray, dofs: Cla
     structure[dofs.diagonal_slots[unknowns[moving]]] += model.stops.tangent(q)[moving]
 
 
-def sway_of_sections(model: ValveModel, nodal: np.ndarray, symmetry: Symmetry, dofs: ClassDofs):
-    """G (n, m) and J (m, n) = G' between the unknowns and the displacements of the sections' centroids."""
+def added_mass(model: ValveModel, nodal: np.ndarray, symmetry: Symmetry, dofs: ClassDofs) -> tuple | None:
+    """What moves along outside the wall in a class: a sparse matrix (k, n) from unknowns to displacements and the mass
+    (k, k) of those, for a quarter; None, since no fluid outside is modelled. Images of panels have `symmetry.signs`.
+    """
+    return None
+
+
+def sway_of_sections(model: ValveModel, nodal: np.ndarray, symmetry: Symmetry, dofs: ClassDofs) -> sp.csr_matrix:
+    """J (m, n) from the unknowns to the displacements of the sections' centroids; its transpose gives the forces."""
     axis, flow = symmetry.sway_axis, model.flow
     if axis is None or not flow.has_fluid:
-        return sp.csr_matrix((dofs.size, 0)), sp.csr_matrix((0, dofs.size))
+        return sp.csr_matrix((0, dofs.size))
     rows = model.mesh.rows
     points = (model.mesh.nodes[:, :2] + nodal[:, :2])[rows]
     slope = centroid_slope(points, axis, flow.floor)
-    matrix = centroid_matrix(slope, rows, dofs.index)
-    return matrix.T.tocsr(), matrix
+    return centroid_matrix(slope, rows, dofs.index)

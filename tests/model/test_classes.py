@@ -7,7 +7,9 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 
+import dbvfiv.model.classes as classes_of_motion
 from dbvfiv.model.classes import linearise_class
+from dbvfiv.model.dynamics import Conditions
 from dbvfiv.model.symmetry import SYMMETRIES
 from tests.model.test_relaxing_wall import relaxing_valve
 from tests.small_valves import find_open_state, make_valve
@@ -86,3 +88,24 @@ def test_the_spectrum_of_the_whole_valve_is_the_union_of_four(whole, classes, pa
     gaps = np.abs(found[:, None] - union[None, :])
     assert np.all(np.sort(np.argmin(gaps, axis=1)) == np.arange(60))
     assert np.all(gaps.min(axis=1) < 1e-8 * np.abs(found))
+
+
+@pytest.mark.parametrize("name", ["SA", "AA"])
+def test_mass_added_outside_joins_the_coupling(model, state, name, monkeypatch):
+    """As if it stood in the mass matrix, beside the plug or without one."""
+    symmetry = SYMMETRIES[name]
+    plain = linearise_class(model, state, PRESSURE, symmetry)
+    generator = np.random.default_rng(4)
+    where = sp.csr_matrix(generator.standard_normal((3, plain.mass.shape[0])))
+    heavy = np.diag([1e-3, 2e-3, 3e-3])
+    monkeypatch.setattr(classes_of_motion, "added_mass", lambda *_: (where, heavy))
+    light = Conditions(100.0, 0.0, 0.003)
+    pencil = linearise_class(model, state, PRESSURE, symmetry).pencil(light)
+    expected = plain.pencil(light)
+    assert pencil.m == expected.m + 3
+    q = generator.standard_normal(pencil.n) + 1j * generator.standard_normal(pencil.n)
+    s, none = 3.0 + 50.0j, np.zeros(0)
+    force = sum(pencil.terms(s, q, none)[0])
+    assert force == pytest.approx(
+        sum(expected.terms(s, q, none)[0]) + s**2 * (where.T @ (heavy @ (where @ q))), rel=1e-9
+    )

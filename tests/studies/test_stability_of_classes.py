@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -126,25 +125,22 @@ def test_back_pressure_is_watched_in_every_class(closures):
     assert all(f"class {name}" in lines for name in OTHERS)
 
 
-@pytest.mark.parametrize("supports", ["contact", "held-lips"])
-def test_the_symmetric_class_is_the_tangent_of_the_path(supports):
-    """Contact and stops included, at a state in which the walls press on each other."""
-    case = make(closure__supports=supports).case
-    model = closure_model(case)
+def test_the_symmetric_class_is_the_tangent_of_the_path():
+    """Contact included, at a state in which the walls press on each other."""
+    model = closure_model(make().case)
     steps = LoadSteps(model.pressed, LoadStepOptions(first_step=50.0))
     steps.reach(4e3)
-    q, touching = steps.q, int(model.pressed.contact_state(steps.q).touching.sum())
-    assert touching or supports == "held-lips"
-    stiffness, mass = ClassStiffness.of(model, SYMMETRIES["SS"]).matrices(q, 4e3)
+    assert model.pressed.contact_state(steps.q).touching.any()
+    stiffness, mass = ClassStiffness.of(model, SYMMETRIES["SS"]).matrices(steps.q, 4e3)
     matrix = model.shell.dofs.matrix
-    expected = matrix(model.pressed.tangent(q, 4e3).stiffness)
+    expected = matrix(model.pressed.tangent(steps.q, 4e3).stiffness)
     assert abs(stiffness - expected).max() < 1e-12 * abs(expected).max()
-    assert abs(mass - matrix(model.pressed.mass(q))).max() == 0.0
-    # lips that move together feel no spring of the contact: one of each node that touches
-    of_class = ClassStiffness.of(model, SYMMETRIES["SA"])
-    springs = replace(of_class, closing=True).matrices(q, 4e3)[0] - of_class.matrices(q, 4e3)[0]
-    values = np.linalg.eigvalsh(springs.toarray())
-    assert np.count_nonzero(values > 1e-9 * np.abs(values).max(initial=1.0)) == touching
+    assert abs(mass - matrix(model.pressed.mass(steps.q))).max() == 0.0
+
+
+def test_held_lips_are_not_watched():
+    found = make(closure__pressures=["1 kPa"], closure__symmetry="all", closure__supports="held-lips").closure()
+    assert found.summary()["classes"] == [] and any("cannot move together" in sentence for sentence in found.warnings)
 
 
 def test_the_lowest_stiffness_at_rest_is_that_of_the_modes(closures):

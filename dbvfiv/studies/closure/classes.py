@@ -1,8 +1,8 @@
 """Buckling out of the symmetry of the model: stiffness eigenvalues in the other classes of motion along the path.
 
-The path itself stays symmetric. Supports between the lips - contact, stops, a duckbill held shut - act on motions in
-which the lips move against each other; lips that move together slide without friction and take their contact forces
-along.
+The path itself stays symmetric. Contact acts on motions in which the lips move against each other; lips that move
+together slide without friction and turn their contact forces with them. A duckbill that is held shut by its supports
+is not free to move with the other lip, so classes are watched with contact alone.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 
+from ...contact import together_blocks
 from ...model.classes import shell_of_class
 from ...model.load_steps import LoadStepOptions
 from ...model.pressed_shell import PressedShell
-from ...model.supports import free_unknowns
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...shell import Shell
 from ...shell.pressure import pressure_stiffness
 from .buckling import Buckling, BucklingWatch
-from .model import ClosureModel
+from .model import CONTACT, ClosureModel
 from .stiffness import StiffnessSpectrum, spectrum_of
 
 
@@ -44,11 +44,8 @@ class ClassStiffness:
 
     @classmethod
     def of(cls, model: ClosureModel, symmetry: Symmetry) -> ClassStiffness:
-        """Of a valve; what its supports hold beyond its symmetry is held between the lips."""
-        free, closing = symmetry.free_unknowns(model.mesh), symmetry.moves_lips_apart
-        if closing:
-            free &= ~(free_unknowns(model.mesh) & ~model.shell.dofs.free)
-        return cls(model.pressed, free, closing)
+        """Of a valve with contact."""
+        return cls(model.pressed, symmetry.free_unknowns(model.mesh), symmetry.moves_lips_apart)
 
     def shell(self, q: np.ndarray) -> Shell:
         """The shell with the unknowns of the class, counted from a state."""
@@ -71,12 +68,17 @@ class ClassStiffness:
         contact, size = self.pressed.contact, shell.size
         if contact is None:
             return sp.csr_matrix((size, size))
-        block = contact.tangent_blocks(nodal, *shell.directors(nodal), self.pressed.multiplier, self.closing)
-        unknowns = shell.dofs.index[contact.nodes][:, [contact.axis, 3, 4]]
-        rows = np.repeat(unknowns[:, :, None], 3, axis=2)
-        columns = np.repeat(unknowns[:, None, :], 3, axis=1)
-        keep = (rows >= 0) & (columns >= 0) & (block != 0)
-        return sp.csr_matrix((block[keep], (rows[keep], columns[keep])), shape=(size, size))
+        directors, first, second = shell.directors(nodal)
+        multiplier, columns = self.pressed.multiplier, [contact.axis, 3, 4]
+        if self.closing:
+            block = contact.tangent_blocks(nodal, directors, first, second, multiplier)
+        else:
+            block, columns = together_blocks(contact, nodal, directors, first, multiplier)
+        unknowns, width = shell.dofs.index[contact.nodes][:, columns], len(columns)
+        rows = np.repeat(unknowns[:, :, None], width, axis=2)
+        across = np.repeat(unknowns[:, None, :], width, axis=1)
+        keep = (rows >= 0) & (across >= 0) & (block != 0)
+        return sp.csr_matrix((block[keep], (rows[keep], across[keep])), shape=(size, size))
 
 
 @dataclass
@@ -96,9 +98,9 @@ class ClassWatch:
 
     @classmethod
     def of(cls, model: ClosureModel, steps: LoadStepOptions, eigenvalues: int, wanted: bool) -> ClassWatch:
-        """Of a model; of no class unless it is wanted."""
+        """Of a model with contact; of no class unless it is wanted."""
         watches = {}
-        for name, symmetry in SYMMETRIES.items() if wanted else ():
+        for name, symmetry in SYMMETRIES.items() if wanted and model.supports == CONTACT else ():
             if name != EQUILIBRIA:
                 spectrum = partial(ClassStiffness.of(model, symmetry).spectrum, eigenvalues)
                 watches[name] = BucklingWatch(model.pressed, steps, eigenvalues, spectrum=spectrum)

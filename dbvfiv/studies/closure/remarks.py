@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...model.symmetry import EQUILIBRIA
 from .model import HELD_LIPS, ClosureModel
 
 #: Overlap of the inner faces over the penetration that is left, from which on the faces count as crossed.
@@ -40,6 +41,11 @@ def start_warnings(model: ClosureModel) -> Iterator[str]:
             "The duckbill is held shut by its supports, as in Th. 3.6, so that nothing is found out about "
             "whether its lips seal."
         )
+        if model.case.closure.symmetry != EQUILIBRIA:
+            yield (
+                "closure.symmetry asks for all classes of motion, but lips that are held shut cannot move together, so "
+                "with these supports only the class of the model is watched for buckling."
+            )
 
 
 def overlap_warnings(model: ClosureModel, states: Iterable[FoundPlace]) -> Iterator[str]:
