@@ -14,6 +14,7 @@ from dbvfiv.studies.case import Case
 from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions, TransferBasis, certified_spectrum
+from tests.small_valves import FORMER
 from tests.verification.test_transient_modes import QUASI, STORAGE, errors, three_routes
 
 SMALL = {"mesh.around": 6, "mesh.along": 8}
@@ -181,12 +182,12 @@ KEYS = {"drive.pressure": 2e3, "fluid.density": 60.0, "damping.alpha": 0.0, "ons
 
 
 def test_onset_over_the_length_of_the_pipe():
-    valve = load(PIPE, KEYS)
+    valve = load(PIPE, KEYS, FORMER)  # the mesh that has its onset at these lengths
     found = valve.onset("tail_length=0.2:60:4:log")
     assert found.points and found.certified.all()
     for point in found.points:
         assert point["confirmed"] and point["criticality"] in ("super", "sub")
-        there = load(PIPE, KEYS, {"downstream.length": point["value"]}).modes(count=4).modes
+        there = load(PIPE, KEYS, FORMER, {"downstream.length": point["value"]}).modes(count=4).modes
         assert min(abs(mode.growth_rate) for mode in there) < 1e-4
 
 
