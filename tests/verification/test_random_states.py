@@ -14,6 +14,7 @@ from eigen import CertifiedSpectrum, SearchOptions, TransferBasis, certified_spe
 from eigen.creep import apart_from_creep
 from eigen.dense import all_eigenvalues
 from eigen.residual import acceptable
+from tests.small_valves import FORMER
 from tests.verification.random_states import (
     RandomState,
     linearised_states,
@@ -47,9 +48,13 @@ def examined(around: int, along: int, number: int, seed: int, pressures: int) ->
     return out
 
 
-def examined_relaxing(around: int, along: int, number: int, seed: int, pressures: int) -> list[Examined]:
-    """The same of walls that relax, each with a basis of its own."""
-    changes = {"damping.model": "loss factor"}
+def examined_relaxing(around: int, along: int, number: int, seed: int, pressures: int, mesh=FORMER) -> list[Examined]:
+    """The same of walls that relax, each with a basis of its own; on even rows and columns.
+
+    Graded ones resolve strains in the bend of the lip at which constants of the 10 % level have lost stability. Factors
+    near 2 on the loss factors make such walls grow by themselves, in a dozen ways at once that do not oscillate.
+    """
+    changes = {"damping.model": "loss factor", **mesh}
     states = linearised_states(around, along, random_pressures(pressures, seed), **changes)
     out = []
     for state in relaxing_states(states, number, seed):
@@ -61,8 +66,10 @@ def examined_relaxing(around: int, along: int, number: int, seed: int, pressures
     return out
 
 
-def judge(results: list[Examined], exact_every: int, exact=None) -> None:
-    """Everything that is asked of a sample; `exact` holds some of them against another solution."""
+def judge(results: list[Examined], exact_every: int, exact=None, left_open: float = 0.005) -> None:
+    """Everything that is asked of a sample, of which a share may be left open with a reason; `exact` holds some of them
+    against another solution.
+    """
     work = np.array([r.certified.spectrum.applications for r in results])
     points = np.array([r.certified.count.evaluations for r in results])
     open_ends = [r for r in results if not r.certified.agrees]
@@ -73,7 +80,7 @@ def judge(results: list[Examined], exact_every: int, exact=None) -> None:
     for r in open_ends:
         print(f"  {r.state}: {r.certified.statement}")
         assert not r.certified.stable and r.certified.statement
-    assert len(open_ends) <= 0.005 * len(results)
+    assert len(open_ends) <= left_open * len(results)
     assert work.max() <= 20 * np.median(work) and points.max() <= 20 * np.median(points)
     for r in results:
         spectrum = r.certified.spectrum
@@ -148,6 +155,18 @@ def against_the_full_pencil(result: Examined) -> None:
 
 def test_a_hundred_random_states_that_relax():
     judge(examined_relaxing(8, 14, 100, seed=0, pressures=12), exact_every=25, exact=against_the_full_pencil)
+
+
+@pytest.mark.slow
+def test_walls_that_lose_stability_are_told():
+    """Of a hundred walls on the graded mesh four grow in up to twelve ways that do not oscillate. The search finds half
+    of these, the count all of them, and the states are left open.
+    """
+    results = examined_relaxing(8, 14, 100, seed=0, pressures=12, mesh={})
+    open_ends = [r for r in results if not r.certified.agrees]
+    for r in open_ends:
+        assert r.certified.unstable_count_independent > r.certified.unstable_count > 0
+    assert len(open_ends) <= 5
 
 
 @pytest.mark.slow
