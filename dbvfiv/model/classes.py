@@ -9,13 +9,11 @@ of its steady pressures, and a plug that sways with the wall (`dbvfiv.flow.plug`
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import block_diag
 
-from ..errors import SolveError
 from ..flow.plug import centroid_matrix, centroid_slope, plug_parts
 from ..shell import Shell
 from ..shell.pressure import pressure_stiffness
@@ -36,31 +34,17 @@ class LinearisedClass(LinearisedState):
     symmetry : Symmetry
     shell : Shell
         With the unknowns of the class, counted from the state.
-    added : (k, k) array
-        Added mass of the last k of the coupled displacements, see `added_mass`.
     """
 
     symmetry: Symmetry = None
     shell: Shell = None
-    added: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def relaxing_of_wall(self) -> tuple[sp.csr_matrix, ...]:
         values = self.shell.relaxing_tangents(np.zeros(self.shell.size))
         return tuple(self.shell.dofs.matrix(part) for part in values)
 
     def fluid_parts(self, density, storage=None, line=None) -> dict[str, np.ndarray]:
-        """A0 to A2 of the plug and of what is added; neither the continuity law nor a line matters, since no area
-        changes.
-        """
-        parts, k = self._plug(density), len(self.added)
-        if k and self.model.flow.unsteady:
-            parts = {name: block_diag(part, np.zeros((k, k))) for name, part in parts.items()}
-            whole = np.zeros((self.forces.shape[1],) * 2)
-            whole[-k:, -k:] = self.added
-            parts["A2"] = parts.get("A2", 0.0) - whole
-        return parts
-
-    def _plug(self, density: float) -> dict[str, np.ndarray]:
+        """A0 to A2 of the plug; neither the continuity law nor a line matters, since no area changes."""
         flow = self.model.flow
         if self.symmetry.sway_axis is None or not flow.has_fluid:
             return {}
@@ -79,11 +63,6 @@ def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Sy
     """Linearise the motions of a class about a steady state at an inlet pressure, Pa."""
     if symmetry.name == EQUILIBRIA:
         return linearise(model, q, inlet)
-    if model.outside is not None:
-        raise SolveError(
-            f"With fluid outside, motions of class {symmetry.name} are not known: its added mass is that of symmetric "
-            "motions. Ask for the class SS, or leave out outside.fluid."
-        )
     nodal = model.nodal(q)
     shell = shell_of_class(model.shell, symmetry.free_unknowns(model.mesh), nodal)
     dofs, still = shell.dofs, np.zeros(shell.size)
@@ -95,13 +74,13 @@ def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Sy
     pressure = model.flow.steady_pressure(area, inlet)[model.station_of_node]
     surface = shell.mesh
     pressure_stiffness(surface.quads, surface.nodes, nodal, pressure, model.loaded, dofs.slots, -1.0, stiffness)
-    slope, added = sway_of_sections(model, nodal, symmetry, dofs), added_mass(model, nodal, symmetry, dofs)
-    if added is not None:
-        slope = sp.vstack([slope, added[0]]).tocsr()
-    mass = {} if added is None else {"added": added[1]}
+    slope = sway_of_sections(model, nodal, symmetry, dofs)
     matrices = [dofs.matrix(values) for values in (shell.mass(still), structure, stiffness)]
-    coupled = slope.T.tocsr(), slope, area
-    return LinearisedClass(model, q, inlet, *matrices, *coupled, symmetry=symmetry, shell=shell, **mass)
+    added = None
+    if model.outside is not None:
+        added = model.outside.added_mass_of_class(q, matrices[1], shell, symmetry.name)
+    coupled = slope.T.tocsr(), slope, area, added
+    return LinearisedClass(model, q, inlet, *matrices, *coupled, symmetry=symmetry, shell=shell)
 
 
 def shell_of_class(shell: Shell, free: np.ndarray, nodal: np.ndarray) -> Shell:
@@ -121,13 +100,6 @@ def add_stops(structure: np.ndarray, model: ValveModel, q: np.ndarray, dofs: Cla
     unknowns = dofs.index[nodes, 1]
     moving = unknowns >= 0
     structure[dofs.diagonal_slots[unknowns[moving]]] += model.stops.tangent(q)[moving]
-
-
-def added_mass(model: ValveModel, nodal: np.ndarray, symmetry: Symmetry, dofs: ClassDofs) -> tuple | None:
-    """What moves along outside the wall in a class: a sparse matrix (k, n) from unknowns to displacements and the mass
-    (k, k) of those, for a quarter; None, since no fluid outside is modelled. Images of panels have `symmetry.signs`.
-    """
-    return None
 
 
 def sway_of_sections(model: ValveModel, nodal: np.ndarray, symmetry: Symmetry, dofs: ClassDofs) -> sp.csr_matrix:

@@ -126,8 +126,11 @@ class OutsideFluid:
     @cached_property
     def flow(self) -> PotentialFlow:
         """The fluid between the wall and what stays at rest."""
+        return self._flow_of("SS")
+
+    def _flow_of(self, symmetry: str) -> PotentialFlow:
         closed = BODY if self.radius is None else ROOM
-        return PotentialFlow(surroundings(self._at_rest, self.radius), closed=closed)
+        return PotentialFlow(surroundings(self._at_rest, self.radius), symmetry, closed)
 
     def _check_clearance(self, points: np.ndarray) -> str:
         """What is wrong with the pipe around the valve, in a sentence; empty where it clears the outer face."""
@@ -172,9 +175,12 @@ class OutsideFluid:
 
     def impedance(self, q: np.ndarray, frozen: Panels | None = None) -> np.ndarray:
         """S (ne, ne), 1/m: see `PotentialFlow.impedance`."""
+        return self._impedance(q, self.flow, frozen)
+
+    def _impedance(self, q: np.ndarray, flow: PotentialFlow, frozen: Panels | None = None) -> np.ndarray:
         panels = self.panels(q)
         opening = 2 * (len(self._edge) - 1) if self.open_lips else 0
-        return self.flow.impedance(panels, len(self.shell.mesh.quads), opening, frozen)
+        return flow.impedance(panels, len(self.shell.mesh.quads), opening, frozen)
 
     def operator(self, q: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray]:
         """E (ne, n), m2, and S (ne, ne), 1/m, at a state."""
@@ -193,6 +199,22 @@ class OutsideFluid:
         """
         fluxes, impedance = self.operator(q)
         return leading_added_mass(fluxes, impedance, structure, kept, self._workspace)
+
+    def added_mass_of_class(self, q: np.ndarray, structure: sp.csr_matrix, shell: Shell, symmetry: str) -> AddedMass:
+        """The same for another class of motion, whose images have its signs.
+
+        Parameters
+        ----------
+        q : (n,) array
+            The state, by the unknowns of the symmetric class.
+        structure : (k, k) sparse matrix
+        shell : Shell
+            With the unknowns of the class.
+        symmetry : str
+            "SA", "AS" or "AA".
+        """
+        fluxes = OuterFace(shell).fluxes(self.shell.dofs.expand(q))
+        return leading_added_mass(fluxes, self._impedance(q, self._flow_of(symmetry)), structure, KEPT)
 
 
 def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Workspace | None = None) -> AddedMass:

@@ -7,9 +7,8 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-import dbvfiv.model.classes as classes_of_motion
+from dbvfiv.model import Conditions
 from dbvfiv.model.classes import linearise_class
-from dbvfiv.model.dynamics import Conditions
 from dbvfiv.model.symmetry import SYMMETRIES
 from tests.model.test_relaxing_wall import relaxing_valve
 from tests.small_valves import find_open_state, make_valve
@@ -90,22 +89,20 @@ def test_the_spectrum_of_the_whole_valve_is_the_union_of_four(whole, classes, pa
     assert np.all(gaps.min(axis=1) < 1e-8 * np.abs(found))
 
 
-@pytest.mark.parametrize("name", ["SA", "AA"])
-def test_mass_added_outside_joins_the_coupling(model, state, name, monkeypatch):
-    """As if it stood in the mass matrix, beside the plug or without one."""
-    symmetry = SYMMETRIES[name]
-    plain = linearise_class(model, state, PRESSURE, symmetry)
-    generator = np.random.default_rng(4)
-    where = sp.csr_matrix(generator.standard_normal((3, plain.mass.shape[0])))
-    heavy = np.diag([1e-3, 2e-3, 3e-3])
-    monkeypatch.setattr(classes_of_motion, "added_mass", lambda *_: (where, heavy))
-    light = Conditions(100.0, 0.0, 0.003)
-    pencil = linearise_class(model, state, PRESSURE, symmetry).pencil(light)
-    expected = plain.pencil(light)
-    assert pencil.m == expected.m + 3
-    q = generator.standard_normal(pencil.n) + 1j * generator.standard_normal(pencil.n)
-    s, none = 3.0 + 50.0j, np.zeros(0)
-    force = sum(pencil.terms(s, q, none)[0])
-    assert force == pytest.approx(
-        sum(expected.terms(s, q, none)[0]) + s**2 * (where.T @ (heavy @ (where @ q))), rel=1e-9
-    )
+@pytest.mark.parametrize("name", ["SA", "AS", "AA"])
+def test_fluid_outside_slows_every_class(name):
+    """Its mass is positive, follows its density, and slows the class's motions without flow."""
+    q, symmetry = find_open_state(), SYMMETRIES[name]
+    dry, wet = (linearise_class(make_valve(more), q, PRESSURE, symmetry) for more in ({}, {"outside.fluid": 1000.0}))
+    assert np.all(wet.added.slowness > 0)
+    squares = [
+        sl.eigh(linear.structure.toarray(), linear.mass.toarray() + more, eigvals_only=True)[:4]
+        for linear, more in ((dry, 0.0), (wet, 1000.0 * wet.added.columns @ wet.added.columns.T))
+    ]
+    assert np.all(squares[1] < 0.8 * squares[0])
+    pencil = wet.pencil(Conditions(500.0, 0.0, 0.003), fluid=False)
+    x, s = np.ones(pencil.n), 2.0 + 30.0j
+    without = dry.pencil(Conditions(500.0, 0.0, 0.003), fluid=False)
+    terms, bare = (sum(p.terms(s, x, np.zeros(p.b))[0]) for p in (pencil, without))
+    added = s**2 * 1000.0 * wet.added.columns @ (wet.added.columns.T @ x)
+    assert terms == pytest.approx(bare + added, rel=1e-9, abs=1e-9 * np.abs(bare).max())

@@ -97,6 +97,7 @@ def onset_result(values, growth, certified=None):
         growth_rates=rows,
         frequencies=np.full(rows.shape, 37.0),
         points=points,
+        classes=(),
         stable_intervals=stretches[0],
         unstable_intervals=stretches[1],
         uncertain_intervals=uncertain_intervals(values, certified),
