@@ -8,6 +8,9 @@ import numpy as np
 
 Interval = tuple[float, float]
 
+#: Relative distance from an onset within which values of a scan say nothing of the state.
+BESIDE = 1e-7
+
 
 def known_intervals(
     values: np.ndarray, growth: np.ndarray, certified: np.ndarray, edges: Iterable[float], unstable: bool
@@ -28,6 +31,9 @@ def known_intervals(
         Which of the two is asked for.
     """
     edges, found = sorted(edges), []
+    # right at an onset the sign of the growth rate is that of rounding
+    away = [all(abs(v - e) > BESIDE * abs(e) for e in edges) or v in (values[0], values[-1]) for v in values]
+    values, growth, certified = (np.asarray(part)[np.array(away, bool)] for part in (values, growth, certified))
     for i in range(len(values) - 1):
         if not (certified[i] and certified[i + 1]):
             continue
