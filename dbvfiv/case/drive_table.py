@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from .quantity import Quantity
+from .text_file import read_text_file
 
 _TIME, _PRESSURE = Quantity("s", "s"), Quantity("Pa", "kPa", head=True)
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
@@ -51,14 +52,7 @@ def read_pairs(path: Path, kinds: tuple[Quantity, Quantity], words: str) -> list
     ValueError
         With a clause that completes "KEY is given as FILE, ...".
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (FileNotFoundError, NotADirectoryError):
-        raise ValueError("which does not exist") from None
-    except UnicodeDecodeError:
-        raise ValueError("which is not a text file") from None
-    except (OSError, ValueError) as error:
-        raise ValueError(f"which cannot be read ({getattr(error, 'strerror', None) or 'bad name'})") from None
+    text = read_text_file(path)
     units, rows = [kind.si for kind in kinds], []
     for number, line in enumerate(text.splitlines(), 1):
         found = _words(line.split("#")[0])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from .text_file import read_text_file
+
 PROFILES, POINTS = 9, 15
 
 
@@ -28,14 +30,7 @@ def read_key_points(path: Path) -> list[list[tuple[float, float, float]]]:
     ValueError
         With a clause that completes "key_points is given as FILE, ...".
     """
-    try:
-        text = Path(path).read_text()
-    except (FileNotFoundError, NotADirectoryError):
-        raise ValueError("which does not exist") from None
-    except UnicodeDecodeError:
-        raise ValueError("which is not a text file") from None
-    except (OSError, ValueError) as error:
-        raise ValueError(f"which cannot be read ({getattr(error, 'strerror', None) or 'bad name'})") from None
+    text = read_text_file(path, encoding=None)
     points = []
     for number, line in enumerate(text.splitlines(), 1):
         line = line.split("#")[0].replace(",", " ").strip()

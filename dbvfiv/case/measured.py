@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 
 from .quantity import Quantity
+from .text_file import read_text_file
 
 _PRESSURE, _VOLUME, _MASS = Quantity("Pa", "kPa", head=True), Quantity("m^3/s", "L/s"), Quantity("kg/s", "kg/s")
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
@@ -42,14 +43,7 @@ def read_measured(path: Path, density: float | None = None) -> list[tuple[float,
         With a clause that completes "measured is given as FILE, ...".
     """
     density = 1000.0 if density is None else density
-    try:
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
-    except (FileNotFoundError, NotADirectoryError):
-        raise ValueError("which does not exist") from None
-    except UnicodeDecodeError:
-        raise ValueError("which is not a text file") from None
-    except (OSError, ValueError) as error:
-        raise ValueError(f"which cannot be read ({getattr(error, 'strerror', None) or 'bad name'})") from None
+    lines = read_text_file(path).splitlines()
     numbered = [(i, line.split("#")[0].strip()) for i, line in enumerate(lines, 1)]
     numbered = [(i, line) for i, line in numbered if line]
     if not numbered:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from ..case.quantity import GRAVITY
+from ..geometry import QUARTERS
 from .line_elements import DEGREE, chain, element
 from .reversed import ReversibleFluid
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from .channel import Channel
     from .elastic_line import ElasticLine
 
-QUARTERS = 4
 #: Newton steps within which velocities in the line must be found, and the relative size of the last one.
 _STEPS, _TOLERANCE = 40, 1e-14
 

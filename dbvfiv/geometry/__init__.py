@@ -2,9 +2,10 @@
 
 from .sections import Profile, flange_section, key_point_sections, lip_section
 from .surface import Surface, surface_of
-from .valve_mesh import ValveMesh, valve_mesh
+from .valve_mesh import QUARTERS, ValveMesh, valve_mesh
 
 __all__ = [
+    "QUARTERS",
     "Profile",
     "Surface",
     "ValveMesh",

@@ -10,6 +10,9 @@ from ..case.valve import Mesh, Valve
 from .divisions import column_division, grading, row_division
 from .surface import Surface, surface_of
 
+#: Of the whole valve that a mesh is one of.
+QUARTERS = 4
+
 
 @dataclass(frozen=True)
 class ValveMesh:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -39,7 +40,8 @@ class LinearisedClass(LinearisedState):
     symmetry: Symmetry = None
     shell: Shell = None
 
-    def relaxing_of_wall(self) -> tuple[sp.csr_matrix, ...]:
+    @cached_property
+    def relaxing(self) -> tuple[sp.csr_matrix, ...]:
         values = self.shell.relaxing_tangents(np.zeros(self.shell.size))
         return tuple(self.shell.dofs.matrix(part) for part in values)
 
@@ -76,9 +78,7 @@ def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Sy
     pressure_stiffness(surface.quads, surface.nodes, nodal, pressure, model.loaded, dofs.slots, -1.0, stiffness)
     slope = sway_of_sections(model, nodal, symmetry, dofs)
     matrices = [dofs.matrix(values) for values in (shell.mass(still), structure, stiffness)]
-    added = None
-    if model.outside is not None:
-        added = model.outside.added_mass_of_class(q, matrices[1], shell, symmetry.name)
+    added = None if model.outside is None else model.outside.added_mass(q, matrices[1], symmetry.name, shell)
     coupled = slope.T.tocsr(), slope, area, added
     return LinearisedClass(model, q, inlet, *matrices, *coupled, symmetry=symmetry, shell=shell)
 

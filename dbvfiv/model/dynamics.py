@@ -138,9 +138,6 @@ class LinearisedState:
     @cached_property
     def relaxing(self) -> tuple:
         """K_g (n, n): material part of the tangent of each group of layers that relax alike."""
-        return self.relaxing_of_wall()
-
-    def relaxing_of_wall(self) -> tuple:
         return self.model.relaxing_stiffness(self.q)
 
     @cached_property

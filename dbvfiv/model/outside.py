@@ -13,7 +13,6 @@ that of the first motion left out, 1/sqrt(mu_(r+1)), do not see it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -121,16 +120,15 @@ class OutsideFluid:
         if sentence:
             raise CaseError(sentence, "outside.pipe_diameter")
         self._at_rest = points[mesh.rows]
-        self._workspace = Workspace()
+        self._flows: dict[str, PotentialFlow] = {}
+        self._workspaces: dict[str, Workspace] = {}
 
-    @cached_property
-    def flow(self) -> PotentialFlow:
-        """The fluid between the wall and what stays at rest."""
-        return self._flow_of("SS")
-
-    def _flow_of(self, symmetry: str) -> PotentialFlow:
-        closed = BODY if self.radius is None else ROOM
-        return PotentialFlow(surroundings(self._at_rest, self.radius), symmetry, closed)
+    def _flow(self, symmetry: str) -> PotentialFlow:
+        """The fluid between the wall and what stays at rest, in motions of a class."""
+        if symmetry not in self._flows:
+            closed = BODY if self.radius is None else ROOM
+            self._flows[symmetry] = PotentialFlow(surroundings(self._at_rest, self.radius), symmetry, closed)
+        return self._flows[symmetry]
 
     def _check_clearance(self, points: np.ndarray) -> str:
         """What is wrong with the pipe around the valve, in a sentence; empty where it clears the outer face."""
@@ -173,48 +171,36 @@ class OutsideFluid:
         edge[:, 0] = np.minimum(np.concatenate([[0.0], np.cumsum(steps)]), outer[:, 0])
         return edge
 
-    def impedance(self, q: np.ndarray, frozen: Panels | None = None) -> np.ndarray:
-        """S (ne, ne), 1/m: see `PotentialFlow.impedance`."""
-        return self._impedance(q, self.flow, frozen)
-
-    def _impedance(self, q: np.ndarray, flow: PotentialFlow, frozen: Panels | None = None) -> np.ndarray:
+    def impedance(self, q: np.ndarray, frozen: Panels | None = None, symmetry: str = "SS") -> np.ndarray:
+        """S (ne, ne), 1/m, in motions of a class: see `PotentialFlow.impedance`."""
         panels = self.panels(q)
         opening = 2 * (len(self._edge) - 1) if self.open_lips else 0
-        return flow.impedance(panels, len(self.shell.mesh.quads), opening, frozen)
+        return self._flow(symmetry).impedance(panels, len(self.shell.mesh.quads), opening, frozen)
 
     def operator(self, q: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray]:
         """E (ne, n), m2, and S (ne, ne), 1/m, at a state."""
         return self.face.fluxes(self.shell.dofs.expand(q)), self.impedance(q)
 
-    def added_mass(self, q: np.ndarray, structure: sp.csr_matrix, kept: int = KEPT) -> AddedMass:
-        """Added mass of unit density at a state.
+    def added_mass(
+        self, q: np.ndarray, structure: sp.csr_matrix, symmetry: str = "SS", shell: Shell | None = None
+    ) -> AddedMass:
+        """Added mass of unit density at a state, of the `KEPT` motions that it slows down most.
 
         Parameters
         ----------
         q : (n,) array
-        structure : (n, n) sparse matrix
-            The structure's own tangent, which says what motions are slow.
-        kept : int
-            Rank r.
-        """
-        fluxes, impedance = self.operator(q)
-        return leading_added_mass(fluxes, impedance, structure, kept, self._workspace)
-
-    def added_mass_of_class(self, q: np.ndarray, structure: sp.csr_matrix, shell: Shell, symmetry: str) -> AddedMass:
-        """The same for another class of motion, whose images have its signs.
-
-        Parameters
-        ----------
-        q : (n,) array
-            The state, by the unknowns of the symmetric class.
+            By the unknowns of the symmetric class.
         structure : (k, k) sparse matrix
-        shell : Shell
-            With the unknowns of the class.
-        symmetry : str
-            "SA", "AS" or "AA".
+            The structure's own tangent, which says what motions are slow.
+        symmetry : {"SS", "SA", "AS", "AA"}
+            Class of the motions, whose signs the images have.
+        shell : Shell, optional
+            With the unknowns of that class.
         """
-        fluxes = OuterFace(shell).fluxes(self.shell.dofs.expand(q))
-        return leading_added_mass(fluxes, self._impedance(q, self._flow_of(symmetry)), structure, KEPT)
+        face = self.face if shell is None else OuterFace(shell)
+        fluxes, impedance = face.fluxes(self.shell.dofs.expand(q)), self.impedance(q, symmetry=symmetry)
+        workspace = self._workspaces.setdefault(symmetry, Workspace())
+        return leading_added_mass(fluxes, impedance, structure, KEPT, workspace)
 
 
 def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Workspace | None = None) -> AddedMass:

@@ -8,9 +8,10 @@ import numpy as np
 
 from ..case.quantity import GRAVITY, head_of
 from ..errors import SolveError
+from ..geometry import QUARTERS
 from .hydraulics import Behind, Hydraulics, hydraulics_of
 from .lip import LipCentre
-from .valve import QUARTERS, ValveModel
+from .valve import ValveModel
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from ..flow import RowAreas
 from ..flow.terms.line import Line
 from ..flow.terms.pump import Pump
 from ..flow.terms.tail import Tail
-from ..geometry import ValveMesh
+from ..geometry import QUARTERS, ValveMesh
 from ..shell import Section, StepWall
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_flow, build_shell
@@ -30,8 +30,6 @@ from .linear import CoupledFactor
 from .outside import OutsideFluid
 from .relaxing import WallRelaxation
 from .supports import lip_stops
-
-QUARTERS = 4
 
 
 @dataclass(frozen=True)
@@ -112,8 +110,7 @@ class ValveModel:
     @property
     def pump(self) -> Pump | None:
         """The pump that feeds it, if there is one."""
-        terms = getattr(self.flow, "terms", ())
-        return next((term for term in terms if isinstance(term, Pump)), None)
+        return self._term(Pump)
 
     @property
     def stations(self) -> int:

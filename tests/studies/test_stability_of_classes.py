@@ -13,7 +13,8 @@ from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.closure.classes import ClassStiffness
 from dbvfiv.studies.closure.model import closure_model
 from dbvfiv.studies.map.classes import leading_of as leading_of_map
-from dbvfiv.studies.onset.classes import common_stretches, joined_stretches, leading_of, merge_points
+from dbvfiv.studies.onset.classes import leading_of, merge_points
+from dbvfiv.studies.onset.intervals import common_stretches, joined_stretches
 
 OTHERS = ["SA", "AS", "AA"]
 SMALL = {"mesh.around": 8, "mesh.along": 14, "drive.pressure": "6 kPa", "damping.alpha": 0}

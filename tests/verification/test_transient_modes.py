@@ -99,6 +99,15 @@ def ringing(x: np.ndarray, step: float) -> complex:
     return complex(np.log(root[np.argmax(root.imag)]) / step)
 
 
+def check_three_routes(found: dict, words: str) -> None:
+    """The full pencil, its reduction and the ringing in time say the same."""
+    full = found["full"]
+    print(f"\n{words}: full {full:.5f} reduced {found['reduced']:.5f} limit {found['limit']:.5f} {found['in time']}")
+    assert abs(found["reduced"] - full) < 1e-6 * abs(full)
+    growth, frequency = errors(found["limit"], full)
+    assert growth < 0.01 and frequency < 0.005
+
+
 def errors(found: complex, expected: complex) -> tuple[float, float]:
     """Relative errors of growth rate and frequency."""
     return abs(found.real / expected.real - 1), abs(abs(found.imag) / abs(expected.imag) - 1)

@@ -17,9 +17,8 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ...case.quantity import GRAVITY
+from ...geometry import QUARTERS
 from ..term import FlowTerm
-
-_QUARTERS = 4
 
 
 class Pump(FlowTerm):
@@ -71,7 +70,7 @@ class Pump(FlowTerm):
         Flow and head of a fluid of another density are those of the same pressures.
         """
         size = self.density / parameters["density"]
-        flow = _QUARTERS * inlet_area * velocity / jnp.sqrt(size)
+        flow = QUARTERS * inlet_area * velocity / jnp.sqrt(size)
         return size * GRAVITY * (self.curve(flow) - self.reference)
 
     def head(self, stream, parameters):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
+from ...geometry import QUARTERS
 from ...model.lip import LipCentre
 from ...motion.control import ControlOptions, FixedSteps
 from ...motion.scheme import scheme
@@ -21,7 +22,6 @@ from ...observer import Observer
 from ..case import Case
 from .closing_motion import ClosingMotion, ContactValve
 from .opening import FACES, measure
-from .state import QUARTERS
 
 #: Rest before the drive turns, over the time it takes to turn.
 LEAD = 0.1

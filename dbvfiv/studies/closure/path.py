@@ -13,6 +13,7 @@ import numpy as np
 from continuation import NotConverged
 
 from ...errors import SolveError
+from ...geometry import QUARTERS
 from ...model.load_steps import LoadStepOptions, LoadSteps
 from ...model.newton import NewtonOptions
 from ...model.symmetry import ALL
@@ -24,7 +25,7 @@ from .energy import EnergyLedger
 from .model import ClosureModel
 from .opening import FACES, opening
 from .path_point import PathPoint, PathRestart
-from .state import QUARTERS, ClosureState, contact_front, describe_closure, face_overlap
+from .state import ClosureState, contact_front, describe_closure, face_overlap
 from .stiffness import stiffness_spectrum
 
 #: Farthest that an equilibrium may lie from its prediction, over the mean wall thickness.

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...geometry import QUARTERS
 from ...record.states import LAYERS
 from ...shell.recovery import LayerFields
 from .columns import STATES, SUMMARY
 from .opening import Opening
-from .state import QUARTERS, ClosureState
+from .state import ClosureState
 
 if TYPE_CHECKING:
     from .result import ClosureResult

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...geometry import QUARTERS
 from ...model.lip import LipCentre
 from ...shell.recovery import layer_fields
 from .balance import force_balance
 from .model import ClosureModel
 from .opening import FACES, Opening, opening
 from .stiffness import StiffnessSpectrum
-
-QUARTERS = 4
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
+from ...geometry import QUARTERS
 from ...model.equilibria import model_warnings, state_warnings
 from ...model.symmetry import SYMMETRIES
 from ...record.record import GrowingRecord
@@ -21,7 +22,7 @@ from .opening import opening
 from .path import ClosureOptions, ClosurePath
 from .path_point import PathPoint, PathRestart
 from .remarks import FoundPlace, overlap_warnings, start_warnings
-from .state import QUARTERS, ClosureState
+from .state import ClosureState
 
 
 class ClosureWalk:

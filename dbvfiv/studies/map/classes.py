@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES, chosen_symmetries
+from ...model.symmetry import EQUILIBRIA, SYMMETRIES
 from ...observer import Observer
 from ...record.record import GrowingRecord
 from ..case import Case
+from ..stability.classes import NOTE, classes_to_look_at
 from ..stability.walk import StabilityWalk
 from .run import FoundMap, run_map
 
-#: Kind of the notes that hold them, one for each class.
-NOTE = "class"
 _GRIDS = ("growth_rate", "frequency", "unstable", "counted", "certified")
 #: Cells alone, under one law: the laws differ in no class but that of the equilibria.
 _PLAIN = {"map.curve": False, "map.refine": 0, "map.continuity": "case", "map.workers": 1}
@@ -25,11 +24,7 @@ _PLAIN = {"map.curve": False, "map.refine": 0, "map.continuity": "case", "map.wo
 
 def look_at_classes(case: Case, record: GrowingRecord, walk: StabilityWalk) -> None:
     """Cells of the grid in the other classes, where they are asked for and not in the record yet."""
-    done = {note["symmetry"] for note in record.notes(NOTE)}
-    for symmetry in chosen_symmetries(case.map.symmetry):
-        if symmetry.name in {EQUILIBRIA, *done}:
-            continue
-        record.progress(f"class {symmetry.name}: {symmetry.words}")
+    for symmetry in classes_to_look_at(record, case.map.symmetry):
         found = run_map(case.replace(_PLAIN), Observer(), walk=walk.in_class(symmetry))
         for sentence in found.warnings:
             record.warn(f"In class {symmetry.name}: {sentence}")

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..result import StudyResult
+from ..stability.classes import NOTE as CLASS_NOTE
 from ..stability.place import describe_fixed, fixed_conditions
 from . import classes, figures
 from .checks import Check
@@ -85,7 +86,7 @@ class MapResult(StudyResult):
     @cached_property
     def classes(self) -> list[dict[str, Any]]:
         """Cells in the other classes of motion, where they were asked for; see `dbvfiv.studies.map.classes`."""
-        notes = {note["symmetry"]: note for note in self.record.notes(classes.NOTE)}
+        notes = {note["symmetry"]: note for note in self.record.notes(CLASS_NOTE)}
         return list(notes.values())
 
     def _picture(self, law: int) -> dict[str, Any]:

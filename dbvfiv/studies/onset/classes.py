@@ -12,9 +12,6 @@ from .intervals import Interval, uncertain_intervals
 from .other_law import note_of
 from .run import FoundOnsets
 
-#: Kind of the notes that hold them, one for each class.
-NOTE = "class"
-
 
 def note_of_class(found: FoundOnsets) -> dict[str, Any]:
     """What a record keeps of the onsets of a class."""
@@ -46,26 +43,6 @@ def merge_points(own: Iterable[dict[str, Any]], unstable: Sequence[Interval], cl
             covered = any(low <= point["value"] <= high for low, high in elsewhere)
             merged.append(point | {"symmetry": name, "edge": point["edge"] and not covered})
     return sorted(merged, key=lambda point: point["value"])
-
-
-def common_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
-    """Stretches that lie in all of some lists."""
-    found = list(map(tuple, parts[0]))
-    for part in parts[1:]:
-        pairs = ((max(a, c), min(b, d)) for a, b in found for c, d in part)
-        found = [(low, high) for low, high in pairs if low < high]
-    return sorted(found)
-
-
-def joined_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
-    """Stretches that lie in any of some lists, those that touch joined."""
-    found: list[Interval] = []
-    for low, high in sorted(tuple(stretch) for part in parts for stretch in part):
-        if found and low <= found[-1][1]:
-            found[-1] = (found[-1][0], max(found[-1][1], high))
-        else:
-            found.append((low, high))
-    return found
 
 
 def leading_of(values: np.ndarray, growth: np.ndarray, frequency: np.ndarray, certified, classes) -> dict[str, Any]:

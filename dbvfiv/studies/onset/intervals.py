@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -52,6 +52,26 @@ def uncertain_intervals(values: np.ndarray, certified: np.ndarray) -> list[Inter
     for i in range(len(values) - 1):
         if not (certified[i] and certified[i + 1]):
             _append(found, float(values[i]), float(values[i + 1]))
+    return found
+
+
+def common_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
+    """Stretches that lie in all of some lists."""
+    found = list(map(tuple, parts[0]))
+    for part in parts[1:]:
+        pairs = ((max(a, c), min(b, d)) for a, b in found for c, d in part)
+        found = [(low, high) for low, high in pairs if low < high]
+    return sorted(found)
+
+
+def joined_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
+    """Stretches that lie in any of some lists, those that touch joined."""
+    found: list[Interval] = []
+    for low, high in sorted(tuple(stretch) for part in parts for stretch in part):
+        if found and low <= found[-1][1]:
+            found[-1] = (found[-1][0], max(found[-1][1], high))
+        else:
+            found.append((low, high))
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from .intervals import Interval
+from .intervals import Interval, common_stretches
 from .run import FoundOnsets
 
 #: Kind of the note that holds them.
@@ -44,8 +44,9 @@ def disagreements(
     other : dict
         As `note_of` gives it.
     """
-    found = [(*part, own) for part in _common(stable, other["unstable"])]
-    found += [(*part, other["continuity"]) for part in _common(unstable, other["stable"])]
+    found = [(*part, own) for part in common_stretches([stable, other["unstable"]])]
+    found += [(*part, other["continuity"]) for part in common_stretches([unstable, other["stable"]])]
+    found = [part for part in found if part[1] - part[0] > _SLIVER * abs(part[1])]
     joined: list[tuple[float, float, str]] = []
     for low, high, law in sorted(found):
         if joined and joined[-1][2] == law and low - joined[-1][1] <= _SLIVER * abs(low):
@@ -53,9 +54,3 @@ def disagreements(
         else:
             joined.append((low, high, law))
     return joined
-
-
-def _common(one: Sequence[Interval], two: Sequence[Interval]) -> list[Interval]:
-    """Stretches that lie in both."""
-    parts = ((max(a, c), min(b, d)) for a, b in one for c, d in two)
-    return [(low, high) for low, high in parts if high - low > _SLIVER * abs(high)]

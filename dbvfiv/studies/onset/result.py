@@ -13,11 +13,12 @@ from matplotlib.figure import Figure
 from ...case.parameters import PARAMETERS
 from ...model.symmetry import EQUILIBRIA
 from ..result import StudyResult
+from ..stability.classes import NOTE as CLASS_NOTE
 from ..stability.crossings import WATCHED
 from ..stability.laws import compare_ranges
 from ..stability.place import describe_fixed, fixed_conditions
 from . import classes, figures, other_law
-from .intervals import Interval, known_intervals, uncertain_intervals
+from .intervals import Interval, common_stretches, joined_stretches, known_intervals, uncertain_intervals
 from .point import FINE, OnsetSample
 from .rows import read_points, read_samples
 
@@ -61,7 +62,7 @@ class OnsetResult(StudyResult):
     @cached_property
     def classes(self) -> list[dict[str, Any]]:
         """Onsets in the other classes of motion, where they were asked for; see `dbvfiv.studies.onset.classes`."""
-        notes = {note["symmetry"]: note for note in self.record.notes(classes.NOTE)}
+        notes = {note["symmetry"]: note for note in self.record.notes(CLASS_NOTE)}
         return [{name: value for name, value in note.items() if name != "what"} for note in notes.values()]
 
     @cached_property
@@ -103,20 +104,20 @@ class OnsetResult(StudyResult):
     def unstable_intervals(self) -> list[Interval]:
         """Where the state is known to be unstable within the range scanned."""
         parts = [self._own_intervals(True), *(part["unstable"] for part in self.classes)]
-        return classes.joined_stretches(parts) if self.classes else parts[0]
+        return joined_stretches(parts) if self.classes else parts[0]
 
     @property
     def stable_intervals(self) -> list[Interval]:
         """Where it is known to be stable, in all classes that were asked for."""
         parts = [self._own_intervals(False), *(part["stable"] for part in self.classes)]
-        return classes.common_stretches(parts) if self.classes else parts[0]
+        return common_stretches(parts) if self.classes else parts[0]
 
     @property
     def uncertain_intervals(self) -> list[Interval]:
         """Where neither is claimed."""
         own = uncertain_intervals(self.values, self.certified)
         parts = [own, *(part["uncertain"] for part in self.classes)]
-        return classes.joined_stretches(parts) if self.classes else own
+        return joined_stretches(parts) if self.classes else own
 
     def _own_intervals(self, unstable: bool) -> list[Interval]:
         edges = [point["value"] for point in self._own_points if point["edge"]]

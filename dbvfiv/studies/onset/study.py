@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ...errors import CaseError
-from ...model.symmetry import EQUILIBRIA, chosen_symmetries
 from ...observer import Observers
 from ...record.record import GrowingRecord
 from ..case import Case
 from ..session import Session
+from ..stability.classes import NOTE as CLASS
+from ..stability.classes import classes_to_look_at
 from ..stability.laws import other_law, require_two_laws
 from ..stability.walk import StabilityWalk
 from ..study import Study
-from .classes import NOTE as CLASS
 from .classes import note_of_class
 from .other_law import NOTE, note_of
 from .result import OnsetResult
@@ -54,11 +54,7 @@ def _look_at_classes(session: Session, record: GrowingRecord, walk: StabilityWal
     """Onsets in the other classes of motion, where they are asked for. Cycles that leave the symmetry have normal forms
     of their own, which are not looked for.
     """
-    done = {note["symmetry"] for note in record.notes(CLASS)}
-    for symmetry in chosen_symmetries(session.case.onset.symmetry):
-        if symmetry.name in {EQUILIBRIA, *done}:
-            continue
-        record.progress(f"class {symmetry.name}: {symmetry.words}")
+    for symmetry in classes_to_look_at(record, session.case.onset.symmetry):
         options = replace(OnsetOptions.of(session.case), normal_form=False, symmetry=symmetry.name)
         found = run_onset(session.case, options, walk=walk.in_class(symmetry))
         for sentence in found.failures:

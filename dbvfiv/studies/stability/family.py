@@ -102,7 +102,7 @@ class ValveFamily(PencilFamily):
         return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, **line), storage=storage)
 
 
-class Surroundings(NamedTuple):
+class FluidLaw(NamedTuple):
     """The law of a condition where more than the blend of the continuity laws decides; 0 for what there is not.
 
     Attributes
@@ -127,26 +127,26 @@ class Surroundings(NamedTuple):
 
 
 #: Blend of the continuity laws alone, or with what else decides.
-Law = float | Surroundings
+Law = float | FluidLaw
 
-_OF_LINE = ("pipe_length", "tail_length", "wave_speed")
+#: What of it belongs to the lines.
+OF_LINE = ("pipe_length", "tail_length", "wave_speed")
 
 
 def law_of(storage: float, density: float, **others: float) -> Law:
-    """The law of a condition; what else decides by the names of `Surroundings`, 0 for what there is not."""
+    """The law of a condition; what else decides by the names of `FluidLaw`, 0 for what there is not."""
     if others.get("wave_speed"):
         others["density"] = density
-    return Surroundings(storage, **others) if any(others.values()) else storage
+    return FluidLaw(storage, **others) if any(others.values()) else storage
 
 
 def law_parts(law: Law) -> tuple[float, dict[str, float]]:
     """Blend of the continuity laws, and parameters of the line as `Conditions.of_line` has them, of a law."""
-    if not isinstance(law, tuple):
+    if not isinstance(law, FluidLaw):
         return float(law), {}
-    law = Surroundings(*law)
-    return law.storage, {name: getattr(law, name) for name in _OF_LINE if getattr(law, name)}
+    return law.storage, {name: getattr(law, name) for name in OF_LINE if getattr(law, name)}
 
 
 def outside_of(law: Law) -> float:
     """Density outside over that inside of a law; 0 where it follows it."""
-    return Surroundings(*law).outside if isinstance(law, tuple) else 0.0
+    return law.outside if isinstance(law, FluidLaw) else 0.0

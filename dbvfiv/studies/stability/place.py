@@ -13,7 +13,7 @@ from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ...model.dynamics import Conditions
 from ..case import Case
-from .family import law_of, law_parts
+from .family import OF_LINE, law_of, law_parts
 
 
 @dataclass(frozen=True)
@@ -78,33 +78,28 @@ class Place:
         return replace(self, **own, design={**self.design, **design})
 
     @property
+    def line(self) -> dict[str, float]:
+        """Parameters of the lines that there are, by their names."""
+        return {name: getattr(self, name) for name in OF_LINE if getattr(self, name)}
+
+    @property
     def condition(self) -> Condition:
         """(density, alpha, beta, law, loss factor), the law as `dbvfiv.studies.stability.family.ValveFamily` has it."""
-        given = {"pipe_length": self.pipe_length, "tail_length": self.tail_length, "wave_speed": self.wave_speed}
         ratio = self.outside / self.density if self.outside else 0.0
-        law = law_of(self.storage, self.density, **given, outside=ratio)
+        law = law_of(self.storage, self.density, **self.line, outside=ratio)
         return Condition(self.density, self.alpha, self.beta, law, self.loss_factor)
 
     def under(self, condition: Condition) -> Place:
         """The same steady state under another condition."""
         density, alpha, beta, law, loss_factor = condition
         storage, line = law_parts(law)
-        return self.at(
-            density=density,
-            alpha=alpha,
-            beta=beta,
-            storage=storage,
-            loss_factor=loss_factor,
-            pipe_length=line.get("pipe_length", 0.0),
-            tail_length=line.get("tail_length", 0.0),
-            wave_speed=line.get("wave_speed", 0.0),
-        )
+        line = dict.fromkeys(OF_LINE, 0.0) | line
+        return self.at(density=density, alpha=alpha, beta=beta, storage=storage, loss_factor=loss_factor, **line)
 
     @property
     def conditions(self) -> Conditions:
         """What surrounds the structure there."""
-        line = self.pipe_length or None, self.tail_length or None, self.wave_speed or None
-        return Conditions(self.density, self.alpha, self.beta, self.loss_factor, *line)
+        return Conditions(self.density, self.alpha, self.beta, self.loss_factor, **self.line)
 
     def value(self, name: str) -> float:
         return float(self.design[name] if name in DESIGN else getattr(self, name))

@@ -9,16 +9,16 @@ from matplotlib.figure import Figure
 
 from ...drawing.style import kilopascals, new_figure, pressure_colours, pressure_heading, some_of
 from ...drawing.views import mark_pieces
+from ...geometry import QUARTERS
 from .discharge import ordered
 
 if TYPE_CHECKING:
     from .result import SteadyResult
 
-_QUARTERS = 4
 _PANELS = (
     ("Static pressure, kPa", lambda state: state.station_pressure / 1e3),
     ("Velocity, m/s", lambda state: state.station_velocity),
-    ("Flow area, cm²", lambda state: _QUARTERS * state.station_area * 1e4),
+    ("Flow area, cm²", lambda state: QUARTERS * state.station_area * 1e4),
 )
 
 

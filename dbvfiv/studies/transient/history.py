@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...flow.line_stepping import LineState
+from ...geometry import QUARTERS
 from ...model.lip import LipCentre
-from ...model.valve import QUARTERS
 from ...motion.equations import ValveMotion
 from ...motion.stepper import StepResult
 

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...errors import CaseError
-from ...model.valve import QUARTERS
+from ...geometry import QUARTERS
 from ...motion.options import RunOptions
 from ...record.record import Record
 from ...record.vtkhdf import Step

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
+from ...geometry import QUARTERS
 from ...model import ValveModel
 from ...model.equilibria import model_warnings
-from ...model.valve import QUARTERS
 from ...motion.control import step_control
 from ...motion.drive import Drive
 from ...motion.equations import ValveMotion
