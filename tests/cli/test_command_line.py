@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-import time
 import types
 
 import pytest
@@ -26,21 +25,11 @@ def test_every_command_has_help_and_loads_nothing_heavy():
     code = (
         "import sys; from dbvfiv.cli._run import build; app = build();"
         "print([c.callback.__module__ for c in app.registered_commands if not c.callback.__doc__]);"
-        "print([m for m in ('jax', 'numpy', 'scipy', 'petsc4py', 'numba', 'pint', 'matplotlib') if m in sys.modules])"
+        "heavy = 'jax numpy scipy petsc4py numba pint matplotlib h5py plotly pyvista'.split();"
+        "print([m for m in heavy if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.split("\n")[:2] == ["[]", "[]"], done.stdout + done.stderr
-
-
-def test_help_is_quick():
-    best = min(_time_of_help() for _ in range(3))
-    assert best < 1.5  # 0.15 s on an idle machine; loading JAX alone would take longer than this
-
-
-def _time_of_help() -> float:
-    start = time.perf_counter()
-    subprocess.run([sys.executable, "-m", "dbvfiv", "--help"], check=True, capture_output=True)
-    return time.perf_counter() - start
 
 
 def test_version(command_line):
