@@ -7,8 +7,8 @@ not agree on one point: App. A's program gives the plane of the ply the shear mo
 (5.57 MPa) and both transverse planes the one with xi = 0 (2.94 MPa), while Th. Table 3-5 prints
 2.94 MPa for xy and xz and 5.57 MPa for yz; the Poisson ratios (0.282 with xi = 2, 0.269 with xi = 0)
 are exchanged in the same way. The table's 1558 MPa along the fibre is 0.3 % above the program's
-1553.8. The program's assignment is the default here, being what the published results were computed
-with.
+1553.8. The program's assignment is the default here, because the listing runs; which of the two the
+published results were computed with is not said.
 """
 
 from __future__ import annotations

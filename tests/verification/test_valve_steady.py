@@ -101,7 +101,7 @@ def test_fibre_angle_orders_the_curves():
 
 
 def test_strain_levels_order_the_curves():
-    """10, 20, 40, 60 %: rubber softens with the strain that its constants were fitted to (Th. Fig. 3-7)."""
+    """10, 20, 40, 60 %: rubber softens with the strain that its constants were fitted to (Th. Figs. 3-6, 7-2)."""
     found = [flows(materials__strain_level=level) for level in ("10 %", "20 %", "40 %", "60 %")]
     for level, flow in zip((10, 20, 40, 60), found):
         print(f"\n{level} % set: {np.round(flow, 2)} kg/s at {TREND_PRESSURES}")

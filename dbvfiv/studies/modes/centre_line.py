@@ -35,7 +35,7 @@ def draw(result: ModesResult, mode: int | None = None) -> Iterator[tuple[str, Ca
 
 
 def centre_line(result: ModesResult, mode: ModeShape) -> Figure:
-    """Inner face at x = 0 over one cycle (compare Fig. 7-16 of Wang 2014): its place, the swing in y, how the motion
+    """Inner face at x = 0 over one cycle (compare Fig. 7-16 of the thesis): its place, the swing in y, how the motion
     lags along it, and how much of it travels.
     """
     line, z = result.mesh.rows[:, 0], result.mesh.z * 1e3

@@ -28,7 +28,7 @@ def labels(results: Sequence[TransientResult]) -> list[str]:
 
 
 def compare(results: Sequence[TransientResult]) -> Figure:
-    """Mass flow and lip opening of several runs over time (compare Figs. 5-3 to 5-10, 7-13 and 7-14 of Wang 2014);
+    """Mass flow and lip opening of several runs over time (compare Figs. 5-3 to 5-10, 7-13 and 7-14 of the thesis);
     where all end in cycles, these in phase.
     """
     cycles = all(result.cycle for result in results)

@@ -144,7 +144,7 @@ def _cycle_rows(result: TransientResult) -> np.ndarray:
 
 
 def centre_line(result: TransientResult, count: int = 6) -> Figure:
-    """Displacement in y along the line x = 0 at several times of a cycle (compare Fig. 7-16 of Wang 2014)."""
+    """Displacement in y along the line x = 0 at several times of a cycle (compare Fig. 7-16 of the thesis)."""
     h, rows = result.history, _cycle_rows(result)
     chosen = rows[
         np.unique(np.linspace(0, len(rows) - 1, count + 1).round().astype(int))[: count if result.cycle else None]
