@@ -1,0 +1,166 @@
+"""The studies that a report rests on, each in a file of its own: a report made again computes nothing twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..case.parameters import PARAMETERS
+from ..errors import CaseError, SolveError
+from ..observer import Observer
+from ..studies.case import Case
+from ..studies.closure.result import ClosureResult
+from ..studies.kept import kept_run
+from ..studies.map.result import MapResult
+from ..studies.modes.result import ModesResult
+from ..studies.onset.result import OnsetResult
+from ..studies.session import Session
+from ..studies.steady.result import SteadyResult
+
+#: What runs for a report, in this order, and of which study it is.
+RUNS = {"steady": "steady", "modes": "modes", "classes": "modes", "onset": "onset", "map": "map", "closure": "closure"}
+
+
+@dataclass(frozen=True)
+class Runs:
+    """How much is computed for a report.
+
+    Attributes
+    ----------
+    cells : int
+        Values along each axis of the stability map.
+    values : int
+        Values of the scan for onsets.
+    workers : int
+        Processes that share the columns of the map.
+    leave_out : tuple of str
+        Of `RUNS` those that are not wanted.
+    """
+
+    cells: int = 20
+    values: int = 24
+    workers: int = 1
+    leave_out: tuple[str, ...] = ()
+
+
+@dataclass
+class Gathered:
+    """Results of a case by the names of `RUNS`, and what is missing.
+
+    Attributes
+    ----------
+    case : Case
+    name : str
+    results : dict of StudyResult
+    missing : dict of str
+        Those that gave no result, and why, in a sentence.
+    """
+
+    case: Case
+    name: str
+    results: dict[str, Any] = field(default_factory=dict)
+    missing: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def steady(self) -> SteadyResult | None:
+        return self.results.get("steady")
+
+    @property
+    def modes(self) -> ModesResult | None:
+        return self.results.get("modes")
+
+    @property
+    def classes(self) -> ModesResult | None:
+        """Modes in all classes of motion under the law of the case."""
+        return self.results.get("classes")
+
+    @property
+    def onset(self) -> OnsetResult | None:
+        return self.results.get("onset")
+
+    @property
+    def map(self) -> MapResult | None:
+        return self.results.get("map")
+
+    @property
+    def closure(self) -> ClosureResult | None:
+        return self.results.get("closure")
+
+
+def gather(
+    case: Case,
+    name: str,
+    folder: Path,
+    runs: Runs = Runs(),
+    observer: Callable[[str], Observer] = lambda _: Observer(),
+) -> Gathered:
+    """Run the studies, or take them from the files of an earlier report of the same case.
+
+    Parameters
+    ----------
+    case : Case
+    name : str
+        For titles.
+    folder : path
+        Of the result files, NAME-RUN.h5.
+    runs : Runs
+    observer : callable
+        From the name of a run to who is told of its progress.
+
+    Raises
+    ------
+    CaseError
+        If the case gives no model, or the folder cannot be written.
+    """
+    session = Session(case, name)
+    session.mesh  # a case that gives no model is told before anything runs
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CaseError(f"The folder {str(folder)!r} cannot be written ({error.strerror or error}).") from error
+    found = Gathered(case, name)
+    for name_of_run, kind in RUNS.items():
+        if name_of_run in runs.leave_out:
+            found.missing[name_of_run] = "It was left out."
+            continue
+        try:
+            asked = session.replace(changes_of(name_of_run, case, runs))
+            choices = {"workers": runs.workers} if kind == "map" else {}
+            path = folder / f"{name}-{name_of_run}.h5"
+            found.results[name_of_run] = kept_run(kind, asked, path, observer(name_of_run), **choices)
+        except (CaseError, SolveError) as error:
+            found.missing[name_of_run] = str(error)
+    return found
+
+
+def changes_of(run: str, case: Case, runs: Runs) -> dict[str, Any]:
+    """Keys that a report sets for one of `RUNS`: both laws side by side, all classes, grids of its own size."""
+    both = {f"{run}.continuity": "both"}
+    if run == "steady":
+        asked = {*case.steady_pressures(), case.drive.pressure} - {case.rest_pressure}
+        return {"steady.pressures": sorted(asked)}
+    if run == "modes":
+        return {} if case.modes.in_vacuo else both | {"modes.symmetry": "SS"}
+    if run == "classes":
+        return {"modes.symmetry": "all", "modes.continuity": "case"}
+    if run == "onset":
+        axis = case.onset.axis
+        return both | {"onset.over": spelled(axis.parameter, axis, runs.values)}
+    if run == "map":
+        x, y = case.map.axes
+        return both | {
+            "map.x": spelled(x.parameter, x, runs.cells, around=case.drive.pressure),
+            "map.y": spelled(y.parameter, y, runs.cells, around=case.fluid.density),
+        }
+    return {}
+
+
+def spelled(parameter: str, axis, count: int, around: float | None = None) -> str:
+    """An axis of a case with another number of values, widened until it holds a pressure or a density of interest."""
+    low, high = axis.values[0], axis.values[-1]
+    if around is not None and parameter in ("pressure", "density") and around > 0:
+        row = PARAMETERS[parameter]
+        low, high = min(low, 0.5 * around), max(high, min(1.5 * around, row.high))
+    return f"{parameter}={low:.9g}:{high:.9g}:{count}" + (":log" if axis.log else "")

@@ -1,0 +1,110 @@
+"""One figure or table of the thesis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ..report.content import Part, Picture, Table
+
+if TYPE_CHECKING:
+    from .workshop import Workshop
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of ours, and the one that the thesis's text gives, if it gives one.
+
+    Attributes
+    ----------
+    what : str
+    ours : float
+    published : float or None
+    unit : str
+    """
+
+    what: str
+    ours: float
+    published: float | None = None
+    unit: str = ""
+
+    @property
+    def difference(self) -> float | None:
+        """Ours over the published one, less one; of what is a percentage already, ours less the published one."""
+        if self.published is None:
+            return None
+        return (self.ours - self.published) / 100 if self.unit == "%" else self.ours / self.published - 1.0
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        return vars(self) | {"difference": self.difference}
+
+    @property
+    def row(self) -> tuple[str, str, str, str]:
+        """For a table."""
+        published = "" if self.published is None else f"{self.published:g}"
+        unit = "points" if self.unit == "%" else "%"
+        difference = "" if self.difference is None else f"{100 * self.difference:+.1f} {unit}"
+        return f"{self.what}{', ' if self.unit else ''}{self.unit}", f"{self.ours:.4g}", published, difference
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What an entry found.
+
+    Attributes
+    ----------
+    sentences : tuple of str
+        What agrees, what does not, and why as far as it is known.
+    numbers : tuple of Number
+    pictures : tuple of Picture
+    """
+
+    sentences: tuple[str, ...]
+    numbers: tuple[Number, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A figure or table of the thesis and how it is made again.
+
+    Attributes
+    ----------
+    name : str
+        "7-4", or "T3-5" for a table.
+    title : str
+    make : callable
+        From a `Workshop` to an `Outcome`.
+    """
+
+    name: str
+    title: str
+    make: Callable[[Workshop], Outcome]
+
+    @property
+    def place(self) -> tuple[int, int, int]:
+        """Chapter, number; tables before figures of the same number."""
+        chapter, number = self.name.removeprefix("T").split("-")
+        return int(chapter), int(number), not self.name.startswith("T")
+
+    @property
+    def label(self) -> str:
+        """As the thesis calls it."""
+        return f"Table {self.name[1:]}" if self.name.startswith("T") else f"Fig. {self.name}"
+
+    def part(self, outcome: Outcome) -> Part:
+        """For a page."""
+        head = ("", "ours", "thesis", "difference")
+        tables = (Table(head, tuple(n.row for n in outcome.numbers)),) if outcome.numbers else ()
+        return Part(f"entry-{self.name}", f"{self.label}: {self.title}", outcome.sentences, tables, outcome.pictures)
+
+
+def spread(numbers: Sequence[Number]) -> str:
+    """Least and greatest difference of some numbers, in words."""
+    found = [100 * n.difference for n in numbers if n.difference is not None]
+    if not found:
+        return ""
+    low, high = min(found), max(found)
+    return f"{low:+.1f} %" if abs(high - low) < 0.05 else f"{low:+.1f} to {high:+.1f} %"
