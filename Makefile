@@ -1,8 +1,8 @@
-# Two commands matter: `make demo` and `make test`; each sets up what is missing first.
+# Two commands matter, `make demo` and `make test`; each sets up what is missing first.
 PYTHON = $(shell cat build/setup/python 2>/dev/null)
 JOBS ?= 2
 
-.PHONY: setup test verify bench demo docs clean
+.PHONY: setup test verify bench demo demo-full reproduce docs clean
 .DEFAULT_GOAL := demo
 
 setup:
@@ -19,7 +19,13 @@ bench: setup
 	@$(PYTHON) -m benchmarks
 
 demo: setup
+	@$(PYTHON) -m dbvfiv report cases/dbv12.toml --workers $(JOBS) -o out/demo/dbv12.html
+
+demo-full: setup
 	@PYTHON="$(PYTHON)" tools/demo
+
+reproduce: setup
+	@$(PYTHON) -m dbvfiv reproduce -o out/thesis
 
 docs: setup
 	@$(PYTHON) -m dbvfiv.studies.case > docs/case-reference.md

@@ -27,7 +27,8 @@ def free_unknowns(mesh: ValveMesh) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LipStops:
-    """One-sided springs against y displacements below zero (Th. 3.5.5).
+    """One-sided springs against y displacements below zero, as the links of App. A act: on displacement and not on y,
+    for each joins a node to a fixed copy of it 10 mm below (Th. 3.5.5 has them reach the plane y = 0).
 
     Attributes
     ----------
