@@ -12,12 +12,13 @@ from .damping import Damping
 from .downstream import Downstream
 from .load import make_case, put
 from .materials import DEFAULT_LAYERS, Layer, Materials
+from .mesh import Mesh
 from .outside import Outside
 from .parameters import PARAMETERS
 from .relaxing import SHIPPED_LOSSES
 from .section import BrokenRule, Section, key
 from .upstream import Upstream
-from .valve import Mesh, Valve
+from .valve import Valve
 
 
 class Case(Section):
@@ -102,7 +103,7 @@ class Case(Section):
         inlet = 2 * (self.valve.flange_radius - self.valve.flange_wall_deduction)
         self.upstream.check_roughness(inlet)
         self.downstream.check_pipe(inlet)
-        self.outside.check_pipe(2 * self.valve.flange_radius + self.valve.thickness_at(self.valve.length))
+        self.outside.check_pipe(self.valve.outer_diameter)
         return self
 
     @property

@@ -1,4 +1,4 @@
-"""The valve's shape, wall and mesh (defaults: the 12-inch inline valve of App. A)."""
+"""The valve's shape and wall (defaults: the 12-inch inline valve of App. A)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import math
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import PrivateAttr, StrictInt, ValidationInfo, field_validator, model_serializer, model_validator
+from pydantic import PrivateAttr, ValidationInfo, field_validator, model_serializer, model_validator
 
 from .key_points import read_key_points
+from .lip import LipSizes
 from .quantity import Length, Number
 from .section import BrokenRule, Section, key
 
@@ -23,9 +24,11 @@ _TWELVE_INCH = {
 _TWELVE_INCH_WALLS = {"measured": (0.012, 0.016), "uniform": (0.01438, 0.01438)}
 _R1, _TH1, _TH2 = 0.00619, 0.00619, 0.00819
 #: What follows from wall and shape where it is not given.
-_FOLLOWING = ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction")
+_FOLLOWING = ("lip_radius", "cuff_radius", "duckbill_wall_deduction", "flange_wall_deduction")
 #: What key points say in place of the case's keys.
-_SHAPE = ("lip_half_width", "lip_radius", "flange_radius", "saddle")
+_SHAPE = ("lip_half_width", "lip_rise", "lip_radius", "cuff_radius", "flange_radius", "saddle")
+#: Steepest a transition may run from the axis, rad: beyond it the rows of the mesh lie in its surface.
+_STEEPEST = math.radians(80.0)
 
 
 class WallStep(Section):
@@ -38,13 +41,36 @@ class WallStep(Section):
 class Valve(Section):
     """Shape and wall of the valve; z runs from the lip (0) to the clamped flange.
 
-    `lip_radius`, `duckbill_wall_deduction` and `flange_wall_deduction` hold numbers also where they were not given.
+    Behind the saddle come a round cuff and a flared transition to the flange, both of no length unless given.
+    `lip_radius`, `cuff_radius`, `duckbill_wall_deduction` and `flange_wall_deduction` hold numbers also where they were
+    not given.
     """
 
     duckbill_length: Length = key(0.21, "Length of the duckbill, from the lip.", gt=0, le=100)
-    saddle_length: Length = key(0.28, "Length of the saddle between duckbill and flange.", gt=0, le=100)
+    saddle_length: Length = key(
+        0.28, "Length of the saddle between the duckbill and the round part behind it.", gt=0, le=100
+    )
+    cuff_length: Length = key(0.0, "Length of a round cuff behind the saddle; 0 for none.", ge=0, le=100)
+    flare_length: Length = key(
+        0.0,
+        "Length of a conical transition from the radius of the cuff to that of the flange; 0 for none.",
+        ge=0,
+        le=100,
+    )
     flange_length: Length = key(0.07, "Length of the round flange at the inlet.", gt=0, le=100)
-    lip_half_width: Length = key(0.125, "Half width of the straight part of the lip (W1).", gt=0, le=100)
+    lip_half_width: Length = key(
+        0.125,
+        "Half width of the lip up to the arc of its side edge (W1); the bill may be narrower or wider than the pipe.",
+        gt=0,
+        le=100,
+    )
+    lip_rise: Length = key(
+        0.0,
+        "By how much the middle of a curved lip stands above its ends: both lips are bowed away from each other by an "
+        "arc of a circle and leave a lens between them at rest; 0 for straight lips.",
+        ge=0,
+        le=10,
+    )
     lip_radius: Length | None = key(
         None,
         "Mid-surface radius of the side edge of the lip, and height of its straight part above the closing plane (R1); "
@@ -52,6 +78,9 @@ class Valve(Section):
         "App. A).",
         gt=0,
         le=10,
+    )
+    cuff_radius: Length | None = key(
+        None, "Mid-surface radius of the cuff; that of the flange where not given.", gt=0, le=100
     )
     flange_radius: Length = key(0.13919, "Mid-surface radius of the flange (Rin).", gt=0, le=100)
     saddle: Literal["ruled", "smooth"] = key(
@@ -85,15 +114,15 @@ class Valve(Section):
     flange_wall_deduction: Length | None = key(
         None,
         "Half wall taken off the flow section of the flange (TH2, Th. 4.14); where not given half the wall at the "
-        "flange (8.19 mm in the 12-inch valve, App. A).",
+        "flange (8.19 mm in the 12-inch valve, App. A); it holds for cuff and flare too.",
         ge=0,
         le=10,
     )
     key_points: Path | None = key(
         None,
         "File of 9 x 15 mid-surface key points (x y z on each line; profiles from lip to flange, "
-        "each from the centre x = 0 to the side edge y = 0) used instead of lip_half_width, lip_radius, flange_radius "
-        "and saddle; the lengths say where duckbill and saddle end on it; relative to the case file.",
+        "each from the centre x = 0 to the side edge y = 0) used instead of lip_half_width, lip_rise, lip_radius, "
+        "cuff_radius, flange_radius and saddle; the lengths say where duckbill and saddle end on it; relative to the case file.",
     )
     _following: frozenset[str] = PrivateAttr(frozenset())
 
@@ -105,7 +134,7 @@ class Valve(Section):
     @property
     def length(self) -> float:
         """Length of the valve along its axis in m."""
-        return self.duckbill_length + self.saddle_length + self.flange_length
+        return self.duckbill_length + self.saddle_length + self.cuff_length + self.flare_length + self.flange_length
 
     def thickness_at(self, z: float) -> float:
         """Wall thickness in m at the axial position ``z`` in m (``thickness_factor`` included)."""
@@ -117,18 +146,29 @@ class Valve(Section):
         return next((s for s in self.wall_map if z < s.to), self.wall_map[-1]).thickness
 
     @property
+    def lip(self) -> LipSizes:
+        """Sizes of the lip's section, of the parametric shape."""
+        return LipSizes(self.lip_half_width, self.lip_radius, self.lip_rise)
+
+    @property
     def rest_areas(self) -> tuple[float, float]:
         """Flow areas in m2 of a quarter at rest, at the lip and at the flange, of the parametric shape."""
-        lip = self.lip_half_width * self.lip_radius + 0.25 * math.pi * self.lip_radius**2
         inner = self.flange_radius - self.flange_wall_deduction
-        return lip - self.duckbill_wall_area, 0.25 * math.pi * inner**2
+        return self.lip.area - self.duckbill_wall_area, 0.25 * math.pi * inner**2
 
     @property
     def duckbill_wall_area(self) -> float:
         """Part in m2 of the duckbill's section that the wall takes (Th. 4.12), of a quarter, less the initial gap."""
-        inner = max(self.lip_radius - self.duckbill_wall_deduction, 0.0)
-        corner = 0.25 * math.pi * (self.lip_radius**2 - inner**2)
-        return corner + self.lip_half_width * (self.duckbill_wall_deduction - self.initial_gap)
+        return self.lip.wall_area(self.duckbill_wall_deduction, self.initial_gap)
+
+    @property
+    def outer_diameter(self) -> float:
+        """Largest extent in m of the outer face at rest across the axis, of the parametric shape."""
+        flange = 2 * self.flange_radius + self.thickness_at(self.length)
+        if self.key_points is not None:
+            return flange
+        cuff = 2 * self.cuff_radius + self.thickness_at(self.length) if self.cuff_length + self.flare_length > 0 else 0
+        return max(flange, cuff, 2 * self.lip.widest + self.thickness_at(0.0))
 
     @field_validator("key_points", mode="after")
     @classmethod
@@ -157,6 +197,7 @@ class Valve(Section):
         )
         numbers = {"lip_radius": _R1 if twelve_inch else 0.5 * lip} if "lip_radius" in self._following else {}
         radius = numbers.get("lip_radius", self.lip_radius)
+        numbers["cuff_radius"] = self.flange_radius
         touching = 0.5 * lip if self.key_points is not None else min(0.5 * lip, radius)
         numbers["duckbill_wall_deduction"] = _TH1 if twelve_inch and radius == _R1 else touching
         numbers["flange_wall_deduction"] = _TH2 if twelve_inch else 0.5 * flange
@@ -180,12 +221,9 @@ class Valve(Section):
                 raise BrokenRule(name, f"{given} beside key_points", "the points give the shape, so leave it out")
 
     def _check_sections(self) -> None:
-        if self.lip_half_width + self.lip_radius > self.flange_radius:
-            widest = self.flange_radius - self.lip_radius
+        if self.lip_rise > self.lip_half_width:
             raise BrokenRule(
-                "lip_half_width",
-                f"{self.lip_half_width:g} m, which makes the lips wider than the pipe",
-                f"it must be at most flange_radius - lip_radius = {widest:g} m",
+                "lip_rise", f"{self.lip_rise:g} m", f"it must be at most lip_half_width = {self.lip_half_width:g} m"
             )
         if self.duckbill_wall_deduction - self.initial_gap >= self.lip_radius:
             raise BrokenRule(
@@ -193,20 +231,46 @@ class Valve(Section):
                 f"{self.duckbill_wall_deduction:g} m, which leaves no flow area between the lips",
                 f"it must be less than lip_radius + initial_gap = {self.lip_radius + self.initial_gap:g} m",
             )
-        if self.flange_wall_deduction >= self.flange_radius:
-            raise BrokenRule(
-                "flange_wall_deduction",
-                f"{self.flange_wall_deduction:g} m, which leaves no flow area at the flange",
-                f"it must be less than flange_radius = {self.flange_radius:g} m",
-            )
+        for name in ("flange_radius", "cuff_radius"):
+            if self.flange_wall_deduction >= getattr(self, name):
+                raise BrokenRule(
+                    "flange_wall_deduction",
+                    f"{self.flange_wall_deduction:g} m, which leaves no flow area at the {name.split('_')[0]}",
+                    f"it must be less than {name} = {getattr(self, name):g} m",
+                )
         lip, flange = self.rest_areas
         if lip >= flange:
             name = "initial_gap" if lip - self.lip_half_width * self.initial_gap < flange else "lip_radius"
+            name = name if self.lip_rise == 0 else "lip_rise"
             raise BrokenRule(
                 name,
                 f"{getattr(self, name):g} m, which leaves {4e4 * lip:.4g} cm2 between the lips at rest",
                 f"the passage there must be smaller than that of the flange, {4e4 * flange:.4g} cm2",
             )
+        self._check_transitions()
+
+    def _check_transitions(self) -> None:
+        if self.cuff_radius != self.flange_radius and self.flare_length == 0:
+            raise BrokenRule(
+                "flare_length",
+                f"0 m between a cuff of radius {self.cuff_radius:g} m and a flange of {self.flange_radius:g} m",
+                "the two need a transition, or the same radius",
+            )
+        lip, steepest = self.lip, math.tan(_STEEPEST)
+        wider = lip.widest > self.cuff_radius
+        across = max(abs(lip.widest - self.cuff_radius), abs(self.cuff_radius - lip.height))
+        blend = 1.5 if self.saddle == "smooth" else 1.0
+        flare = abs(self.flange_radius - self.cuff_radius)
+        for name, rise in (("saddle_length", across), ("flare_length", flare)):
+            if blend * rise > steepest * getattr(self, name):
+                least = blend * rise / steepest
+                what = "lips this much wider than the pipe" if wider else "lip and pipe"
+                between = what if name == "saddle_length" else "cuff and flange"
+                raise BrokenRule(
+                    name,
+                    f"{getattr(self, name):g} m between {between}, which is steeper than 80 degrees from the axis",
+                    f"it must be at least {least:.4g} m",
+                )
 
     def _check_wall(self) -> None:
         if self.wall == "measured":
@@ -229,67 +293,3 @@ class Valve(Section):
                 f"{thickest * self.thickness_factor:g} m at its thickest, which fills the pipe",
                 f"it must be less than twice flange_radius = {2 * self.flange_radius:g} m",
             )
-
-
-class Mesh(Section):
-    """The shell mesh of the quarter model."""
-
-    around: StrictInt = key(28, "Elements along the section, from the centre to the side edge.", ge=4, le=1000)
-    along: StrictInt = key(48, "Elements along the axis, from lip to flange, in all.", ge=6, le=2000)
-    grading: Number = key(0.5, "Length of the element at the side edge over that at the centre.", ge=0.05, le=2.0)
-    layer_points: StrictInt = key(2, "Gauss points through the thickness of each layer.", ge=1, le=10)
-    element: Literal["MITC4+EAS", "MITC4+", "MITC4"] = key(
-        "MITC4+EAS",
-        "What is assumed about the in-plane strains: as the shape gives them (MITC4), bending of warped elements "
-        "without stretching (MITC4+), and with that free bending in the plane of the element (MITC4+EAS).",
-    )
-    rows: Literal["graded", "breaks", "uniform"] = key(
-        "graded",
-        "Rows of nodes on every joint of the surface and step of the wall, and closer towards joints at which the "
-        "surface turns (graded); evenly between them (breaks); or evenly between the joints alone, whatever the wall "
-        "does (uniform).",
-    )
-    row_grading: Number = key(
-        0.4,
-        "Length of the rows at a joint at which the surface turns by 20 degrees over that far from it.",
-        ge=0.05,
-        le=1.0,
-    )
-    breaks: tuple[Length, ...] = key(
-        (), "Further axial positions to put a row on, from the lip; not with uniform rows."
-    )
-    row_positions: tuple[Length, ...] = key(
-        (),
-        "Axial positions of all rows from the lip (0) to the flange, in place of rows and breaks; where along is not "
-        "one less than their number, along rows are spread as these are.",
-    )
-    columns: Literal["graded", "breaks", "uniform"] = key(
-        "graded",
-        "Columns of nodes on the edge of the loaded columns, of those with a lip stop and of the bend at the side of "
-        "the lip, and closer in that bend (graded); evenly between them (breaks); or even columns whatever these do "
-        "(uniform).",
-    )
-    column_grading: Number = key(
-        1 / 3, "Length of the columns in the bend at the side of the lip over that beside it.", ge=0.05, le=1.0
-    )
-
-    def check_positions(self, length: float) -> None:
-        """Refuse rows that do not lie on a valve of this length, m."""
-        outside = next((z for z in self.breaks if not 0 < z < length), None)
-        if outside is not None:
-            raise BrokenRule(
-                "mesh.breaks",
-                f"a list with {outside:g} m",
-                f"a row lies between the lip, 0 m, and the flange, {length:g} m",
-            )
-        if not self.row_positions:
-            return
-        if len(self.row_positions) < 7:
-            given = f"a list of {len(self.row_positions)}"
-            raise BrokenRule("mesh.row_positions", given, "a mesh has at least 7 rows of nodes, 6 elements along")
-        if any(b <= a for a, b in zip(self.row_positions, self.row_positions[1:])):
-            raise BrokenRule("mesh.row_positions", "a list that falls", "rows must increase from lip to flange")
-        first, last = self.row_positions[0], self.row_positions[-1]
-        if abs(first) > 1e-9 * length or abs(last - length) > 1e-9 * length:
-            ends = f"a list from {first:g} to {last:g} m"
-            raise BrokenRule("mesh.row_positions", ends, f"rows reach from the lip, 0 m, to the flange, {length:g} m")

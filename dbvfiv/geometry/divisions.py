@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case.valve import Mesh, Valve
+from ..case.mesh import Mesh
+from ..case.valve import Valve
 from .surface import Surface
 
 #: Angles between two pieces of the surface up to which their joint counts for nothing and from which in full, rad.

@@ -9,6 +9,8 @@ import numpy as np
 from scipy.integrate import cumulative_simpson
 from scipy.interpolate import make_interp_spline
 
+from ..case.lip import LipSizes
+
 
 @dataclass(frozen=True)
 class Profile:
@@ -26,15 +28,23 @@ class Profile:
     points: Callable[[np.ndarray], np.ndarray]
 
 
-def lip_section(half_width: float, radius: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Closed lip: straight at y = radius up to the half width, then a quarter circle down to y = 0 (App. A)."""
-    length = half_width + 0.5 * np.pi * radius
+def lip_section(lip: LipSizes) -> Callable[[np.ndarray], np.ndarray]:
+    """Lip: straight at y = radius up to the half width, then a quarter circle down to y = 0 (App. A); or bowed by a
+    rise.
+    """
+    radius, bow_length, turn = lip.radius, lip.bow_length, lip.turn
+    length = bow_length + lip.edge_length
 
     def points(s):
         arc = np.asarray(s) * length
-        angle = np.clip((arc - half_width) / radius, 0.0, 0.5 * np.pi)
-        x = np.where(arc < half_width, arc, half_width + radius * np.sin(angle))
-        return np.stack([x, radius * np.cos(angle)], axis=-1)
+        angle = np.clip((arc - bow_length) / radius, 0.0, 0.5 * np.pi - turn)
+        if turn == 0.0:
+            x = np.where(arc < bow_length, arc, bow_length + radius * np.sin(angle))
+            return np.stack([x, radius * np.cos(angle)], axis=-1)
+        bent = np.minimum(arc / lip.bow, turn)
+        x = lip.bow * np.sin(bent) + radius * (np.sin(turn + angle) - np.sin(turn))
+        y = lip.height - 2.0 * lip.bow * np.sin(0.5 * bent) ** 2 + radius * (np.cos(turn + angle) - np.cos(turn))
+        return np.stack([x, y], axis=-1)
 
     return points
 

@@ -58,12 +58,21 @@ class Surface:
 
 
 def surface_of(valve: Valve) -> Surface:
-    """Surface of a valve: from its key points if it has any, else lip, saddle and flange (App. A)."""
+    """Surface of a valve: from its key points if it has any, else lip, saddle, cuff, flare and flange (App. A)."""
     if valve.key_points is not None:
         return Surface(tuple(key_point_sections(read_key_points(valve.key_points))))
-    lip = lip_section(valve.lip_half_width, valve.lip_radius)
-    flange = flange_section(valve.flange_radius)
-    joint = valve.duckbill_length
-    cuff = joint + valve.saddle_length
-    profiles = (Profile(0.0, lip), Profile(joint, lip), Profile(cuff, flange), Profile(valve.length, flange))
-    return Surface(profiles, smooth=valve.saddle == "smooth")
+    lip, cuff, flange = lip_section(valve.lip), flange_section(valve.cuff_radius), flange_section(valve.flange_radius)
+    profiles, end = [Profile(0.0, lip)], 0.0
+    pieces = (
+        (valve.duckbill_length, lip),
+        (valve.saddle_length, cuff),
+        (valve.cuff_length, cuff),
+        (valve.flare_length, flange),
+        (valve.flange_length, flange),
+    )
+    for length, section in pieces:
+        end += length
+        if length > 0:
+            profiles.append(Profile(end, section))
+    profiles[-1] = Profile(valve.length, flange)
+    return Surface(tuple(profiles), smooth=valve.saddle == "smooth")

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case.valve import Mesh, Valve
+from ..case.mesh import Mesh
+from ..case.valve import Valve
 from .divisions import column_division, grading, row_division
 from .surface import Surface, surface_of
 
@@ -103,23 +104,32 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=()) -> ValveMesh:
 
 
 def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
-    """Part of the section taken by the wall (Th. 4.12-4.14, App. A): constant on duckbill and flange, linear over the
-    saddle.
+    """Part of the section taken by the wall (Th. 4.12-4.14, App. A): constant on duckbill, cuff and flange, linear
+    over saddle and flare.
 
     Raises
     ------
     ValueError
         If the wall fills the section of the lip or of the flange that key points give.
     """
-    if valve.key_points is None:
-        duckbill = valve.duckbill_wall_area
-        inner = valve.flange_radius - valve.flange_wall_deduction
-        flange = 0.25 * np.pi * (valve.flange_radius**2 - inner**2)
-    else:
+    place = np.asarray(z)
+    share = np.clip((place - valve.duckbill_length) / valve.saddle_length, 0.0, 1.0)
+    if valve.key_points is not None:
         duckbill, flange = _key_point_deductions(valve, surface)
-    joint = valve.duckbill_length
-    share = np.clip((np.asarray(z) - joint) / valve.saddle_length, 0.0, 1.0)
-    return duckbill + share * (flange - duckbill)
+        return duckbill + share * (flange - duckbill)
+    duckbill = valve.duckbill_wall_area
+    cuff, flange = (_round_deduction(radius, valve) for radius in (valve.cuff_radius, valve.flange_radius))
+    taken = duckbill + share * (cuff - duckbill)
+    if valve.flare_length > 0:
+        begin = valve.duckbill_length + valve.saddle_length + valve.cuff_length
+        taken = taken + np.clip((place - begin) / valve.flare_length, 0.0, 1.0) * (flange - cuff)
+    return taken
+
+
+def _round_deduction(radius: float, valve: Valve) -> float:
+    """Area taken by the wall inside a quarter circle, m2 (Th. 4.14)."""
+    inner = radius - valve.flange_wall_deduction
+    return 0.25 * np.pi * (radius**2 - inner**2)
 
 
 def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float]:
