@@ -93,7 +93,7 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
-        self.mesh.check_positions(self.valve.length)
+        self.mesh.check_positions(self.valve.as_given.length)
         if self.drive.kind == "flow" and self.upstream.is_elastic and not self.fluid.unsteady:
             raise BrokenRule(
                 "upstream.wave_speed",

@@ -11,7 +11,8 @@ from pydantic import PrivateAttr, ValidationInfo, field_validator, model_seriali
 from .key_points import read_key_points
 from .lip import LipSizes
 from .quantity import Length, Number
-from .section import BrokenRule, Section, key
+from .section import Section, key
+from .valve_rules import check_key_points, check_sections, check_wall
 
 #: Sizes of the 12-inch valve and its wall at lip and flange, m, and what App. A sets for it: R1, TH1, TH2.
 _TWELVE_INCH = {
@@ -25,10 +26,12 @@ _TWELVE_INCH_WALLS = {"measured": (0.012, 0.016), "uniform": (0.01438, 0.01438)}
 _R1, _TH1, _TH2 = 0.00619, 0.00619, 0.00819
 #: What follows from wall and shape where it is not given.
 _FOLLOWING = ("lip_radius", "cuff_radius", "duckbill_wall_deduction", "flange_wall_deduction")
-#: What key points say in place of the case's keys.
-_SHAPE = ("lip_half_width", "lip_rise", "lip_radius", "cuff_radius", "flange_radius", "saddle")
-#: Steepest a transition may run from the axis, rad: beyond it the rows of the mesh lie in its surface.
-_STEEPEST = math.radians(80.0)
+#: Lengths that `scale` multiplies, beside those of the wall map.
+_SIZES = (
+    *("duckbill_length", "saddle_length", "cuff_length", "flare_length", "flange_length", "lip_half_width"),
+    *("lip_rise", "lip_radius", "cuff_radius", "flange_radius", "wall_thickness", "initial_gap"),
+    *("duckbill_wall_deduction", "flange_wall_deduction"),
+)
 
 
 class WallStep(Section):
@@ -37,13 +40,17 @@ class WallStep(Section):
     to: Length = key(..., "End of the piece, measured along the axis from the lip.", gt=0, le=100)
     thickness: Length = key(..., "Wall thickness of the piece.", gt=0, le=10)
 
+    def enlarged(self, factor: float) -> WallStep:
+        """The same with all lengths multiplied."""
+        return self.model_copy(update={"to": factor * self.to, "thickness": factor * self.thickness})
+
 
 class Valve(Section):
     """Shape and wall of the valve; z runs from the lip (0) to the clamped flange.
 
     Behind the saddle come a round cuff and a flared transition to the flange, both of no length unless given.
     `lip_radius`, `cuff_radius`, `duckbill_wall_deduction` and `flange_wall_deduction` hold numbers also where they were
-    not given.
+    not given, and all sizes are those of the valve as it is built: `scale` times what the case gives.
     """
 
     duckbill_length: Length = key(0.21, "Length of the duckbill, from the lip.", gt=0, le=100)
@@ -122,14 +129,28 @@ class Valve(Section):
         None,
         "File of 9 x 15 mid-surface key points (x y z on each line; profiles from lip to flange, "
         "each from the centre x = 0 to the side edge y = 0) used instead of lip_half_width, lip_rise, lip_radius, "
-        "cuff_radius, flange_radius and saddle; the lengths say where duckbill and saddle end on it; relative to the case file.",
+        "cuff_radius, flange_radius and saddle; the lengths say where duckbill and saddle end on it; relative to "
+        "the case file.",
+    )
+    scale: Number = key(
+        1.0,
+        "Multiplies every length of this section, wall and gap included, and the positions in mesh.breaks and "
+        "mesh.row_positions and in key_points; layers keep their shares of the wall. Lengths of other sections stay.",
+        gt=0,
+        le=1000,
     )
     _following: frozenset[str] = PrivateAttr(frozenset())
+    _given: Any = PrivateAttr(None)
 
     @property
     def following(self) -> frozenset[str]:
         """Keys that were not given and follow from wall and shape."""
         return self._following
+
+    @property
+    def as_given(self) -> Valve:
+        """The valve with its sizes as the case gives them, before `scale` multiplies them."""
+        return self if self._given is None else self._given
 
     @property
     def length(self) -> float:
@@ -182,12 +203,13 @@ class Valve(Section):
 
     @model_serializer(mode="wrap")
     def _leave_what_follows(self, handler: Any) -> dict[str, Any]:
-        """Without the numbers that follow, so that they follow anew after a change."""
-        return {name: None if name in self._following else value for name, value in handler(self).items()}
+        """Sizes before the scale, without the numbers that follow, so that they follow anew after a change."""
+        given = handler(self.as_given)
+        return {name: None if name in self._following else value for name, value in given.items()}
 
     def _fill(self) -> None:
         """Numbers for the keys that were not given."""
-        before = self._following  # a valve is checked again when it becomes part of a case
+        before = self._following
         self._following = frozenset(name for name in _FOLLOWING if getattr(self, name) is None or name in before)
         lip, flange = self._wall_at(0.0), self._wall_at(self.length)
         twelve_inch = (
@@ -205,91 +227,21 @@ class Valve(Section):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Valve:
+        if self._given is not None:  # a valve is checked again when it becomes part of a case
+            return self
         self._fill()
-        self._check_wall()
+        check_wall(self)
         if self.key_points is None:
-            self._check_sections()
+            check_sections(self)
         else:
-            self._check_key_points()
+            check_key_points(self)
+        self._enlarge()
         return self
 
-    def _check_key_points(self) -> None:
-        for name in _SHAPE:
-            value = getattr(self, name)
-            if name not in self._following and value != type(self).model_fields[name].default:
-                given = f"{value:g} m" if isinstance(value, float) else repr(value)
-                raise BrokenRule(name, f"{given} beside key_points", "the points give the shape, so leave it out")
-
-    def _check_sections(self) -> None:
-        if self.lip_rise > self.lip_half_width:
-            raise BrokenRule(
-                "lip_rise", f"{self.lip_rise:g} m", f"it must be at most lip_half_width = {self.lip_half_width:g} m"
-            )
-        if self.duckbill_wall_deduction - self.initial_gap >= self.lip_radius:
-            raise BrokenRule(
-                "duckbill_wall_deduction",
-                f"{self.duckbill_wall_deduction:g} m, which leaves no flow area between the lips",
-                f"it must be less than lip_radius + initial_gap = {self.lip_radius + self.initial_gap:g} m",
-            )
-        for name in ("flange_radius", "cuff_radius"):
-            if self.flange_wall_deduction >= getattr(self, name):
-                raise BrokenRule(
-                    "flange_wall_deduction",
-                    f"{self.flange_wall_deduction:g} m, which leaves no flow area at the {name.split('_')[0]}",
-                    f"it must be less than {name} = {getattr(self, name):g} m",
-                )
-        lip, flange = self.rest_areas
-        if lip >= flange:
-            name = "initial_gap" if lip - self.lip_half_width * self.initial_gap < flange else "lip_radius"
-            name = name if self.lip_rise == 0 else "lip_rise"
-            raise BrokenRule(
-                name,
-                f"{getattr(self, name):g} m, which leaves {4e4 * lip:.4g} cm2 between the lips at rest",
-                f"the passage there must be smaller than that of the flange, {4e4 * flange:.4g} cm2",
-            )
-        self._check_transitions()
-
-    def _check_transitions(self) -> None:
-        if self.cuff_radius != self.flange_radius and self.flare_length == 0:
-            raise BrokenRule(
-                "flare_length",
-                f"0 m between a cuff of radius {self.cuff_radius:g} m and a flange of {self.flange_radius:g} m",
-                "the two need a transition, or the same radius",
-            )
-        lip, steepest = self.lip, math.tan(_STEEPEST)
-        wider = lip.widest > self.cuff_radius
-        across = max(abs(lip.widest - self.cuff_radius), abs(self.cuff_radius - lip.height))
-        blend = 1.5 if self.saddle == "smooth" else 1.0
-        flare = abs(self.flange_radius - self.cuff_radius)
-        for name, rise in (("saddle_length", across), ("flare_length", flare)):
-            if blend * rise > steepest * getattr(self, name):
-                least = blend * rise / steepest
-                what = "lips this much wider than the pipe" if wider else "lip and pipe"
-                between = what if name == "saddle_length" else "cuff and flange"
-                raise BrokenRule(
-                    name,
-                    f"{getattr(self, name):g} m between {between}, which is steeper than 80 degrees from the axis",
-                    f"it must be at least {least:.4g} m",
-                )
-
-    def _check_wall(self) -> None:
-        if self.wall == "measured":
-            ends = [step.to for step in self.wall_map]
-            if any(b <= a for a, b in zip(ends, ends[1:])):
-                raise BrokenRule("wall_map", f"a list whose ends go {ends}", "they must increase from lip to flange")
-            if ends[-1] < self.length * (1 - 1e-9):
-                raise BrokenRule(
-                    "wall_map",
-                    f"a list that ends at {ends[-1]:g} m",
-                    f"it must reach the valve's length of {self.length:g} m",
-                )
-            thickest = max(step.thickness for step in self.wall_map)
-            name = "wall_map"
-        else:
-            thickest, name = self.wall_thickness, "wall_thickness"
-        if thickest * self.thickness_factor >= 2 * self.flange_radius:
-            raise BrokenRule(
-                name,
-                f"{thickest * self.thickness_factor:g} m at its thickest, which fills the pipe",
-                f"it must be less than twice flange_radius = {2 * self.flange_radius:g} m",
-            )
+    def _enlarge(self) -> None:
+        """Multiply all sizes by the scale; what was given is remembered."""
+        if self.scale == 1.0:
+            return
+        self._given = self.model_copy()
+        self.__dict__.update({name: self.scale * getattr(self, name) for name in _SIZES})
+        self.__dict__["wall_map"] = tuple(step.enlarged(self.scale) for step in self.wall_map)

@@ -74,10 +74,11 @@ def _tables(name: str, items: tuple[Section, ...], comments: bool) -> Iterator[s
 
 
 def _keys(section: Section, comments: bool) -> Iterator[str]:
+    given = getattr(section, "as_given", section)
     for name, field in type(section).model_fields.items():
         if name == "named" and isinstance(section, Materials):
             continue
-        value = getattr(section, name)
+        value = getattr(given, name)
         if comments:
             yield from _comment(field)
         follows = name in getattr(section, "following", ())

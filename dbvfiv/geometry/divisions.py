@@ -41,14 +41,15 @@ def row_division(valve: Valve, mesh: Mesh, surface: Surface) -> Division:
     joints = surface.breaks
     if mesh.rows == "uniform":
         return divide(joints, (), mesh.along)
-    given = np.asarray(mesh.row_positions, float)
+    given = valve.scale * np.asarray(mesh.row_positions, float)
     if len(given):
         given[[0, -1]] = joints[[0, -1]]
         if len(given) == mesh.along + 1:
             return Division(given, np.zeros(0))
         return divide(given[[0, -1]], (), mesh.along, (given, np.arange(len(given), dtype=float)))
     wall = [step.to for step in valve.wall_map] if valve.wall == "measured" else []
-    breaks = [z for z in (*mesh.breaks, *wall) if joints[0] < z < joints[-1]]
+    asked = [valve.scale * z for z in mesh.breaks]
+    breaks = [z for z in (*asked, *wall) if joints[0] < z < joints[-1]]
     law = _row_law(mesh, surface) if mesh.rows == "graded" else None
     return divide(joints, breaks, mesh.along, law)
 
