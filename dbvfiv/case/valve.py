@@ -13,6 +13,7 @@ from .lip import LipSizes
 from .quantity import Length, Number
 from .section import Section, key
 from .valve_rules import check_key_points, check_sections, check_wall
+from .wall import WallPatch, WallStep
 
 #: Sizes of the 12-inch valve and its wall at lip and flange, m, and what App. A sets for it: R1, TH1, TH2.
 _TWELVE_INCH = {
@@ -32,17 +33,6 @@ _SIZES = (
     *("lip_rise", "lip_radius", "cuff_radius", "flange_radius", "wall_thickness", "initial_gap"),
     *("duckbill_wall_deduction", "flange_wall_deduction"),
 )
-
-
-class WallStep(Section):
-    """One piece of the measured wall."""
-
-    to: Length = key(..., "End of the piece, measured along the axis from the lip.", gt=0, le=100)
-    thickness: Length = key(..., "Wall thickness of the piece.", gt=0, le=10)
-
-    def enlarged(self, factor: float) -> WallStep:
-        """The same with all lengths multiplied."""
-        return self.model_copy(update={"to": factor * self.to, "thickness": factor * self.thickness})
 
 
 class Valve(Section):
@@ -107,6 +97,11 @@ class Valve(Section):
         min_length=1,
     )
     wall_thickness: Length = key(0.01438, "Wall thickness where wall is uniform.", gt=0, le=10)
+    patches: tuple[WallPatch, ...] = key(
+        (),
+        "Parts of the wall that are thicker or thinner than it says, later ones on top of earlier ones. The mid-surface "
+        "stays; the flow section follows the inner face, as far as the faces do not meet.",
+    )
     thickness_factor: Number = key(
         1.0, "Multiplies the wall thickness everywhere; mid-surface and flow section stay.", gt=0, le=10
     )
@@ -157,14 +152,24 @@ class Valve(Section):
         """Length of the valve along its axis in m."""
         return self.duckbill_length + self.saddle_length + self.cuff_length + self.flare_length + self.flange_length
 
-    def thickness_at(self, z: float) -> float:
-        """Wall thickness in m at the axial position ``z`` in m (``thickness_factor`` included)."""
-        return self._wall_at(z) * self.thickness_factor
+    def thickness_at(self, z: float, s: float | None = None) -> float:
+        """Wall thickness in m at the axial position ``z`` in m (``thickness_factor`` included); with patches on it
+        where ``s`` says at which share of the section.
+        """
+        return (self._wall_at(z) if s is None else self.wall_at(z, s)) * self.thickness_factor
 
     def _wall_at(self, z: float) -> float:
         if self.wall == "uniform":
             return self.wall_thickness
-        return next((s for s in self.wall_map if z < s.to), self.wall_map[-1]).thickness
+        return next((step for step in self.wall_map if z < step.to), self.wall_map[-1]).thickness
+
+    def wall_at(self, z: float, s: float) -> float:
+        """Wall thickness in m with its patches at the axial position z, m, and the share s of the section."""
+        thickness = self._wall_at(z)
+        for patch in self.patches:
+            if patch.covers(z, s):
+                thickness = patch.on(thickness)
+        return thickness
 
     @property
     def lip(self) -> LipSizes:
@@ -244,4 +249,5 @@ class Valve(Section):
             return
         self._given = self.model_copy()
         self.__dict__.update({name: self.scale * getattr(self, name) for name in _SIZES})
-        self.__dict__["wall_map"] = tuple(step.enlarged(self.scale) for step in self.wall_map)
+        for name in ("wall_map", "patches"):
+            self.__dict__[name] = tuple(piece.enlarged(self.scale) for piece in getattr(self, name))

@@ -97,9 +97,39 @@ def check_wall(valve: Valve) -> None:
         name = "wall_map"
     else:
         thickest, name = valve.wall_thickness, "wall_thickness"
+    _check_thickest(valve, name, thickest)
+    _check_patches(valve)
+
+
+def _check_thickest(valve: Valve, name: str, thickest: float) -> None:
+    """Refuse a wall that fills the pipe."""
     if thickest * valve.thickness_factor >= 2 * valve.flange_radius:
         raise BrokenRule(
             name,
             f"{thickest * valve.thickness_factor:g} m at its thickest, which fills the pipe",
             f"it must be less than twice flange_radius = {2 * valve.flange_radius:g} m",
         )
+
+
+def _check_patches(valve: Valve) -> None:
+    """Refuse patches beside the valve and those that leave no wall, looked for between all edges."""
+    along, around = {0.0}, {0.0}
+    for i, patch in enumerate(valve.patches):
+        try:
+            patch.check_inside(valve.length)
+        except BrokenRule as rule:
+            raise BrokenRule(f"patches.{i}.{rule.key}", rule.given, rule.allowed) from None
+        along |= set(patch.axial_edges)
+        around |= set(patch.section_edges)
+    along |= {step.to for step in valve.wall_map} if valve.wall == "measured" else set()
+    for z in along:
+        for s in around:
+            if valve.patches and z < valve.length and s < 1:
+                thickness = valve.wall_at(z, s)
+                _check_thickest(valve, "patches", thickness)
+                if thickness <= 0:
+                    raise BrokenRule(
+                        "patches",
+                        f"a list that leaves {thickness:g} m of wall at z = {z:g} m and {s:g} of the section",
+                        "the wall must be thicker than 0 everywhere",
+                    )

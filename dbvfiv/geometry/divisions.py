@@ -49,7 +49,8 @@ def row_division(valve: Valve, mesh: Mesh, surface: Surface) -> Division:
         return divide(given[[0, -1]], (), mesh.along, (given, np.arange(len(given), dtype=float)))
     wall = [step.to for step in valve.wall_map] if valve.wall == "measured" else []
     asked = [valve.scale * z for z in mesh.breaks]
-    breaks = [z for z in (*asked, *wall) if joints[0] < z < joints[-1]]
+    patches = [z for patch in valve.patches for z in patch.axial_edges]
+    breaks = [z for z in (*asked, *wall, *patches) if joints[0] < z < joints[-1]]
     law = _row_law(mesh, surface) if mesh.rows == "graded" else None
     return divide(joints, breaks, mesh.along, law)
 

@@ -11,7 +11,7 @@ from dbvfiv.case.key_points import POINTS, PROFILES
 from dbvfiv.case.model import Case
 from dbvfiv.geometry import surface_of, valve_mesh
 from dbvfiv.geometry.divisions import grading
-from dbvfiv.geometry.valve_mesh import wall_deduction
+from dbvfiv.geometry.wall_area import wall_deduction
 from dbvfiv.model.build import build_shell
 
 VALVE = Case().valve
