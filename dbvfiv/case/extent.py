@@ -57,7 +57,9 @@ class Extent(Section):
     def covers(self, z: float, s: float) -> bool:
         """Whether the place at the axial position z, m, and the share s of the section belongs to it."""
         along = (self.begin or 0.0) <= z and (self.end is None or z < self.end)
-        around = (self.around_from or 0.0) <= s and (self.around_to is None or s < self.around_to or self.around_to == 1)
+        around = (self.around_from or 0.0) <= s and (
+            self.around_to is None or s < self.around_to or self.around_to == 1
+        )
         return along and around
 
     def check_inside(self, length: float) -> None:

@@ -83,8 +83,14 @@ def test_patches_are_read_and_written(tmp_path):
 BAD = {
     "neither thickness nor extra": ({}, r"valve.patches.0.thickness is missing; a patch has either"),
     "both": ({"thickness": 0.01, "extra": 0.01}, "thickness is 0.01 m beside extra"),
-    "end before begin": ({"extra": 0.001, "begin": 0.3, "end": 0.2}, "valve.patches.0.end is 0.2 m; it must lie behind"),
-    "around backwards": ({"extra": 0.001, "around_from": 0.6, "around_to": 0.5}, "around_to is 0.5; it must be greater"),
+    "end before begin": (
+        {"extra": 0.001, "begin": 0.3, "end": 0.2},
+        "valve.patches.0.end is 0.2 m; it must lie behind",
+    ),
+    "around backwards": (
+        {"extra": 0.001, "around_from": 0.6, "around_to": 0.5},
+        "around_to is 0.5; it must be greater",
+    ),
     "beyond the valve": ({"extra": 0.001, "begin": 0.6}, "valve.patches.0.begin is 0.6 m; the valve ends at 0.56 m"),
     "share above one": ({"extra": 0.001, "around_to": 1.5}, "around_to is given as 1.5; it must be .*at most 1"),
     "an arc as a length": ({"extra": 0.001, "around_to": "30 mm"}, 'around_to is given as "30 mm"'),
