@@ -21,7 +21,8 @@ class Extent(Section):
     )
     around_from: Number | None = key(
         None,
-        "Share of the section's length, from the centre (0) to the side edge (1), at which it begins; 0 where not given.",
+        "Share of the section's length, from the centre (0) to the side edge (1), at which it begins; 0 where not "
+        "given.",
         ge=0,
         lt=1,
     )
@@ -57,9 +58,8 @@ class Extent(Section):
     def covers(self, z: float, s: float) -> bool:
         """Whether the place at the axial position z, m, and the share s of the section belongs to it."""
         along = (self.begin or 0.0) <= z and (self.end is None or z < self.end)
-        around = (self.around_from or 0.0) <= s and (
-            self.around_to is None or s < self.around_to or self.around_to == 1
-        )
+        end = 2.0 if self.around_to in (None, 1.0) else self.around_to
+        around = (self.around_from or 0.0) <= s < end
         return along and around
 
     def check_inside(self, length: float) -> None:

@@ -83,4 +83,6 @@ class LipSizes:
         corner = (0.25 * math.pi - 0.5 * turn) * (self.radius**2 - inner**2)
         if turn == 0:
             return corner + self.half_width * (half_wall - gap)
-        return corner + half_wall * self.bow_length - 0.5 * turn * half_wall**2 - self.half_width * gap
+        return (
+            corner + half_wall * self.bow_length - 0.5 * turn * half_wall**2 - max(self.widest - half_wall, 0.0) * gap
+        )

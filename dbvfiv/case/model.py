@@ -100,7 +100,7 @@ class Case(Section):
                 f"{self.upstream.wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
                 "give it with the unsteady law alone",
             )
-        inlet = 2 * (self.valve.flange_radius - self.valve.flange_wall_deduction)
+        inlet = 2 * (self.valve.inlet_radius - self.valve.flange_wall_deduction)
         self.upstream.check_roughness(inlet)
         self.downstream.check_pipe(inlet)
         self.outside.check_pipe(self.valve.outer_diameter)

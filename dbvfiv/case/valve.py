@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from pydantic import PrivateAttr, ValidationInfo, field_validator, model_serializer, model_validator
 
-from .key_points import read_key_points
+from .key_points import key_point_inlet, read_key_points
 from .lip import LipSizes
 from .quantity import Length, Number
 from .section import Section, key
@@ -99,8 +99,8 @@ class Valve(Section):
     wall_thickness: Length = key(0.01438, "Wall thickness where wall is uniform.", gt=0, le=10)
     patches: tuple[WallPatch, ...] = key(
         (),
-        "Parts of the wall that are thicker or thinner than it says, later ones on top of earlier ones. The mid-surface "
-        "stays; the flow section follows the inner face, as far as the faces do not meet.",
+        "Parts of the wall that are thicker or thinner than it says, later ones on top of earlier ones. The "
+        "mid-surface stays; the flow section follows the inner face, as far as the faces do not meet.",
     )
     thickness_factor: Number = key(
         1.0, "Multiplies the wall thickness everywhere; mid-surface and flow section stay.", gt=0, le=10
@@ -122,10 +122,15 @@ class Valve(Section):
     )
     key_points: Path | None = key(
         None,
-        "File of 9 x 15 mid-surface key points (x y z on each line; profiles from lip to flange, "
-        "each from the centre x = 0 to the side edge y = 0) used instead of lip_half_width, lip_rise, lip_radius, "
-        "cuff_radius, flange_radius and saddle; the lengths say where duckbill and saddle end on it; relative to "
-        "the case file.",
+        "File of mid-surface key points, any number of profiles and points, used instead of lip_half_width, lip_rise, "
+        "lip_radius, cuff_radius, flange_radius and saddle: a table of x, y and z with units (profile, x [mm], y [mm], "
+        "z [mm], joint; profiles from lip to flange, each from the centre x = 0 to the side edge y = 0) or bare lines "
+        "x y z in m; the lengths say where duckbill and saddle end on it; relative to the case file.",
+    )
+    key_point_skin: Literal["ruled", "smooth"] = key(
+        "ruled",
+        "How profiles of key points are joined: by straight rulings, with a row of nodes on each, or by curves along "
+        "the axis that do not overshoot.",
     )
     scale: Number = key(
         1.0,
@@ -188,9 +193,16 @@ class Valve(Section):
         return self.lip.wall_area(self.duckbill_wall_deduction, self.initial_gap)
 
     @property
+    def inlet_radius(self) -> float:
+        """Mid-surface radius in m at the inlet end: that of the flange, or the mean one of key points."""
+        found = None if self.key_points is None else key_point_inlet(self.key_points)
+        factor = 1.0 if self._given is None else self.scale
+        return self.flange_radius if found is None else factor * found
+
+    @property
     def outer_diameter(self) -> float:
         """Largest extent in m of the outer face at rest across the axis, of the parametric shape."""
-        flange = 2 * self.flange_radius + self.thickness_at(self.length)
+        flange = 2 * self.inlet_radius + self.thickness_at(self.length)
         if self.key_points is not None:
             return flange
         cuff = 2 * self.cuff_radius + self.thickness_at(self.length) if self.cuff_length + self.flare_length > 0 else 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from .key_points import read_key_points
 from .section import BrokenRule
 
 if TYPE_CHECKING:
@@ -23,6 +24,17 @@ def check_key_points(valve: Valve) -> None:
         if name not in valve.following and value != type(valve).model_fields[name].default:
             given = f"{value:g} m" if isinstance(value, float) else repr(value)
             raise BrokenRule(name, f"{given} beside key_points", "the points give the shape, so leave it out")
+    try:
+        end = read_key_points(valve.key_points)[-1].z
+    except ValueError:  # said where the file is looked for
+        return
+    if abs(end - valve.length) > 1e-6 * valve.length:
+        raise BrokenRule(
+            "key_points",
+            f"{valve.key_points.name}, whose profiles end at z = {end:g} m",
+            f"the lengths of duckbill, saddle, cuff, flare and flange must add up to that, and they make "
+            f"{valve.length:g} m",
+        )
 
 
 def check_sections(valve: Valve) -> None:
@@ -103,11 +115,12 @@ def check_wall(valve: Valve) -> None:
 
 def _check_thickest(valve: Valve, name: str, thickest: float) -> None:
     """Refuse a wall that fills the pipe."""
-    if thickest * valve.thickness_factor >= 2 * valve.flange_radius:
+    radius = valve.inlet_radius
+    if thickest * valve.thickness_factor >= 2 * radius:
         raise BrokenRule(
             name,
             f"{thickest * valve.thickness_factor:g} m at its thickest, which fills the pipe",
-            f"it must be less than twice flange_radius = {2 * valve.flange_radius:g} m",
+            f"it must be less than twice flange_radius = {2 * radius:g} m",
         )
 
 

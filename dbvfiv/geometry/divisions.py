@@ -50,6 +50,8 @@ def row_division(valve: Valve, mesh: Mesh, surface: Surface) -> Division:
     wall = [step.to for step in valve.wall_map] if valve.wall == "measured" else []
     asked = [valve.scale * z for z in mesh.breaks]
     patches = [z for patch in valve.patches for z in patch.axial_edges]
+    if valve.key_points is not None:  # supports and loads change there, whatever the points do
+        asked += [valve.duckbill_length, valve.duckbill_length + valve.saddle_length]
     breaks = [z for z in (*asked, *wall, *patches) if joints[0] < z < joints[-1]]
     law = _row_law(mesh, surface) if mesh.rows == "graded" else None
     return divide(joints, breaks, mesh.along, law)

@@ -25,13 +25,13 @@ def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
 
 def _even_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
     """That of a wall without patches."""
-    place = np.asarray(z)
+    place = np.asarray(z, float)
     share = np.clip((place - valve.duckbill_length) / valve.saddle_length, 0.0, 1.0)
     if valve.key_points is not None:
-        duckbill, flange = _key_point_deductions(valve, surface)
-        return duckbill + share * (flange - duckbill)
-    duckbill = valve.duckbill_wall_area
-    cuff, flange = (_round_deduction(radius, valve) for radius in (valve.cuff_radius, valve.flange_radius))
+        duckbill, cuff, flange = _key_point_deductions(valve, surface)
+    else:
+        duckbill = valve.duckbill_wall_area
+        cuff, flange = (_round_deduction(radius, valve) for radius in (valve.cuff_radius, valve.flange_radius))
     taken = duckbill + share * (cuff - duckbill)
     if valve.flare_length > 0:
         begin = valve.duckbill_length + valve.saddle_length + valve.cuff_length
@@ -45,25 +45,26 @@ def _round_deduction(radius: float, valve: Valve) -> float:
     return 0.25 * np.pi * (radius**2 - inner**2)
 
 
-def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float]:
-    """Areas taken by the wall at the lip and at the flange that key points give.
+def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float, float]:
+    """Areas taken by the wall at the lip, at the cuff and at the flange that key points give.
 
     A face at the distance h inside a section of length L that turns by a right angle takes h L - pi h^2/4, which is
     Th. 4.12 and 4.14 for the sections of App. A.
     """
     found = []
-    half_walls = (valve.duckbill_wall_deduction, valve.flange_wall_deduction)
-    for place, name, z, half in zip(("lip", "flange"), ("duckbill", "flange"), surface.breaks[[0, -1]], half_walls):
-        points = surface.section(z, np.linspace(0.0, 1.0, 8001))
-        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-        gap = valve.initial_gap * max(points[-1, 0] - half, 0.0) if place == "lip" else 0.0
-        found.append(half * length - 0.25 * np.pi * half**2 - gap)
+    lip, flange = surface.breaks[[0, -1]]
+    cuff = flange if valve.flare_length == 0 else valve.duckbill_length + valve.saddle_length
+    halves = {"duckbill": valve.duckbill_wall_deduction, "flange": valve.flange_wall_deduction}
+    for place, name, z in (("lip", "duckbill", lip), ("cuff", "flange", cuff), ("flange", "flange", flange)):
+        half, edge = halves[name], surface.section(z, np.ones(1))[0, 0]
+        gap = valve.initial_gap * max(edge - half, 0.0) if place == "lip" else 0.0
+        found.append(half * surface.length(z) - 0.25 * np.pi * half**2 - gap)
         if found[-1] >= surface.area(z):
             raise ValueError(
                 f"The key points of the {place} leave no flow area inside a half wall of {half:g} m; it must be less, "
                 f"see valve.{name}_wall_deduction."
             )
-    return found[0], found[1]
+    return found[0], found[1], found[2]
 
 
 def _patched(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:

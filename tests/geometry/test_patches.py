@@ -85,11 +85,11 @@ BAD = {
     "both": ({"thickness": 0.01, "extra": 0.01}, "thickness is 0.01 m beside extra"),
     "end before begin": (
         {"extra": 0.001, "begin": 0.3, "end": 0.2},
-        "valve.patches.0.end is 0.2 m; it must lie behind",
+        "valve.patches.0.end is 0.2 m; it must lie",
     ),
     "around backwards": (
         {"extra": 0.001, "around_from": 0.6, "around_to": 0.5},
-        "around_to is 0.5; it must be greater",
+        "around_to is 0.5; it must be",
     ),
     "beyond the valve": ({"extra": 0.001, "begin": 0.6}, "valve.patches.0.begin is 0.6 m; the valve ends at 0.56 m"),
     "share above one": ({"extra": 0.001, "around_to": 1.5}, "around_to is given as 1.5; it must be .*at most 1"),
