@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, overload
 
 from .case.changes import Changes, change_case
 from .case.pressures import is_single, read_pressures
+from .drawing import described
+from .drawing.files import draw_figures, write_figures
 from .errors import SolveError
 from .materials.damping_report import DampingReport, describe_damping
 from .model import ValveModel
@@ -72,6 +74,16 @@ class Valve:
     def model(self) -> ValveModel:
         """The coupled model of the case."""
         return self.session.model
+
+    def plot(self, folder: str | Path = ".", format: str = "png", only: Sequence[str] = ()) -> list[Path]:
+        """Draw the valve as its case describes it, with measures, wall and layers; nothing is solved.
+
+        Examples
+        --------
+        >>> dbvfiv.load("cases/dbv6.toml").plot("figures")      # doctest: +SKIP
+        """
+        figures = draw_figures(described.drawers_of(self.model), only, f"case {self.name!r}")
+        return write_figures(figures, folder, format)
 
     def replace(self, changes: Changes) -> Valve:
         """A valve with some keys of its case changed, as `load` takes them: ``{"fluid.density": 10}``."""

@@ -8,8 +8,9 @@ from ..errors import CaseError
 from .axis import Axis, parse_axis
 from .load import make_case
 from .materials import RUBBERS, Card, Layer, Materials
+from .mesh import Mesh
 from .model import Case
-from .valve import Mesh, Valve
+from .valve import Valve
 
 __all__ = [
     "Axis",

@@ -93,7 +93,8 @@ def show_value(value: Any, quantity: Quantity | None) -> str:
         return "[" + ", ".join(show_value(v, quantity) for v in value) + "]"
     if isinstance(value, Section):
         fields = type(value).model_fields
-        pairs = (f"{n} = {show_value(getattr(value, n), quantity_of(f))}" for n, f in fields.items())
+        given = {n: f for n, f in fields.items() if getattr(value, n) is not None}
+        pairs = (f"{n} = {show_value(getattr(value, n), quantity_of(f))}" for n, f in given.items())
         return "{ " + ", ".join(pairs) + " }"
     text = str(value).replace("\\", "\\\\").replace('"', '\\"')
     return f'"{text}"'
@@ -154,6 +155,8 @@ def allowed_words(field: FieldInfo) -> str:
     if kind == "choice":
         options = [repr(a).replace("'", '"') for a in typing.get_args(core)]
         return options[0] if len(options) == 1 else " or ".join(options)
+    if kind == "list of tables" and not _limits(field.metadata).get("min_length"):
+        return "a list of tables"
     if kind in ("table", "list of tables", "tables"):
         return {"table": "a table", "list of tables": "a list of at least one table", "tables": "tables"}[kind]
     if kind == "file":

@@ -1,48 +1,190 @@
-"""Mid-surface key points: nine profiles of fifteen points, as the thesis's program reads them (App. A)."""
+"""Mid-surface key points: profiles of points from the lip to the flange, a table with units or as App. A has them."""
 
 from __future__ import annotations
 
+import csv
 import math
+import re
+from dataclasses import dataclass
 from pathlib import Path
 
+from .quantity import Quantity
 from .text_file import read_text_file
 
-PROFILES, POINTS = 9, 15
+#: A file of bare numbers of this many lines holds nine profiles of fifteen points, as the thesis's program reads them.
+_BARE = 9, 15
+_LENGTH = Quantity("m", "mm")
+_COLUMN = re.compile(r"\s*([A-Za-z]+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*")
+_HEADER = "the first line must name x, y and z with their units, such as 'profile, x [mm], y [mm], z [mm], joint'"
+#: Distance from a symmetry plane, over the size of the profile, up to which a point lies on it.
+_ON_PLANE = 1e-6
+_LARGEST = 200_000
 
 
-def read_key_points(path: Path) -> list[list[tuple[float, float, float]]]:
+@dataclass(frozen=True)
+class KeyProfile:
+    """One section of the mid-surface.
+
+    Attributes
+    ----------
+    points : tuple of (x, y, z), m
+        From the centre, x = 0, to the side edge, y = 0.
+    joints : tuple of int
+        Points inside at which the curvature jumps or the section has a corner.
+    smooth : bool
+        Whether the section is smooth between joints, so that curves of higher degree serve.
+    """
+
+    points: tuple[tuple[float, float, float], ...]
+    joints: tuple[int, ...] = ()
+    smooth: bool = False
+
+    @property
+    def z(self) -> float:
+        """Axial position, m: the mean of its points."""
+        return math.fsum(point[2] for point in self.points) / len(self.points)
+
+
+def read_key_points(path: Path) -> tuple[KeyProfile, ...]:
     """Read a file of key points.
 
     Parameters
     ----------
     path : Path
-        One point ``x y z`` in m on each line (blanks or commas between);
-        empty lines and text after ``#`` are skipped.
+        Either a table (commas, semicolons, tabs or blanks) whose first line names the columns ``x``, ``y`` and ``z``
+        with their units and, where wanted, ``profile`` (any word, the same for all points of one) and ``joint`` (1
+        where the curvature jumps); or bare lines ``x y z`` in m. Points of one profile follow each other, told by that
+        word or by their equal z; 135 bare lines are 9 profiles of 15 points. Empty lines and text after ``#`` are
+        skipped.
 
     Returns
     -------
-    list of list of tuple
-        ``[9][15]`` points, profiles from lip to flange, each profile from the
-        centre (x = 0) to the side edge (y = 0). ``numpy.asarray`` makes it (9, 15, 3).
+    tuple of KeyProfile
+        From lip to flange.
 
     Raises
     ------
     ValueError
         With a clause that completes "key_points is given as FILE, ...".
     """
-    text = read_text_file(path, encoding=None)
-    points = []
-    for number, line in enumerate(text.splitlines(), 1):
-        line = line.split("#")[0].replace(",", " ").strip()
-        if not line:
-            continue
+    lines = read_text_file(path).splitlines()
+    numbered = [(i, line.split("#")[0].strip()) for i, line in enumerate(lines, 1)]
+    numbered = [(i, line) for i, line in numbered if line]
+    if not numbered:
+        raise ValueError("which holds no points")
+    if len(numbered) > _LARGEST:
+        raise ValueError(f"which holds more than {_LARGEST} lines")
+    profiles = _table(numbered) if re.match(r"[A-Za-z\"']", numbered[0][1]) else _bare(numbered)
+    _check(profiles)
+    return tuple(profiles)
+
+
+def key_point_inlet(path: Path) -> float | None:
+    """Mean radius, m, of the last profile of a file of key points; None where it cannot be read."""
+    try:
+        last = read_key_points(path)[-1].points
+    except ValueError:
+        return None
+    return math.fsum(math.hypot(x, y) for x, y, _ in last) / len(last)
+
+
+def _bare(numbered: list[tuple[int, str]]) -> list[KeyProfile]:
+    points = [_numbers(line.replace(",", " ").split(), number) for number, line in numbered]
+    count, each = _BARE
+    if len(points) == count * each:
+        groups = [points[i * each : (i + 1) * each] for i in range(count)]
+    else:
+        groups = _by(points, [point[2] for point in points])
+    return [KeyProfile(tuple(group)) for group in groups]
+
+
+def _table(numbered: list[tuple[int, str]]) -> list[KeyProfile]:
+    head, mark = numbered[0][1], _mark(numbered[0][1])
+    columns = [_COLUMN.fullmatch(word) for word in _words(head, mark)]
+    names = [match[1].lower() if match else "" for match in columns]
+    for name in ("x", "y", "z"):
+        if names.count(name) != 1:
+            raise ValueError(f"whose first line names no column {name}, or several; {_HEADER}")
+    unknown = [name for name in names if name not in ("x", "y", "z", "profile", "joint")]
+    if unknown or len(set(names)) < len(names):
+        raise ValueError(f"whose first line has a column that is not told or stands twice; {_HEADER}")
+    units = {name: match[2] for name, match in zip(names, columns) if name in "xyz"}
+    for name, unit in units.items():
         try:
-            point = tuple(float(word) for word in line.split())
+            _LENGTH.parse(f"1 {unit}")
         except ValueError:
-            point = ()
-        if len(point) != 3 or not all(map(math.isfinite, point)):
-            raise ValueError(f"whose line {number} is not three numbers x y z")
-        points.append(point)
-    if len(points) != PROFILES * POINTS:
-        raise ValueError(f"which holds {len(points)} points and not {PROFILES} x {POINTS} = {PROFILES * POINTS}")
-    return [points[i * POINTS : (i + 1) * POINTS] for i in range(PROFILES)]
+            raise ValueError(f"whose column {name} has no unit of length; {_HEADER}") from None
+    points, labels, joints = [], [], []
+    for number, line in numbered[1:]:
+        words = _words(line, mark)
+        if len(words) != len(names):
+            raise ValueError(f"whose line {number} has {len(words)} entries and not {len(names)}")
+        row = dict(zip(names, words))
+        points.append(_numbers([row[name] for name in "xyz"], number, [units[name] for name in "xyz"]))
+        labels.append(row.get("profile", points[-1][2]))
+        joints.append(row.get("joint", "") not in ("", "0"))
+    if not points:
+        raise ValueError("which holds no points below its first line")
+    groups, marks = _by(points, labels), _by(joints, labels)
+    if len(set(labels)) != len(groups):
+        raise ValueError("in which the points of a profile do not follow each other")
+    return [
+        KeyProfile(tuple(group), tuple(i for i in range(1, len(group) - 1) if mark[i]), smooth="joint" in names)
+        for group, mark in zip(groups, marks)
+    ]
+
+
+def _mark(line: str) -> str | None:
+    return next((mark for mark in ";\t," if mark in line), None)
+
+
+def _words(line: str, mark: str | None) -> list[str]:
+    if mark is None:
+        return re.sub(r"\s+([\[(])", r"\1", line).split()
+    return [word.strip() for word in next(csv.reader([line], delimiter=mark))]
+
+
+def _numbers(words: list[str], number: int, units: list[str] | None = None) -> tuple[float, float, float]:
+    try:
+        point = tuple(float(word) for word in words)
+        if units is not None:
+            point = tuple(_LENGTH.parse(f"{value!r} {unit}") for value, unit in zip(point, units))
+    except ValueError:
+        point = ()
+    if len(point) != 3 or not all(map(math.isfinite, point)):
+        raise ValueError(f"whose line {number} is not three numbers x y z")
+    return point
+
+
+def _by(items: list, labels: list) -> list[list]:
+    """Items in groups of equal labels that follow each other."""
+    groups: list[list] = []
+    for i, item in enumerate(items):
+        if i == 0 or labels[i] != labels[i - 1]:
+            groups.append([])
+        groups[-1].append(item)
+    return groups
+
+
+def _check(profiles: list[KeyProfile]) -> None:
+    """Refuse profiles that make no quarter of a valve."""
+    if len(profiles) < 2:
+        raise ValueError("which holds one profile, and a valve has two or more")
+    for i, profile in enumerate(profiles, 1):
+        points = profile.points
+        where = f"whose profile {i} at z = {profile.z:g} m"
+        if len(points) < 3:
+            raise ValueError(f"{where} has {len(points)} points, and a profile has three or more")
+        size = max(max(abs(x), abs(y)) for x, y, _ in points)
+        near = _ON_PLANE * size
+        if abs(points[0][0]) > near or abs(points[-1][1]) > near:
+            raise ValueError(f"{where} does not run from the centre, x = 0, to the side edge, y = 0")
+        if min(min(x, y) for x, y, _ in points) < -near:
+            raise ValueError(f"{where} leaves the quarter of positive x and y")
+        if min(math.dist(a[:2], b[:2]) for a, b in zip(points, points[1:])) <= 1e-9 * size:
+            raise ValueError(f"{where} has the same point twice")
+    places = [profile.z for profile in profiles]
+    if any(b <= a for a, b in zip(places, places[1:])):
+        raise ValueError("whose profiles do not go from the lip to the flange with z increasing")
+    if abs(places[0]) > 1e-6 * places[-1]:
+        raise ValueError(f"whose first profile lies at z = {places[0]:g} m, and the lip is at 0")

@@ -12,12 +12,13 @@ from .damping import Damping
 from .downstream import Downstream
 from .load import make_case, put
 from .materials import DEFAULT_LAYERS, Layer, Materials
+from .mesh import Mesh
 from .outside import Outside
 from .parameters import PARAMETERS
 from .relaxing import SHIPPED_LOSSES
 from .section import BrokenRule, Section, key
 from .upstream import Upstream
-from .valve import Mesh, Valve
+from .valve import Valve
 
 
 class Case(Section):
@@ -92,17 +93,17 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
-        self.mesh.check_positions(self.valve.length)
+        self.mesh.check_positions(self.valve.as_given.length)
         if self.drive.kind == "flow" and self.upstream.is_elastic and not self.fluid.unsteady:
             raise BrokenRule(
                 "upstream.wave_speed",
                 f"{self.upstream.wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
                 "give it with the unsteady law alone",
             )
-        inlet = 2 * (self.valve.flange_radius - self.valve.flange_wall_deduction)
+        inlet = 2 * (self.valve.inlet_radius - self.valve.flange_wall_deduction)
         self.upstream.check_roughness(inlet)
         self.downstream.check_pipe(inlet)
-        self.outside.check_pipe(2 * self.valve.flange_radius + self.valve.thickness_at(self.valve.length))
+        self.outside.check_pipe(self.valve.outer_diameter)
         return self
 
     @property

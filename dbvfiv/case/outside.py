@@ -84,7 +84,7 @@ class Outside(Section):
         return f"with {fluid} outside, {place}{lips}"
 
     def check_pipe(self, outer: float) -> None:
-        """Refuse a pipe that the valve does not go into; `outer` is the diameter of its outer face at the flange, m.
+        """Refuse a pipe that the valve does not go into; `outer` is the largest diameter of its outer face, m.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class Outside(Section):
         if self.is_there and self.pipe_diameter is not None and self.pipe_diameter < CLEARANCE * outer:
             raise BrokenRule(
                 "outside.pipe_diameter",
-                f"{1e3 * self.pipe_diameter:g} mm around a flange of {1e3 * outer:.4g} mm",
+                f"{1e3 * self.pipe_diameter:g} mm around a valve of {1e3 * outer:.4g} mm",
                 f"it must be at least {CLEARANCE:g} times that, {1e3 * CLEARANCE * outer:.4g} mm, for the fluid "
                 "between them to be resolved",
             )

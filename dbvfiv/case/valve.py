@@ -1,4 +1,4 @@
-"""The valve's shape, wall and mesh (defaults: the 12-inch inline valve of App. A)."""
+"""The valve's shape and wall (defaults: the 12-inch inline valve of App. A)."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ import math
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import PrivateAttr, StrictInt, ValidationInfo, field_validator, model_serializer, model_validator
+from pydantic import PrivateAttr, ValidationInfo, field_validator, model_serializer, model_validator
 
-from .key_points import read_key_points
+from .key_points import key_point_inlet, read_key_points
+from .lip import LipSizes
 from .quantity import Length, Number
-from .section import BrokenRule, Section, key
+from .section import Section, key
+from .valve_rules import check_key_points, check_sections, check_wall
+from .wall import WallPatch, WallStep
 
 #: Sizes of the 12-inch valve and its wall at lip and flange, m, and what App. A sets for it: R1, TH1, TH2.
 _TWELVE_INCH = {
@@ -23,28 +26,48 @@ _TWELVE_INCH = {
 _TWELVE_INCH_WALLS = {"measured": (0.012, 0.016), "uniform": (0.01438, 0.01438)}
 _R1, _TH1, _TH2 = 0.00619, 0.00619, 0.00819
 #: What follows from wall and shape where it is not given.
-_FOLLOWING = ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction")
-#: What key points say in place of the case's keys.
-_SHAPE = ("lip_half_width", "lip_radius", "flange_radius", "saddle")
-
-
-class WallStep(Section):
-    """One piece of the measured wall."""
-
-    to: Length = key(..., "End of the piece, measured along the axis from the lip.", gt=0, le=100)
-    thickness: Length = key(..., "Wall thickness of the piece.", gt=0, le=10)
+_FOLLOWING = ("lip_radius", "cuff_radius", "duckbill_wall_deduction", "flange_wall_deduction")
+#: Lengths that `scale` multiplies, beside those of the wall map.
+_SIZES = (
+    *("duckbill_length", "saddle_length", "cuff_length", "flare_length", "flange_length", "lip_half_width"),
+    *("lip_rise", "lip_radius", "cuff_radius", "flange_radius", "wall_thickness", "initial_gap"),
+    *("duckbill_wall_deduction", "flange_wall_deduction"),
+)
 
 
 class Valve(Section):
     """Shape and wall of the valve; z runs from the lip (0) to the clamped flange.
 
-    `lip_radius`, `duckbill_wall_deduction` and `flange_wall_deduction` hold numbers also where they were not given.
+    Behind the saddle come a round cuff and a flared transition to the flange, both of no length unless given.
+    `lip_radius`, `cuff_radius`, `duckbill_wall_deduction` and `flange_wall_deduction` hold numbers also where they were
+    not given, and all sizes are those of the valve as it is built: `scale` times what the case gives.
     """
 
     duckbill_length: Length = key(0.21, "Length of the duckbill, from the lip.", gt=0, le=100)
-    saddle_length: Length = key(0.28, "Length of the saddle between duckbill and flange.", gt=0, le=100)
+    saddle_length: Length = key(
+        0.28, "Length of the saddle between the duckbill and the round part behind it.", gt=0, le=100
+    )
+    cuff_length: Length = key(0.0, "Length of a round cuff behind the saddle; 0 for none.", ge=0, le=100)
+    flare_length: Length = key(
+        0.0,
+        "Length of a conical transition from the radius of the cuff to that of the flange; 0 for none.",
+        ge=0,
+        le=100,
+    )
     flange_length: Length = key(0.07, "Length of the round flange at the inlet.", gt=0, le=100)
-    lip_half_width: Length = key(0.125, "Half width of the straight part of the lip (W1).", gt=0, le=100)
+    lip_half_width: Length = key(
+        0.125,
+        "Half width of the lip up to the arc of its side edge (W1); the bill may be narrower or wider than the pipe.",
+        gt=0,
+        le=100,
+    )
+    lip_rise: Length = key(
+        0.0,
+        "By how much the middle of a curved lip stands above its ends: both lips are bowed away from each other by an "
+        "arc of a circle and leave a lens between them at rest; 0 for straight lips.",
+        ge=0,
+        le=10,
+    )
     lip_radius: Length | None = key(
         None,
         "Mid-surface radius of the side edge of the lip, and height of its straight part above the closing plane (R1); "
@@ -52,6 +75,9 @@ class Valve(Section):
         "App. A).",
         gt=0,
         le=10,
+    )
+    cuff_radius: Length | None = key(
+        None, "Mid-surface radius of the cuff; that of the flange where not given.", gt=0, le=100
     )
     flange_radius: Length = key(0.13919, "Mid-surface radius of the flange (Rin).", gt=0, le=100)
     saddle: Literal["ruled", "smooth"] = key(
@@ -71,6 +97,11 @@ class Valve(Section):
         min_length=1,
     )
     wall_thickness: Length = key(0.01438, "Wall thickness where wall is uniform.", gt=0, le=10)
+    patches: tuple[WallPatch, ...] = key(
+        (),
+        "Parts of the wall that are thicker or thinner than it says, later ones on top of earlier ones. The "
+        "mid-surface stays; the flow section follows the inner face, as far as the faces do not meet.",
+    )
     thickness_factor: Number = key(
         1.0, "Multiplies the wall thickness everywhere; mid-surface and flow section stay.", gt=0, le=10
     )
@@ -85,17 +116,31 @@ class Valve(Section):
     flange_wall_deduction: Length | None = key(
         None,
         "Half wall taken off the flow section of the flange (TH2, Th. 4.14); where not given half the wall at the "
-        "flange (8.19 mm in the 12-inch valve, App. A).",
+        "flange (8.19 mm in the 12-inch valve, App. A); it holds for cuff and flare too.",
         ge=0,
         le=10,
     )
     key_points: Path | None = key(
         None,
-        "File of 9 x 15 mid-surface key points (x y z on each line; profiles from lip to flange, "
-        "each from the centre x = 0 to the side edge y = 0) used instead of lip_half_width, lip_radius, flange_radius "
-        "and saddle; the lengths say where duckbill and saddle end on it; relative to the case file.",
+        "File of mid-surface key points, any number of profiles and points, used instead of lip_half_width, lip_rise, "
+        "lip_radius, cuff_radius, flange_radius and saddle: a table of x, y and z with units (profile, x [mm], y [mm], "
+        "z [mm], joint; profiles from lip to flange, each from the centre x = 0 to the side edge y = 0) or bare lines "
+        "x y z in m; the lengths say where duckbill and saddle end on it; relative to the case file.",
+    )
+    key_point_skin: Literal["ruled", "smooth"] = key(
+        "ruled",
+        "How profiles of key points are joined: by straight rulings, with a row of nodes on each, or by curves along "
+        "the axis that do not overshoot.",
+    )
+    scale: Number = key(
+        1.0,
+        "Multiplies every length of this section, wall and gap included, and the positions in mesh.breaks and "
+        "mesh.row_positions and in key_points; layers keep their shares of the wall. Lengths of other sections stay.",
+        gt=0,
+        le=1000,
     )
     _following: frozenset[str] = PrivateAttr(frozenset())
+    _given: Any = PrivateAttr(None)
 
     @property
     def following(self) -> frozenset[str]:
@@ -103,32 +148,65 @@ class Valve(Section):
         return self._following
 
     @property
+    def as_given(self) -> Valve:
+        """The valve with its sizes as the case gives them, before `scale` multiplies them."""
+        return self if self._given is None else self._given
+
+    @property
     def length(self) -> float:
         """Length of the valve along its axis in m."""
-        return self.duckbill_length + self.saddle_length + self.flange_length
+        return self.duckbill_length + self.saddle_length + self.cuff_length + self.flare_length + self.flange_length
 
-    def thickness_at(self, z: float) -> float:
-        """Wall thickness in m at the axial position ``z`` in m (``thickness_factor`` included)."""
-        return self._wall_at(z) * self.thickness_factor
+    def thickness_at(self, z: float, s: float | None = None) -> float:
+        """Wall thickness in m at the axial position ``z`` in m (``thickness_factor`` included); with patches on it
+        where ``s`` says at which share of the section.
+        """
+        return (self._wall_at(z) if s is None else self.wall_at(z, s)) * self.thickness_factor
 
     def _wall_at(self, z: float) -> float:
         if self.wall == "uniform":
             return self.wall_thickness
-        return next((s for s in self.wall_map if z < s.to), self.wall_map[-1]).thickness
+        return next((step for step in self.wall_map if z < step.to), self.wall_map[-1]).thickness
+
+    def wall_at(self, z: float, s: float) -> float:
+        """Wall thickness in m with its patches at the axial position z, m, and the share s of the section."""
+        thickness = self._wall_at(z)
+        for patch in self.patches:
+            if patch.covers(z, s):
+                thickness = patch.on(thickness)
+        return thickness
+
+    @property
+    def lip(self) -> LipSizes:
+        """Sizes of the lip's section, of the parametric shape."""
+        return LipSizes(self.lip_half_width, self.lip_radius, self.lip_rise)
 
     @property
     def rest_areas(self) -> tuple[float, float]:
         """Flow areas in m2 of a quarter at rest, at the lip and at the flange, of the parametric shape."""
-        lip = self.lip_half_width * self.lip_radius + 0.25 * math.pi * self.lip_radius**2
         inner = self.flange_radius - self.flange_wall_deduction
-        return lip - self.duckbill_wall_area, 0.25 * math.pi * inner**2
+        return self.lip.area - self.duckbill_wall_area, 0.25 * math.pi * inner**2
 
     @property
     def duckbill_wall_area(self) -> float:
         """Part in m2 of the duckbill's section that the wall takes (Th. 4.12), of a quarter, less the initial gap."""
-        inner = max(self.lip_radius - self.duckbill_wall_deduction, 0.0)
-        corner = 0.25 * math.pi * (self.lip_radius**2 - inner**2)
-        return corner + self.lip_half_width * (self.duckbill_wall_deduction - self.initial_gap)
+        return self.lip.wall_area(self.duckbill_wall_deduction, self.initial_gap)
+
+    @property
+    def inlet_radius(self) -> float:
+        """Mid-surface radius in m at the inlet end: that of the flange, or the mean one of key points."""
+        found = None if self.key_points is None else key_point_inlet(self.key_points)
+        factor = 1.0 if self._given is None else self.scale
+        return self.flange_radius if found is None else factor * found
+
+    @property
+    def outer_diameter(self) -> float:
+        """Largest extent in m of the outer face at rest across the axis, of the parametric shape."""
+        flange = 2 * self.inlet_radius + self.thickness_at(self.length)
+        if self.key_points is not None:
+            return flange
+        cuff = 2 * self.cuff_radius + self.thickness_at(self.length) if self.cuff_length + self.flare_length > 0 else 0
+        return max(flange, cuff, 2 * self.lip.widest + self.thickness_at(0.0))
 
     @field_validator("key_points", mode="after")
     @classmethod
@@ -142,12 +220,13 @@ class Valve(Section):
 
     @model_serializer(mode="wrap")
     def _leave_what_follows(self, handler: Any) -> dict[str, Any]:
-        """Without the numbers that follow, so that they follow anew after a change."""
-        return {name: None if name in self._following else value for name, value in handler(self).items()}
+        """Sizes before the scale, without the numbers that follow, so that they follow anew after a change."""
+        given = handler(self.as_given)
+        return {name: None if name in self._following else value for name, value in given.items()}
 
     def _fill(self) -> None:
         """Numbers for the keys that were not given."""
-        before = self._following  # a valve is checked again when it becomes part of a case
+        before = self._following
         self._following = frozenset(name for name in _FOLLOWING if getattr(self, name) is None or name in before)
         lip, flange = self._wall_at(0.0), self._wall_at(self.length)
         twelve_inch = (
@@ -157,6 +236,7 @@ class Valve(Section):
         )
         numbers = {"lip_radius": _R1 if twelve_inch else 0.5 * lip} if "lip_radius" in self._following else {}
         radius = numbers.get("lip_radius", self.lip_radius)
+        numbers["cuff_radius"] = self.flange_radius
         touching = 0.5 * lip if self.key_points is not None else min(0.5 * lip, radius)
         numbers["duckbill_wall_deduction"] = _TH1 if twelve_inch and radius == _R1 else touching
         numbers["flange_wall_deduction"] = _TH2 if twelve_inch else 0.5 * flange
@@ -164,132 +244,22 @@ class Valve(Section):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Valve:
+        if self._given is not None:  # a valve is checked again when it becomes part of a case
+            return self
         self._fill()
-        self._check_wall()
+        check_wall(self)
         if self.key_points is None:
-            self._check_sections()
+            check_sections(self)
         else:
-            self._check_key_points()
+            check_key_points(self)
+        self._enlarge()
         return self
 
-    def _check_key_points(self) -> None:
-        for name in _SHAPE:
-            value = getattr(self, name)
-            if name not in self._following and value != type(self).model_fields[name].default:
-                given = f"{value:g} m" if isinstance(value, float) else repr(value)
-                raise BrokenRule(name, f"{given} beside key_points", "the points give the shape, so leave it out")
-
-    def _check_sections(self) -> None:
-        if self.lip_half_width + self.lip_radius > self.flange_radius:
-            widest = self.flange_radius - self.lip_radius
-            raise BrokenRule(
-                "lip_half_width",
-                f"{self.lip_half_width:g} m, which makes the lips wider than the pipe",
-                f"it must be at most flange_radius - lip_radius = {widest:g} m",
-            )
-        if self.duckbill_wall_deduction - self.initial_gap >= self.lip_radius:
-            raise BrokenRule(
-                "duckbill_wall_deduction",
-                f"{self.duckbill_wall_deduction:g} m, which leaves no flow area between the lips",
-                f"it must be less than lip_radius + initial_gap = {self.lip_radius + self.initial_gap:g} m",
-            )
-        if self.flange_wall_deduction >= self.flange_radius:
-            raise BrokenRule(
-                "flange_wall_deduction",
-                f"{self.flange_wall_deduction:g} m, which leaves no flow area at the flange",
-                f"it must be less than flange_radius = {self.flange_radius:g} m",
-            )
-        lip, flange = self.rest_areas
-        if lip >= flange:
-            name = "initial_gap" if lip - self.lip_half_width * self.initial_gap < flange else "lip_radius"
-            raise BrokenRule(
-                name,
-                f"{getattr(self, name):g} m, which leaves {4e4 * lip:.4g} cm2 between the lips at rest",
-                f"the passage there must be smaller than that of the flange, {4e4 * flange:.4g} cm2",
-            )
-
-    def _check_wall(self) -> None:
-        if self.wall == "measured":
-            ends = [step.to for step in self.wall_map]
-            if any(b <= a for a, b in zip(ends, ends[1:])):
-                raise BrokenRule("wall_map", f"a list whose ends go {ends}", "they must increase from lip to flange")
-            if ends[-1] < self.length * (1 - 1e-9):
-                raise BrokenRule(
-                    "wall_map",
-                    f"a list that ends at {ends[-1]:g} m",
-                    f"it must reach the valve's length of {self.length:g} m",
-                )
-            thickest = max(step.thickness for step in self.wall_map)
-            name = "wall_map"
-        else:
-            thickest, name = self.wall_thickness, "wall_thickness"
-        if thickest * self.thickness_factor >= 2 * self.flange_radius:
-            raise BrokenRule(
-                name,
-                f"{thickest * self.thickness_factor:g} m at its thickest, which fills the pipe",
-                f"it must be less than twice flange_radius = {2 * self.flange_radius:g} m",
-            )
-
-
-class Mesh(Section):
-    """The shell mesh of the quarter model."""
-
-    around: StrictInt = key(28, "Elements along the section, from the centre to the side edge.", ge=4, le=1000)
-    along: StrictInt = key(48, "Elements along the axis, from lip to flange, in all.", ge=6, le=2000)
-    grading: Number = key(0.5, "Length of the element at the side edge over that at the centre.", ge=0.05, le=2.0)
-    layer_points: StrictInt = key(2, "Gauss points through the thickness of each layer.", ge=1, le=10)
-    element: Literal["MITC4+EAS", "MITC4+", "MITC4"] = key(
-        "MITC4+EAS",
-        "What is assumed about the in-plane strains: as the shape gives them (MITC4), bending of warped elements "
-        "without stretching (MITC4+), and with that free bending in the plane of the element (MITC4+EAS).",
-    )
-    rows: Literal["graded", "breaks", "uniform"] = key(
-        "graded",
-        "Rows of nodes on every joint of the surface and step of the wall, and closer towards joints at which the "
-        "surface turns (graded); evenly between them (breaks); or evenly between the joints alone, whatever the wall "
-        "does (uniform).",
-    )
-    row_grading: Number = key(
-        0.4,
-        "Length of the rows at a joint at which the surface turns by 20 degrees over that far from it.",
-        ge=0.05,
-        le=1.0,
-    )
-    breaks: tuple[Length, ...] = key(
-        (), "Further axial positions to put a row on, from the lip; not with uniform rows."
-    )
-    row_positions: tuple[Length, ...] = key(
-        (),
-        "Axial positions of all rows from the lip (0) to the flange, in place of rows and breaks; where along is not "
-        "one less than their number, along rows are spread as these are.",
-    )
-    columns: Literal["graded", "breaks", "uniform"] = key(
-        "graded",
-        "Columns of nodes on the edge of the loaded columns, of those with a lip stop and of the bend at the side of "
-        "the lip, and closer in that bend (graded); evenly between them (breaks); or even columns whatever these do "
-        "(uniform).",
-    )
-    column_grading: Number = key(
-        1 / 3, "Length of the columns in the bend at the side of the lip over that beside it.", ge=0.05, le=1.0
-    )
-
-    def check_positions(self, length: float) -> None:
-        """Refuse rows that do not lie on a valve of this length, m."""
-        outside = next((z for z in self.breaks if not 0 < z < length), None)
-        if outside is not None:
-            raise BrokenRule(
-                "mesh.breaks",
-                f"a list with {outside:g} m",
-                f"a row lies between the lip, 0 m, and the flange, {length:g} m",
-            )
-        if not self.row_positions:
+    def _enlarge(self) -> None:
+        """Multiply all sizes by the scale; what was given is remembered."""
+        if self.scale == 1.0:
             return
-        if len(self.row_positions) < 7:
-            given = f"a list of {len(self.row_positions)}"
-            raise BrokenRule("mesh.row_positions", given, "a mesh has at least 7 rows of nodes, 6 elements along")
-        if any(b <= a for a, b in zip(self.row_positions, self.row_positions[1:])):
-            raise BrokenRule("mesh.row_positions", "a list that falls", "rows must increase from lip to flange")
-        first, last = self.row_positions[0], self.row_positions[-1]
-        if abs(first) > 1e-9 * length or abs(last - length) > 1e-9 * length:
-            ends = f"a list from {first:g} to {last:g} m"
-            raise BrokenRule("mesh.row_positions", ends, f"rows reach from the lip, 0 m, to the flange, {length:g} m")
+        self._given = self.model_copy()
+        self.__dict__.update({name: self.scale * getattr(self, name) for name in _SIZES})
+        for name in ("wall_map", "patches"):
+            self.__dict__[name] = tuple(piece.enlarged(self.scale) for piece in getattr(self, name))

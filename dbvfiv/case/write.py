@@ -74,10 +74,11 @@ def _tables(name: str, items: tuple[Section, ...], comments: bool) -> Iterator[s
 
 
 def _keys(section: Section, comments: bool) -> Iterator[str]:
+    given = getattr(section, "as_given", section)
     for name, field in type(section).model_fields.items():
         if name == "named" and isinstance(section, Materials):
             continue
-        value = getattr(section, name)
+        value = getattr(given, name)
         if comments:
             yield from _comment(field)
         follows = name in getattr(section, "following", ())
@@ -93,12 +94,14 @@ def _comment(field: Any) -> Iterator[str]:
     words = field.description or ""
     if element_model(field.annotation) is None:
         words = f"{words} [{allowed_words(field)}]"
+    elif typing.get_origin(field.annotation) is tuple and not field.is_required() and not field.default:
+        words = f"{words} Each is a table of {', '.join(element_model(field.annotation).model_fields)}."
     for line in textwrap.wrap(words, _WIDTH - 2):
         yield f"# {line}"
 
 
 def _value(value: Any, field: Any) -> str:
-    if typing.get_origin(field.annotation) is tuple and element_model(field.annotation):
+    if value and typing.get_origin(field.annotation) is tuple and element_model(field.annotation):
         rows = "".join(f"    {show_value(item, None)},\n" for item in value)
         return f"[\n{rows}]"
     return show_value(value, quantity_of(field))

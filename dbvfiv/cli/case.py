@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -19,6 +20,16 @@ def command(
     ] = None,
     explain: Annotated[bool, typer.Option("--explain", help="Explain KEY, or every key.")] = False,
     new: Annotated[bool, typer.Option("--new", help="Write a commented starter to FILE.")] = False,
+    key_points: Annotated[
+        Path | None,
+        typer.Option("--key-points", metavar="FILE", help="Write the shape of the case as a table of key points."),
+    ] = None,
+    points: Annotated[
+        int, typer.Option("--points", min=6, max=2001, help="Key points between two joints of a profile.")
+    ] = 17,
+    profiles: Annotated[
+        int, typer.Option("--profiles", min=0, max=200, help="Further profiles of key points inside the saddle.")
+    ] = 0,
     overrides: Override = None,
     as_json: AsJson = False,
 ) -> None:
@@ -29,13 +40,17 @@ def command(
     dbvfiv case --new my.toml            write a commented starter
 
     dbvfiv case --explain drive.pressure explain one key, a section, or all
+
+    dbvfiv case my.toml --key-points my.csv  write its shape as key points, to edit
     """
-    if explain and new:
-        raise CaseError("Only one of --explain and --new can be given at a time.")
+    if explain + new + (key_points is not None) > 1:
+        raise CaseError("Only one of --explain, --new and --key-points can be given at a time.")
     act = action("case")
     if explain:
         act.explain_keys(target, as_json)
     elif new:
         act.write_new(target, overrides, as_json)
+    elif key_points is not None:
+        act.write_key_points(target, key_points, points, profiles, overrides, as_json)
     else:
         act.check(target, overrides, as_json)

@@ -1,4 +1,4 @@
-"""``dbvfiv plot``: figures of a result."""
+"""``dbvfiv plot``: figures of a result, or of the valve of a case."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ._later import action
-from ._options import AsJson, ResultFile
+from ._options import AsJson, Override
 
 ORDER = 50
 
@@ -22,7 +22,10 @@ class Format(StrEnum):
 
 
 def command(
-    file: ResultFile,
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="RESULT.h5|CASE.toml", help="Result file of an earlier command, or a case file."),
+    ],
     folder: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the figures.")] = Path("."),
     format: Annotated[Format, typer.Option("--format", help="File format.")] = Format.png,
     only: Annotated[
@@ -48,7 +51,12 @@ def command(
             help="Also write a GIF: of one cycle of mode N, or of the last N cycles of a transient; may be repeated.",
         ),
     ] = None,
+    overrides: Override = None,
     as_json: AsJson = False,
 ) -> None:
-    """Draw the figures of a result file; those of one state show the highest pressure unless --pressure is given."""
-    action("plot").plot(file, folder, format.value, only or (), pressure, mode, animate or (), as_json)
+    """Draw the figures of a result file; those of one state show the highest pressure unless --pressure is given.
+
+    Of a case file: the valve with its measures, wall and layers, before anything is solved.
+    """
+    chosen = (only or (), pressure, mode, animate or (), overrides or ())
+    action("plot").plot(file, folder, format.value, *chosen, as_json)

@@ -57,13 +57,16 @@ def frame(axes, points: np.ndarray) -> None:
 
 
 def mark_pieces(result: Result, *panels) -> None:
-    """Thin lines where duckbill, saddle and flange meet."""
+    """Thin lines where duckbill, saddle, cuff, flare and flange meet."""
     valve = result.case.valve
     if valve.key_points is not None:
         return
     for axes in panels:
-        for z in (valve.duckbill_length, valve.duckbill_length + valve.saddle_length):
-            axes.axvline(z * 1e3, color="0.6", lw=0.8, ls=":")
+        z = 0.0
+        for length in (valve.duckbill_length, valve.saddle_length, valve.cuff_length, valve.flare_length):
+            z += length
+            if length > 0:
+                axes.axvline(z * 1e3, color="0.6", lw=0.8, ls=":")
 
 
 def unrolled(mesh: MeshData) -> tuple[np.ndarray, np.ndarray]:

@@ -1,5 +1,6 @@
 """The valve's mid-surface: sections, surfaces between them, and the graded mesh on it."""
 
+from .key_point_table import key_point_table
 from .sections import Profile, flange_section, key_point_sections, lip_section
 from .surface import Surface, surface_of
 from .valve_mesh import QUARTERS, ValveMesh, valve_mesh
@@ -11,6 +12,7 @@ __all__ = [
     "ValveMesh",
     "flange_section",
     "key_point_sections",
+    "key_point_table",
     "lip_section",
     "surface_of",
     "valve_mesh",

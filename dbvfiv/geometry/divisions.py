@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case.valve import Mesh, Valve
+from ..case.mesh import Mesh
+from ..case.valve import Valve
 from .surface import Surface
 
 #: Angles between two pieces of the surface up to which their joint counts for nothing and from which in full, rad.
@@ -40,14 +41,18 @@ def row_division(valve: Valve, mesh: Mesh, surface: Surface) -> Division:
     joints = surface.breaks
     if mesh.rows == "uniform":
         return divide(joints, (), mesh.along)
-    given = np.asarray(mesh.row_positions, float)
+    given = valve.scale * np.asarray(mesh.row_positions, float)
     if len(given):
         given[[0, -1]] = joints[[0, -1]]
         if len(given) == mesh.along + 1:
             return Division(given, np.zeros(0))
         return divide(given[[0, -1]], (), mesh.along, (given, np.arange(len(given), dtype=float)))
     wall = [step.to for step in valve.wall_map] if valve.wall == "measured" else []
-    breaks = [z for z in (*mesh.breaks, *wall) if joints[0] < z < joints[-1]]
+    asked = [valve.scale * z for z in mesh.breaks]
+    patches = [z for patch in valve.patches for z in patch.axial_edges]
+    if valve.key_points is not None:  # supports and loads change there, whatever the points do
+        asked += [valve.duckbill_length, valve.duckbill_length + valve.saddle_length]
+    breaks = [z for z in (*asked, *wall, *patches) if joints[0] < z < joints[-1]]
     law = _row_law(mesh, surface) if mesh.rows == "graded" else None
     return divide(joints, breaks, mesh.along, law)
 

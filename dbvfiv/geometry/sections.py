@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import BSpline, make_interp_spline
+
+from ..case.key_points import KeyProfile
+from ..case.lip import LipSizes
+
+#: Places at which the arc length of a key-point curve is kept, and Gauss points between them.
+_FINE = 401
+_GAUSS = np.polynomial.legendre.leggauss(6)
 
 
 @dataclass(frozen=True)
@@ -20,21 +26,35 @@ class Profile:
         Axial position, m.
     points : callable
         Positions (k, 2) in x and y, m, at normalised arc lengths s (k,) in 0 (centre) .. 1 (side edge).
+    length : float
+        Arc length, m.
+    joints : tuple of float
+        Normalised arc lengths at which the curvature jumps.
     """
 
     z: float
     points: Callable[[np.ndarray], np.ndarray]
+    length: float = np.nan
+    joints: tuple[float, ...] = ()
 
 
-def lip_section(half_width: float, radius: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Closed lip: straight at y = radius up to the half width, then a quarter circle down to y = 0 (App. A)."""
-    length = half_width + 0.5 * np.pi * radius
+def lip_section(lip: LipSizes) -> Callable[[np.ndarray], np.ndarray]:
+    """Lip: straight at y = radius up to the half width, then a quarter circle down to y = 0 (App. A); or bowed by a
+    rise.
+    """
+    radius, bow_length, turn = lip.radius, lip.bow_length, lip.turn
+    length = bow_length + lip.edge_length
 
     def points(s):
         arc = np.asarray(s) * length
-        angle = np.clip((arc - half_width) / radius, 0.0, 0.5 * np.pi)
-        x = np.where(arc < half_width, arc, half_width + radius * np.sin(angle))
-        return np.stack([x, radius * np.cos(angle)], axis=-1)
+        angle = np.clip((arc - bow_length) / radius, 0.0, 0.5 * np.pi - turn)
+        if turn == 0.0:
+            x = np.where(arc < bow_length, arc, bow_length + radius * np.sin(angle))
+            return np.stack([x, radius * np.cos(angle)], axis=-1)
+        bent = np.minimum(arc / lip.bow, turn)
+        x = lip.bow * np.sin(bent) + radius * (np.sin(turn + angle) - np.sin(turn))
+        y = lip.height - 2.0 * lip.bow * np.sin(0.5 * bent) ** 2 + radius * (np.cos(turn + angle) - np.cos(turn))
+        return np.stack([x, y], axis=-1)
 
     return points
 
@@ -49,30 +69,82 @@ def flange_section(radius: float) -> Callable[[np.ndarray], np.ndarray]:
     return points
 
 
-def key_point_sections(points: np.ndarray) -> list[Profile]:
-    """Profiles through given key points.
+def lip_profile(z: float, lip: LipSizes) -> Profile:
+    """Profile of a lip at an axial position, m; the curvature jumps where its side edge begins."""
+    length = lip.bow_length + lip.edge_length
+    return Profile(z, lip_section(lip), length, (lip.bow_length / length,))
 
-    Parameters
-    ----------
-    points : (profiles, points, 3) array, m
-        From lip to flange; each profile from the centre to the side edge at one axial position.
 
-    Each profile is a cubic spline through its points over the chord length, evaluated at equal normalised arc length,
-    as the thesis's program draws its lines (App. A).
+def round_profile(z: float, radius: float) -> Profile:
+    """Profile of a round part, radius in m, at an axial position, m."""
+    return Profile(z, flange_section(radius), 0.5 * np.pi * radius)
+
+
+def key_point_sections(profiles: Sequence[KeyProfile], scale: float = 1.0) -> list[Profile]:
+    """Profiles through given key points, multiplied by a scale, each at equal normalised arc length.
+
+    A profile is a spline through its points over the chord length, cubic as the thesis's program draws its lines (App.
+    A). Where a table marks joints it is one between each two of them, of degree five as far as their points allow.
     """
-    return [
-        Profile(float(np.mean(profile[:, 2])), _spline_section(profile[:, :2])) for profile in np.asarray(points, float)
-    ]
+    return [Profile(scale * profile.z, *_spline_section(profile, scale)) for profile in profiles]
 
 
-def _spline_section(xy: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(xy, axis=0), axis=1))])
-    curve = make_interp_spline(chord, xy, k=3)
-    fine = np.linspace(0.0, chord[-1], 4001)
-    speed = np.linalg.norm(curve.derivative()(fine), axis=1)
-    arc = cumulative_simpson(speed, x=fine, initial=0.0)
+def _spline_section(profile: KeyProfile, scale: float) -> tuple[Callable[[np.ndarray], np.ndarray], float]:
+    """Points at normalised arc lengths, and the length, m."""
+    xy = scale * np.asarray(profile.points, float)[:, :2]
+    ends = [0, *profile.joints, len(xy) - 1]
+    degree = 5 if profile.smooth else 3
+    pieces = [_Piece.through(xy[a : b + 1], degree) for a, b in zip(ends[:-1], ends[1:])]
+    starts = np.concatenate([[0.0], np.cumsum([piece.length for piece in pieces])])
 
     def points(s):
-        return curve(np.interp(np.asarray(s) * arc[-1], arc, fine))
+        arc = np.asarray(s, float) * starts[-1]
+        number = np.clip(np.searchsorted(starts, arc, side="right") - 1, 0, len(pieces) - 1)
+        out = np.empty((len(arc), 2))
+        for i, piece in enumerate(pieces):
+            chosen = number == i
+            if np.any(chosen):
+                out[chosen] = piece.at(arc[chosen] - starts[i])
+        return out
 
-    return points
+    return points, float(starts[-1])
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A smooth curve and its arc length at even places of its parameter."""
+
+    curve: BSpline
+    slope: BSpline
+    places: np.ndarray
+    arc: np.ndarray
+
+    @classmethod
+    def through(cls, xy: np.ndarray, degree: int) -> _Piece:
+        """Spline through points (k, 2) over their chord length."""
+        chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(xy, axis=0), axis=1))])
+        highest = min(degree, len(xy) - 1)
+        curve = make_interp_spline(chord, xy, k=highest - 1 + highest % 2)
+        slope = curve.derivative()
+        places = np.unique(np.concatenate([np.linspace(0.0, chord[-1], _FINE), chord]))
+        steps = _arc(slope, places[:-1], places[1:])
+        return cls(curve, slope, places, np.concatenate([[0.0], np.cumsum(steps)]))
+
+    @property
+    def length(self) -> float:
+        return float(self.arc[-1])
+
+    def at(self, arc: np.ndarray) -> np.ndarray:
+        """Points (k, 2) at arc lengths (k,), found by Newton's method."""
+        place = np.interp(arc, self.arc, self.places)
+        for _ in range(3):
+            before = np.clip(np.searchsorted(self.places, place, side="right") - 1, 0, len(self.places) - 2)
+            missed = self.arc[before] + _arc(self.slope, self.places[before], place) - arc
+            place = np.clip(place - missed / np.linalg.norm(self.slope(place), axis=1), 0.0, self.places[-1])
+        return self.curve(place)
+
+
+def _arc(slope: BSpline, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Arc lengths (k,) of a curve between parameters (k,)."""
+    half, middle = 0.5 * (end - start), 0.5 * (end + start)
+    return half * sum(w * np.linalg.norm(slope(middle + x * half), axis=1) for x, w in zip(*_GAUSS))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from ..case.key_points import read_key_points
 from ..case.valve import Valve
-from .sections import Profile, flange_section, key_point_sections, lip_section
+from .sections import Profile, key_point_sections, lip_profile, round_profile
 
 
 @dataclass(frozen=True)
@@ -56,14 +58,52 @@ class Surface:
         points = self.section(z, np.linspace(0.0, 1.0, 8001))
         return float(np.sum(0.5 * (points[1:, 1] + points[:-1, 1]) * np.diff(points[:, 0])))
 
+    def length(self, z: float) -> float:
+        """Arc length of the section, m: of the profile that lies there, else of the polygon through 8001 points."""
+        near = next((p for p in self.profiles if abs(p.z - z) <= 1e-9 * self.profiles[-1].z), None)
+        if near is not None and np.isfinite(near.length):
+            return near.length
+        return float(np.linalg.norm(np.diff(self.section(z, np.linspace(0.0, 1.0, 8001)), axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True)
+class SmoothSurface(Surface):
+    """Profiles joined by curves along the axis that do not overshoot (monotone cubics, Fritsch and Carlson 1980)."""
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Axial positions of the ends, m; between them the surface has no joints."""
+        return np.array([self.profiles[0].z, self.profiles[-1].z])
+
+    def section(self, z: float, s: np.ndarray) -> np.ndarray:
+        """Points (k, 3) of the section at the axial position z, normalised arc lengths s (k,)."""
+        s = np.asarray(s, float)
+        xy = self._curve(s.tobytes())(np.clip(z, *self.breaks))
+        return np.column_stack([xy, np.full(len(xy), z)])
+
+    @lru_cache(maxsize=8)  # noqa: B019
+    def _curve(self, s: bytes) -> PchipInterpolator:
+        places = np.frombuffer(s)
+        heights = np.stack([profile.points(places) for profile in self.profiles])
+        return PchipInterpolator([profile.z for profile in self.profiles], heights, axis=0)
+
 
 def surface_of(valve: Valve) -> Surface:
-    """Surface of a valve: from its key points if it has any, else lip, saddle and flange (App. A)."""
+    """Surface of a valve: from its key points if it has any, else lip, saddle, cuff, flare and flange (App. A)."""
     if valve.key_points is not None:
-        return Surface(tuple(key_point_sections(read_key_points(valve.key_points))))
-    lip = lip_section(valve.lip_half_width, valve.lip_radius)
-    flange = flange_section(valve.flange_radius)
-    joint = valve.duckbill_length
-    cuff = joint + valve.saddle_length
-    profiles = (Profile(0.0, lip), Profile(joint, lip), Profile(cuff, flange), Profile(valve.length, flange))
-    return Surface(profiles, smooth=valve.saddle == "smooth")
+        profiles = tuple(key_point_sections(read_key_points(valve.key_points), valve.scale))
+        return SmoothSurface(profiles) if valve.key_point_skin == "smooth" else Surface(profiles)
+    profiles, end = [lip_profile(0.0, valve.lip)], 0.0
+    pieces = (
+        (valve.duckbill_length, lip_profile, valve.lip),
+        (valve.saddle_length, round_profile, valve.cuff_radius),
+        (valve.cuff_length, round_profile, valve.cuff_radius),
+        (valve.flare_length, round_profile, valve.flange_radius),
+        (valve.flange_length, round_profile, valve.flange_radius),
+    )
+    for length, profile, size in pieces:
+        end += length
+        if length > 0:
+            profiles.append(profile(end, size))
+    profiles[-1] = replace(profiles[-1], z=valve.length)
+    return Surface(tuple(profiles), smooth=valve.saddle == "smooth")

@@ -6,9 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case.valve import Mesh, Valve
-from .divisions import column_division, grading, row_division
-from .surface import Surface, surface_of
+from ..case.mesh import Mesh
+from ..case.valve import Valve
+from ..errors import CaseError
+from .divisions import column_division, grading, inverse_grading, row_division
+from .surface import surface_of
+from .wall_area import wall_deduction
 
 #: Of the whole valve that a mesh is one of.
 QUARTERS = 4
@@ -73,8 +76,12 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=()) -> ValveMesh:
     ------
     ValueError
         If the mesh has fewer elements along than the surface has pieces.
+    CaseError
+        If patches of the wall leave no flow area.
     """
     surface = surface_of(valve)
+    edges = dict.fromkeys(s for patch in valve.patches for s in patch.section_edges if 0.0 < s < 1.0)
+    column_breaks = (*column_breaks, *(inverse_grading(s, mesh.grading) for s in edges))
     along, across = row_division(valve, mesh, surface), column_division(mesh, surface, column_breaks)
     z, columns = along.positions, across.positions
     s = grading(columns, mesh.grading)
@@ -84,6 +91,12 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=()) -> ValveMesh:
     count = mesh.around + 1
     rows = np.arange(len(z) * count, dtype=np.int32).reshape(len(z), count)
     quads = np.stack([rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]], axis=-1).reshape(-1, 4)
+    rest_area, taken = np.array([surface.area(level) for level in z]), wall_deduction(valve, z, surface)
+    if valve.patches and np.any(taken >= rest_area):
+        place = z[np.argmax(taken >= rest_area)]
+        raise CaseError(
+            f"valve.patches leave no flow area at z = {place:.4g} m; the wall must be thinner there.", "valve.patches"
+        )
     middle = 0.5 * (z[1:] + z[:-1])
     element_z = np.repeat(middle, mesh.around)
     return ValveMesh(
@@ -92,52 +105,19 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=()) -> ValveMesh:
         rows=rows,
         columns=columns,
         z=z,
-        thickness=np.array([valve.thickness_at(level) for level in element_z]),
+        thickness=_element_thickness(valve, element_z, grading(0.5 * (columns[1:] + columns[:-1]), mesh.grading)),
         element_z=element_z,
         element_columns=np.tile(np.stack([columns[:-1], columns[1:]], axis=1), (mesh.along, 1)),
-        rest_area=np.array([surface.area(level) for level in z]),
-        wall_deduction=wall_deduction(valve, z, surface),
+        rest_area=rest_area,
+        wall_deduction=taken,
         missed_rows=along.missed,
         missed_columns=across.missed,
     )
 
 
-def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
-    """Part of the section taken by the wall (Th. 4.12-4.14, App. A): constant on duckbill and flange, linear over the
-    saddle.
-
-    Raises
-    ------
-    ValueError
-        If the wall fills the section of the lip or of the flange that key points give.
-    """
-    if valve.key_points is None:
-        duckbill = valve.duckbill_wall_area
-        inner = valve.flange_radius - valve.flange_wall_deduction
-        flange = 0.25 * np.pi * (valve.flange_radius**2 - inner**2)
-    else:
-        duckbill, flange = _key_point_deductions(valve, surface)
-    joint = valve.duckbill_length
-    share = np.clip((np.asarray(z) - joint) / valve.saddle_length, 0.0, 1.0)
-    return duckbill + share * (flange - duckbill)
-
-
-def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float]:
-    """Areas taken by the wall at the lip and at the flange that key points give.
-
-    A face at the distance h inside a section of length L that turns by a right angle takes h L - pi h^2/4, which is
-    Th. 4.12 and 4.14 for the sections of App. A.
-    """
-    found = []
-    half_walls = (valve.duckbill_wall_deduction, valve.flange_wall_deduction)
-    for place, name, z, half in zip(("lip", "flange"), ("duckbill", "flange"), surface.breaks[[0, -1]], half_walls):
-        points = surface.section(z, np.linspace(0.0, 1.0, 8001))
-        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-        gap = valve.initial_gap * max(points[-1, 0] - half, 0.0) if place == "lip" else 0.0
-        found.append(half * length - 0.25 * np.pi * half**2 - gap)
-        if found[-1] >= surface.area(z):
-            raise ValueError(
-                f"The key points of the {place} leave no flow area inside a half wall of {half:g} m; it must be less, "
-                f"see valve.{name}_wall_deduction."
-            )
-    return found[0], found[1]
+def _element_thickness(valve: Valve, element_z: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """(ne,) thickness at the element centres, m; `across` (around,) are their shares of the section."""
+    if not valve.patches:
+        return np.array([valve.thickness_at(level) for level in element_z])
+    shares = np.tile(across, len(element_z) // len(across))
+    return np.array([valve.thickness_at(level, share) for level, share in zip(element_z, shares)])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SolveError
+from ..geometry.divisions import grading
 from ..materials.stability import stability_margin
 from ..observer import Observer
 from .load_steps import LoadStepOptions, LoadSteps
@@ -223,6 +224,7 @@ def _states(path: LoadPath, pressures: list[float], failures: list[str], observe
 
 def model_warnings(model: ValveModel) -> Iterator[str]:
     """Sentences about the model that hold whatever the load."""
+    mesh = model.case.mesh
     folded = model.shell.folded_places()
     if len(folded):
         (xa, _ya, za), (xb, _yb, zb) = folded.min(axis=0), folded.max(axis=0)
@@ -236,6 +238,14 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
         yield (
             f"{model.mesh.shape[1]} elements along are too few for a row on every step of the wall and every break "
             f"asked for: those at z = {places} m fall inside elements; raise mesh.along."
+        )
+    edges = {s for patch in model.case.valve.patches for s in patch.section_edges}
+    missed = [s for s in sorted(edges) if np.isclose(grading(model.mesh.missed_columns, mesh.grading), s).any()]
+    if missed:
+        places = ", ".join(f"{s:g}" for s in missed)
+        yield (
+            f"{model.mesh.shape[0]} elements around are too few for a column on every edge of a patch: those at "
+            f"{places} of the section fall inside elements; raise mesh.around."
         )
 
 

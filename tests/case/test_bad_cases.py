@@ -61,7 +61,7 @@ BAD = {
     "unknown choice": ("[fluid]\ncontinuity = 'steady'", '"quasi-steady" or "storage"'),
     "choice given as a number": ("[drive]\nkind = 1", '"flow" or "uniform"'),
     "outside flow": ("[drive]\nside = 'outside'", "drive.side.*uniform"),
-    "lips wider than the pipe": ("[valve]\nlip_half_width = 0.2", "lip_half_width.*wider than the pipe"),
+    "lips far wider than the pipe": ("[valve]\nlip_half_width = 3", "saddle_length.*wider than the pipe.*at least"),
     "no flow area at the lips": ("[valve]\nduckbill_wall_deduction = 0.02", "no flow area between the lips"),
     "no flow area at the flange": ("[valve]\nflange_wall_deduction = 0.2", "no flow area at the flange"),
     "wall thicker than the pipe": ("[valve]\nwall='uniform'\nwall_thickness=0.3", "fills the pipe"),
@@ -132,7 +132,7 @@ BAD = {
     ),
     "surrounding pipe inside the valve": (
         "[outside]\nfluid = 'same'\npipe_diameter = '250 mm'",
-        r"outside\.pipe_diameter is 250 mm around a flange of 294\.4 mm.*at least",
+        r"outside\.pipe_diameter is 250 mm around a valve of 294\.4 mm.*at least",
     ),
     "surrounding pipe that is a pressure": (
         "[outside]\npipe_diameter = '3 kPa'",

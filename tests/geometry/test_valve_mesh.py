@@ -7,11 +7,10 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from dbvfiv.case.key_points import POINTS, PROFILES
 from dbvfiv.case.model import Case
 from dbvfiv.geometry import surface_of, valve_mesh
 from dbvfiv.geometry.divisions import grading
-from dbvfiv.geometry.valve_mesh import wall_deduction
+from dbvfiv.geometry.wall_area import wall_deduction
 from dbvfiv.model.build import build_shell
 
 VALVE = Case().valve
@@ -123,7 +122,7 @@ def test_wall_deduction():
 def key_point_file(path, surface, s):
     """Nine profiles on the parametric surface, at the joints and at even distances between them."""
     z = [0.0, 0.105, 0.21, 0.28, 0.35, 0.42, 0.49, 0.525, 0.56]
-    assert len(z) == PROFILES and len(s) == POINTS
+    assert len(z) == 9 and len(s) == 15
     with path.open("w") as file:
         file.write("# x y z\n")
         for level in z:

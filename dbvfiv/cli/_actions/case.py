@@ -8,6 +8,7 @@ from ...case.reference import explain, explanation_text
 from ...case.section import Section
 from ...case.write import HEAD, case_toml
 from ...errors import CaseError
+from ...geometry import key_point_table
 from ...studies.case import Case, load_case
 from .._output import print_json
 
@@ -32,20 +33,41 @@ def write_new(target: str | None, overrides: list[str] | None, as_json: bool) ->
     """Write a commented starter; raises `CaseError` where that cannot be."""
     if target is None:
         raise CaseError("--new needs the name of the file to write, such as my.toml.")
-    path = Path(target)
     text = case_toml(load_case(None, (_PREDICTION, *(overrides or ()))), comments=True).replace(HEAD, HEAD + _SAID, 1)
+    _write(target, text)
+    if as_json:
+        print_json({"written": target})
+    else:
+        print(f"Wrote {target}; check it with `dbvfiv case {target}`.")
+
+
+def write_key_points(
+    target: str | None, file: Path, points: int, profiles: int, overrides: list[str] | None, as_json: bool
+) -> None:
+    """Write the shape of a case as key points; raises `CaseError` where that cannot be."""
+    valve = load_case(target, overrides or ()).valve
+    _write(str(file), key_point_table(valve, points, profiles))
+    instead = ("lip_half_width", "lip_rise", "lip_radius", "cuff_radius", "flange_radius", "saddle")
+    smooth = ', key_point_skin = "smooth"' if valve.saddle == "smooth" else ""
+    if as_json:
+        print_json({"written": str(file)})
+    else:
+        print(
+            f'Wrote {file}; edit it and give key_points = "{file.name}"{smooth} in [valve] in place of '
+            f"{', '.join(instead)}."
+        )
+
+
+def _write(target: str, text: str) -> None:
+    """Write a new file."""
     try:
-        with path.open("x") as file:
+        with Path(target).open("x") as file:
             file.write(text)
     except FileExistsError:
         raise CaseError(f"{target!r} exists already and is not overwritten; choose another name.") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "its name is not valid"
         raise CaseError(f"{target!r} cannot be written ({reason}).") from None
-    if as_json:
-        print_json({"written": target})
-    else:
-        print(f"Wrote {target}; check it with `dbvfiv case {target}`.")
 
 
 def explain_keys(key: str | None, as_json: bool) -> None:

@@ -1,10 +1,11 @@
-"""Figures and films of a result file."""
+"""Figures and films of a result file, and the picture of the valve of a case file."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from ...api import load
 from ...case.pressures import read_pressures
 from ...errors import CaseError
 from ...studies.session import load_result
@@ -20,15 +21,27 @@ def plot(
     pressure: str | None,
     mode: int | None,
     films: Sequence[int],
+    overrides: Sequence[str],
     as_json: bool,
 ) -> None:
-    """Draw the figures of a result, those of one state at the `pressure`, and films of modes or cycles.
+    """Draw the figures of a result, those of one state at the `pressure`, and films of modes or cycles; or the valve
+    of a case.
 
     Raises
     ------
     CaseError
-        If the result has no such figure or does not move.
+        If the result has no such figure or does not move, or an option does not go with a case or a result.
     """
+    if file.suffix.lower() == ".toml":
+        choices = {"--pressure": pressure, "--mode": mode, "--animate": films or None}
+        for name, value in choices.items():
+            if value is not None:
+                raise CaseError(f"{name} goes with a result file; the picture of {str(file)!r} is that of its valve.")
+        valve = load(file, list(overrides))
+        _say(valve.plot(folder, format, only=only), as_json)
+        return
+    if overrides:
+        raise CaseError(f"--set goes with a case file; {str(file)!r} is a result, whose case stays as it was.")
     choices: dict[str, object] = {}
     if pressure is not None:
         choices["pressure"] = read_pressures([pressure], "--pressure")[0]
@@ -38,6 +51,10 @@ def plot(
     makers = [_film(result, file, folder, number) for number in films]  # misuse shows before anything is drawn
     written = result.plot(folder, format, only=only, **choices)
     written += [make() for make in makers]
+    _say(written, as_json)
+
+
+def _say(written: Sequence[Path], as_json: bool) -> None:
     if as_json:
         print_json({"written": [str(path) for path in written]})
     else:

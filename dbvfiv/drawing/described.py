@@ -1,0 +1,174 @@
+"""The valve as its case describes it, before anything is solved: faces, measures, wall, plies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from ..case.model import Case
+from ..model import ValveModel
+from ..record.mesh import MeshData
+from .axes import HALO, colour_bar, headline
+from .faces import ValveSkin, faces
+from .style import COMPUTED, MAGNITUDE, REST, new_figure
+from .views import draw_skin, unrolled
+
+_COLOURS = matplotlib.colormaps[MAGNITUDE]
+#: Of rubbers and of plies in the picture of the layers.
+_RUBBER, _PLY = "#c9ced6", "#e8b878"
+
+
+def drawers_of(model: ValveModel) -> dict[str, Callable[[], Figure]]:
+    """Pictures of a valve by name."""
+    return {"valve": lambda: valve_figure(model)}
+
+
+def valve_figure(model: ValveModel) -> Figure:
+    """The valve in space, in its two planes of symmetry and in sections with measures, its wall and its layers."""
+    case, mesh = model.case, MeshData.of(model)
+    wall = 1e3 * mesh.thickness
+    scale = Normalize(wall.min(), wall.max() if wall.max() > wall.min() else wall.max() * 1.001)
+    figure = new_figure(11.6, 10.4)
+    grid = figure.add_gridspec(3, 3, width_ratios=(1.35, 1.35, 1.0), height_ratios=(1.5, 1.0, 1.0))
+    _in_space(figure.add_subplot(grid[0, :2], projection="3d", computed_zorder=False), mesh, scale)
+    _sections(figure.add_subplot(grid[0, 2]), case, mesh)
+    _plane(figure.add_subplot(grid[1, :2]), case, mesh, 1)
+    _plane(figure.add_subplot(grid[2, :2]), case, mesh, 0)
+    _wall(figure, figure.add_subplot(grid[1, 2]), mesh, scale)
+    _layers(figure.add_subplot(grid[2, 2]), case, mesh)
+    headline(figure, _title(model))
+    return figure
+
+
+def _title(model: ValveModel) -> str:
+    case, shell = model.case, model.shell
+    volume = 4.0 * float(np.sum(shell.geometry.area.sum(axis=1) * shell.mesh.thickness))
+    weight = volume * float(shell.section.inertia[0])
+    passage = 4e4 * (model.mesh.rest_area - model.mesh.wall_deduction)
+    lip, inlet = passage[0], passage[-1]
+    scaled = f", {case.valve.scale:g} times as given" if case.valve.scale != 1.0 else ""
+    return (
+        f"Valve as described{scaled}: {1e3 * case.valve.length:.4g} mm long, wall of {weight:.3g} kg\n"
+        f"passage at rest {lip:.3g} cm² at the lips, {inlet:.4g} cm² at the inlet"
+    )
+
+
+def _in_space(axes, mesh: MeshData, scale: Normalize) -> None:
+    """Both faces of the whole valve, coloured by the thickness of the wall."""
+    skin = ValveSkin.of(mesh)
+    corners = skin.corners(np.zeros((len(mesh.nodes), 5)))[:, :, [2, 0, 1]] * 1e3
+    cells = len(skin.valve.quads)
+    values = np.concatenate([1e3 * mesh.thickness[skin.valve.cell]] * 2)
+    rim = len(skin.quads) - 2 * cells
+    colours = np.concatenate([_COLOURS(scale(values)), np.full((rim, 4), (0.75, 0.75, 0.75, 1.0))])
+    draw_skin(axes, corners, colours, zoom=1.12)
+
+
+def _plane(axes: Axes, case: Case, mesh: MeshData, across: int) -> None:
+    """Wall in the plane x = 0 (across 1: y over z) or y = 0 (across 0), mirrored, with the lengths of its pieces."""
+    line = mesh.rows[:, 0 if across else -1]
+    inner, outer = (1e3 * face[line] for face in faces(mesh))
+    for sign in (1.0, -1.0):
+        axes.fill(
+            np.concatenate([inner[:, 2], outer[::-1, 2]]),
+            sign * np.concatenate([inner[:, across], outer[::-1, across]]),
+            color="0.85",
+            lw=0,
+        )
+        for face, width in ((inner, 1.6), (outer, 0.9)):
+            axes.plot(face[:, 2], sign * face[:, across], color=COMPUTED, lw=width)
+        axes.plot(1e3 * mesh.nodes[line, 2], sign * 1e3 * mesh.nodes[line, across], color=REST, lw=0.6, ls="--")
+    top = max(outer[:, across].max(), inner[:, across].max())
+    for row, side in ((0, "right"), (-1, "left")):
+        place = outer[row]
+        axes.annotate(
+            f"{2 * place[across]:.4g} mm",
+            (place[2], -place[across]),
+            textcoords="offset points",
+            xytext=(-6 if side == "right" else 6, 4),
+            ha=side,
+            path_effects=HALO,
+        )
+    if across:
+        _measure_pieces(axes, case, 1.18 * top)
+    axes.set_ylim(-1.15 * top, (1.5 if across else 1.15) * top)
+    axes.set_xlim(-0.28e3 * case.valve.length, 1.28e3 * case.valve.length)
+    axes.set_aspect("equal")
+    axes.set_ylabel("y, mm" if across else "x, mm")
+    if not across:
+        axes.set_xlabel("Distance from the lip z, mm")
+    name = "Plane x = 0" if across else "Plane y = 0: side edges"
+    axes.set_title(f"{name}, faces (full) and middle of the wall", loc="left", fontweight="bold")
+
+
+def _measure_pieces(axes: Axes, case: Case, height: float) -> None:
+    """Lengths of the pieces between arrows."""
+    begin = 0.0
+    for name in ("duckbill", "saddle", "cuff", "flare", "flange"):
+        length = 1e3 * getattr(case.valve, f"{name}_length")
+        if length == 0:
+            continue
+        arrow = {"arrowstyle": "<->", "lw": 0.9, "color": "0.3", "shrinkA": 0, "shrinkB": 0}
+        axes.annotate("", (begin, height), (begin + length, height), arrowprops=arrow)
+        axes.text(begin + 0.5 * length, 1.03 * height, f"{name}\n{length:.4g}", ha="center", va="bottom", fontsize=8)
+        begin += length
+
+
+def _sections(axes: Axes, case: Case, mesh: MeshData) -> None:
+    """Inner and outer face of the lip and of the inlet, of a quarter."""
+    inner, outer = faces(mesh)
+    for row, name, look in ((0, "lip", COMPUTED), (-1, "inlet", "0.45")):
+        nodes = mesh.rows[row]
+        for face, width, label in ((inner, 1.6, name), (outer, 0.8, None)):
+            axes.plot(*(1e3 * face[nodes, :2].T), color=look, lw=width, label=label)
+    axes.set_aspect("equal")
+    axes.set_xlim(left=0)
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    axes.set_xlabel("x, mm")
+    axes.set_ylabel("y, mm")
+    axes.set_title("Sections, inner face thick", loc="left", fontweight="bold")
+    axes.legend(loc="upper right")
+
+
+def _wall(figure: Figure, axes: Axes, mesh: MeshData, scale: Normalize) -> None:
+    """Thickness over the unrolled quarter."""
+    arc, z = unrolled(mesh)
+    values = 1e3 * mesh.thickness.reshape(mesh.shape[::-1])
+    axes.pcolormesh(1e3 * z, 1e3 * arc, values, cmap=_COLOURS, norm=scale, shading="flat", edgecolor="1", lw=0.1)
+    axes.set_xlabel("z, mm")
+    axes.set_ylabel("Arc from x = 0, mm")
+    axes.grid(False)
+    axes.set_title("Thickness and mesh", loc="left", fontweight="bold")
+    colour_bar(figure, ScalarMappable(scale, _COLOURS), axes, "Wall, mm", aspect=18)
+
+
+def _layers(axes: Axes, case: Case, mesh: MeshData) -> None:
+    """Layers from inside (below) to outside where the lip is, with their angles, true to their shares."""
+    wall, place = 1e3 * mesh.thickness[0], 0.0
+    for share, title, layer in zip(mesh.layer_fractions, mesh.layer_titles(), case.layers):
+        height = wall * share
+        ply = layer.material == "fibre" or bool(layer.angle)
+        axes.barh(place + 0.5 * height, 1.0, height, color=_PLY if ply else _RUBBER, edgecolor="white", lw=1.2)
+        axes.text(0.02, place + 0.5 * height, title, va="center", fontsize=8)
+        axes.text(0.98, place + 0.5 * height, f"{height:.3g} mm", va="center", ha="right", fontsize=8)
+        place += height
+    axes.set_xlim(0, 1)
+    axes.set_ylim(0, place)
+    axes.set_xticks([])
+    axes.grid(False)
+    axes.set_ylabel("From the inner face, mm")
+    axes.set_title("Layers at the middle of the lip", loc="left", fontweight="bold")
+    axes.legend(
+        handles=[Patch(color=_RUBBER, label="rubber"), Patch(color=_PLY, label="ply, angle from the axis")],
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.02),
+        ncols=2,
+        fontsize=8,
+    )

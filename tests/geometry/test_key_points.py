@@ -1,0 +1,192 @@
+"""Key points of any number: tables with units and joints, the parametric shape written and read back, slips refused."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.case.key_points import read_key_points
+from dbvfiv.geometry import key_point_table, surface_of, valve_mesh
+from dbvfiv.studies.case import Case
+
+WIDE = {
+    "valve.lip_half_width": 0.18,
+    "valve.flange_radius": 0.1,
+    "valve.wall": "uniform",
+    "valve.wall_thickness": 0.01,
+    "mesh.around": 10,
+    "mesh.along": 16,
+}
+SHAPE = ("lip_half_width", "lip_rise", "lip_radius", "cuff_radius", "flange_radius", "saddle")
+
+
+def by_points(case: Case, folder, points: int = 17, extra: int = 0, **more) -> Case:
+    """The same case by key points that are written from it."""
+    (folder / "points.csv").write_text(key_point_table(case.valve, points, extra))
+    data = case.to_dict()
+    for name in SHAPE:
+        data["valve"].pop(name)
+    return Case.from_dict(data).replace({"valve.key_points": str(folder / "points.csv")} | more)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {},
+        {"valve.lip_rise": 0.01},
+        {"valve.cuff_length": 0.06, "valve.cuff_radius": 0.09, "valve.flare_length": 0.05},
+        {"valve.scale": 0.4},
+        {"valve.saddle": "smooth"},
+    ],
+)
+def test_the_parametric_shape_comes_back(more, tmp_path):
+    case = Case().replace(WIDE | more)
+    skin = {"valve.key_point_skin": "smooth"} if "valve.saddle" in more else {}
+    again = by_points(case, tmp_path, 65, **skin)
+    one, two = (valve_mesh(c.valve, c.mesh, (0.5,)) for c in (case, again))
+    size = case.valve.length
+    assert two.z == pytest.approx(one.z, abs=1e-9 * size)
+    assert two.nodes == pytest.approx(one.nodes, abs=(1e-9 if skin else 1e-12) * size)
+    passage = one.rest_area - one.wall_deduction
+    assert two.rest_area - two.wall_deduction == pytest.approx(passage, rel=1e-8)
+
+
+def test_a_wide_bill_by_points_and_by_parameters_is_one_valve(tmp_path):
+    """Flow, opening and modes of a bill 1.86 times as wide as its pipe agree to 1e-10."""
+    case = Case().replace(WIDE | {"steady.tolerance": 1e-12})
+    again = by_points(case, tmp_path, 65)
+    states = [dbvfiv.Valve(c).steady(pressure=5e3) for c in (case, again)]
+    one, two = states
+    assert two.mass_flow == pytest.approx(one.mass_flow, rel=1e-10)
+    size = np.abs(one.nodal[:, :3]).max()
+    assert two.nodal[:, :3] == pytest.approx(one.nodal[:, :3], abs=1e-10 * size)
+    found = [np.array([(m.growth_rate, m.frequency) for m in s.modes(count=3, in_vacuo=True).modes]) for s in states]
+    assert found[1] == pytest.approx(found[0], rel=1e-10)
+
+
+def test_few_points_give_nearly_the_same_shape(tmp_path):
+    case = Case().replace(WIDE)
+    fine = np.linspace(0.0, 1.0, 201)
+    own = surface_of(case.valve)
+    for points, error in ((6, 1e-6), (17, 1e-10)):
+        given = surface_of(by_points(case, tmp_path, points).valve)
+        away = max(np.abs(given.section(z, fine) - own.section(z, fine)).max() for z in own.breaks)
+        assert away < error
+    more = by_points(case, tmp_path, 17, 5)
+    assert len(surface_of(more.valve).profiles) == 9
+    mesh, plain = (valve_mesh(c.valve, c.mesh) for c in (more, case))
+    rest = np.interp(mesh.z, plain.z, plain.rest_area)
+    assert mesh.rest_area == pytest.approx(rest, rel=2e-2)
+
+
+def test_a_smooth_skin_goes_through_its_profiles_and_needs_no_row_on_them(tmp_path):
+    """An elliptic bill that opens into a round pipe, of 21 profiles: on 16 rows too."""
+    angle = np.linspace(0, np.pi / 2, 21)
+    with (tmp_path / "ellipses.csv").open("w") as file:
+        file.write("x [cm]; y [cm]; z [m]\n")
+        for z in np.linspace(0.0, 0.56, 21):
+            a, b = 15.0 - 5.0 * np.sin(np.pi * z / 1.12), 1.0 + 9.0 * np.sin(np.pi * z / 1.12) ** 2
+            file.writelines(f"{a * np.sin(t):.12f}; {b * np.cos(t):.12f}; {z:.12f}\n" for t in angle)
+    given = {"valve.key_points": str(tmp_path / "ellipses.csv"), "mesh.along": 16, "mesh.around": 8}
+    case = Case().replace(given | {"valve.key_point_skin": "smooth"})
+    mesh = valve_mesh(case.valve, case.mesh)
+    assert mesh.shape == (8, 16)
+    a, b = 0.15 - 0.05 * np.sin(np.pi * mesh.z / 1.12), 0.01 + 0.09 * np.sin(np.pi * mesh.z / 1.12) ** 2
+    assert mesh.rest_area == pytest.approx(np.pi / 4 * a * b, rel=3e-3)
+    assert case.valve.inlet_radius == pytest.approx(0.1, rel=1e-6)
+    with pytest.raises(ValueError, match="the surface has 20 pieces and each needs an element"):
+        ruled = Case().replace(given)
+        valve_mesh(ruled.valve, ruled.mesh)
+
+
+def test_forms_of_a_table(tmp_path):
+    """Separators, units, order of columns, words for profiles; bare lines in m."""
+    rows = [
+        (0.0, 0.02, 0.0),
+        (0.05, 0.015, 0.0),
+        (0.06, 0.0, 0.0),
+        (0.0, 0.04, 0.3),
+        (0.03, 0.03, 0.3),
+        (0.04, 0.0, 0.3),
+    ]
+    texts = {
+        "bare": "".join(f"{x} {y} {z}\n" for x, y, z in rows),
+        "bare commas": "".join(f"{x}, {y}, {z}  # a point\n" for x, y, z in rows),
+        "table": "x [m], y [m], z [m]\n" + "".join(f"{x}, {y}, {z}\n" for x, y, z in rows),
+        "millimetres": "Z (mm)\tX (mm)\tY (cm)\n" + "".join(f"{1e3 * z}\t{1e3 * x}\t{1e2 * y}\n" for x, y, z in rows),
+        "words": "profile; x [m]; y [m]; z [m]; joint\n"
+        + "".join(f"{'lip' if z == 0 else 'flange'}; {x}; {y}; {z}; 0\n" for x, y, z in rows),
+    }
+    for name, text in texts.items():
+        (tmp_path / "points.csv").write_text(text)
+        found = read_key_points(tmp_path / "points.csv")
+        assert [len(profile.points) for profile in found] == [3, 3], name
+        assert np.array([p for profile in found for p in profile.points]) == pytest.approx(np.array(rows)), name
+
+
+GOOD = ["x [mm], y [mm], z [mm]", "0, 20, 0", "50, 15, 0", "60, 0, 0", "0, 40, 560", "30, 30, 560", "40, 0, 560"]
+
+
+def changed(line: int, text: str | None) -> str:
+    lines = list(GOOD)
+    lines[line : line + 1] = [] if text is None else text.split("|")
+    return "\n".join(lines)
+
+
+BAD = {
+    "empty": ("", "which holds no points"),
+    "comments alone": ("# nothing\n\n# here", "which holds no points"),
+    "header alone": (GOOD[0], "no points below its first line"),
+    "no unit": (changed(0, "x, y, z"), "column x has no unit of length"),
+    "unit of another dimension": (changed(0, "x [mm], y [kPa], z [mm]"), "column y has no unit of length"),
+    "unknown unit": (changed(0, "x [mm], y [mm], z [furlung]"), "column z has no unit of length"),
+    "no column y": (changed(0, "x [mm], u [mm], z [mm]"), "names no column y"),
+    "column twice": (changed(0, "x [mm], y [mm], z [mm], x [mm]"), "names no column x, or several"),
+    "unknown column": (changed(0, "x [mm], y [mm], z [mm], weight [kg]"), "not told or stands twice"),
+    "word for a number": (changed(2, "50, fifteen, 0"), "line 3 is not three numbers"),
+    "number missing": (changed(2, "50, 15"), "line 3 has 2 entries and not 3"),
+    "number too many": (changed(2, "50, 15, 0, 7"), "line 3 has 4 entries and not 3"),
+    "not finite": (changed(2, "50, inf, 0"), "line 3 is not three numbers"),
+    "one profile": ("\n".join(GOOD[:4]), "holds one profile"),
+    "two points in a profile": (changed(5, None), "profile 2 at z = 0.56 m has 2 points"),
+    "does not begin at the centre": (changed(1, "5, 20, 0"), "profile 1 at z = 0 m does not run from the centre"),
+    "does not end at the side edge": (changed(6, "40, 3, 560"), "profile 2 at z = 0.56 m does not run from"),
+    "backwards": ("\n".join([GOOD[0], *GOOD[3:0:-1], *GOOD[4:]]), "profile 1 at z = 0 m does not run from"),
+    "below the plane": (changed(2, "50, -15, 0"), "leaves the quarter"),
+    "same point twice": (changed(2, "50, 15, 0|50, 15, 0"), "has the same point twice"),
+    "flange first": ("\n".join([GOOD[0], *GOOD[4:], *GOOD[1:4]]), "do not go from the lip to the flange"),
+    "does not begin at the lip": ("\n".join(GOOD).replace(", 0\n", ", 7\n"), "first profile lies at z = 0.007 m"),
+    "profiles mixed": (
+        "profile, x [mm], y [mm], z [mm]\n" + "\n".join(f"{'ab'[i % 2]}, {row}" for i, row in enumerate(GOOD[1:])),
+        "points of a profile do not follow each other",
+    ),
+    "too short a valve": ("\n".join(GOOD).replace("560", "400"), "profiles end at z = 0.4 m; the lengths .*0.56 m"),
+    "bare word among numbers": ("0 20 0\n50 x 0\n", "line 2 is not three numbers"),
+    "binary": ("\x00\x01", "line 1 is not three numbers"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_tables(name, tmp_path, command_line, one_sentence):
+    text, words = BAD[name]
+    (tmp_path / "points.csv").write_text(text)
+    (tmp_path / "case.toml").write_text("[valve]\nkey_points = 'points.csv'\n")
+    done = command_line("case", tmp_path / "case.toml")
+    assert done.status == 2 and not done.out
+    message = done.err.replace("points.csv", "points").replace("case.toml", "case")
+    assert one_sentence(message), message
+    assert re.search(words, done.err)
+
+
+def test_the_command_writes_a_table(tmp_path, command_line):
+    target = tmp_path / "own.csv"
+    done = command_line("case", "--key-points", target, "--points", 9, "--set", "valve.lip_half_width=0.16")
+    assert done.status == 0 and 'key_points = "own.csv"' in done.out
+    profiles = read_key_points(target)
+    assert [len(profile.points) for profile in profiles] == [17, 17, 17, 17] and profiles[0].joints == (8,)
+    assert command_line("case", "--key-points", target).status == 2  # not overwritten
+    assert command_line("case", "--set", f"valve.key_points={target}", "--key-points", tmp_path / "b.csv").status == 2
+    assert command_line("case", "--key-points", target, "--new").status == 2
