@@ -10,6 +10,7 @@ from pydantic import ValidationInfo, model_validator
 from . import physics
 from .damping import Damping
 from .downstream import Downstream
+from .gravity import Gravity
 from .load import make_case, put
 from .materials import DEFAULT_LAYERS, Layer, Materials
 from .outside import Outside
@@ -48,6 +49,7 @@ class Case(Section):
     upstream: Upstream = key(Upstream(), "The line in front of the valve.")
     downstream: Downstream = key(Downstream(), "What the valve discharges into.")
     outside: Outside = key(Outside(), "The fluid outside the wall.")
+    gravity: Gravity = key(Gravity(), "The weight of wall and fluid.")
     supports: physics.Supports = key(physics.Supports(), "One-sided stops of the lips.")
 
     @model_validator(mode="before")
@@ -118,7 +120,12 @@ class Case(Section):
     @property
     def rest_pressure(self) -> float:
         """The drive.pressure, Pa, at which nothing flows."""
-        return self.downstream.pressure if self.drive.kind == "flow" else 0.0
+        return self.downstream.pressure + self.level_pressure if self.drive.kind == "flow" else 0.0
+
+    @property
+    def level_pressure(self) -> float:
+        """By how much the fluid's levels raise it, Pa: weight of the fluid up to an outlet that is higher."""
+        return self.fluid.density * self.gravity.along * self.valve.length if self.drive.kind == "flow" else 0.0
 
     @property
     def has_waves(self) -> bool:

@@ -150,6 +150,16 @@ class LineChannel(FlowLaw):
         return self.channel.back
 
     @property
+    def level(self) -> float:
+        """That of the channel."""
+        return self.channel.level
+
+    @property
+    def static(self):
+        """That of the channel."""
+        return self.channel.static
+
+    @property
     def storage(self) -> float:
         """Blend of the continuity laws."""
         return self.channel.storage

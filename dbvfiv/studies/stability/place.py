@@ -142,10 +142,24 @@ def describe_fixed(case: Case, *moved: str) -> str:
 
 
 def is_surrounding(case: Case, name: str) -> bool:
-    """Whether a parameter leaves the steady state and the linearised structure of a case as they are; the length of a
-    line does where it has no friction.
+    """Whether a parameter leaves the steady state and the linearised structure of a case as they are."""
+    return PARAMETERS[name].surrounding and not why_it_moves(case, name)
+
+
+def why_it_moves(case: Case, name: str) -> str:
+    """Why a parameter that leaves steady states alone as a rule moves them in a case, as a clause; empty where it does
+    not: the length of a line does where it has no friction, and the density without gravity.
     """
-    return PARAMETERS[name].surrounding and not (name == "pipe_length" and case.upstream.has_friction)
+    if name == "pipe_length" and case.has_line and case.upstream.has_friction:
+        return "friction in the line moves the steady state with it"
+    if name == "density" and case.gravity.is_there:
+        return "the weight of the fluid moves the steady state with it"
+    return ""
+
+
+def moving_surroundings(case: Case) -> tuple[str, ...]:
+    """Parameters of the surroundings that move the steady states of a case."""
+    return tuple(name for name in ("pipe_length", "density") if why_it_moves(case, name))
 
 
 def check_flow(case: Case) -> None:
@@ -225,7 +239,7 @@ def require_parameter(case: Case, name: str) -> None:
 
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
-    level (0.1 for 10 %), length of the line (m) where the steady state depends on it.
+    level (0.1 for 10 %); length of the line (m) and density (kg/m3) where the steady state depends on them.
 
     Raises
     ------
@@ -235,6 +249,8 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     changes: dict[str, object] = {}
     if "pipe_length" in design:
         changes["upstream.length"] = design["pipe_length"]
+    if "density" in design:
+        changes["fluid.density"] = design["density"]
     if "thickness" in design:
         changes["valve.thickness_factor"] = case.valve.thickness_factor * design["thickness"]
     if "strain" in design:
