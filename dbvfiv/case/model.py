@@ -97,12 +97,12 @@ class Case(Section):
         self.mesh.check_positions(self.valve.length)
         if self.drive.kind == "flow" and self.upstream.is_elastic and not self.fluid.unsteady:
             raise BrokenRule(
-                "upstream.wave_speed",
-                f"{self.upstream.wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
+                "upstream.pieces" if self.upstream.pieces else "upstream.wave_speed",
+                f"{self.upstream.first_wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
                 "give it with the unsteady law alone",
             )
         inlet = 2 * (self.valve.flange_radius - self.valve.flange_wall_deduction)
-        self.upstream.check_roughness(inlet)
+        self.upstream.check_pipes(inlet)
         self.downstream.check_pipe(inlet)
         self.outside.check_pipe(2 * self.valve.flange_radius + self.valve.thickness_at(self.valve.length))
         return self
@@ -110,7 +110,7 @@ class Case(Section):
     @property
     def has_line(self) -> bool:
         """Whether fluid comes through a pipe in front of the valve."""
-        return self.drive.kind == "flow" and self.upstream.length > 0
+        return self.drive.kind == "flow" and self.upstream.whole_length > 0
 
     @property
     def has_tail(self) -> bool:

@@ -8,7 +8,7 @@ from ..case.model import Case
 from ..flow import Channel, FlowLaw, UniformLoad
 from ..flow.elastic_line import ElasticLine, LineChannel
 from ..flow.terms import terms_of
-from ..flow.terms.line import Line
+from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
 from ..geometry import ValveMesh, valve_mesh
 from ..materials.damping import relaxation_from_case
@@ -74,9 +74,10 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
     rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, **given)
     if not case.has_waves:
         return rigid
-    line = next(term for term in terms if isinstance(term, Line))
+    line = next(term for term in terms if isinstance(term, (Line, PiecedLine)))
     pump = next((term for term in terms if isinstance(term, Pump)), None)
     rest = [term for term in terms if term not in (line, pump)]
     channel = Channel(mesh.z, floor, storage, terms=rest, **given)
-    waves = ElasticLine(line, case.upstream.wave_speed, case.upstream.elements, pump)
+    pipes = case.upstream.pipes
+    waves = ElasticLine(line, [pipe.wave_speed for pipe in pipes], [pipe.elements for pipe in pipes], pump)
     return LineChannel(channel, rigid, waves)

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 
 from ..case.model import Case
 from ..flow import RowAreas
-from ..flow.terms.line import Line
+from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
 from ..flow.terms.tail import Tail
 from ..geometry import QUARTERS, ValveMesh
@@ -96,17 +96,17 @@ class ValveModel:
         return self.shell.size
 
     @property
-    def line(self) -> Line | None:
-        """The pipe in front of the valve, if there is one."""
-        return self._term(Line)
+    def line(self) -> Line | PiecedLine | None:
+        """The pipe in front of the valve, or the pipes, if there is one."""
+        return self._term(Line, PiecedLine)
 
     @property
     def tail(self) -> Tail | None:
         """The pipe behind the valve, if there is one."""
         return self._term(Tail)
 
-    def _term(self, kind: type):
-        return next((term for term in getattr(self.flow, "terms", ()) if isinstance(term, kind)), None)
+    def _term(self, *kinds: type):
+        return next((term for term in getattr(self.flow, "terms", ()) if isinstance(term, kinds)), None)
 
     @property
     def pump(self) -> Pump | None:

@@ -65,9 +65,9 @@ class Place:
             damping.beta,
             storage,
             damping.loss_factor,
-            case.upstream.length if case.has_line else 0.0,
+            case.upstream.whole_length if case.has_line else 0.0,
             case.downstream.length if case.has_tail else 0.0,
-            case.upstream.wave_speed if case.has_waves else 0.0,
+            case.upstream.first_wave_speed if case.has_waves else 0.0,
             case.outside.fixed_density,
         )
 
@@ -121,10 +121,10 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
         "loss_factor": case.damping.loss_factor,
     }
     if case.has_line:
-        given["pipe_length"] = case.upstream.length
+        given["pipe_length"] = case.upstream.whole_length
     if case.has_tail and case.downstream.length:
         given["tail_length"] = case.downstream.length
-    if case.has_waves:
+    if case.has_waves and not case.upstream.pieces:
         given["wave_speed"] = case.upstream.wave_speed
     given = {name: value for name, value in given.items() if not case.damping.lacks(name)}
     if case.outside.is_there:
@@ -150,7 +150,7 @@ def why_it_moves(case: Case, name: str) -> str:
     """Why a parameter that leaves steady states alone as a rule moves them in a case, as a clause; empty where it does
     not: the length of a line does where it has no friction, and the density without gravity.
     """
-    if name == "pipe_length" and case.has_line and case.upstream.has_friction:
+    if name == "pipe_length" and case.has_line and not case.upstream.pieces and case.upstream.has_friction:
         return "friction in the line moves the steady state with it"
     if name == "density" and case.gravity.is_there:
         return "the weight of the fluid moves the steady state with it"
@@ -200,6 +200,12 @@ def require_parameter(case: Case, name: str) -> None:
         For strain levels without a rubber that has them, angles without a ply that has one, the length of a line that
         is not there, and what the model of damping does not have.
     """
+    if name in ("pipe_length", "wave_speed") and case.upstream.pieces:
+        raise CaseError(
+            f"There is no one {name} to change: the line has {len(case.upstream.pieces)} pieces, each with its own; "
+            "give a line of one pipe, or set the pieces one by one.",
+            key="upstream.pieces",
+        )
     if name == "pipe_length" and not case.has_line:
         raise CaseError(
             "There is no pipe_length to change: the valve has no line in front; give upstream.length (drive.pressure "
