@@ -158,7 +158,8 @@ def allowed_words(field: FieldInfo) -> str:
     if kind == "list of tables" and not _limits(field.metadata).get("min_length"):
         return "a list of tables"
     if kind in ("table", "list of tables", "tables"):
-        return {"table": "a table", "list of tables": "a list of at least one table", "tables": "tables"}[kind]
+        some = "a list of at least one table" if _limits(field.metadata).get("min_length") else "a list of tables"
+        return {"table": "a table", "list of tables": some, "tables": "tables"}[kind]
     if kind == "file":
         return "the name of a file that can be read"
     if kind.startswith("list of"):

@@ -10,6 +10,7 @@ from pydantic import ValidationInfo, model_validator
 from . import physics
 from .damping import Damping
 from .downstream import Downstream
+from .gravity import Gravity
 from .load import make_case, put
 from .materials import DEFAULT_LAYERS, Layer, Materials
 from .mesh import Mesh
@@ -49,6 +50,7 @@ class Case(Section):
     upstream: Upstream = key(Upstream(), "The line in front of the valve.")
     downstream: Downstream = key(Downstream(), "What the valve discharges into.")
     outside: Outside = key(Outside(), "The fluid outside the wall.")
+    gravity: Gravity = key(Gravity(), "The weight of wall and fluid.")
     supports: physics.Supports = key(physics.Supports(), "One-sided stops of the lips.")
 
     @model_validator(mode="before")
@@ -96,12 +98,12 @@ class Case(Section):
         self.mesh.check_positions(self.valve.as_given.length)
         if self.drive.kind == "flow" and self.upstream.is_elastic and not self.fluid.unsteady:
             raise BrokenRule(
-                "upstream.wave_speed",
-                f"{self.upstream.wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
+                "upstream.pieces" if self.upstream.pieces else "upstream.wave_speed",
+                f"{self.upstream.first_wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
                 "give it with the unsteady law alone",
             )
         inlet = 2 * (self.valve.inlet_radius - self.valve.flange_wall_deduction)
-        self.upstream.check_roughness(inlet)
+        self.upstream.check_pipes(inlet)
         self.downstream.check_pipe(inlet)
         self.outside.check_pipe(self.valve.outer_diameter)
         return self
@@ -109,7 +111,7 @@ class Case(Section):
     @property
     def has_line(self) -> bool:
         """Whether fluid comes through a pipe in front of the valve."""
-        return self.drive.kind == "flow" and self.upstream.length > 0
+        return self.drive.kind == "flow" and self.upstream.whole_length > 0
 
     @property
     def has_tail(self) -> bool:
@@ -119,7 +121,12 @@ class Case(Section):
     @property
     def rest_pressure(self) -> float:
         """The drive.pressure, Pa, at which nothing flows."""
-        return self.downstream.pressure if self.drive.kind == "flow" else 0.0
+        return self.downstream.pressure + self.level_pressure if self.drive.kind == "flow" else 0.0
+
+    @property
+    def level_pressure(self) -> float:
+        """By how much the fluid's levels raise it, Pa: weight of the fluid up to an outlet that is higher."""
+        return self.fluid.density * self.gravity.along * self.valve.length if self.drive.kind == "flow" else 0.0
 
     @property
     def has_waves(self) -> bool:

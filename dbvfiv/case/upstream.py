@@ -13,18 +13,13 @@ from .section import BrokenRule, Section, key
 
 #: Roughness over diameter up to which the law of fully rough pipes was measured.
 _ROUGHEST = 0.05
+_LENGTH = PARAMETERS["pipe_length"]
 
 
-class Upstream(Section):
-    """A straight pipe in front of the valve: a rigid column of fluid with friction and losses."""
+class Pipe(Section):
+    """A straight pipe: a rigid column of fluid with friction and losses, or an elastic one."""
 
-    length: Annotated[float, PARAMETERS["pipe_length"].quantity] = key(
-        0.0,
-        "Length of the pipe between the flange and its far end, where drive.pressure is given; 0 for no line, whatever "
-        "the other keys say.",
-        ge=0,
-        le=PARAMETERS["pipe_length"].high,
-    )
+    length: Annotated[float, _LENGTH.quantity] = key(..., "Length of the pipe.", gt=0, le=_LENGTH.high)
     diameter: Length | None = key(
         None,
         "Inner diameter of the pipe; where not given that of the valve's flow section at the flange. A change of "
@@ -64,25 +59,9 @@ class Upstream(Section):
         le=400,
     )
 
-    pump: PumpCurve | None = key(
-        None,
-        "Curve of a pump at the far end, in place of drive.pressure: a CSV file of flow and head (header flow [L/s], "
-        "head [m]; relative to the case file), or rows [[flow, head], ...] in m3/s and m or with units. Between rows "
-        "the monotone cubic of Fritsch and Carlson; no result is taken from beyond them.",
-    )
-
-    @property
-    def is_elastic(self) -> bool:
-        """Whether waves run in the line."""
-        return self.length > 0 and self.wave_speed is not None
-
-    @property
-    def has_friction(self) -> bool:
-        """Whether more length loses more head."""
-        return self.friction > 0 or self.roughness > 0
-
-    def check_roughness(self, inlet: float) -> None:
-        """Refuse a roughness that no pipe of its diameter has; `inlet` is the diameter of the valve's inlet, m.
+    def check_roughness(self, inlet: float, name: str) -> None:
+        """Refuse a roughness that no pipe of its diameter has; `inlet` is the diameter of the valve's inlet, m, and
+        `name` the key of the pipe.
 
         Raises
         ------
@@ -91,13 +70,13 @@ class Upstream(Section):
         diameter = inlet if self.diameter is None else self.diameter
         if self.length > 0 and self.roughness > _ROUGHEST * diameter:
             raise BrokenRule(
-                "upstream.roughness",
+                f"{name}.roughness",
                 f"{1e3 * self.roughness:g} mm in a pipe of {1e3 * diameter:g} mm",
                 f"it must be at most {_ROUGHEST:g} of the diameter, {1e3 * _ROUGHEST * diameter:.4g} mm",
             )
 
     @model_validator(mode="after")
-    def _one_friction(self) -> Upstream:
+    def _one_friction(self) -> Pipe:
         if self.friction > 0 and self.roughness > 0:
             raise BrokenRule(
                 "roughness",
@@ -107,17 +86,89 @@ class Upstream(Section):
         return self
 
     @model_validator(mode="after")
-    def _pump_at_the_end_of_a_line(self) -> Upstream:
-        if self.pump is not None and not self.length > 0:
-            raise BrokenRule(
-                "pump", "given without a line", "it stands at the far end of one, so give upstream.length as well"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _elements_of_waves(self) -> Upstream:
+    def _elements_of_waves(self) -> Pipe:
         if self.elements is not None and self.wave_speed is None:
             raise BrokenRule(
                 "elements", f"{self.elements} without a wave_speed", "a rigid column has none, so give both or neither"
+            )
+        return self
+
+
+class Upstream(Pipe):
+    """A straight pipe in front of the valve, or several in series: rigid columns of fluid with friction and losses."""
+
+    length: Annotated[float, _LENGTH.quantity] = key(
+        0.0,
+        "Length of the pipe between the flange and its far end, where drive.pressure is given; 0 for no line, whatever "
+        "the other keys say.",
+        ge=0,
+        le=_LENGTH.high,
+    )
+    pieces: tuple[Pipe, ...] = key(
+        (),
+        "Pipes in series in place of one, [[upstream.pieces]] from the far end to the flange, each with the keys of "
+        "one. Inertances and losses add; waves go from pipe to pipe with the same flow and total pressure at a joint, "
+        "and rigid pipes may stand between elastic ones. A joint takes no head: put that of a reducer or a widening "
+        "into a loss.",
+        max_length=50,
+    )
+    pump: PumpCurve | None = key(
+        None,
+        "Curve of a pump at the far end, in place of drive.pressure: a CSV file of flow and head (header flow [L/s], "
+        "head [m]; relative to the case file), or rows [[flow, head], ...] in m3/s and m or with units. Between rows "
+        "the monotone cubic of Fritsch and Carlson; no result is taken from beyond them.",
+    )
+
+    @property
+    def pipes(self) -> tuple[Pipe, ...]:
+        """All pipes from the far end to the flange; one of no length where there is no line."""
+        return self.pieces or (self,)
+
+    @property
+    def whole_length(self) -> float:
+        """Length of all of them, m."""
+        return sum(pipe.length for pipe in self.pipes)
+
+    @property
+    def first_wave_speed(self) -> float | None:
+        """That of the first pipe in which waves run, m/s; None where none do."""
+        return next((pipe.wave_speed for pipe in self.pipes if pipe.wave_speed is not None), None)
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether waves run in the line."""
+        return self.whole_length > 0 and self.first_wave_speed is not None
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether more length loses more head."""
+        return any(pipe.friction > 0 or pipe.roughness > 0 for pipe in self.pipes)
+
+    def check_pipes(self, inlet: float) -> None:
+        """Refuse a roughness that no pipe of its diameter has; `inlet` is the diameter of the valve's inlet, m.
+
+        Raises
+        ------
+        BrokenRule
+        """
+        for i, pipe in enumerate(self.pipes):
+            pipe.check_roughness(inlet, f"upstream.pieces.{i}" if self.pieces else "upstream")
+
+    @model_validator(mode="after")
+    def _one_pipe_or_pieces(self) -> Upstream:
+        for name in Pipe.model_fields if self.pieces else ():
+            if getattr(self, name) != type(self).model_fields[name].default:
+                raise BrokenRule(
+                    name,
+                    f"{getattr(self, name):g} beside upstream.pieces",
+                    "it belongs to a line of one pipe, so give it in a piece",
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _pump_at_the_end_of_a_line(self) -> Upstream:
+        if self.pump is not None and not self.whole_length > 0:
+            raise BrokenRule(
+                "pump", "given without a line", "it stands at the far end of one, so give upstream.length as well"
             )
         return self

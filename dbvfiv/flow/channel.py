@@ -1,11 +1,12 @@
-"""One streamline of an incompressible, inviscid fluid without gravity (Th. 4.1-4.10).
+"""One streamline of an incompressible, inviscid fluid (Th. 4.1-4.10).
 
     p_k = P_in - rho [ (U_k^2 - U^2)/2 + d/dt integral_in^k U ds ],      p_outlet = 0
 
 Stations run from the outlet (first) to the inlet (last) and keep their places along the axis, as in the thesis's
 program (App. A). U is the inlet velocity. Continuity is blended between two laws by `storage` in 0..1: A_k U_k = A_in U
 - storage * integral_in^k dA/dt ds, so 0 is the quasi-steady law of the thesis and 1 the conservation of volume under
-moving walls. Terms add losses and inertances: see `dbvfiv.flow.term`.
+moving walls. Terms add losses and inertances: see `dbvfiv.flow.term`. The thesis leaves gravity out; here `levels` has
+what it does to a valve that stands upright.
 """
 
 from __future__ import annotations
@@ -40,6 +41,9 @@ class Channel(FlowLaw):
         Losses and inertances on the way.
     back : float
         Pressure at the far end downstream, Pa.
+    levels : (m,) array, optional
+        Pressure of the fluid inside at rest under its weight, Pa, over that at the outlet; those of the fluid outside
+        in `levels_outside`. The levels keep their places, as the stations do.
     reversible : bool
         Let flow that is drawn in lose its head; see `dbvfiv.flow.heads`. Small motions of an outward flow are the same.
 
@@ -50,7 +54,7 @@ class Channel(FlowLaw):
         the square of the speeds and the speeds.
     """
 
-    DATA = ("step", "floor", "terms", "back")
+    DATA = ("step", "floor", "terms", "back", "static")
     STATIC = ("unsteady", "reversible")
     inner_names = ("inlet velocity",)
 
@@ -63,13 +67,19 @@ class Channel(FlowLaw):
         terms: Sequence[FlowTerm] = (),
         reversible: bool = False,
         back: float = 0.0,
+        levels: np.ndarray | None = None,
+        levels_outside: np.ndarray | None = None,
     ):
         self.z = np.asarray(z, float)
         self.step = np.diff(self.z)
         if np.any(self.step <= 0):
             raise ValueError("The stations of a channel must have increasing positions from the outlet to the inlet.")
         self.floor = float(floor)
-        self.storage, self.back = float(storage), float(back)
+        self.storage = float(storage)
+        none = np.zeros(len(self.z))
+        inside, outside = (none if given is None else np.asarray(given, float) for given in (levels, levels_outside))
+        self.level, self.static = float(inside[-1] - inside[0]), inside - inside[0] - (outside - outside[0])
+        self.back = float(back) + self.level
         self.unsteady, self.reversible = bool(unsteady), bool(reversible)
         self.terms = tuple(terms)
         self._check_terms()
@@ -157,7 +167,7 @@ class Channel(FlowLaw):
             momentum = lambda a, r, u: self.psi(a, r, u, parameters)  # noqa: E731
             _, inertia = jax.jvp(momentum, (area, rate, inner), (rate, acceleration, inner_rate))
         head = self.heads(area, rate, inner, parameters)
-        p = parameters["inlet"] - self.back - parameters["density"] * (head + inertia)
+        p = parameters["inlet"] - self.back - parameters["density"] * (head + inertia) + self.static
         return jnp.concatenate([jnp.zeros(1), p[1:]]), p[:1]
 
     def _blend(self, parameters):
@@ -185,7 +195,7 @@ class Channel(FlowLaw):
             unit = self.stream(area, still, 1.0 / open_, 1.0 / open_[-1:])
             lost = 2.0 * self.term_heads(unit, parameters, self.losses)
             total, ratio = total + lost, ratio + lost[0] * open_[-1] ** 2
-        pressure = inlet * (total[0] - total) / (total[0] - kinetic)
+        pressure = inlet * (total[0] - total) / (total[0] - kinetic) + self.static
         speed = jnp.sqrt(2.0 * inlet / (parameters["density"] * jnp.where(ratio > 0, ratio, 1.0)))
         return pressure, jnp.where(ratio > 0, speed, jnp.inf)[None]
 

@@ -9,11 +9,16 @@ there is taken at: see `dbvfiv.flow.terms.line`. At the flange flow and total pr
 
 With w = u A_line/A_in, which is the inlet velocity at the flange, and pi = h A_line/(A_in c) both equations carry the
 same speed and the energy is rho A_line/2 (A_in/A_line)^2 (w^2 + pi^2) a length. Elements: `line_elements`.
+
+Pipes in series meet with the same flow and the same total pressure: w is one function along all of them, and each has
+its own pi. A rigid pipe among them is a length of no extent, whose inertance and loss stand at the node between its
+neighbours.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -22,7 +27,7 @@ from .channel import Channel
 from .law import FlowLaw, FlowMotion, FlowParameter, Traceable
 from .line_elements import DEGREE, chain, element
 from .line_stepping import LineFluid
-from .terms.line import Line
+from .terms.line import Line, PiecedLine
 from .terms.pump import Pump
 
 #: Wavelengths that an element of degree 4 resolves: frequencies of waves are then 1.5e-4 too high, measured.
@@ -36,25 +41,67 @@ def default_elements(length: float, wave_speed: float) -> int:
     return int(np.clip(np.ceil(FREQUENCY * length / (RESOLVED * wave_speed)), 2, MOST))
 
 
+class Segments(NamedTuple):
+    """The elements of a line from the far end to the flange, and what stands at its nodes.
+
+    Attributes
+    ----------
+    length, ratio, speed, lost : (e,) arrays
+        Of each element: length, m; area of the inlet over its own; wave speed, m/s; what it loses of w|w|.
+    inertance, loss : (k + 1,) arrays
+        Of rigid pipes at the nodes: length times ratio, m; what they lose of w|w|.
+    """
+
+    length: Any
+    ratio: Any
+    speed: Any
+    lost: Any
+    inertance: Any
+    loss: Any
+
+    @property
+    def lost_before(self):
+        """Loss (e,) of all that is before each element, of w|w|."""
+        rigid = jnp.cumsum(self.loss)[:-1:DEGREE]
+        return rigid + jnp.cumsum(self.lost) - self.lost
+
+
 class ElasticLine(Traceable):
-    """Waves in a line of equal elements.
+    """Waves in a line of equal elements, or in pipes in series, each with its own.
 
     Parameters
     ----------
-    line : Line
-        Its length, section, losses and far end.
-    wave_speed : float, m/s
-    elements : int, optional
+    line : Line or PiecedLine
+        Length, section, losses and far end.
+    wave_speed : float or sequence of float or None, m/s
+        Of each pipe; None for a rigid one. That of the first elastic one is a parameter; with another value the others
+        change in proportion.
+    elements : int or sequence of int or None, optional
+        Of each pipe.
     pump : Pump, optional
         At the far end.
     """
 
-    DATA = ("line", "wave_speed", "pump")
-    STATIC = ("elements",)
+    DATA = ("line", "wave_speed", "speeds", "pump")
+    STATIC = ("elements", "counts")
 
-    def __init__(self, line: Line, wave_speed: float, elements: int | None = None, pump: Pump | None = None):
-        self.line, self.wave_speed, self.pump = line, float(wave_speed), pump
-        self.elements = default_elements(line.length, wave_speed) if elements is None else int(elements)
+    def __init__(
+        self,
+        line: Line | PiecedLine,
+        wave_speed: float | Sequence[float | None],
+        elements: int | Sequence[int | None] | None = None,
+        pump: Pump | None = None,
+    ):
+        speeds = (wave_speed,) if np.isscalar(wave_speed) else tuple(wave_speed)
+        given = (elements,) * len(speeds) if elements is None or np.isscalar(elements) else tuple(elements)
+        self.line, self.pump = line, pump
+        self.speeds = tuple(float(speed or 0.0) for speed in speeds)
+        self.wave_speed = next(speed for speed in self.speeds if speed)
+        self.counts = tuple(
+            0 if not speed else default_elements(part.length, speed) if count is None else int(count)
+            for part, speed, count in zip(line.parts, self.speeds, given, strict=True)
+        )
+        self.elements = sum(self.counts)
 
     @property
     def size(self) -> int:
@@ -64,9 +111,32 @@ class ElasticLine(Traceable):
     @property
     def places(self) -> tuple[np.ndarray, np.ndarray]:
         """Where velocities and pressures are, from the far end (0) to the flange (1); the flange's velocity is last."""
-        one, starts = element(), np.arange(self.elements)[:, None]
-        nodes = np.append((starts + one.nodes[:-1]).ravel(), self.elements)
-        return nodes / self.elements, (starts + one.points).ravel() / self.elements
+        one, ends = element(), np.zeros((self.elements, 2))
+        first, distance = 0, 0.0
+        for part, count in zip(self.line.parts, self.counts):
+            cuts = distance + part.length * np.arange(count + 1) / max(count, 1)
+            ends[first : first + count] = np.stack([cuts[:-1], cuts[1:]], axis=1)
+            first, distance = first + count, distance + part.length
+        start, width = ends[:, :1] / distance, np.diff(ends, axis=1) / distance
+        return np.append((start + width * one.nodes[:-1]).ravel(), 1.0), (start + width * one.points).ravel()
+
+    def segments(self, inlet_area, parameters) -> Segments:
+        """Elements and nodes for the area of a quarter of the inlet, m2; traceable."""
+        stretch = parameters["pipe_length"] / self.line.length
+        faster = parameters["wave_speed"] / self.wave_speed
+        columns = []
+        inertance, loss = jnp.zeros(DEGREE * self.elements + 1), jnp.zeros(DEGREE * self.elements + 1)
+        for part, speed, count in zip(self.line.parts, self.speeds, self.counts):
+            diameter, ratio = part.section(inlet_area)
+            length = stretch * part.length
+            lost = 0.5 * part.lost(diameter, length) * ratio**2
+            if count:
+                own = (length / count, ratio, faster * speed, lost / count)
+                columns += [jnp.stack([jnp.asarray(value, float) for value in own])] * count
+            else:
+                node = DEGREE * len(columns)
+                inertance, loss = inertance.at[node].add(ratio * length), loss.at[node].add(lost)
+        return Segments(*jnp.stack(columns, axis=1), inertance, loss)
 
     def far_head(self, velocity, inlet_area, parameters, steady: bool = False):
         """Total pressure at the far end over the density, m2/s2, from the velocity there referred to the flange."""
@@ -87,26 +157,23 @@ class ElasticLine(Traceable):
         pressure, pressure_rate : (k,) arrays
             pi and its rate, m/s and m/s2.
         """
-        one, count = element(), self.elements
-        diameter, ratio = self.line.section(inlet_area)
-        length, speed = parameters["pipe_length"] / count, parameters["wave_speed"]
-        lost = 0.5 * self.line.lost(diameter, parameters["pipe_length"]) * ratio**2 / count
-        nodes = chain(count)
+        one, nodes, segments = element(), chain(self.elements), self.segments(inlet_area, parameters)
+        length, ratio, speed, lost = (column[:, None] for column in segments[:4])
         w, w_rate = velocity[nodes], rate[nodes]
-        at, flows = pressure.reshape(count, -1), w @ one.value.T
+        at, flows = pressure.reshape(self.elements, -1), w @ one.value.T
         local = ratio * (length * (w_rate @ one.mass.T) - speed * ((one.weights * at) @ one.slope))
         local = local + lost * ((one.weights * flows * jnp.abs(flows)) @ one.value)
-        momentum = jnp.zeros_like(velocity).at[nodes].add(local)
+        momentum = (segments.inertance * rate + segments.loss * velocity * jnp.abs(velocity)).at[nodes].add(local)
         momentum = momentum.at[0].add(-self.far_head(velocity[0], inlet_area, parameters))
-        stretched = length * pressure_rate.reshape(count, -1) + speed * (w @ one.slope.T)
+        stretched = length * pressure_rate.reshape(self.elements, -1) + speed * (w @ one.slope.T)
         return momentum, (ratio * one.weights * stretched).ravel()
 
     def steady_pressure(self, velocity, inlet_area, parameters):
         """pi (k,) of the steady flow with an inlet velocity."""
-        diameter, ratio = self.line.section(inlet_area)
-        lost = 0.5 * self.line.lost(diameter, parameters["pipe_length"]) * ratio**2 * velocity * jnp.abs(velocity)
-        head = self.far_head(velocity, inlet_area, parameters, steady=True) - lost * self.places[1]
-        return head / (ratio * parameters["wave_speed"])
+        segments = self.segments(inlet_area, parameters)
+        lost = segments.lost_before[:, None] + segments.lost[:, None] * element().points
+        head = self.far_head(velocity, inlet_area, parameters, steady=True) - lost * velocity * jnp.abs(velocity)
+        return (head / (segments.ratio * segments.speed)[:, None]).ravel()
 
 
 class LineChannel(FlowLaw):
@@ -150,6 +217,16 @@ class LineChannel(FlowLaw):
         return self.channel.back
 
     @property
+    def level(self) -> float:
+        """That of the channel."""
+        return self.channel.level
+
+    @property
+    def static(self):
+        """That of the channel."""
+        return self.channel.static
+
+    @property
     def storage(self) -> float:
         """Blend of the continuity laws."""
         return self.channel.storage
@@ -162,7 +239,10 @@ class LineChannel(FlowLaw):
     def resolved(self, given) -> float:
         """Frequency up to which the elements resolve waves, Hz, under given parameters."""
         values = self.values({"inlet": 0.0, "density": 1.0} | dict(given))
-        return RESOLVED * self.line.elements * values["wave_speed"] / values["pipe_length"]
+        line = self.line
+        stretch, faster = values["pipe_length"] / line.line.length, values["wave_speed"] / line.wave_speed
+        pipes = [pipe for pipe in zip(line.counts, line.speeds, line.line.parts) if pipe[0]]
+        return min(RESOLVED * n * faster * speed / (stretch * part.length) for n, speed, part in pipes)
 
     def split(self, inner):
         """Velocities (k + 1,), that of the flange last, and pressures (k,) of the line from the law's unknowns."""

@@ -143,8 +143,13 @@ class FlowLaw(Traceable, ABC):
     has_fluid : bool
         Whether a fluid moves: its density matters, and small motions of the wall change the pressures.
     back : float
-        Pressure that inlet pressures work against, Pa: that at the far end downstream. Station pressures are what the
-        wall sees and not over it.
+        Pressure that inlet pressures work against, Pa: that at the far end downstream, and `level`. Station pressures
+        are what the wall sees and not over it.
+    level : float
+        Weight of the fluid between the levels of inlet and outlet, Pa; positive where the outlet is higher.
+    static : (m,) array or 0
+        Pressure of the levels, Pa: what stands on the wall at each station where nothing flows against `back`, that of
+        the fluid inside less that outside. It vanishes at the outlet.
     unsteady : bool
         Whether rates matter; without, the steady law holds at every instant and the inner unknowns follow from the
         passage.
@@ -153,6 +158,8 @@ class FlowLaw(Traceable, ABC):
     inner_names: ClassVar[tuple[str, ...]] = ()
     floor: float = 0.0
     back: float = 0.0
+    level: float = 0.0
+    static: Any = 0.0
     has_fluid: bool = True
     unsteady: bool = True
 

@@ -81,12 +81,14 @@ class LineWaves:
 
     def __init__(self, line: ElasticLine, inlet_area: float, density: float):
         one, count = element(), line.elements
-        diameter, ratio = line.line.section(inlet_area)
-        length = line.line.length
-        self.ratio, self.density, self.area = float(ratio), density, float(inlet_area)
+        own = {"pipe_length": line.line.length, "wave_speed": line.wave_speed}
+        segments = line.segments(inlet_area, own)
+        self.length, self.ratio, self.speed, self.lost = (np.array(column)[:, None] for column in segments[:4])
+        self._rigid, self._loss = np.array(segments.inertance), np.array(segments.loss)
+        self._before, self.lossy = np.array(segments.lost_before)[:, None], bool(self.lost.any() or self._loss.any())
+        self.density, self.area, self.count = density, float(inlet_area), count
         self.reservoir, self.pump = line.line.reservoir, line.pump
-        self.speed, self.length, self.count = line.wave_speed, length / count, count
-        self.lost = 0.5 * float(line.line.lost(diameter, length)) * self.ratio**2 / count
+        self._first_ratio = float(line.line.section(inlet_area)[1])
         self.nodes = chain(count)
         self.size = DEGREE * count + 1
         local = np.arange(DEGREE + 1)
@@ -113,7 +115,7 @@ class LineWaves:
 
     def inertia(self, rate: np.ndarray) -> np.ndarray:
         """What rates (k + 1,) of the velocities need, m2/s2."""
-        return self._sum(self.ratio * self.length * (rate[self.nodes] @ self._mass.T))
+        return self._sum(self.ratio * self.length * (rate[self.nodes] @ self._mass.T)) + self._rigid * rate
 
     def push(self, pressure: np.ndarray) -> np.ndarray:
         """What pressures (k,) push the nodes by, m2/s2."""
@@ -131,7 +133,7 @@ class LineWaves:
 
     def friction(self, velocity: np.ndarray) -> np.ndarray:
         """Friction (k + 1,), m2/s2."""
-        return self._sum(self._friction(velocity)[0] @ self._value)
+        return self._sum(self._friction(velocity)[0] @ self._value) + self._loss * velocity * np.abs(velocity)
 
     def far(self, velocity: float, inlet: float) -> tuple[float, float]:
         """Total pressure at the far end over the density, m2/s2, and its slope."""
@@ -144,24 +146,27 @@ class LineWaves:
 
     def _source(self, velocity: float, inlet: float) -> tuple[float, float]:
         """The same under the pressure of steady flow."""
-        speed = self.ratio * velocity
+        speed = self._first_ratio * velocity
         gained = min(speed, 0.0) if self.reservoir else speed
-        return inlet / self.density + 0.5 * gained**2, self.ratio * gained
+        return inlet / self.density + 0.5 * gained**2, self._first_ratio * gained
 
     def linear(self, rate: float) -> np.ndarray:
         """Banded matrix of inertia and compression where the rate of everything is `rate` times it."""
         if self._banded is None or self._banded[0] != rate:
-            mass, stiff = rate * self.length * self._mass, self.speed**2 / (rate * self.length) * self._stiff
-            local = np.broadcast_to(self.ratio * (mass + stiff), (self.count, *mass.shape))
-            self._banded = rate, self._assembled(local)
+            length, speed, ratio = (column[:, :, None] for column in (self.length, self.speed, self.ratio))
+            mass, stiff = rate * length * self._mass, speed**2 / (rate * length) * self._stiff
+            banded = self._assembled(ratio * (mass + stiff))
+            banded[DEGREE] += rate * self._rigid
+            self._banded = rate, banded
         return self._banded[1]
 
     def tangent(self, rate: float, velocity: np.ndarray, far_slope: float) -> np.ndarray:
         """Banded derivative of the momentum at velocities (k + 1,)."""
         out = self.linear(rate)
-        if self.lost:
+        if self.lossy:
             slope = self._friction(velocity)[1]
             out = out + self._assembled(np.einsum("ep,pi,pj->eij", slope, self._value, self._value))
+            out[DEGREE] += 2.0 * self._loss * np.abs(velocity)
         else:
             out = out.copy()
         out[DEGREE, 0] -= far_slope
@@ -174,15 +179,15 @@ class LineWaves:
         """Kinetic and elastic energy, J of a quarter."""
         weight = 0.5 * self.density * self.area
         kinetic = weight * float(state.velocity @ self.inertia(state.velocity))
-        squares = self._weights * state.pressure.reshape(self.count, -1) ** 2
-        return kinetic, weight * self.ratio * self.length * float(squares.sum())
+        squares = self.ratio * self.length * self._weights * state.pressure.reshape(self.count, -1) ** 2
+        return kinetic, weight * float(squares.sum())
 
     def steady(self, velocity: float, inlet: float) -> LineState:
         """Uniform flow with an inlet velocity, m/s, under a pressure at the far end, Pa."""
-        points = (np.arange(self.count)[:, None] + element().points).ravel() / self.count
-        head = self._source(velocity, inlet)[0] - self.lost * self.count * velocity * abs(velocity) * points
+        lost = self._before + self.lost * element().points
+        head = self._source(velocity, inlet)[0] - lost * velocity * abs(velocity)
         k = self.size - 1
-        pressure = head / (self.ratio * self.speed)
+        pressure = (head / (self.ratio * self.speed)).ravel()
         return LineState(np.full(k + 1, velocity), np.zeros(k + 1), pressure, np.zeros(k), np.zeros(3))
 
     def at_rest(self) -> LineState:
@@ -206,7 +211,8 @@ class LineWaves:
 
     def _masses(self) -> tuple[np.ndarray, np.ndarray]:
         """Banded mass of all nodes but the flange's, and the column (k + 1,) of that."""
-        whole = self._assembled(np.broadcast_to(self.ratio * self.length * self._mass, (self.count, *self._mass.shape)))
+        whole = self._assembled((self.ratio * self.length)[:, :, None] * self._mass)
+        whole[DEGREE] += self._rigid
         unit = np.zeros(self.size)
         unit[-1] = 1.0
         return whole[:, :-1], self.inertia(unit)
@@ -260,7 +266,7 @@ class LineStep:
         waves = self.waves
         head, slope = waves.far(velocity[0], self.inlet)
         out = self._known + _product(waves.linear(self._rate), velocity)
-        if waves.lost:
+        if waves.lossy:
             out += waves.friction(velocity)
         out[0] -= head
         return out, slope

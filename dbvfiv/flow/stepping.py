@@ -171,7 +171,8 @@ class MovingFluid:
 
     def pressure(self, flow: FlowState, psi_rate: np.ndarray, inlet: float) -> np.ndarray:
         """Pressures (m,), Pa; the first, at the outlet, is to vanish."""
-        return inlet - self.channel.back - self.density * (self._whole_head(flow) + psi_rate)
+        channel = self.channel
+        return inlet - channel.back - self.density * (self._whole_head(flow) + psi_rate) + channel.static
 
     def _driving(self, inlet: float) -> float:
         """What drives the flow, as pressure over density, m2/s2."""

@@ -106,7 +106,7 @@ class AnalyticResidual:
         motion, parameters = self._shaped(motion), self._given(parameters)
         a, b = self._shaped(a), self._shaped(b)
         out = np.array(_form_of_remainder(motion, parameters, (a, b), self._arrays))
-        form = partial(_form, self.model.shell.second, motion[0])
+        form = partial(_form, self._own_form, motion[0])
         # form(a0, b0) + beta (form(a0, b1) + form(a1, b0)), in one evaluation where one of the motions has no velocity
         beta = parameters["beta"]
         out[self._forces] += form(a[0] + beta * a[1], b[0] + beta * b[1]) - beta**2 * form(a[1], b[1])
@@ -119,15 +119,21 @@ class AnalyticResidual:
         motion, parameters = self._shaped(motion), self._given(parameters)
         a, b, c = self._shaped(a), self._shaped(b), self._shaped(c)
         out = np.array(_form_of_remainder(motion, parameters, (a, b, c), self._arrays))
-        form = partial(_form, self.model.shell.third, motion[0])
+        form = partial(_form, self._own_form, motion[0])
         beta = parameters["beta"]
         out[self._forces] += form(a[0], b[0], c[0] + beta * c[1]) + beta * (
             form(a[0], b[1], c[0]) + form(a[1], b[0], c[0])
         )
         return out
 
+    def _own_form(self, q, *directions) -> np.ndarray:
+        """Derivative (n,) along two or three directions of the force of shell and weight."""
+        model = self.model
+        own = (model.shell.second if len(directions) == 2 else model.shell.third)(q, *directions)
+        return own if model.weight is None else own + model.weight.form(model.shell, q, *directions)
+
     def remainder_form(self, motion, parameters, *directions) -> np.ndarray:
-        """Directional derivative (n + l,), along two or three motions, of all but the structure's own force."""
+        """Directional derivative (n + l,), along two or three motions, of all but the shell's own force."""
         self._check_at_rest(motion)
         require_forms(self.model)
         motion, parameters = self._shaped(motion), self._given(parameters)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..case.model import Case
 from ..flow import Channel, FlowLaw, UniformLoad
 from ..flow.elastic_line import ElasticLine, LineChannel
 from ..flow.terms import terms_of
-from ..flow.terms.line import Line
+from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
 from ..geometry import ValveMesh, valve_mesh
 from ..materials.damping import relaxation_from_case
 from ..materials.library import law_from_case
 from ..materials.orthotropic import OrthotropicPly
-from ..shell import Layer, Section, Shell, ShellMesh
+from ..shell import Layer, Section, Shell, ShellMesh, Weight
 from .supports import free_unknowns
 
 
@@ -43,19 +45,39 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
     )
 
 
+def build_weight(case: Case, shell: Shell) -> Weight | None:
+    """Weight of the wall of a case in the fluids on its sides; None without gravity."""
+    if not case.gravity.is_there:
+        return None
+    inside = case.fluid.density
+    displaced = 0.5 * (inside + case.outside.density(inside)) if case.drive.kind == "flow" else 0.0
+    return Weight(shell, np.array([0.0, 0.0, case.gravity.along]), displaced)
+
+
+def _levels(case: Case, mesh: ValveMesh) -> dict[str, np.ndarray]:
+    """Pressures of the fluids' levels, Pa, over those at the lips, as `Channel` takes them; none without gravity."""
+    if not case.gravity.is_there:
+        return {}
+    inside = case.fluid.density
+    depth = case.gravity.along * (mesh.z - mesh.z[0])
+    return {"levels": inside * depth, "levels_outside": case.outside.density(inside) * depth}
+
+
 def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
     """Flow law of a case on the stations of its mesh."""
     if case.drive.kind == "uniform":
         return UniformLoad(len(mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
     gap_area = mesh.rest_area[0] - mesh.wall_deduction[0]
     storage = 1.0 if case.fluid.continuity == "storage" else 0.0
-    terms, floor, back = terms_of(case), case.fluid.area_floor * gap_area, case.rest_pressure
-    rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, back=back)
+    terms, floor = terms_of(case), case.fluid.area_floor * gap_area
+    given = {"back": case.downstream.pressure} | _levels(case, mesh)
+    rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, **given)
     if not case.has_waves:
         return rigid
-    line = next(term for term in terms if isinstance(term, Line))
+    line = next(term for term in terms if isinstance(term, (Line, PiecedLine)))
     pump = next((term for term in terms if isinstance(term, Pump)), None)
     rest = [term for term in terms if term not in (line, pump)]
-    channel = Channel(mesh.z, floor, storage, terms=rest, back=back)
-    waves = ElasticLine(line, case.upstream.wave_speed, case.upstream.elements, pump)
+    channel = Channel(mesh.z, floor, storage, terms=rest, **given)
+    pipes = case.upstream.pipes
+    waves = ElasticLine(line, [pipe.wave_speed for pipe in pipes], [pipe.elements for pipe in pipes], pump)
     return LineChannel(channel, rigid, waves)

@@ -70,6 +70,8 @@ def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Sy
     dofs, still = shell.dofs, np.zeros(shell.size)
     area = model.rows.areas(nodal)
     _, structure = shell.force_and_tangent(still)
+    if model.weight is not None:
+        model.weight.add_tangent(shell, still, structure)
     if symmetry.moves_lips_apart:
         add_stops(structure, model, q, dofs)
     stiffness = structure.copy()

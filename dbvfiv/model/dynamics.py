@@ -41,11 +41,12 @@ class Conditions:
     loss_factor : float
         Factor on the loss factors of all materials; zero leaves them elastic.
     pipe_length : float, optional
-        Of the line in front, m; the case's own where it is not given, and of no effect without a line.
+        Of the line in front, m; the case's own where it is not given, and of no effect without a line. Pipes in series
+        are stretched alike.
     tail_length : float, optional
         Of the pipe behind, m; likewise.
     wave_speed : float, optional
-        In an elastic line, m/s; likewise.
+        In an elastic line, m/s; likewise. Of pipes in series that of the first one in which waves run.
     """
 
     density: float
@@ -58,9 +59,9 @@ class Conditions:
 
     @classmethod
     def of(cls, case) -> Conditions:
-        damping, length = case.damping, case.upstream.length if case.has_line else None
+        damping, length = case.damping, case.upstream.whole_length if case.has_line else None
         behind = case.downstream.length if case.has_tail else None
-        speed = case.upstream.wave_speed if case.has_waves else None
+        speed = case.upstream.first_wave_speed if case.has_waves else None
         return cls(case.fluid.density, damping.alpha, damping.beta, damping.loss_factor, length, behind, speed)
 
     @property

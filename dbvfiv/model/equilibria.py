@@ -11,7 +11,8 @@ from ..errors import SolveError
 from ..geometry.divisions import grading
 from ..materials.stability import stability_margin
 from ..observer import Observer
-from .load_steps import LoadStepOptions, LoadSteps
+from .load_steps import LoadStepOptions, LoadSteps, Way
+from .loading import Loading
 from .newton import NewtonOptions
 from .state import SteadyState, describe_state
 from .valve import ValveModel
@@ -75,14 +76,9 @@ class LoadPath(LoadSteps):
             If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
             If the pressure downstream is not overcome.
         """
-        back = self.model.flow.back
-        if back and target <= back:
-            raise SolveError(
-                f"At {target:.6g} Pa nothing flows: the pressure downstream is {back:.6g} Pa, and the drive must be "
-                "greater; `dbvfiv closure` says what a back pressure does to the valve."
-            )
+        self._check_drive(target)
         try:
-            way = self.reach(target)
+            way = self._loaded(target) if self._at_rest else self.reach(target)
         except SolveError as error:
             raise SolveError(f"{str(error).removesuffix('.')}{self._too_wide()}.") from None
         last = way.result
@@ -97,6 +93,39 @@ class LoadPath(LoadSteps):
             rounding=last.rounding,
             reason=last.reason,
         )
+
+    def _check_drive(self, target: float) -> None:
+        """Refuse a pressure that does not drive the flow; with gravity a valve that holds still fluid hangs as well."""
+        back, level = self.model.flow.back, self.model.flow.level
+        if not back or target > back or (target == back and self.model.weight is not None):
+            return
+        by_level = f", {level:.6g} Pa of it by the level of the lips," if level else ""
+        raise SolveError(
+            f"At {target:.6g} Pa nothing flows: the pressure downstream is {back:.6g} Pa{by_level} and the drive must "
+            "be greater; `dbvfiv closure` says what a back pressure does to the valve."
+        )
+
+    @property
+    def _at_rest(self) -> bool:
+        """Whether the walk stands where nothing loads a wall that weighs, which is no equilibrium, or where it hangs
+        without a flow: lips that all but touch open from rest more surely than from there.
+        """
+        still = self.pressure == self.model.flow.back
+        return self.model.weight is not None and (still or not np.any(self.q))
+
+    def _loaded(self, target: float) -> Way:
+        """Put on pressure, levels and weight together, and step on from there."""
+        ramp = LoadSteps(Loading(self.model, target), self.options)
+        try:
+            way = ramp.reach(1.0)
+        except SolveError as error:
+            raise SolveError(
+                f"No equilibrium was found on the way from rest to {target:.6g} Pa and the weight of wall and fluid, "
+                f"put on together, beyond {100 * ramp.pressure:.3g} % of both"
+            ) from error
+        self.q, self.pressure = ramp.q, target
+        settled = self.settle()
+        return Way(way.iterations + settled.iterations, way.steps, settled)
 
     def _too_wide(self) -> str:
         """Clause on a passage that leaves no finite flow, of the last equilibrium; empty for other causes."""
@@ -172,7 +201,15 @@ def redescribe(model: ValveModel, state: SteadyState) -> SteadyState:
 
 
 def rest_state(model: ValveModel) -> SteadyState:
-    """The valve at rest without pressure difference, as a state."""
+    """The valve at rest without pressure difference, as a state; with gravity it hangs, the fluid in it still.
+
+    Raises
+    ------
+    SolveError
+        If a valve that hangs has no equilibrium.
+    """
+    if model.weight is not None:
+        return LoadPath(model, SteadyOptions.of(model.case)).go_to(model.flow.back)
     return describe_state(
         model,
         model.rest(),

@@ -104,8 +104,12 @@ class ValveMemoryForms:
         out = expand(remainder, *map(self._joined, motions)).astype(complex)
         n, rates = self.model.size, [motion.rate for motion in motions]
         # beta damps with the tangent of the unrelaxed wall, so its force is the rate of the elastic one
-        factors = self._factors(rates) + self._values["beta"] * sum(rates)
-        out[:n] += self.model.shell.relaxed_form(self.q, [motion.vector[:n] for motion in motions], factors)
+        damped = self._values["beta"] * sum(rates)
+        vectors = [motion.vector[:n] for motion in motions]
+        out[:n] += self.model.shell.relaxed_form(self.q, vectors, self._factors(rates) + damped)
+        if self.model.weight is not None:
+            weight, shell = self.model.weight, self.model.shell
+            out[:n] += (1.0 + damped) * expand(lambda *x: weight.form(shell, self.q, *x), *vectors)
         return out
 
     def _factors(self, rates) -> np.ndarray:

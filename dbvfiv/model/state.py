@@ -37,6 +37,9 @@ class SteadyState:
         In that pipe; 0 without one.
     tail_loss : float, m
         Head lost in that pipe.
+    level_pressure : float, Pa
+        Weight of the fluid between flange and lips where these are higher, negative where they are lower; heads are
+        referred to the level of the lips.
     q : (n,) array
         Free displacements (m) and rotations (rad).
     nodal : (nn, 5) array
@@ -76,6 +79,7 @@ class SteadyState:
     recovered_pressure: float
     downstream_velocity: float
     tail_loss: float
+    level_pressure: float
     q: np.ndarray
     nodal: np.ndarray
     mass_flow: float
@@ -111,7 +115,8 @@ class SteadyState:
             self.downstream_velocity,
             self.tail_loss,
         )
-        return hydraulics_of(self.flange_pressure, density, self.volume_flow, velocity, self.line_loss, behind)
+        pressure = self.flange_pressure - self.level_pressure
+        return hydraulics_of(pressure, density, self.volume_flow, velocity, self.line_loss, behind)
 
 
 def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution) -> SteadyState:
@@ -136,15 +141,17 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     station_pressure = model.flow.steady_pressure(area, pressure)
     line = model.line
     outlet, recovered, tail_speed, tail_loss = _behind(model, area, velocity, float(speeds[0]))
+    flange = station_pressure[-1] - np.broadcast_to(model.flow.static, area.shape)[-1] + outlet + model.flow.level
     return SteadyState(
         pressure=float(pressure),
         head=head_of(pressure, density),
-        flange_pressure=float(pressure if line is None else station_pressure[-1] + outlet),
+        flange_pressure=float(pressure if line is None else flange),
         line_loss=0.0 if line is None else line.lost_head(float(area[-1]), velocity) / GRAVITY,
         outlet_pressure=outlet,
         recovered_pressure=recovered,
         downstream_velocity=tail_speed,
         tail_loss=tail_loss,
+        level_pressure=model.flow.level,
         q=np.asarray(q),
         nodal=nodal,
         mass_flow=mass_flow,
@@ -172,8 +179,9 @@ def _behind(model: ValveModel, area: np.ndarray, velocity: float, jet: float) ->
         If the jet is wider than the pipe.
     """
     tail, density = model.tail, model.case.fluid.density
+    downstream = model.flow.back - model.flow.level
     if tail is None:
-        return model.flow.back, 0.0, 0.0, 0.0
+        return downstream, 0.0, 0.0, 0.0
     if area[0] > tail.quarter:
         raise SolveError(
             f"The passage at the lips, {1e4 * QUARTERS * area[0]:.4g} cm2, is wider than the pipe that it stands in, "
@@ -182,7 +190,7 @@ def _behind(model: ValveModel, area: np.ndarray, velocity: float, jet: float) ->
     speed = float(tail.speed(area[-1], velocity))
     recovered = density * float(tail.gained(model.flow.open_area(area)[0], jet, speed))
     lost = float(tail.lost_head(speed))
-    return model.flow.back + density * lost - recovered, recovered, speed, lost / GRAVITY
+    return downstream + density * lost - recovered, recovered, speed, lost / GRAVITY
 
 
 def _boundless(model: ValveModel, area: np.ndarray, pressure: float) -> str:

@@ -184,7 +184,7 @@ class ValveSystem(SystemBase):
 
     @cached_property
     def _unit_load(self) -> float:
-        return self._base.force_scale(self._base.rest(), self._base.flow.back + 1.0)
+        return float(np.linalg.norm(self._base.pressure_derivative(self._base.rest(), self._base.flow.back + 1.0)))
 
     def linear(self, u, mu) -> ValveLinearisation:
         q, _, inner = self.split(np.asarray(u, float))

@@ -19,13 +19,13 @@ import scipy.sparse as sp
 
 from ..case.model import Case
 from ..flow import RowAreas
-from ..flow.terms.line import Line
+from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
 from ..flow.terms.tail import Tail
 from ..geometry import QUARTERS, ValveMesh
-from ..shell import Section, StepWall
+from ..shell import Section, StepWall, Weight
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
-from .build import build_flow, build_shell
+from .build import build_flow, build_shell, build_weight
 from .linear import CoupledFactor
 from .outside import OutsideFluid
 from .relaxing import WallRelaxation
@@ -82,6 +82,7 @@ class ValveModel:
         self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
         self.loaded = loaded_share(self.mesh, case)
         self.flow = build_flow(case, self.mesh)
+        self.weight: Weight | None = build_weight(case, self.shell)
         self.outside = OutsideFluid(case, self.mesh, self.shell) if case.outside.is_there else None
         self.relaxation = WallRelaxation.of(self.shell.section)
         self._stop_slots = dofs.diagonal_slots[self.stops.unknowns]
@@ -95,17 +96,17 @@ class ValveModel:
         return self.shell.size
 
     @property
-    def line(self) -> Line | None:
-        """The pipe in front of the valve, if there is one."""
-        return self._term(Line)
+    def line(self) -> Line | PiecedLine | None:
+        """The pipe in front of the valve, or the pipes, if there is one."""
+        return self._term(Line, PiecedLine)
 
     @property
     def tail(self) -> Tail | None:
         """The pipe behind the valve, if there is one."""
         return self._term(Tail)
 
-    def _term(self, kind: type):
-        return next((term for term in getattr(self.flow, "terms", ()) if isinstance(term, kind)), None)
+    def _term(self, *kinds: type):
+        return next((term for term in getattr(self.flow, "terms", ()) if isinstance(term, kinds)), None)
 
     @property
     def pump(self) -> Pump | None:
@@ -127,20 +128,18 @@ class ValveModel:
     # -- statics
     # ----
 
-    def residual(self, q: np.ndarray, pressure: float) -> np.ndarray:
-        """Unbalanced force (n,) at an inlet pressure, Pa."""
+    def residual(self, q: np.ndarray, pressure: float, share: float = 1.0) -> np.ndarray:
+        """Unbalanced force (n,) at an inlet pressure, Pa; `share` of what loads the wall, its weight included."""
         nodal = self.nodal(q)
-        p = self.flow.steady_pressure(self.rows.areas(nodal), pressure)
-        force = self.shell.force(q) - self.pressure_force(nodal, p)
-        force[self.stops.unknowns] += self.stops.force(q)
-        return force
+        p = share * self.flow.steady_pressure(self.rows.areas(nodal), pressure)
+        return self.internal_force(q, share=share) - self.pressure_force(nodal, p)
 
-    def tangent(self, q: np.ndarray, pressure: float) -> Tangent:
-        """Residual and linearisation at an inlet pressure, Pa."""
+    def tangent(self, q: np.ndarray, pressure: float, share: float = 1.0) -> Tangent:
+        """Residual and linearisation at an inlet pressure, Pa; `share` as `residual` has it."""
         nodal = self.nodal(q)
         area = self.rows.areas(nodal)
-        p, slope = self.flow.steady_operator(area, pressure)
-        force, structure = self.structure(q)
+        p, slope = (share * part for part in self.flow.steady_operator(area, pressure))
+        force, structure = self.structure(q, share=share)
         force -= self.pressure_force(nodal, p)
         return Tangent(
             residual=force,
@@ -153,11 +152,24 @@ class ValveModel:
             pressure=p,
         )
 
-    def structure(self, q: np.ndarray, step: StepWall | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Internal force (n,) of shell and stops and values (nnz,) of their tangent; `step` for a wall in motion."""
+    def internal_force(self, q: np.ndarray, step: StepWall | None = None, share: float = 1.0) -> np.ndarray:
+        """Force (n,) of shell and stops, and of a share of the weight; `step` for a wall in motion."""
+        force = self.shell.force(q, step)
+        force[self.stops.unknowns] += self.stops.force(q)
+        if self.weight is not None:
+            force += share * self.weight.force(self.shell, q)
+        return force
+
+    def structure(
+        self, q: np.ndarray, step: StepWall | None = None, share: float = 1.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """`internal_force` (n,) and values (nnz,) of its tangent."""
         force, data = self.shell.force_and_tangent(q, step=step)
         force[self.stops.unknowns] += self.stops.force(q)
         data[self._stop_slots] += self.stops.tangent(q)
+        if self.weight is not None:
+            force += share * self.weight.force(self.shell, q)
+            self.weight.add_tangent(self.shell, q, data, share)
         return force, data
 
     def relaxing_stiffness(self, q: np.ndarray) -> tuple[sp.csr_matrix, ...]:
@@ -237,17 +249,18 @@ class ValveModel:
 
     def pressure_derivative(self, q: np.ndarray, pressure: float) -> np.ndarray:
         """Derivative (n,) of the residual by the inlet pressure; steady pressures are proportional to what it has over
-        that downstream.
+        that downstream, but for those of the levels.
         """
         nodal = self.nodal(q)
-        unit = self.flow.steady_pressure(self.rows.areas(nodal), self.flow.back + 1.0)
+        unit = self.flow.steady_pressure(self.rows.areas(nodal), self.flow.back + 1.0) - self.flow.static
         return -self.pressure_force(nodal, unit)
 
     def force_scale(self, q: np.ndarray, pressure: float) -> float:
-        """Norm of the pressure forces, N: what residuals are measured against."""
+        """Norm of the pressure forces and of the weight, N: what residuals are measured against."""
         nodal = self.nodal(q)
         p = self.flow.steady_pressure(self.rows.areas(nodal), pressure)
-        return float(np.linalg.norm(self.pressure_force(nodal, p)))
+        own = 0.0 if self.weight is None else np.linalg.norm(self.weight.force(self.shell, q))
+        return float(np.linalg.norm(self.pressure_force(nodal, p)) + own)
 
     # -- dynamics
     # ----

@@ -76,10 +76,8 @@ class ValveMotion:
     # ----
 
     def internal_force(self, q: np.ndarray, step: StepWall | None = None) -> np.ndarray:
-        """Force (n,) of shell and stops; `step` for a wall that relaxes."""
-        force = self.model.shell.force(q, step)
-        force[self.model.stops.unknowns] += self.model.stops.force(q)
-        return force
+        """Force (n,) of shell, stops and weight; `step` for a wall that relaxes."""
+        return self.model.internal_force(q, step)
 
     def force_rate(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Rate (n,) of the internal force by the slow law: K_s(q) v."""
@@ -344,6 +342,11 @@ class ValveMotion:
         else:
             strain = shell.energy(q)
         return float(kinetic), float(strain), self.model.stops.energy(q)
+
+    def weight_energy(self, q: np.ndarray) -> float:
+        """Potential of the wall's weight over that at rest, J of a quarter; zero without gravity."""
+        weight = self.model.weight
+        return 0.0 if weight is None else weight.energy(self.model.shell, q)
 
     def outside_energy(self, q: np.ndarray, v: np.ndarray) -> float:
         """Kinetic energy of the fluid outside, J of a quarter; zero where there is none."""

@@ -70,13 +70,14 @@ def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observe
 def steady_positions(model: ValveModel, inlet: float, options: SteadyOptions | None = None) -> np.ndarray:
     """Equilibrium (n,) at an inlet pressure, Pa.
 
-    It is as exact as rounding allows: what is left of a residual would shake light parts of the wall.
+    It is as exact as rounding allows: what is left of a residual would shake light parts of the wall. Without a flow
+    the valve is at rest; with gravity it hangs, the fluid in it still.
     """
-    if inlet <= model.flow.back:
+    if inlet <= model.flow.back and model.weight is None:
         return model.rest()
     options = SteadyOptions.of(model.case) if options is None else options
     path = LoadPath(model, SteadyOptions(NewtonOptions(1e-13, options.newton.max_iterations), options.min_step))
-    path.go_to(inlet)
+    path.go_to(max(inlet, model.flow.back))
     return path.q
 
 

@@ -31,6 +31,9 @@ SUMMARY = (
     Column("downstream_velocity", "m/s", "Velocity in that pipe"),
     Column("tail_loss", "m", "Head lost in that pipe"),
     Column(
+        "level_pressure", "Pa", "Weight of the fluid between flange and lips where gravity acts and these are higher"
+    ),
+    Column(
         "mass_flow",
         "kg/s",
         "Mass flow of the whole valve",

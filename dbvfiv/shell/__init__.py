@@ -5,6 +5,7 @@ from .mesh import ShellMesh, nodal_directors, tangent_frames
 from .section import Layer, Section
 from .shell import Shell, StepWall
 from .supports import DofMap
+from .weight import Weight
 
 __all__ = [
     "DofMap",
@@ -15,6 +16,7 @@ __all__ = [
     "ShellMesh",
     "StepWall",
     "WallMemory",
+    "Weight",
     "nodal_directors",
     "tangent_frames",
 ]

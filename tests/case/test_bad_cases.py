@@ -244,6 +244,42 @@ BAD = {
         "[upstream]\nlength = 20\n[onset]\nover = 'pipe_length=0:20:5'",
         r"onset\.over.*start is not greater than 0",
     ),
+    "pieces beside a length": (
+        "[upstream]\nlength = 5\n[[upstream.pieces]]\nlength = 3",
+        r"upstream\.length is 5 beside upstream\.pieces.*one pipe",
+    ),
+    "pieces beside a wave speed": (
+        "[upstream]\nwave_speed = 500\n[[upstream.pieces]]\nlength = 3",
+        r"upstream\.wave_speed is 500 beside upstream\.pieces",
+    ),
+    "piece without a length": ("[[upstream.pieces]]\ndiameter = 0.3", r"upstream\.pieces\.0\.length is missing"),
+    "piece of no length": ("[[upstream.pieces]]\nlength = 0", r"upstream\.pieces\.0\.length.*greater than 0"),
+    "piece with a pump": (
+        "[[upstream.pieces]]\nlength = 3\npump = [[0, 5], [0.1, 1]]",
+        r"upstream\.pieces\.0\.pump is not a key",
+    ),
+    "piece with both kinds of friction": (
+        "[[upstream.pieces]]\nlength = 3\n[[upstream.pieces]]\nlength = 3\nfriction = 0.02\nroughness = '1 mm'",
+        r"upstream\.pieces\.1\.roughness is 1 mm beside friction",
+    ),
+    "piece as rough as it is wide": (
+        "[[upstream.pieces]]\nlength = 3\n[[upstream.pieces]]\nlength = 3\ndiameter = 0.1\nroughness = '8 mm'",
+        r"upstream\.pieces\.1\.roughness is 8 mm in a pipe of 100 mm",
+    ),
+    "piece with elements and no waves": (
+        "[[upstream.pieces]]\nlength = 3\nelements = 4",
+        r"upstream\.pieces\.0\.elements is 4 without a wave_speed",
+    ),
+    "pieces as a table": ("[upstream.pieces]\nlength = 3", r"upstream\.pieces.*list of tables"),
+    "too many pieces": ("[upstream]\npieces = [" + "{ length = 1 }," * 51 + "]", r"upstream\.pieces"),
+    "waves in a piece of a steady law": (
+        "[fluid]\nunsteady = false\n[[upstream.pieces]]\nlength = 3\nwave_speed = 500",
+        r"upstream\.pieces is 500 m/s with fluid\.unsteady = false",
+    ),
+    "gravity across the valve": ("[gravity]\ndirection = '-y'", r"gravity\.direction.*across the axis.*symmetric"),
+    "gravity to no known place": ("[gravity]\ndirection = 'down'", r"gravity\.direction.*no direction.*-z"),
+    "gravity as a vector": ("[gravity]\ndirection = [0, 0, -1]", r"gravity\.direction is given as a list"),
+    "gravity of some size": ("[gravity]\nacceleration = 9.81", r"gravity\.acceleration is not a key"),
     "no edge columns left": ("[drive]\nunloaded_edge = '28/28'", "unloaded_edge.*less than 1"),
     "division by zero": ("[drive]\nunloaded_edge = '3/0'", "divides by zero"),
     "nested too deeply": ("a = " + "[" * 3000 + "]" * 3000, "."),

@@ -1,13 +1,16 @@
-"""A pipe in front of the valve: a rigid column of fluid that loses head by friction and fittings.
+"""A pipe in front of the valve, or several in series: a rigid column that loses head by friction and fittings.
 
     P_flange = P_0 - rho [ L' dU/dt + (U^2 - c u^2)/2 + (f L/D + K) u|u|/2 ],   u = U A_in/A_line,   L' = L A_in/A_line
 
 U is the velocity at the flange, u that in the line. c is 0 where P_0 is the pressure of a reservoir at the far end,
 whose fluid is at rest, and 1 where it is the static pressure in the line there. Flow that runs back into a reservoir
-loses the head of its jet, so that c is 1 then.
+loses the head of its jet, so that c is 1 then. Of pieces in series inertances and losses add, each with its own
+section; u is that of the first, at the far end, and where sections change no head is lost but what `loss` says.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import jax.numpy as jnp
 
@@ -53,6 +56,11 @@ class Line(FlowTerm):
     def parameters(self) -> tuple[FlowParameter, ...]:
         return (FlowParameter("pipe_length", "m", "length of the pipe in front", self.length),)
 
+    @property
+    def parts(self) -> tuple[Line, ...]:
+        """Pieces from the far end to the flange."""
+        return (self,)
+
     def section(self, inlet):
         """Diameter, m, and area of the inlet over that of the line, from the area of a quarter of the inlet."""
         own = jnp.sqrt(16.0 * inlet / jnp.pi)
@@ -81,10 +89,63 @@ class Line(FlowTerm):
         return parameters["pipe_length"] * self.section(stream.area[-1])[1] * stream.inner[0]
 
 
-def from_case(case) -> Line | None:
+class PiecedLine(FlowTerm):
+    """Pipes in series in front of the valve.
+
+    Its parameter is the length of all; another one than its own stretches all pieces alike.
+
+    Parameters
+    ----------
+    parts : sequence of Line
+        From the far end to the flange; whether there is a reservoir is what the first one says.
+    """
+
+    DATA = ("parts", "length")
+
+    def __init__(self, parts: Sequence[Line]):
+        self.parts = tuple(parts)
+        self.length = sum(part.length for part in self.parts)
+
+    @property
+    def parameters(self) -> tuple[FlowParameter, ...]:
+        return (FlowParameter("pipe_length", "m", "length of the pipes in front", self.length),)
+
+    @property
+    def reservoir(self) -> bool:
+        """Whether the pressure that drives the flow is that of a reservoir; else it is static, in the first pipe."""
+        return self.parts[0].reservoir
+
+    def section(self, inlet):
+        """Diameter, m, of the first pipe, and area of the inlet over its own; see `Line.section`."""
+        return self.parts[0].section(inlet)
+
+    def lost_head(self, inlet: float, velocity: float) -> float:
+        """Head lost in all pipes, m2/s2; see `Line.lost_head`."""
+        return sum(part.lost_head(inlet, velocity) for part in self.parts)
+
+    def head(self, stream, parameters):
+        velocity, inlet = stream.inner[0], stream.area[-1]
+        speed = self.section(inlet)[1] * velocity
+        gained = jnp.minimum(speed, 0.0) if self.reservoir else speed
+        stretch, lost = parameters["pipe_length"] / self.length, 0.0
+        for part in self.parts:
+            diameter, ratio = part.section(inlet)
+            own = ratio * velocity
+            lost = lost + part.lost(diameter, stretch * part.length) * own * jnp.abs(own)
+        return 0.5 * (velocity**2 - gained**2 + lost)
+
+    def momentum(self, stream, parameters):
+        inertance = sum(part.length * part.section(stream.area[-1])[1] for part in self.parts)
+        return parameters["pipe_length"] / self.length * inertance * stream.inner[0]
+
+
+def from_case(case) -> Line | PiecedLine | None:
     """The line of a case, or None where it has none."""
-    line = case.upstream
     if not case.has_line:
         return None
     reservoir = case.drive.at == "reservoir"
-    return Line(line.length, line.diameter, line.friction, line.roughness, line.loss, reservoir)
+    parts = [
+        Line(pipe.length, pipe.diameter, pipe.friction, pipe.roughness, pipe.loss, reservoir)
+        for pipe in case.upstream.pipes
+    ]
+    return PiecedLine(parts) if case.upstream.pieces else parts[0]

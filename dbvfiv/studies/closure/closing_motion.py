@@ -21,7 +21,7 @@ class ContactValve(ValveModel):
 
     def __init__(self, case: Case):
         pump = {"upstream.pump": None} if case.has_pump else {}  # what reverses the pressure takes its place
-        super().__init__(case.replace({"supports.lip_stop": False} | pump))
+        super().__init__(case.replace({"supports.lip_stop": False, "gravity.direction": "none"} | pump))
         closure, nodes = case.closure, np.arange(len(self.mesh.nodes))
         law = ContactLaw(
             max(*closure.pressures, closure.open_pressure) / closure.contact_depth, ROUNDING * closure.contact_depth
@@ -54,11 +54,11 @@ class ContactValve(ValveModel):
         nodal = self.nodal(q)
         return self.contact.energy(nodal, self.shell.directors(nodal)[0], self._free)
 
-    def residual(self, q, pressure):
-        return super().residual(q, pressure) + self.contact_force(q)
+    def internal_force(self, q, step=None, share=1.0):
+        return super().internal_force(q, step, share) + self.contact_force(q)
 
-    def structure(self, q, step=None):
-        force, data = super().structure(q, step)
+    def structure(self, q, step=None, share=1.0):
+        force, data = super().structure(q, step, share)
         nodal = self.nodal(q)
         self.contact.add_force_and_tangent(force, data, nodal, *self.shell.directors(nodal), self._free)
         return force, data
@@ -66,9 +66,6 @@ class ContactValve(ValveModel):
 
 class ClosingMotion(ValveMotion):
     """Equations of motion of a `ContactValve`."""
-
-    def internal_force(self, q, step=None):
-        return self.model.shell.force(q, step) + self.model.contact_force(q)
 
     def energies(self, q, v):
         kinetic, strain, _ = super().energies(q, v)

@@ -30,6 +30,8 @@ def run(session: Session, record: GrowingRecord, in_time: bool = False, compare:
         record.note("asked", in_time=in_time, compare=compare)
     case, pressures = session.case, session.case.closure.pressures
     record.begin("closure", len(pressures) * (2 if compare else 1))
+    if case.gravity.is_there:
+        record.warn("Gravity has no part in back pressure: wall and fluid weigh nothing in these states.")
     if compare:
         record.item(f"Supports: {case.closure.supports}")
     if case.closure.start == "open":

@@ -55,7 +55,8 @@ def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: 
     """
     mu = place.mu()
     omega = abs(complex(mode.eigenvalue).imag)
-    name = PARAMETERS[parameter].system_name or None if parameter else None
+    follows = parameter and not (parameter == "density" and case.gravity.is_there)  # whose levels it would leave out
+    name = PARAMETERS[parameter].system_name or None if follows else None
     system = system_of(case, walk, place)
     model = system.model(mu)
     require_forms(model)

@@ -199,9 +199,9 @@ def _value(model, pressure, conditions, name) -> float:
     if name in _OF_PENCIL:
         value = getattr(conditions, name)
         own = {
-            "pipe_length": model.case.upstream.length,
+            "pipe_length": model.case.upstream.whole_length,
             "tail_length": model.case.downstream.length,
-            "wave_speed": model.case.upstream.wave_speed,
+            "wave_speed": model.case.upstream.first_wave_speed,
         }
         return own[name] if value is None else value
     if name == "storage":

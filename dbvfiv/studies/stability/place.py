@@ -65,9 +65,9 @@ class Place:
             damping.beta,
             storage,
             damping.loss_factor,
-            case.upstream.length if case.has_line else 0.0,
+            case.upstream.whole_length if case.has_line else 0.0,
             case.downstream.length if case.has_tail else 0.0,
-            case.upstream.wave_speed if case.has_waves else 0.0,
+            case.upstream.first_wave_speed if case.has_waves else 0.0,
             case.outside.fixed_density,
         )
 
@@ -121,10 +121,10 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
         "loss_factor": case.damping.loss_factor,
     }
     if case.has_line:
-        given["pipe_length"] = case.upstream.length
+        given["pipe_length"] = case.upstream.whole_length
     if case.has_tail and case.downstream.length:
         given["tail_length"] = case.downstream.length
-    if case.has_waves:
+    if case.has_waves and not case.upstream.pieces:
         given["wave_speed"] = case.upstream.wave_speed
     given = {name: value for name, value in given.items() if not case.damping.lacks(name)}
     if case.outside.is_there:
@@ -142,10 +142,24 @@ def describe_fixed(case: Case, *moved: str) -> str:
 
 
 def is_surrounding(case: Case, name: str) -> bool:
-    """Whether a parameter leaves the steady state and the linearised structure of a case as they are; the length of a
-    line does where it has no friction.
+    """Whether a parameter leaves the steady state and the linearised structure of a case as they are."""
+    return PARAMETERS[name].surrounding and not why_it_moves(case, name)
+
+
+def why_it_moves(case: Case, name: str) -> str:
+    """Why a parameter that leaves steady states alone as a rule moves them in a case, as a clause; empty where it does
+    not: the length of a line does where it has no friction, and the density without gravity.
     """
-    return PARAMETERS[name].surrounding and not (name == "pipe_length" and case.upstream.has_friction)
+    if name == "pipe_length" and case.has_line and not case.upstream.pieces and case.upstream.has_friction:
+        return "friction in the line moves the steady state with it"
+    if name == "density" and case.gravity.is_there:
+        return "the weight of the fluid moves the steady state with it"
+    return ""
+
+
+def moving_surroundings(case: Case) -> tuple[str, ...]:
+    """Parameters of the surroundings that move the steady states of a case."""
+    return tuple(name for name in ("pipe_length", "density") if why_it_moves(case, name))
 
 
 def check_flow(case: Case) -> None:
@@ -186,6 +200,12 @@ def require_parameter(case: Case, name: str) -> None:
         For strain levels without a rubber that has them, angles without a ply that has one, the length of a line that
         is not there, and what the model of damping does not have.
     """
+    if name in ("pipe_length", "wave_speed") and case.upstream.pieces:
+        raise CaseError(
+            f"There is no one {name} to change: the line has {len(case.upstream.pieces)} pieces, each with its own; "
+            "give a line of one pipe, or set the pieces one by one.",
+            key="upstream.pieces",
+        )
     if name == "pipe_length" and not case.has_line:
         raise CaseError(
             "There is no pipe_length to change: the valve has no line in front; give upstream.length (drive.pressure "
@@ -225,7 +245,7 @@ def require_parameter(case: Case, name: str) -> None:
 
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
-    level (0.1 for 10 %), length of the line (m) where the steady state depends on it.
+    level (0.1 for 10 %); length of the line (m) and density (kg/m3) where the steady state depends on them.
 
     Raises
     ------
@@ -235,6 +255,8 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     changes: dict[str, object] = {}
     if "pipe_length" in design:
         changes["upstream.length"] = design["pipe_length"]
+    if "density" in design:
+        changes["fluid.density"] = design["density"]
     if "thickness" in design:
         changes["valve.thickness_factor"] = case.valve.thickness_factor * design["thickness"]
     if "strain" in design:

@@ -19,7 +19,7 @@ from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...observer import Observer
 from ..case import Case
 from .family import ValveFamily
-from .place import Place, is_surrounding, rebuilder
+from .place import Place, moving_surroundings, rebuilder
 
 #: Steps over the last one up to which a cubic is trusted ahead of it.
 REACH = 2.0
@@ -82,7 +82,8 @@ class StabilityWalk:
         self._workspace = Workspace()  # for structural frequencies
         self.observer = observer or Observer()
         self._rebuild = rebuilder(case)
-        self._line_moves = case.has_line and not is_surrounding(case, "pipe_length")
+        own = Place.of(case)
+        self._moving = {name: own.value(name) for name in moving_surroundings(case)}
         self._built: dict[tuple, _Built] = {}
         self._last: tuple[tuple, ValveFamily] | None = None
         if model is not None:
@@ -93,10 +94,9 @@ class StabilityWalk:
         return _Built(model, path, ColumnSolver(), {})
 
     def _key(self, place: Place) -> tuple:
-        """What a model has to be built anew for: the design, and the length of a line that moves the steady state."""
+        """What a model has to be built anew for: the design, and what of the surroundings moves the steady state."""
         design = dict(place.design)
-        if self._line_moves and place.pipe_length != self.case.upstream.length:
-            design["pipe_length"] = place.pipe_length
+        design |= {name: place.value(name) for name, own in self._moving.items() if place.value(name) != own}
         return tuple(sorted(design.items()))
 
     def built(self, place: Place) -> _Built:

@@ -84,9 +84,11 @@ def find_cracking(model: ValveModel, states: Iterable[SteadyState], area_ratio: 
 
     def missing(drive: float) -> float:
         """Logarithm of the passage over the one wanted, at a pressure over that downstream."""
-        if drive == 0.0:
+        if drive == 0.0 and model.weight is None:
             return -np.log(area_ratio)
         return float(np.log(max(path.go_to(back + drive).station_area[0], rest * 1e-6)) - wanted)
 
+    if missing(0.0) >= 0.0:  # the weight alone has opened it
+        return Cracking(area_ratio, 0.0, 0.0)
     drive = brentq(missing, 0.0, upper.pressure - back, xtol=1e-12, rtol=_ACCURACY)
     return Cracking(area_ratio, float(drive), head_of(float(drive), model.case.fluid.density))

@@ -76,7 +76,7 @@ def operating_point(result: SteadyResult) -> Figure:
     states = [state for state in ordered(result) if state.hydraulics is not None]
     figure, axes = _axes("Flow, L/s", "Total head at the flange, m")
     flow = np.array([0.0] + [1e3 * s.volume_flow for s in states])
-    rest = head_of(result.case.rest_pressure, result.case.fluid.density)
+    rest = head_of(result.case.rest_pressure - result.case.level_pressure, result.case.fluid.density)
     head = np.array([rest] + [s.hydraulics.total_head for s in states])
     axes.plot(flow, head, "-", color=COMPUTED, label="valve and what is behind it")
     chosen = some_of(states, 5)

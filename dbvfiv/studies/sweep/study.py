@@ -14,7 +14,7 @@ from ...record.record import GrowingRecord
 from ...record.states import SUMMARY
 from ..case import Case
 from ..session import Session
-from ..stability.place import is_surrounding, require_parameter
+from ..stability.place import require_parameter, why_it_moves
 from ..study import Study
 from .printed import head, point_row
 from .result import BRANCHES, CHECKS, POINTS, STATES, SweepResult, tables_of
@@ -25,10 +25,12 @@ def run(session: Session, record: GrowingRecord) -> None:
     """Modes along `sweep.over` of the case; what is done is kept every few seconds."""
     axis = session.case.sweep.axis
     require_parameter(session.case, axis.parameter)
-    if axis.parameter != "pressure" and not is_surrounding(session.case, axis.parameter):
+    moves = why_it_moves(session.case, axis.parameter)
+    if moves:
+        mended = "give upstream.loss in place of friction, or" if axis.parameter == "pipe_length" else "choose"
         raise CaseError(
-            f"sweep.over ranges over {axis.parameter}, but friction in the line moves the steady state with it (onset "
-            "and map follow that); give upstream.loss in place of friction, or another parameter."
+            f"sweep.over ranges over {axis.parameter}, but {moves} (onset and map follow that); {mended} another "
+            "parameter."
         )
     state = None if axis.parameter == "pressure" else session.equilibrium(record)
     found = run_sweep(

@@ -119,6 +119,7 @@ _STORED = (
     ("outside_energy", "fluid\noutside", {"color": ACCENT, "ls": "--"}),
     ("strain_energy", "strain", {"color": COMPUTED}),
     ("stop_energy", "lip stops", {"color": "0.45", "ls": ":"}),
+    ("weight_energy", "weight of\nthe wall", {"color": COMPUTED, "ls": ":"}),
 )
 _EXCHANGED = (
     ("pressure_work", "work of the\npressure", {"color": COMPUTED}),

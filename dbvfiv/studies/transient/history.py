@@ -52,8 +52,10 @@ class Reader:
         throat = int(np.argmin(area))
         out = density * load.speed[0] * float(self.motion.model.flow.open_area(area[0]))
         outside = motion.outside_energy(state.q, state.v)
+        weight = motion.weight_energy(state.q)
         renewed = 0.0 if motion.outside is None else motion.outside.renewed
-        balance = kinetic + outside + strain + stop - self.energy - self.work + self.dissipation - renewed
+        stored = kinetic + outside + strain + stop + weight
+        balance = stored - self.energy - self.work + self.dissipation - renewed
         memory, by_group = state.memory, {}
         if memory is not None:
             balance += memory.work.sum()
@@ -79,6 +81,7 @@ class Reader:
             "outside_renewed": QUARTERS * renewed,
             "strain_energy": QUARTERS * strain,
             "stop_energy": QUARTERS * stop,
+            "weight_energy": QUARTERS * weight,
             "pressure_work": QUARTERS * self.work,
             "dissipation": QUARTERS * self.dissipation,
             "balance": QUARTERS * balance,

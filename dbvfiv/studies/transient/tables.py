@@ -34,6 +34,7 @@ SCALARS = (
     ),
     Column("strain_energy", "J", "Strain energy of the wall"),
     Column("stop_energy", "J", "Energy of the lip stops"),
+    Column("weight_energy", "J", "Potential of the wall's weight over that at rest"),
     Column("pressure_work", "J", "Work of the pressure on the wall since the start"),
     Column("dissipation", "J", "Energy lost to Rayleigh damping since the start"),
     Column(

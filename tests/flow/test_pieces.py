@@ -1,0 +1,185 @@
+"""Pipes in series: one in pieces is one, organ pipes of two sections, blows at a joint, rigid pipes between elastic."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from dbvfiv.flow import Channel, FlowMotion
+from dbvfiv.flow.elastic_line import ElasticLine, LineChannel
+from dbvfiv.flow.line_elements import DEGREE
+from dbvfiv.flow.line_stepping import LineState, LineStep, LineWaves
+from dbvfiv.flow.terms.line import Line, PiecedLine
+from tests.flow.test_channel import FLOOR, passage
+from tests.flow.test_elastic_line import DENSITY, QUARTER, SUPPLY, shut_frequencies, wave_run
+
+jax.config.update("jax_enable_x64", True)
+
+
+def area_of(diameter):
+    return 0.25 * np.pi * diameter**2
+
+
+def in_series(*parts: Line, speeds, elements=None) -> ElasticLine:
+    return ElasticLine(PiecedLine(parts), speeds, elements)
+
+
+def behind(line: ElasticLine, storage=0.0) -> LineChannel:
+    z, _ = passage()
+    return LineChannel(Channel(z, FLOOR, storage), Channel(z, FLOOR, storage, terms=[line.line]), line)
+
+
+@pytest.mark.parametrize("reservoir", [True, False])
+def test_a_pipe_in_pieces_is_the_pipe(reservoir):
+    """Operators, steady flow and steps of a rigid and of an elastic line."""
+    z, area = passage()
+    keys = {"diameter": 0.2, "friction": 0.02, "reservoir": reservoir}
+    given = {"inlet": SUPPLY, "density": DENSITY}
+    parts = [Line(5.0, loss=0.5, **keys), Line(15.0, loss=1.5, **keys)]
+    rigid = [Channel(z, FLOOR, 1.0, terms=[term]) for term in (Line(20.0, loss=2.0, **keys), PiecedLine(parts))]
+    pipes = [
+        ElasticLine(Line(20.0, **keys), 900.0, 8),
+        in_series(Line(5, **keys), Line(15, **keys), speeds=(900.0,) * 2, elements=(2, 6)),
+    ]
+    for one, other in (rigid, [behind(line, 1.0) for line in pipes]):
+        assert other.steady_pressure(area, SUPPLY) == pytest.approx(one.steady_pressure(area, SUPPLY), rel=1e-12)
+        here, there = (law.linearise_still(area, given).parts() for law in (one, other))
+        for name, value in here.items():
+            assert there[name] == pytest.approx(value, rel=1e-11, abs=1e-11 * max(np.abs(value).max(initial=0.0), 1e-9))
+        given_longer = given | {"pipe_length": 30.0}
+        assert other.evaluate(FlowMotion.still(area, other.steady_inner(area, given)), given_longer)[
+            1
+        ] == pytest.approx(
+            one.evaluate(FlowMotion.still(area, one.steady_inner(area, given)), given_longer)[1], rel=1e-9, abs=1e-6
+        )
+    ends = []
+    for line in pipes:
+        waves = LineWaves(line, area[-1], DENSITY)
+        start = waves.moving(waves.steady(1.0, SUPPLY), SUPPLY, 0.3)
+        _, states = wave_run(waves, start, 1e-3, 20, lambda t: 1.0 + 30.0 * t, SUPPLY)
+        ends.append(states[-1])
+    for name in ("velocity", "pressure", "books"):
+        assert getattr(ends[1], name) == pytest.approx(getattr(ends[0], name), rel=1e-10)
+    assert pipes[1].places[0] == pytest.approx(pipes[0].places[0]) and behind(pipes[1]).resolved({}) == behind(
+        pipes[0]
+    ).resolved({})
+
+
+def test_rigid_pieces_add_inertance_and_losses():
+    term = PiecedLine([Line(3.0, 0.2, friction=0.03, loss=0.5), Line(2.0, 0.1, loss=1.0), Line(1.0, roughness=1e-4)])
+    z, area = passage()
+    law, inlet = Channel(z, FLOOR, terms=[term]), 4.0 * area[-1]
+    own = np.sqrt(4 * inlet / np.pi)
+    ratios = np.array([inlet / area_of(0.2), inlet / area_of(0.1), 1.0])
+    inertance = law.linearise_still(area, {"inlet": SUPPLY, "density": 1.0}).S1[0, 0]
+    bare = Channel(z, FLOOR).linearise_still(area, {"inlet": SUPPLY, "density": 1.0}).S1[0, 0]
+    assert bare - inertance == pytest.approx(np.array([3.0, 2.0, 1.0]) @ ratios, rel=1e-12)
+    rough = (2 * np.log10(3.7 * own / 1e-4)) ** -2
+    zeta = np.array([0.03 * 3.0 / 0.2 + 0.5, 1.0, rough / own])
+    assert term.lost_head(area[-1], 1.7) == pytest.approx(0.5 * zeta @ (1.7 * ratios) ** 2, rel=1e-12)
+    velocity = law.inlet_velocity(area, SUPPLY, DENSITY)
+    jet = velocity * area[-1] / area[0]
+    assert SUPPLY / DENSITY == pytest.approx(0.5 * jet**2 + term.lost_head(area[-1], velocity), rel=1e-9)
+
+
+def roots(function, count: int, top: float) -> np.ndarray:
+    """First zeros of a function without poles."""
+    grid = np.linspace(1e-6, top, 4000)
+    values = np.array([function(x) for x in grid])
+    cuts = np.flatnonzero(values[:-1] * values[1:] < 0)[:count]
+    return np.array([brentq(function, grid[i], grid[i + 1], xtol=1e-13) for i in cuts])
+
+
+@pytest.mark.parametrize("rigid", [0.0, 6.0])
+def test_organ_pipes_of_two_sections(rigid):
+    """tan(w L1/c1) tan(w L2/c2) = Z2/Z1, Z = c/A, open at its far end and shut at the flange; a rigid pipe between them
+    adds w L/A to Z1 tan.
+    """
+    (l1, d1, c1), (l2, d2, c2), d = (12.0, 0.3, 1000.0), (5.0, 0.15, 400.0), 0.2
+    z1, z2 = c1 / area_of(d1), c2 / area_of(d2)
+
+    def dispersion(w):
+        x, y = w * l1 / c1, w * l2 / c2
+        lump = w * rigid / area_of(d)
+        return (z1 * np.sin(x) + lump * np.cos(x)) * np.sin(y) - z2 * np.cos(x) * np.cos(y)
+
+    pipes = [Line(l1, d1), *([Line(rigid, d)] if rigid else []), Line(l2, d2)]
+    speeds = [c1, *([None] if rigid else []), c2]
+    line = in_series(*pipes, speeds=speeds, elements=[12, *([None] if rigid else []), 12])
+    found = shut_frequencies(line)
+    assert len(found) == DEGREE * 24
+    assert found[:6] == pytest.approx(roots(dispersion, 6, 3000.0), rel=1e-8)
+
+
+def test_a_rigid_piece_at_an_end_is_its_inertance():
+    """At the far end it hangs between the reservoir and the waves, at the flange between them and the valve."""
+    length, speed, d = 10.0, 500.0, 0.2
+    ends = [in_series(Line(4.0, d), Line(length, d), speeds=(None, speed), elements=(None, 16))]
+    function = lambda w: np.cos(w * length / speed) - w * 4.0 / speed * np.sin(w * length / speed)  # noqa: E731
+    assert shut_frequencies(ends[0])[:4] == pytest.approx(roots(function, 4, 1000.0), rel=1e-8)
+    near = LineWaves(
+        in_series(Line(length, d), Line(4.0, d), speeds=(speed, None), elements=(8, None)), QUARTER, DENSITY
+    )
+    bare = LineWaves(ElasticLine(Line(length, d), speed, 8), QUARTER, DENSITY)
+    ratio = 4 * QUARTER / area_of(d)
+    assert near.inertance - bare.inertance == pytest.approx(4.0 * ratio, rel=1e-10)
+
+
+@pytest.mark.parametrize("wider", [0.15, 0.4])
+def test_a_blow_at_a_change_of_section(wider):
+    """It goes on as 2 Z1/(Z1 + Z2) of itself and comes back as (Z1 - Z2)/(Z1 + Z2), Z = c/A (Wylie and Streeter)."""
+    (l1, c1), (l2, c2), d2 = (20.0, 800.0), (20.0, 1000.0), 0.25
+    line = in_series(Line(l1, wider), Line(l2, d2), speeds=(c1, c2), elements=(24, 24))
+    waves = LineWaves(line, QUARTER, DENSITY)
+    velocity, rise, step = 1e-2, 0.15 * l2 / c2, l2 / c2 / 200
+    flange = lambda t: -0.5 * velocity * (1.0 - np.cos(np.pi * min(1.0, t / rise)))  # noqa: E731
+    pressure, states = wave_run(waves, waves.at_rest(), step, 560, flange, 0.0)
+    z1, z2 = c1 / area_of(wider), c2 / area_of(d2)
+    blow = c2 * 4 * QUARTER / area_of(d2) * velocity
+    assert (pressure / DENSITY)[40:380] == pytest.approx(blow, rel=5e-3)
+    back = (z1 - z2) / (z1 + z2)
+    time = (np.arange(560) + 0.5) * step * c2 / l2
+    late = (pressure / DENSITY)[(time > 2.4) & (time < 2.75)]
+    assert late.mean() == pytest.approx((1 + 2 * back) * blow, rel=5e-3)
+    then = states[330]  # 1.65 of the way: the blow is past the joint by 0.65 of a pipe
+    head = (then.pressure.reshape(48, -1) * waves.ratio * waves.speed)[:, 0]
+    passed = head[16:34]
+    assert passed == pytest.approx(2 * z1 / (z1 + z2) * blow, rel=0.01)
+
+
+def test_what_a_step_solves_is_the_law():
+    _, area = passage()
+    parts = [
+        Line(2.0, 0.3, loss=0.7),
+        Line(4.0, 0.2, friction=0.03),
+        Line(1.0, 0.25, loss=1.1),
+        Line(3.0, roughness=1e-4),
+    ]
+    line = in_series(
+        *parts, Line(0.5, 0.1, loss=0.2), speeds=(None, 800.0, None, 500.0, None), elements=(None, 3, None, 2, None)
+    )
+    law, rng, waves = behind(line), np.random.default_rng(3), LineWaves(line, area[-1], DENSITY)
+    k = line.size // 2
+    sizes = ((k + 1, 1.0), (k + 1, 30.0), (k, 0.3), (k, 30.0))
+    old = LineState(*(rng.standard_normal(n) * size for n, size in sizes), np.zeros(3))
+    theta, rate, h, velocity = 0.6, 1.1, 2e-3, -0.4
+    step = LineStep(waves, old, h, theta, rate, SUPPLY)
+    head, slope = step.at(velocity)
+    new = step.end(velocity)
+    mid = [a + theta * (b - a) for a, b in ((old.velocity, new.velocity), (old.pressure, new.pressure))]
+    both = ((old.velocity_rate, new.velocity_rate), (old.pressure_rate, new.pressure_rate))
+    rates = [(1 - rate) * before + rate * after for before, after in both]
+    given = law.values({"inlet": SUPPLY, "density": DENSITY})
+    momentum, continuity = line.equations(mid[0], rates[0], mid[1], rates[1], area[-1], given)
+    size = np.abs(waves.inertia(rates[0])).max()
+    assert np.abs(np.asarray(momentum)[:-1]).max() < 1e-11 * size and np.abs(continuity).max() < 1e-10 * size
+    assert -momentum[-1] == pytest.approx(head, rel=1e-11)
+    d = 1e-5
+    assert slope == pytest.approx((step.at(velocity + d)[0] - step.at(velocity - d)[0]) / (2 * d), rel=1e-6)
+    steady = law.steady_inner(area, {"inlet": SUPPLY, "density": DENSITY})
+    _, rest = law.evaluate(FlowMotion.still(area, steady), {"inlet": SUPPLY, "density": DENSITY})
+    assert np.abs(rest).max() < 1e-9 * SUPPLY
+    own = waves.steady(float(steady[0]), SUPPLY)
+    assert own.pressure == pytest.approx(steady[k + 1 :], rel=1e-11)

@@ -1,0 +1,190 @@
+"""A valve that stands upright: steady states, modes, motions, and studies over the density, which moves them."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from continuation.memory import Motion
+from dbvfiv.case import CaseError
+from dbvfiv.case.quantity import GRAVITY
+from dbvfiv.errors import SolveError
+from dbvfiv.model.analytic import AnalyticResidual
+from dbvfiv.model.classes import linearise_class
+from dbvfiv.model.equilibria import find_equilibrium, rest_state
+from dbvfiv.model.memory_forms import ValveMemoryForms
+from dbvfiv.model.symmetry import SYMMETRIES
+from dbvfiv.studies.stability.place import Place, is_surrounding
+from dbvfiv.studies.stability.walk import StabilityWalk
+from tests.small_valves import EVEN, make_valve
+from tests.verification.test_transient_modes import check_three_routes, three_routes
+
+SMALL = {"mesh.around": 6, "mesh.along": 8}
+DOWN, UP = {"gravity.direction": "-z"}, {"gravity.direction": "+z"}
+WET = {"outside.fluid": "same"}
+LEVEL = 1000.0 * GRAVITY * 0.56
+
+
+def load(*keys):
+    changes = dict(SMALL)
+    for some in keys:
+        changes |= some
+    return dbvfiv.load(None, changes)
+
+
+def test_a_valve_that_weighs_nothing_sees_the_level_alone():
+    """One rubber as heavy as the fluid on both of its sides: the drive is that over the level."""
+    floating = {"layers": [{"material": "CR", "thickness": 0.014}], "fluid.density": 1300.0}
+    lying = load(floating, WET).steady(pressure=12e3)
+    for gravity, sign in ((DOWN, -1.0), (UP, 1.0)):
+        state = load(floating, WET, gravity).steady(pressure=12e3 + sign * 1.3 * LEVEL)
+        assert state.q == pytest.approx(lying.q, rel=1e-7, abs=1e-10)
+        assert state.mass_flow == pytest.approx(lying.mass_flow, rel=1e-8)
+        assert state.hydraulics.loss_coefficient == pytest.approx(lying.hydraulics.loss_coefficient, rel=1e-7)
+        assert state.level_pressure == pytest.approx(sign * 1.3 * LEVEL)
+
+
+@pytest.mark.parametrize("keys", [{}, {"upstream.length": 10.0, "upstream.loss": 1.0, "drive.at": "line"}], ids=str)
+def test_heads_and_jet_of_a_valve_that_discharges_downwards(keys):
+    state = load(DOWN, keys).steady(pressure=12e3)
+    flange, jet = state.station_velocity[-1], state.outlet_velocity
+    fall = state.flange_pressure / 1000.0 + 0.5 * flange**2 + GRAVITY * 0.56
+    assert 0.5 * jet**2 == pytest.approx(fall, rel=1e-8)
+    assert state.hydraulics.total_head == pytest.approx(fall / GRAVITY, rel=1e-8)
+    assert state.hydraulics.head_loss == pytest.approx(fall / GRAVITY, rel=1e-8)
+    assert state.station_pressure[-1] == pytest.approx(state.flange_pressure, rel=1e-8)
+
+
+def test_forces_balance_and_the_tangent_is_that_of_the_residual():
+    for keys in (DOWN, UP | WET):
+        model = load(keys).model
+        q = load(keys).steady(pressure=12e3).q
+        v = 1e-6 * np.random.default_rng(0).standard_normal(model.size)
+        tangent = model.tangent(q, 12e3)
+        found = model.residual(q + v, 12e3) - model.residual(q - v, 12e3)
+        exact = 2 * model.apply(tangent, v)
+        assert found == pytest.approx(exact, abs=1e-5 * np.abs(exact).max())
+        own = model.shell.dofs.matrix(tangent.structure)
+        assert abs(own - own.T).max() < 1e-14 * abs(own).max()
+
+
+def test_a_valve_that_hangs_holds_still_water():
+    model = load(UP).model
+    state = rest_state(model)
+    assert state.mass_flow == 0.0 and state.pressure == pytest.approx(LEVEL)
+    depth = model.mesh.z
+    assert state.station_pressure == pytest.approx(1000.0 * GRAVITY * depth, abs=1e-6)
+
+
+def test_less_than_the_level_does_not_flow():
+    with pytest.raises(SolveError, match="nothing flows.*by the level of the lips"):
+        find_equilibrium(load(UP).model, 5e3)
+
+
+@pytest.mark.parametrize("keys, pressure", [(DOWN, 4e3), pytest.param(UP | WET, 14e3, marks=pytest.mark.slow)], ids=str)
+def test_three_routes(keys, pressure):
+    check_three_routes(three_routes("storage", pressure, 1000.0, mesh=(6, 8), further=keys), str(keys))
+
+
+def test_energies_balance():
+    keys = SMALL | DOWN | {"transient.start": "rest", "transient.duration": 0.03, "transient.step": 2e-4}
+    keys |= {"transient.numerical_damping": 0.0, "drive.pressure": 4e3, "damping.alpha": 0.0}
+    history = dbvfiv.load(None, keys).transient().history
+    turned_over = np.abs(np.diff(history["pressure_work"])).sum()
+    assert np.abs(history["weight_energy"]).max() > 1e-3 * turned_over
+    off = np.abs(history["balance"]).max()
+    assert off < 5e-3 * turned_over and off < 0.2 * np.abs(history["weight_energy"]).max()
+
+
+@pytest.mark.slow
+def test_classes_of_motion_hold_the_weight():
+    """The tangent of each class is that of the whole weight, by differences of its force."""
+    model = make_valve(DOWN)
+    q = load(DOWN).steady(pressure=12e3).q
+    bare = make_valve()
+    for symmetry in SYMMETRIES.values():
+        heavy, light = (linearise_class(m, q, 12e3, symmetry).structure for m in (model, bare))
+        shell = linearise_class(model, q, 12e3, symmetry).shell if symmetry.name != "SS" else model.shell
+        here = np.zeros(shell.size) if symmetry.name != "SS" else q
+        v = 1e-4 * np.random.default_rng(1).standard_normal(shell.size)
+        change = model.weight.force(shell, here + v) - model.weight.force(shell, here - v)
+        assert change == pytest.approx(2 * (heavy - light) @ v, abs=1e-6 * np.abs(change).max())
+
+
+@pytest.mark.slow
+def test_higher_forms_hold_the_weight():
+    model = make_valve(EVEN | DOWN)
+    residual = AnalyticResidual(model)
+    nodal = np.zeros((len(model.mesh.nodes), 5))
+    nodal[:, 1] = 0.02 * np.clip(1 - model.mesh.nodes[:, 2] / 0.49, 0, 1) ** 2
+    zero, random = np.zeros(model.size), np.random.default_rng(5)
+    about = model.shell.dofs.restrict(nodal), zero, zero, 1.3, 0.0
+    parameters = {"inlet": 4e3, "density": 1000.0, "alpha": 2.0, "beta": 0.003, "storage": 1.0}
+    kinds = (1e-3, 1e-1, 1.0)
+    directions = [(*(s * random.normal(size=model.size) for s in kinds), 0.1, 0.1) for _ in range(2)]
+    h, total = 1e-3, 0.0
+    for signs in itertools.product((-1, 1), repeat=2):
+        place = list(about)
+        for sign, direction in zip(signs, directions):
+            place = [x + sign * h * d for x, d in zip(place, direction)]
+        total = total + np.prod(signs) * residual.value(tuple(place), parameters)
+    exact = residual.second(about, parameters, *directions)
+    assert exact == pytest.approx(total / (2 * h) ** 2, abs=1e-3 * np.abs(exact).max())
+
+
+def test_studies_over_the_density_follow_the_steady_state():
+    keys = DOWN | {"drive.pressure": "6 kPa", "damping.alpha": 0.0}
+    case = load(keys).case
+    assert not is_surrounding(case, "density") and is_surrounding(load().case, "density")
+    with pytest.raises(CaseError, match=r"sweep\.over.*density.*weight of the fluid"):
+        load(keys).sweep("density=10:1000:4:log")
+    walk, place = StabilityWalk(case), Place.of(case)
+    for density in (10.0, 400.0):
+        valve = load(keys, {"fluid.density": density})
+        there = place.at(density=density)
+        assert walk.equilibrium(there) == pytest.approx(valve.steady(pressure="6 kPa").q, rel=1e-6, abs=1e-9)
+        leading = valve.modes(count=4).modes[0]
+        assert walk.spectrum(there, 4).eigenvalues[0].real == pytest.approx(leading.growth_rate, rel=1e-6)
+    (found,) = load(keys).steady(pressure="6 kPa").sensitivity("density").sensitivities
+    low, high = (
+        load(keys, {"fluid.density": 1000.0 + step}).modes(count=4).modes[0].growth_rate for step in (-1.0, 1.0)
+    )
+    assert found.growth_rate == pytest.approx((high - low) / 2.0, rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("keys", [DOWN, DOWN | {"damping.model": "loss factor"}], ids=["beta", "loss factors"])
+def test_normal_forms_hold_the_weight(keys):
+    """Those of a wall that relaxes are those of one that does not where nothing relaxes."""
+    model = load(keys, {"damping.beta": 1e-3} if "damping.model" not in keys else {}).model
+    q = load(keys).steady(pressure=6e3).q
+    mu = {"inlet": 6e3, "density": 1000.0, "storage": 1.0, "alpha": 1.0, "beta": 1e-3, "loss_factor": 0.0}
+    forms, residual = ValveMemoryForms(model, q, mu), AnalyticResidual(model)
+    random, zero = np.random.default_rng(2), np.zeros(model.size)
+    a, b = (Motion(s, random.normal(size=model.size + 1) * 1e-3) for s in (3.0, -2.0))
+    inner = model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)
+    split = [
+        (m.vector[:-1], m.rate * m.vector[:-1], m.rate**2 * m.vector[:-1], m.vector[-1:], m.rate * m.vector[-1:])
+        for m in (a, b)
+    ]
+    exact = residual.second((q, zero, zero, inner, 0 * inner), mu, *split)
+    assert forms.second(a, b).real == pytest.approx(exact, abs=1e-8 * np.abs(exact).max())
+
+
+@pytest.mark.slow
+def test_a_map_over_the_density():
+    axes = {"map.x": "pressure=3 kPa:6 kPa:2:log", "map.y": "density=10:1000:3:log"}
+    found = load(DOWN, {"damping.alpha": 0.0}, axes).map()
+    assert not found.failures and found.grid("certified").all()
+    (growth,) = found.grid("growth_rate")
+    keys = {"fluid.density": 10.0, "drive.pressure": 3e3, "damping.alpha": 0.0}
+    assert growth[0, 0] == pytest.approx(load(DOWN, keys).modes(count=4).modes[0].growth_rate, rel=1e-6)
+
+
+def test_back_pressure_says_that_nothing_weighs(command_line):
+    keys = SMALL | DOWN | {"closure.pressures": "[100]"}
+    out = command_line("closure", *(f"--set={key}={value}" for key, value in keys.items()))
+    assert out.status == 0 and "Gravity has no part" in out.out + out.err

@@ -1,0 +1,87 @@
+"""Studies of a valve behind pipes in series: two equal ones are one, and what belongs to one pipe alone is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.case import CaseError
+from dbvfiv.studies.sensitivity.derivatives import parameters_of
+from tests.verification.test_transient_modes import check_three_routes, three_routes
+
+SMALL = {"mesh.around": 6, "mesh.along": 8, "drive.pressure": 6e3, "damping.alpha": 0.0, "fluid.density": 100.0}
+PIPE = {"diameter": "250 mm", "friction": 0.02}
+ONE = {f"upstream.{name}": value for name, value in PIPE.items()} | {"upstream.length": 12.0, "upstream.loss": 2.0}
+TWO = {"upstream.pieces": [{"length": 6.0, "loss": 1.0, **PIPE}] * 2}
+MIXED = {
+    "upstream.pieces": [
+        {"length": 4.0, "diameter": "300 mm", "loss": 0.5},
+        {"length": 8.0, "diameter": "250 mm", "wave_speed": 600.0, "elements": 3},
+        {"length": 2.0, "diameter": "200 mm", "friction": 0.02, "wave_speed": 900.0, "elements": 2},
+    ]
+}
+
+
+def load(*keys):
+    changes = dict(SMALL)
+    for some in keys:
+        changes |= some
+    return dbvfiv.load(None, changes)
+
+
+def with_waves(keys):
+    """The same pipe or pipes with waves of 700 m/s in them."""
+    if "upstream.pieces" in keys:
+        pieces = [piece | {"wave_speed": 700.0, "elements": 2} for piece in keys["upstream.pieces"]]
+        return {"upstream.pieces": pieces}
+    return keys | {"upstream.wave_speed": 700.0, "upstream.elements": 4}
+
+
+@pytest.mark.parametrize("elastic", [False, True], ids=["rigid", "elastic"])
+def test_two_equal_pieces_are_one_pipe(elastic):
+    one, two = (load(with_waves(keys) if elastic else keys, {"steady.cracking_area": 2.0}) for keys in (ONE, TWO))
+    states = [valve.steady(pressure=6e3) for valve in (one, two)]
+    for name in ("mass_flow", "line_loss", "flange_pressure", "lip_opening"):
+        assert getattr(states[1], name) == pytest.approx(getattr(states[0], name), rel=1e-8)
+    assert states[1].line_loss > 0
+    modes = [[complex(m.growth_rate, m.frequency) for m in valve.modes(count=6).modes] for valve in (one, two)]
+    assert modes[1] == pytest.approx(modes[0], rel=1e-8)
+    run = {"transient.start": "kick", "transient.step": 5e-4, "transient.duration": 0.01}
+    first, second = (
+        load(with_waves(keys) if elastic else keys, run).transient().history["lip_displacement"] for keys in (ONE, TWO)
+    )
+    swing = np.ptp(first)
+    assert swing > 0 and np.abs(second - first).max() < 1e-8 * np.abs(first).max()
+
+
+def test_three_routes_behind_pipes_of_each_kind():
+    check_three_routes(three_routes("storage", 6e3, 100.0, mesh=(6, 8), further=MIXED), "three pipes")
+
+
+def test_over_the_density_waves_keep_their_speeds():
+    """Studies over the density reduce the line at unit density."""
+    found = load(MIXED).sweep("density=20:100:3:log")
+    assert found.certified
+    leading = load(MIXED).modes(count=4).modes[0]
+    assert max(b.growth_rate[-1] for b in found.branches) == pytest.approx(leading.growth_rate, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["pipe_length", "wave_speed"])
+def test_no_one_pipe_to_change(name):
+    with pytest.raises(CaseError, match=f"no one {name} to change.*3 pieces"):
+        load(MIXED).onset(f"{name}=1:50:5:log" if name == "pipe_length" else f"{name}=100:1000:5:log")
+    assert name not in parameters_of(load(MIXED).model)
+
+
+def test_pieces_from_a_file(tmp_path, command_line):
+    path = tmp_path / "line.toml"
+    path.write_text(
+        "[mesh]\naround = 6\nalong = 8\n[drive]\nhead = '1 m'\n"
+        "[[upstream.pieces]]\nlength = '15 m'\ndiameter = '400 mm'\nroughness = '0.1 mm'\n"
+        "[[upstream.pieces]]\nlength = '5 m'\ndiameter = '300 mm'\nloss = 0.3\n"
+    )
+    out = command_line("steady", path)
+    assert out.status == 0 and "line loss" in out.out
+    case = dbvfiv.load(path).case
+    assert case.upstream.whole_length == 20.0 and case.from_dict(case.to_dict()) == case
