@@ -2,7 +2,7 @@
 PYTHON = $(shell cat build/setup/python 2>/dev/null)
 JOBS ?= 2
 
-.PHONY: setup test verify bench demo demo-full reproduce docs clean
+.PHONY: setup test verify verify-3d bench demo demo-full reproduce docs clean
 .DEFAULT_GOAL := demo
 
 setup:
@@ -14,6 +14,11 @@ test: setup
 verify: setup
 	@$(PYTHON) -m pytest -s tests/verification
 	@$(PYTHON) -m pytest -m slow --ignore=tests/verification
+
+# flow and wall in three dimensions, end to end; installs Debian's OpenFOAM where there is none
+verify-3d: setup
+	@tools/openfoam
+	@$(PYTHON) -m pytest -s tests/cfd tests/exchange tests/wall
 
 bench: setup
 	@$(PYTHON) -m benchmarks

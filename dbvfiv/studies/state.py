@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..exchange.files import state_name, write_shapes
 from ..model import ValveModel
 from ..model.state import SteadyState
 from ..record.record import GrowingRecord
@@ -124,6 +125,19 @@ class State(SteadyState):
     def export(self, path: str | Path, quarter: bool = False, deformed: bool = False) -> Path:
         """Write this state for ParaView."""
         return gather_states(self.results, [self]).export(path, quarter, deformed)
+
+    def export_shapes(
+        self, folder: str | Path = ".", format: str = "stl", shapes: Sequence[str] = (), quarter: bool = False
+    ) -> list[Path]:
+        """Write faces of the wall, the wall and the fluid inside as STL (m) or STEP (mm); see
+        `dbvfiv.exchange.files.write_shapes`.
+
+        Examples
+        --------
+        >>> state.export_shapes("cad", "step", ["fluid", "wall"])     # doctest: +SKIP
+        """
+        name = state_name(self.results.header.name, self.pressure)
+        return write_shapes(self.results.mesh, self.nodal, folder, name, format, shapes, quarter)
 
 
 def sensitivity_keys(of: str | Sequence[str], mode: int | None) -> dict[str, Any]:

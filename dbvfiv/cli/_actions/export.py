@@ -1,11 +1,13 @@
-"""A result for ParaView."""
+"""A result for ParaView, surfaces and bodies of a state for CAD."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ...studies.session import load_result
 from .._output import print_json
+from .states import chosen_state
 
 
 def export(file: Path, output: Path | None, quarter: bool, deformed: bool, mode: int | None, as_json: bool) -> None:
@@ -18,3 +20,21 @@ def export(file: Path, output: Path | None, quarter: bool, deformed: bool, mode:
         print_json({"written": str(written)})
     else:
         print(f"Wrote {written}.")
+
+
+def export_shapes(
+    file: Path,
+    output: Path | None,
+    format: str,
+    shapes: Sequence[str],
+    pressure: str | None,
+    quarter: bool,
+    as_json: bool,
+) -> None:
+    """Write shapes of one state into a folder, beside the result unless one is named."""
+    folder = file.parent if output is None else output
+    written = chosen_state(file, pressure).export_shapes(folder, format, shapes, quarter)
+    if as_json:
+        print_json({"written": [str(path) for path in written]})
+    else:
+        print("\n".join(f"Wrote {path}." for path in written))
