@@ -1,0 +1,188 @@
+"""Floquet exponents of periodic motions by Hill's method: perturbations exp(sigma t) times a Fourier series.
+
+The linearisation projected on the basis of the corrections is a small dense problem, quadratic in sigma or nearly so,
+whose leading eigenvalues come from shifted Arnoldi iterations. What their vectors miss in the full equations is
+measured, and added to the basis until it is small; how far the exponent of the shift in time is from zero measures the
+rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from continuation.harmonics import Harmonics
+
+#: Shifts: distance right of the axis, and how far up the band of exponents, both over omega.
+_RIGHT, _UP = 0.1, (0.0, 0.25, 0.5)
+#: Steps of each Arnoldi iteration.
+_STEPS = 60
+#: Most that the outer two harmonics may hold of a perturbation.
+_RIM = 0.05
+#: How far past half the frequency the imaginary part of a real negative multiplier may come out, over omega.
+_EDGE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Exponents:
+    """Leading Floquet exponents.
+
+    Attributes
+    ----------
+    values : (k,) complex array
+        1/s, sorted by growth rate, imaginary parts from 0 to omega / 2; that of the shift in time left out.
+    vectors : list of (2 H + 1, n) complex arrays
+        Coefficients of the perturbations.
+    errors : (k,) array
+        What each perturbation misses in the full equations, as a share of itself.
+    trivial : float
+        Size of the exponent of the shift in time, 1/s; zero for a forced system.
+    omega : float
+    """
+
+    values: np.ndarray
+    vectors: list[np.ndarray]
+    errors: np.ndarray
+    trivial: float
+    omega: float
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """(k,) complex."""
+        return np.exp(self.values * 2 * np.pi / self.omega)
+
+    @property
+    def unstable(self) -> int:
+        """Dimension in which perturbations grow; those that grow slower than the shift in time moves do not count."""
+        grows = self.values[self.values.real > max(2.0 * self.trivial, 1e-6 * self.omega)]
+        return int(sum(1 if self.is_real(value) else 2 for value in grows))
+
+    def is_real(self, value: complex) -> bool:
+        """Whether the multiplier of an exponent is real."""
+        near = 1e-3 * self.omega
+        return abs(value.imag) < near or abs(value.imag - 0.5 * self.omega) < near
+
+    @property
+    def stable(self) -> bool:
+        return self.unstable == 0
+
+
+def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-2, rounds: int = 2) -> Exponents:
+    """Leading exponents of the motion of a linearisation.
+
+    Parameters
+    ----------
+    solver : continuation.cycles.CycleSolver
+        Its basis grows by what perturbations miss.
+    linear : continuation.bordered_cycle.CycleLinearisation
+        At the motion itself.
+    count : int
+        Exponents wanted.
+    tolerance : float
+        Largest share that a perturbation may miss.
+    rounds : int
+        Times that the basis is made larger.
+    """
+    for left in range(rounds, -1, -1):
+        found = _of_projection(linear, count, solver.system.autonomous)
+        missed = [_missed(linear, *pair) for pair in zip(found.values, found.vectors)]
+        errors = np.array([share for share, _ in missed])
+        found = Exponents(found.values, found.vectors, errors, found.trivial, found.omega)
+        if not left or not np.any(errors > tolerance):
+            return found
+        rows = [part for share, rest in missed if share > tolerance for part in (rest.real, rest.imag)]
+        if not solver.learn(np.concatenate(rows)):
+            return found
+        linear.rebase(solver.basis_for(linear.motion))
+    return found
+
+
+def _missed(linear, sigma: complex, vector: np.ndarray) -> tuple[float, np.ndarray]:
+    """Share that a perturbation misses, and the correction (2 H + 1, n) that one pass of the smoother gives."""
+    if linear.smoother is None:
+        return 0.0, np.zeros_like(vector)
+    rest = linear.smoother(linear.operator.apply(vector, sigma))
+    scaled, whole = rest / linear.scale, np.linalg.norm(vector / linear.scale)
+    outside = scaled - (scaled @ linear.basis) @ linear.basis.T
+    return float(np.linalg.norm(outside) / whole), outside * linear.scale
+
+
+def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
+    reduced, motion = linear.reduced, linear.motion
+    omega, h = motion.omega, motion.harmonics
+    found: list[tuple[complex, np.ndarray]] = []
+    for sigma, x in _near(reduced, [omega * (_RIGHT + 1j * up) for up in _UP]):
+        x = x.reshape(h.size, -1)
+        if sigma.imag < 0:
+            sigma, x = np.conj(sigma), x.conj()
+        new = all(abs(sigma - known) > 1e-6 * omega for known, _ in found)
+        # each perturbation once: all others are turns of it by whole periods
+        if new and sigma.imag <= (0.5 + _EDGE) * omega and _is_whole(h, x):
+            found.append((complex(sigma), x))
+    trivial = 0.0
+    if autonomous and found:
+        trivial = float(abs(found.pop(int(np.argmin([abs(sigma) for sigma, _ in found])))[0]))
+    found = sorted(found, key=lambda pair: -pair[0].real)[:count]
+    v = linear.scale[:, None] * linear.basis
+    values = np.array([sigma for sigma, _ in found], complex)
+    return Exponents(values, [x @ v.T for _, x in found], np.zeros(len(found)), trivial, omega)
+
+
+def _is_whole(h: Harmonics, x: np.ndarray) -> bool:
+    weight = np.sum(np.abs(h.two_sided(x)) ** 2, axis=1)
+    rim = weight[[0, 1, -2, -1]].sum() if h.count > 2 else 0.0
+    return bool(rim <= _RIM * weight.sum())
+
+
+def _near(reduced, shifts) -> list[tuple[complex, np.ndarray]]:
+    """Eigenpairs of the projection near shifts; the matrix is quadratic, about each shift where something relaxes."""
+    step, found, parts = 0.25 * reduced.motion.omega, [], None
+    for shift in shifts:
+        if parts is None or not reduced.polynomial:
+            middle = 0.0 if reduced.polynomial else shift
+            here, ahead, behind = (reduced.matrix(middle + d) for d in (0.0, step, -step))
+            first, second = (ahead - behind) / (2 * step), (ahead + behind - 2 * here) / (2 * step**2)
+            parts = (here - middle * first + middle**2 * second, first - 2 * middle * second, second)
+        found += _nearest(parts, shift)
+    return found
+
+
+def _nearest(parts, shift: complex) -> list[tuple[complex, np.ndarray]]:
+    """Eigenpairs near a shift of l0 + sigma l1 + sigma^2 l2."""
+    l0, l1, l2 = parts
+    factor = la.lu_factor(l0 + shift * l1 + shift**2 * l2, check_finite=False)
+    size = len(l0)
+
+    def invert(x):
+        y, z = x[:size], x[size:]
+        top = -la.lu_solve(factor, l2 @ (z + shift * y) + l1 @ y, check_finite=False)
+        return np.append(top, y + shift * top)
+
+    return [(shift + 1.0 / value, vector[:size]) for value, vector in _arnoldi(invert, 2 * size)]
+
+
+def _arnoldi(apply, size: int) -> list[tuple[complex, np.ndarray]]:
+    """Ritz pairs of the largest eigenvalues that have converged."""
+    steps = min(_STEPS, size)
+    basis = np.zeros((size, steps + 1), complex)
+    start = np.random.default_rng(0).standard_normal(size)
+    basis[:, 0] = start / np.linalg.norm(start)
+    h = np.zeros((steps + 1, steps), complex)
+    done = steps
+    for k in range(steps):
+        w = apply(basis[:, k])
+        for _ in range(2):
+            part = basis[:, : k + 1].conj().T @ w
+            h[: k + 1, k] += part
+            w = w - basis[:, : k + 1] @ part
+        h[k + 1, k] = np.linalg.norm(w)
+        if abs(h[k + 1, k]) <= 1e-13 * np.abs(h[: k + 2, : k + 1]).max():
+            done = k + 1
+            break
+        basis[:, k + 1] = w / h[k + 1, k]
+    values, vectors = np.linalg.eig(h[:done, :done])
+    last = abs(h[done, done - 1]) if done < len(h) else 0.0
+    good = [i for i in range(done) if last * abs(vectors[-1, i]) <= 1e-9 * abs(values[i]) and values[i]]
+    return [(complex(values[i]), basis[:, :done] @ vectors[:, i]) for i in good]
