@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -151,10 +151,17 @@ class CycleTracer:
     # -- the branch
     # ----
 
-    def start(self, first: Cycle, second: Cycle) -> None:
+    def start(self, first: Cycle, second: Cycle, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
         """Begin with two cycles; the branch goes on from the second, away from the first."""
         for cycle in (first, second):
-            self._accept(cycle, False)
+            tell(self._accept(cycle, False))
+
+    def restore(self, points: Sequence[CyclePoint]) -> None:
+        """Go on from points that are known, two at least."""
+        require(len(points) >= 2, "A branch goes on from two points at least.")
+        self.points = [
+            replace(p, tests={name: float(event(p.cycle)) for name, event in self.events.items()}) for p in points
+        ]
 
     def run(self, tell: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None) -> str:
         """Go on until the parameter leaves its limits, the points are used up or no cycle is found; why it ended."""

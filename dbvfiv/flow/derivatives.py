@@ -101,17 +101,3 @@ def _root(law, area, parameters):
     inner, step, _ = jax.lax.while_loop(goes_on, advance, (start, step_at(start), 0))
     found = jnp.linalg.norm(step) <= _TOLERANCE * jnp.linalg.norm(inner)
     return jnp.where(found, inner, jnp.nan)
-
-
-@jax.jit
-def equations_along(law, motions, parameters):
-    """`equations` at N instants at once, all parts of the motion (N, ...): pressures (N, m) and residuals (N, l)."""
-    return jax.vmap(lambda motion: law.equations(motion, parameters))(motions)
-
-
-@jax.jit
-def linearised_along(law, motions, parameters):
-    """`linearised` at N instants at once, each part (N, ...)."""
-    slopes = jax.jacfwd(lambda m: law.equations(m, parameters))
-    pressure, residual = jax.vmap(slopes)(motions)
-    return (*pressure, *residual)

@@ -21,7 +21,6 @@ from eigen.pencil import FLUID_PARTS
 
 from ..errors import SolveError
 from ..flow import FlowMotion
-from ..flow.derivatives import equations_along, linearised_along
 from ..model import ValveModel
 from ..shell import StepWall
 from .kernels import inertia_force
@@ -79,18 +78,18 @@ class PeriodicValve:
         n = self.size - self.inner
         return samples[:, :n], samples[:, n:]
 
-    def passage(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> FlowMotion:
-        """Areas and the flow's unknowns with their rates at the samples, each (N, ...)."""
+    def passages(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> list[FlowMotion]:
+        """Areas and the flow's unknowns with their rates at each sample."""
         model, rates = self.model(mu), motion.rates
         q, u = self._split(motion.samples)
         area = np.stack([model.rows.areas(model.nodal(x)) for x in q])
-        return FlowMotion(area, rates.apply(1, area), rates.apply(2, area), u, rates.apply(1, u))
+        return [FlowMotion(*x) for x in zip(area, rates.apply(1, area), rates.apply(2, area), u, rates.apply(1, u))]
 
     def pressures(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         """Pressures (N, m), Pa, and the flow's equations (N, l)."""
         flow = self.model(mu).flow
-        p, rest = equations_along(flow, self.passage(motion, mu), flow.values(mu))
-        return np.asarray(p), np.asarray(rest)
+        p, rest = zip(*(flow.evaluate(passage, mu) for passage in self.passages(motion, mu)))
+        return np.array(p), np.array(rest)
 
     def _memory(self, mu: Mapping[str, float]) -> PeriodicMemory | None:
         model = self.model(mu)
@@ -136,10 +135,9 @@ class PeriodicValve:
         model, rates = self.model(mu), motion.rates
         q, _ = self._split(motion.samples)
         v, a = rates.apply(1, q), rates.apply(2, q)
-        flow, passage = model.flow, self.passage(motion, mu)
-        values = flow.values(mu)
-        parts = [np.asarray(x) for x in linearised_along(flow, passage, values)]
-        p = np.asarray(equations_along(flow, passage, values)[0])
+        slopes = [model.flow.linearise(passage, mu).parts() for passage in self.passages(motion, mu)]
+        parts = {name: np.array([one[name] for one in slopes]) for name in FLUID_PARTS}
+        p, _ = self.pressures(motion, mu)
         memory = self._memory(mu)
         held = None if memory is None else memory.held(q, rates)
         own, rest, damping, mass, left, right = [], [], [], [], [], []
@@ -168,7 +166,7 @@ class PeriodicValve:
         coarse = list(terms)
         operator = PeriodicOperator(motion, terms, coarse)
         means = [np.mean(x, axis=0) for x in (own, rest, damping, mass)]
-        operator.average = self._average(model, means, (left, right), [x.mean(axis=0) for x in parts], q, mu)
+        operator.average = self._average(model, means, (left, right), parts, q, mu)
         return operator
 
     def _blocks(self, model: ValveModel, values) -> list[sp.csr_matrix]:
@@ -179,7 +177,7 @@ class PeriodicValve:
 
     def _fluid_term(self, left, right, parts) -> Term:
         """- G p over the flow's equations, from areas and the flow's unknowns."""
-        a0, a1, a2, b0, b1, r0, r1, r2, s0, s1 = parts
+        a0, a1, a2, b0, b1, r0, r1, r2, s0, s1 = (parts[name] for name in FLUID_PARTS)
         inner, w = sp.identity(self.inner, format="csr"), self._weight
         zero = np.zeros_like(s0), np.zeros_like(b0)
         middle = [
@@ -198,7 +196,7 @@ class PeriodicValve:
         relaxation = model.relaxation.stiffness(
             mu.get("loss_factor", 0.0), lambda: model.relaxing_stiffness(q.mean(axis=0))
         )
-        fluid = dict(zip(FLUID_PARTS, parts))
+        fluid = {name: part.mean(axis=0) for name, part in parts.items()}
         return CoupledPencil(
             matrix(mass), matrix(damping + beta * own), matrix(own + rest), g, j, relaxation=relaxation, **fluid
         )
