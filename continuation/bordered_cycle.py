@@ -147,7 +147,9 @@ class CycleLinearisation:
         left.
         """
         shape, size = self.motion.coefficients.shape, self.motion.coefficients.size
-        units = np.append(np.tile(self.scale, shape[0]), np.maximum(np.abs(values_of(self.motion, self.mu, self.free)), 1e-9))
+        units = np.append(
+            np.tile(self.scale, shape[0]), np.maximum(np.abs(values_of(self.motion, self.mu, self.free)), 1e-9)
+        )
         start = self._precondition(rhs) / units
         x, count, missed = gmres(lambda y: self._precondition(self.apply(units * y)) / units, start, tolerance, most)
         assert len(x) == size + len(self.free)

@@ -21,6 +21,8 @@ _RIGHT, _UP = 0.1, (0.0, 0.25, 0.5)
 _STEPS = 60
 #: Most that the outer two harmonics may hold of a perturbation.
 _RIM = 0.05
+#: Most corrections of an eigenpair whose projection is not exact.
+_REFINED = 6
 #: How far past half the frequency the imaginary part of a real negative multiplier may come out, over omega.
 _EDGE = 1e-4
 
@@ -121,6 +123,9 @@ def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
         # each perturbation once: all others are turns of it by whole periods
         if new and sigma.imag <= (0.5 + _EDGE) * omega and _is_whole(h, x):
             found.append((complex(sigma), x))
+    found = sorted(found, key=lambda pair: -pair[0].real)[: count + 1]
+    if not linear.operator.exact:
+        found = [_refined(linear, *pair) for pair in found]
     trivial = 0.0
     if autonomous and found:
         trivial = float(abs(found.pop(int(np.argmin([abs(sigma) for sigma, _ in found])))[0]))
@@ -128,6 +133,29 @@ def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
     v = linear.scale[:, None] * linear.basis
     values = np.array([sigma for sigma, _ in found], complex)
     return Exponents(values, [x @ v.T for _, x in found], np.zeros(len(found)), trivial, omega)
+
+
+def _refined(linear, sigma: complex, x: np.ndarray) -> tuple[complex, np.ndarray]:
+    """An eigenpair of the projection of the operator itself, from that of what stands for it, by Newton's method with
+    the matrix of the latter.
+    """
+    reduced, omega = linear.reduced, linear.motion.omega
+    v, shape, step = linear.scale[:, None] * linear.basis, x.shape, 1e-4 * linear.motion.omega
+    x = x / np.linalg.norm(x)
+    here, ahead = reduced.matrix(complex(sigma)), reduced.matrix(complex(sigma + step))
+    size = x.size
+    matrix = np.zeros((size + 1, size + 1), complex)
+    matrix[:size, :size], matrix[:size, size] = here, (ahead - here) @ x.ravel() / step
+    matrix[size, :size] = x.ravel().conj()
+    balance = 1.0 / np.maximum(np.abs(matrix).max(axis=1), 1e-300)
+    factor = la.lu_factor(matrix * balance[:, None], check_finite=False)
+    for _ in range(_REFINED):
+        rest = (linear.operator.apply(x @ v.T, sigma) @ v).ravel()
+        change = la.lu_solve(factor, balance * np.append(-rest, 0.0), check_finite=False)
+        x, sigma = x + change[:size].reshape(shape), complex(sigma + change[size])
+        if abs(change[size]) <= 1e-5 * omega:
+            break
+    return sigma, x
 
 
 def _is_whole(h: Harmonics, x: np.ndarray) -> bool:

@@ -144,6 +144,8 @@ class PeriodicOperator:
 
     def __init__(self, motion: PeriodicMotion, terms: Sequence[Term], coarse: Sequence[Term] | None = None):
         self.motion, self.terms = motion, tuple(terms)
+        #: Whether projections are those of the operator itself.
+        self.exact = coarse is None
         self._coarse = self.terms if coarse is None else tuple(coarse)
         self._rates = {0.0: motion.rates}
 
@@ -219,7 +221,9 @@ class PeriodicSystem(Protocol):
         """(n, r) directions in which the equations are coupled in time; all of them for a small system."""
         ...
 
-    def smoother(self, operator: PeriodicOperator, mu: Mapping[str, float]) -> Callable[[np.ndarray], np.ndarray] | None:
+    def smoother(
+        self, operator: PeriodicOperator, mu: Mapping[str, float]
+    ) -> Callable[[np.ndarray], np.ndarray] | None:
         """Approximate solves, coefficients (2 H + 1, n) to coefficients, good in all other directions; None where there
         are none.
         """

@@ -16,16 +16,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
-from eigen import CoupledPencil, Relaxation, Workspace
+from eigen import CoupledPencil, Workspace
 from eigen.pencil import FLUID_PARTS
 
 from ..errors import SolveError
 from ..flow import FlowMotion
 from ..model import ValveModel
-from ..shell import StepWall
 from .kernels import inertia_force
 from .periodic_inertia import inertia_slopes
-from .periodic_memory import PeriodicMemory
+from .periodic_memory import MemoryTerm, PeriodicMemory
 
 #: Distance from the imaginary axis, over the angular frequency, of the matrices that smooth: clear of neutral modes.
 CLEAR = 0.15
@@ -163,7 +162,12 @@ class PeriodicValve:
             Term([(0, self._blocks(model, rest)), (1, self._blocks(model, damping)), (2, self._blocks(model, mass))]),
             self._fluid_term(left, right, parts),
         ]
-        coarse = list(terms)
+        coarse = None
+        if memory is not None:
+            groups = zip(*(model.shell.relaxing_tangents(x) for x in q))
+            blocks = [self._blocks(model, group) for group in groups]
+            coarse = [*terms, *(Term([(0, b)], outer=phi) for b, phi in zip(blocks, memory.filters))]
+            terms.append(MemoryTerm(memory, q, self.size))
         operator = PeriodicOperator(motion, terms, coarse)
         means = [np.mean(x, axis=0) for x in (own, rest, damping, mass)]
         operator.average = self._average(model, means, (left, right), parts, q, mu)
@@ -224,7 +228,7 @@ class StiffnessDamping:
 
 
 class AveragedSolves:
-    """Solves of each harmonic k with T(c)^-1 of an averaged pencil, c real, times what damping makes of i k omega for c.
+    """T(c)^-1 of an averaged pencil, c real, for each harmonic, times what damping makes of c for i k omega.
 
     Stiff directions answer as damped springs, and slow ones belong to the basis, so one factorisation serves all
     harmonics.

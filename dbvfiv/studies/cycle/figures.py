@@ -10,7 +10,16 @@ from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
 from ...drawing.axes import HALO, colour_bar
-from ...drawing.style import ACCENT, COMPUTED, REST, UNSTABLE, new_figure, parameter_label, phase_looks, pressure_colours
+from ...drawing.style import (
+    ACCENT,
+    COMPUTED,
+    REST,
+    UNSTABLE,
+    new_figure,
+    parameter_label,
+    phase_looks,
+    pressure_colours,
+)
 from ..stability.place import describe_fixed
 
 if TYPE_CHECKING:
@@ -125,9 +134,14 @@ def phase_plane(result: CycleResult) -> Figure:
     shown = _some(result)
     row = PARAMETERS[result.parameter]
     for point, colour in zip(shown, pressure_colours([point.value for point in shown])):
-        lip, rate = np.append(point.orbit.lip, point.orbit.lip[0]), np.append(point.orbit.lip_rate, point.orbit.lip_rate[0])
+        lip, rate = (
+            np.append(point.orbit.lip, point.orbit.lip[0]),
+            np.append(point.orbit.lip_rate, point.orbit.lip_rate[0]),
+        )
         look = {"ls": "--"} if point.stable is False else {}
-        axes.plot(1e3 * lip, rate, color=colour, label=f"{point.value / row.scale:.4g} {row.shown_unit}".strip(), **look)
+        axes.plot(
+            1e3 * lip, rate, color=colour, label=f"{point.value / row.scale:.4g} {row.shown_unit}".strip(), **look
+        )
     axes.set_xlabel("Displacement of one lip, mm")
     axes.set_ylabel("Its velocity, m/s")
     axes.set_title(_title(result), loc="left", fontweight="bold")
@@ -159,7 +173,14 @@ def wave(result: CycleResult) -> Figure:
     moved = 1e3 * (orbit.centre_line - orbit.centre_line.mean(axis=0))
     size = np.abs(moved).max()
     image = axes.pcolormesh(
-        1e3 * result.mesh.z, 1e3 * orbit.time, moved, cmap="RdBu_r", vmin=-size, vmax=size, shading="nearest", rasterized=True
+        1e3 * result.mesh.z,
+        1e3 * orbit.time,
+        moved,
+        cmap="RdBu_r",
+        vmin=-size,
+        vmax=size,
+        shading="nearest",
+        rasterized=True,
     )
     colour_bar(figure, image, axes, "Displacement about the mean, mm")
     axes.set_xlabel("Distance from the lip z, mm")

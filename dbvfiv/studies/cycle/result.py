@@ -64,8 +64,8 @@ class Point:
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
         names = (
-            "value amplitude frequency lip_least lip_largest lip_mean flow_mean flow_amplitude least_speed harmonics tail "
-            "correction trivial asked"
+            "value amplitude frequency lip_least lip_largest lip_mean flow_mean flow_amplitude least_speed harmonics "
+            "tail correction trivial asked"
         ).split()
         plain = {name: np.asarray(self.numbers[name]).item() for name in names}
         found = [

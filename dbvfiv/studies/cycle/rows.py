@@ -31,8 +31,12 @@ COLUMNS = (
         shown=Shown("amplitude", "mm", 10, lambda r: f"{1e3 * r.amplitude:.4f}"),
     ),
     Column("frequency", "Hz", "Frequency", shown=Shown("frequency", "Hz", 10, lambda r: f"{r.frequency:.4f}")),
-    Column("lip_least", "m", "Least displacement", shown=Shown("lip from", "mm", 9, lambda r: f"{1e3 * r.lip_least:.3f}")),
-    Column("lip_largest", "m", "Largest displacement", shown=Shown("to", "mm", 9, lambda r: f"{1e3 * r.lip_largest:.3f}")),
+    Column(
+        "lip_least", "m", "Least displacement", shown=Shown("lip from", "mm", 9, lambda r: f"{1e3 * r.lip_least:.3f}")
+    ),
+    Column(
+        "lip_largest", "m", "Largest displacement", shown=Shown("to", "mm", 9, lambda r: f"{1e3 * r.lip_largest:.3f}")
+    ),
     Column("lip_mean", "m", "Mean displacement"),
     Column(
         "flow_mean", "kg/s", "Mean mass flow at the lip", shown=Shown("flow", "kg/s", 9, lambda r: f"{r.flow_mean:.4f}")
@@ -56,10 +60,10 @@ COLUMNS = (
     Column("angular_frequencies", "rad/s", "Of the leading Floquet exponents, from 0 to half that of the cycle"),
     Column("errors", "", "Share of each perturbation that the full equations miss"),
     Column("trivial", "1/s", "Size of the exponent of a shift in time, zero but for errors"),
+    Column("harmonics", "", "Harmonics of the series", "i8", Shown("harm.", "", 6, lambda r: str(int(r.harmonics)))),
     Column(
-        "harmonics", "", "Harmonics of the series", "i8", Shown("harm.", "", 6, lambda r: str(int(r.harmonics)))
+        "tail", "", "Share of the motion that the last two hold", shown=Shown("tail", "", 8, lambda r: f"{r.tail:.1g}")
     ),
-    Column("tail", "", "Share of the motion that the last two hold", shown=Shown("tail", "", 8, lambda r: f"{r.tail:.1g}")),
     Column("correction", "", "Last correction over the motion"),
     Column("iterations", "", "Corrections", "i8"),
     Column("krylov", "", "Krylov iterations", "i8"),

@@ -112,7 +112,8 @@ def _without(case: Case, scan: Scan) -> str:
     state = "stable" if unstable == {False} else "unstable" if unstable == {True} else "never neutral with a frequency"
     return (
         f"No oscillation starts between {axis.parameter} = {low} and {high} {row.shown_unit}: the steady state is "
-        f"{state} there, and a branch of cycles starts where it loses stability. `dbvfiv onset` looks over a wider range."
+        f"{state} there, and a branch of cycles starts where it loses stability. `dbvfiv onset` looks over a wider "
+        "range."
     )
 
 
@@ -169,7 +170,9 @@ def first_cycles(solver: CycleSolver, onset: Onset, parameter: str, lip: int, ca
     inner = model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)
     shape = np.concatenate([mode.q, mode.u])
     if abs(shape[lip]) < 1e-6 * np.abs(mode.q).max():
-        raise SolveError("The mode that becomes unstable does not move the middle of the lips, by which cycles are told.")
+        raise SolveError(
+            "The mode that becomes unstable does not move the middle of the lips, by which cycles are told."
+        )
     wave = np.zeros((HARMONICS + 1, system.size), complex)
     wave[0], wave[1] = np.concatenate([q, inner]), 0.5 * case.cycle.amplitude * shape / shape[lip]
     motion = PeriodicMotion(h, h.real(wave), abs(onset.eigenvalue.imag))

@@ -15,7 +15,7 @@ from ...record.record import GrowingRecord
 from ...record.table import printed_head, printed_row
 from ..case import Case
 from ..session import Session
-from ..stability.place import Place, check_scan
+from ..stability.place import check_scan
 from ..stability.walk import StabilityWalk
 from ..study import Study
 from .orbit import Orbit
