@@ -8,7 +8,7 @@ rest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.linalg as la
@@ -23,6 +23,10 @@ _STEPS = 60
 _RIM = 0.05
 #: Most corrections of an eigenpair whose projection is not exact.
 _REFINED = 6
+#: What the equations of a perturbation out of the band may have beyond the series.
+_CLOSED = 1e-4
+#: Distance over omega within which turned exponents with like perturbations are one.
+_ALIKE = 0.02
 #: How far past half the frequency the imaginary part of a real negative multiplier may come out, over omega.
 _EDGE = 1e-4
 
@@ -42,6 +46,8 @@ class Exponents:
     trivial : float
         Size of the exponent of the shift in time, 1/s; zero for a forced system.
     omega : float
+    as_found : (k,) complex array
+        Exponents that go with the vectors: the values but for whole turns.
     """
 
     values: np.ndarray
@@ -49,6 +55,7 @@ class Exponents:
     errors: np.ndarray
     trivial: float
     omega: float
+    as_found: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
 
     @property
     def multipliers(self) -> np.ndarray:
@@ -89,9 +96,9 @@ def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-2, r
     """
     for left in range(rounds, -1, -1):
         found = _of_projection(linear, count, solver.system.autonomous)
-        missed = [_missed(linear, *pair) for pair in zip(found.values, found.vectors)]
+        missed = [_missed(linear, *pair) for pair in zip(found.as_found, found.vectors)]
         errors = np.array([share for share, _ in missed])
-        found = Exponents(found.values, found.vectors, errors, found.trivial, found.omega)
+        found = replace(found, errors=errors)
         if not left or not np.any(errors > tolerance):
             return found
         rows = [part for share, rest in missed if share > tolerance for part in (rest.real, rest.imag)]
@@ -114,25 +121,20 @@ def _missed(linear, sigma: complex, vector: np.ndarray) -> tuple[float, np.ndarr
 def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
     reduced, motion = linear.reduced, linear.motion
     omega, h = motion.omega, motion.harmonics
-    found: list[tuple[complex, np.ndarray]] = []
-    for sigma, x in _near(reduced, [omega * (_RIGHT + 1j * up) for up in _UP]):
-        x = x.reshape(h.size, -1)
-        if sigma.imag < 0:
-            sigma, x = np.conj(sigma), x.conj()
-        new = all(abs(sigma - known) > 1e-6 * omega for known, _ in found)
-        # each perturbation once: all others are turns of it by whole periods
-        if new and sigma.imag <= (0.5 + _EDGE) * omega and _is_whole(h, x):
-            found.append((complex(sigma), x))
-    found = sorted(found, key=lambda pair: -pair[0].real)[: count + 1]
+    pairs = [(s, x.reshape(h.size, -1)) for s, x in _near(reduced, [omega * (_RIGHT + 1j * up) for up in _UP])]
+    inside = lambda sigma: abs(sigma.imag) <= (0.5 + _EDGE) * omega  # noqa: E731
+    pairs = [(s, x) for s, x in pairs if _is_whole(h, x) and (inside(s) or _cut_off(reduced, s, x) <= _CLOSED)]
+    found = _each_once(sorted(pairs, key=lambda pair: not inside(pair[0])), inside, omega)
+    found = sorted(found, key=lambda one: -one[0].real)[: count + 1]
     if not linear.operator.exact:
-        found = [_refined(linear, *pair) for pair in found]
+        found = [(f + new - s, new, x) for f, s, (new, x) in ((f, s, _refined(linear, s, x)) for f, s, x in found)]
     trivial = 0.0
     if autonomous and found:
-        trivial = float(abs(found.pop(int(np.argmin([abs(sigma) for sigma, _ in found])))[0]))
-    found = sorted(found, key=lambda pair: -pair[0].real)[:count]
+        trivial = float(abs(found.pop(int(np.argmin([abs(folded) for folded, _, _ in found])))[0]))
+    found = sorted(found, key=lambda one: -one[0].real)[:count]
     v = linear.scale[:, None] * linear.basis
-    values = np.array([sigma for sigma, _ in found], complex)
-    return Exponents(values, [x @ v.T for _, x in found], np.zeros(len(found)), trivial, omega)
+    values, as_found = (np.array(part, complex) for part in ([one[0] for one in found], [one[1] for one in found]))
+    return Exponents(values, [x @ v.T for _, _, x in found], np.zeros(len(found)), trivial, omega, as_found)
 
 
 def _refined(linear, sigma: complex, x: np.ndarray) -> tuple[complex, np.ndarray]:
@@ -158,9 +160,37 @@ def _refined(linear, sigma: complex, x: np.ndarray) -> tuple[complex, np.ndarray
     return sigma, x
 
 
+def _each_once(pairs, inside, omega: float) -> list[tuple[complex, np.ndarray]]:
+    """Perturbations with imaginary parts from 0 to omega / 2, each once.
+
+    All turns of an exponent by whole frequencies are eigenvalues, but for what the series cuts off. Those in the band
+    come first and are taken. Others are turned into it where nothing like them is known there: a perturbation that is
+    faster than the motion needs fewer harmonics as it is, and its vector stays so.
+    """
+    found: list[tuple[complex, complex, np.ndarray]] = []
+    for sigma, x in pairs:
+        folded = sigma - 1j * omega * np.round(sigma.imag / omega)
+        if folded.imag < 0:
+            folded, sigma, x = np.conj(folded), np.conj(sigma), x.conj()
+        near = 1e-6 if inside(sigma) else _ALIKE
+        if all(abs(folded - other) > near * omega for other, _, _ in found):
+            found.append((complex(folded), complex(sigma), x))
+    return found
+
+
+def _cut_off(reduced, sigma: complex, x: np.ndarray) -> float:
+    """What of a perturbation's equations lies beyond the series, over those within at the frequency of the motion."""
+    h, rates = reduced.motion.harmonics, reduced.rates(complex(sigma))
+    samples = h.evaluate(x)
+    rest = sum(term.apply(samples, rates) for term in reduced.terms)
+    beside = reduced.rates(complex(sigma + reduced.motion.omega))
+    moved = sum(term.apply(samples, beside) for term in reduced.terms) - rest
+    return float(np.linalg.norm(rest - h.evaluate(h.project(rest))) / np.linalg.norm(moved))
+
+
 def _is_whole(h: Harmonics, x: np.ndarray) -> bool:
     weight = np.sum(np.abs(h.two_sided(x)) ** 2, axis=1)
-    rim = weight[[0, 1, -2, -1]].sum() if h.count > 2 else 0.0
+    rim = weight[[0, 1, -2, -1] if h.count > 3 else [0, -1]].sum()
     return bool(rim <= _RIM * weight.sum())
 
 

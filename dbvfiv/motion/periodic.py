@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from continuation import OutOfDomain
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
 from eigen import CoupledPencil, Workspace
 from eigen.pencil import FLUID_PARTS
@@ -247,7 +248,10 @@ class AveragedSolves:
     def __init__(self, pencil, motion, weight: float, stiffening, workspace: Workspace):
         self.size, self.weight, self.harmonics = pencil.n, weight, motion.harmonics
         clear = CLEAR * motion.omega
-        self._factor = workspace.shifted(pencil, clear)
+        try:
+            self._factor = workspace.shifted(pencil, clear)
+        except SingularShiftError as error:
+            raise OutOfDomain("The mean of the motion's linearisation is singular, as where stops hit hard.") from error
         rates = 1j * motion.omega * np.arange(motion.harmonics.count + 1)
         self._shares = stiffening(np.array([clear])) / stiffening(rates)
 

@@ -8,7 +8,7 @@ import pytest
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
 from dbvfiv.errors import SolveError
-from dbvfiv.model.dynamics import dynamic_residual, Conditions
+from dbvfiv.model.dynamics import Conditions, dynamic_residual
 from dbvfiv.motion.periodic import PeriodicValve
 from tests.small_valves import find_open_state, make_valve
 
