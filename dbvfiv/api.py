@@ -16,6 +16,7 @@ from .materials.damping_report import DampingReport, describe_damping
 from .model import ValveModel
 from .studies.case import Case, load_case
 from .studies.closure.result import ClosureResult
+from .studies.cycle.result import CycleResult
 from .studies.map.result import MapResult
 from .studies.modes.result import ModesResult
 from .studies.onset.result import OnsetResult
@@ -300,6 +301,36 @@ class Valve:
         >>> [(p["value"], p["frequency"]) for p in found.points]        # doctest: +SKIP
         """
         return self._ask({"onset.over": over}, changes).perform("onset", output, observer)
+
+    def cycle(
+        self,
+        over: str | None = None,
+        *,
+        output: str | Path | None = None,
+        observer: Observer | None = None,
+        **changes: Any,
+    ) -> CycleResult:
+        """Limit cycles followed from an onset along one parameter.
+
+        Parameters
+        ----------
+        over : str, optional
+            PARAMETER=START:STOP:COUNT[:log]; cycle.over of the case by default.
+        output : path, optional
+            Result file, written cycle by cycle; `dbvfiv.resume` continues it.
+        observer, changes
+            As for `modes`; also pressure, for cycles over something else.
+
+        Raises
+        ------
+        CaseError, SolveError
+
+        Examples
+        --------
+        >>> found = dbvfiv.load("cases/light-fluid.toml").cycle("density=25:60:8")     # doctest: +SKIP
+        >>> [(p.value, p.amplitude, p.frequency, p.stable) for p in found.points]     # doctest: +SKIP
+        """
+        return self._ask({"cycle.over": over}, changes).perform("cycle", output, observer)
 
     def map(
         self,

@@ -1,0 +1,421 @@
+"""Branches of periodic motions along one parameter: steps, folds, changes of stability, other events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from continuation.bordered_cycle import Condition
+from continuation.cycles import Cycle, CycleSolver
+from continuation.errors import ContinuationError, NotConverged
+from continuation.hill import Exponents, floquet_exponents
+from continuation.options import require
+
+#: Kinds of special points.
+FOLD, DOUBLING, TORUS, BRANCHING = "fold", "period doubling", "torus", "branch point"
+
+
+@dataclass(frozen=True)
+class CycleBranchOptions:
+    """Options of a branch of cycles.
+
+    Attributes
+    ----------
+    step : float
+        First step in arclength, with the parameter over `scale` and the motion over `motion_scale`.
+    min_step, max_step : float
+    scale : float
+        Of the parameter.
+    motion_scale : float
+        Of the motion: root of the sum of squares of its coefficients in units of the system's scales.
+    limits : tuple of float
+        Range of the parameter.
+    values : tuple of float
+        Values of the parameter at which a cycle is wanted.
+    max_points : int
+    exponents : int
+        Floquet exponents kept; 0 for none.
+    tail : float
+        Largest share that the last two harmonics may have in a motion.
+    max_harmonics : int
+    located : float
+        Relative accuracy of special points in arclength over the step.
+    """
+
+    step: float = 0.05
+    min_step: float = 1e-4
+    max_step: float = 0.3
+    scale: float = 1.0
+    motion_scale: float = 1.0
+    limits: tuple[float, float] = (-np.inf, np.inf)
+    values: tuple[float, ...] = ()
+    max_points: int = 200
+    exponents: int = 4
+    tail: float = 1e-3
+    max_harmonics: int = 24
+    located: float = 1e-2
+
+    def __post_init__(self):
+        require(0 < self.min_step <= self.step <= self.max_step, "Steps must satisfy 0 < min_step <= step <= max_step.")
+        require(self.scale > 0 and self.motion_scale > 0, "Scales must be positive.")
+        require(0 < self.tail < 1, "The share of the last harmonics lies between 0 and 1.")
+
+
+@dataclass(frozen=True, eq=False)
+class CyclePoint:
+    """A cycle on a branch.
+
+    Attributes
+    ----------
+    cycle : Cycle
+    value : float
+        Of the parameter.
+    arclength : float
+    exponents : Exponents or None
+    asked : bool
+        Whether it lies at a value that was asked for.
+    tests : dict
+        Values of the events' functions.
+    """
+
+    cycle: Cycle
+    value: float
+    arclength: float
+    exponents: Exponents | None
+    asked: bool = False
+    tests: dict = field(default_factory=dict)
+
+    @property
+    def motion(self):
+        return self.cycle.motion
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialCycle:
+    """A special point.
+
+    Attributes
+    ----------
+    kind : str
+    point : CyclePoint
+        The cycle nearest to it that was computed.
+    value : float
+        Of the parameter, by interpolation.
+    frequency : float
+        Of the perturbation that becomes neutral, Hz; zero for a fold.
+    located : bool
+        Whether it was found as closely as asked for.
+    """
+
+    kind: str
+    point: CyclePoint
+    value: float
+    frequency: float = 0.0
+    located: bool = True
+
+
+class CycleTracer:
+    """Follows a branch of cycles.
+
+    Parameters
+    ----------
+    solver : CycleSolver
+    parameter : str
+    options : CycleBranchOptions
+    events : mapping of str to callable
+        Functions of a `Cycle` whose zeros are special points of that name.
+
+    Attributes
+    ----------
+    points : list of CyclePoint
+    special : list of SpecialCycle
+    reason : str
+        Why the branch ended.
+    """
+
+    def __init__(
+        self,
+        solver: CycleSolver,
+        parameter: str,
+        options: CycleBranchOptions = CycleBranchOptions(),
+        events: Mapping[str, Callable[[Cycle], float]] = {},
+    ):
+        self.solver, self.parameter, self.options, self.events = solver, parameter, options, dict(events)
+        self.points: list[CyclePoint] = []
+        self.special: list[SpecialCycle] = []
+        self.reason = "running"
+        self._weight = 1.0 / (np.asarray(solver.system.scales) * options.motion_scale) ** 2
+
+    # -- the branch
+    # ----
+
+    def start(self, first: Cycle, second: Cycle, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
+        """Begin with two cycles; the branch goes on from the second, away from the first."""
+        for cycle in (first, second):
+            tell(self._accept(cycle, False))
+
+    def restore(self, points: Sequence[CyclePoint]) -> None:
+        """Go on from points that are known, two at least."""
+        require(len(points) >= 2, "A branch goes on from two points at least.")
+        self.points = [
+            replace(p, tests={name: float(event(p.cycle)) for name, event in self.events.items()}) for p in points
+        ]
+
+    def run(self, tell: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None) -> str:
+        """Go on until the parameter leaves its limits, the points are used up or no cycle is found; why it ended."""
+        options = self.options
+        step = options.step
+        while len(self.points) < options.max_points:
+            done, step, again = self._advance(step)
+            if done is None:
+                self.reason = again
+                return self.reason
+            for special in self._between(self.points[-2], self.points[-1]):
+                self.special.append(special)
+                tell(special)
+            tell(self.points[-1])
+            low, high = options.limits
+            ahead = self._direction()
+            value = self.points[-1].value
+            if (value <= low and ahead < 0) or (value >= high and ahead > 0):
+                self.reason = f"limit of {self.parameter} reached"
+                return self.reason
+        self.reason = "points used up"
+        return self.reason
+
+    def _direction(self) -> float:
+        return float(np.sign(self.points[-1].value - self.points[-2].value))
+
+    def _advance(self, step: float) -> tuple[CyclePoint | None, float, str]:
+        options, said = self.options, ""
+        while step >= options.min_step:
+            target = self._target(step)
+            try:
+                cycle = self._step(step, target)
+                point = self._accept(cycle, target in options.values)
+            except ContinuationError as error:
+                said = str(error)
+                step *= 0.4
+                continue
+            grown = 1.6 if cycle.iterations <= 4 else (0.7 if cycle.iterations >= 9 else 1.0)
+            return point, min(max(step * grown, options.min_step), options.max_step), ""
+        return None, step, f"no further cycle was found: {said}"
+
+    def _target(self, step: float) -> float | None:
+        """The next value that is asked for, or the limit, where it lies within the step."""
+        here, ahead = self.points[-1].value, self._direction()
+        reach = self._slope() * step
+        wanted = [v for v in (*self.options.values, *self.options.limits) if np.isfinite(v)]
+        wanted = [v for v in wanted if 1e-9 * self.options.scale < (v - here) * ahead <= 1.3 * abs(reach)]
+        return min(wanted, key=lambda v: abs(v - here)) if wanted else None
+
+    def _slope(self) -> float:
+        """Change of the parameter over that of the arclength at the last point."""
+        a, b = self.points[-2:]
+        return (b.value - a.value) / (b.arclength - a.arclength)
+
+    def _step(self, step: float, target: float | None) -> Cycle:
+        last = self.points[-1]
+        if target is not None:
+            step = abs((target - last.value) / self._slope())
+        motion, value = self._predict(last.arclength + step)
+        mu = last.cycle.mu | {self.parameter: value if target is None else target}
+        if target is not None:
+            return self._solved(motion, mu, (), ())
+        return self._solved(motion, mu, (self.parameter,), (self._plane(motion, value),))
+
+    def _solved(self, motion, mu, free, conditions) -> Cycle:
+        options = self.options
+        while True:
+            cycle = self.solver.solve(motion, mu, free, conditions)
+            if cycle.motion.tail <= options.tail:
+                return cycle
+            count = cycle.motion.harmonics.count + 2
+            if count > options.max_harmonics:
+                raise NotConverged(
+                    f"{options.max_harmonics} harmonics are too few: the last two hold {cycle.motion.tail:.2g} of the "
+                    "motion.",
+                    "harmonics",
+                )
+            motion, mu = cycle.motion.resized(count), cycle.mu
+            conditions = tuple(Condition(motion.harmonics.resized(c.row), c.extra, c.value) for c in conditions)
+
+    def _predict(self, arclength: float):
+        """Motion and parameter ahead by the polynomial through the last points."""
+        last = self.points[-4:]
+        h = last[-1].motion.harmonics
+        if last[-1].motion.tail > 0.4 * self.options.tail and h.count + 2 <= self.options.max_harmonics:
+            h = type(h)(h.count + 2)
+        weights = _lagrange([p.arclength for p in last], arclength)
+        coefficients = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, last))
+        omega = float(sum(w * p.motion.omega for w, p in zip(weights, last)))
+        value = float(sum(w * p.value for w, p in zip(weights, last)))
+        return type(last[-1].motion)(h, coefficients, omega), value
+
+    def _plane(self, motion, value: float) -> Condition:
+        """Normal to the way from the last point, through the prediction."""
+        last = self.points[-1]
+        c = motion.coefficients
+        row = (c - motion.harmonics.resized(last.motion.coefficients)) * self._weight
+        extra = np.zeros(len(self.solver.unknowns((self.parameter,))))
+        extra[-1] = (value - last.value) / self.options.scale**2
+        size = np.sqrt(np.sum(row**2 / self._weight) + (extra[-1] * self.options.scale) ** 2)
+        return Condition(row / size, extra / size, float(np.vdot(row, c) + extra[-1] * value) / size)
+
+    # -- points
+    # ----
+
+    def _accept(self, cycle: Cycle, asked: bool) -> CyclePoint:
+        """Take a cycle as the next point, with the phase of the one before."""
+        point = self._described(cycle, asked)
+        self.points.append(point)
+        return point
+
+    def _described(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
+        after = self.points[-1] if after is None and self.points else after
+        exponents = None
+        if self.options.exponents:
+            linear = self.solver.linearise(cycle.motion, cycle.mu)
+            exponents = floquet_exponents(self.solver, linear, self.options.exponents)
+        value = cycle.mu[self.parameter]
+        tests = {name: float(event(cycle)) for name, event in self.events.items()}
+        length = 0.0 if after is None else after.arclength + self._distance(after, cycle)
+        return CyclePoint(cycle, value, length, exponents, asked, tests)
+
+    def _distance(self, point: CyclePoint, cycle: Cycle) -> float:
+        c = cycle.motion.coefficients
+        change = c - cycle.motion.harmonics.resized(point.motion.coefficients)
+        moved = (cycle.mu[self.parameter] - point.value) / self.options.scale
+        return float(np.sqrt(np.sum(change**2 * self._weight) + moved**2))
+
+    # -- special points
+    # ----
+
+    def _between(self, a: CyclePoint, b: CyclePoint) -> list[SpecialCycle]:
+        found = []
+        if len(self.points) > 2:
+            before = self.points[-3]
+            if (a.value - before.value) * (b.value - a.value) < 0:
+                found.append(self._fold(before, a, b))
+        for name in self.events:
+            if a.tests[name] * b.tests[name] < 0:
+                found.append(self._located(name, a, b, lambda p, n=name: p.tests[n]))
+        if a.exponents is not None and b.exponents is not None:
+            change = _change(a.exponents, b.exponents)
+            if change is not None and not (change == FOLD):
+                found.append(self._located(change, a, b, _test_of(a.exponents, b.exponents)))
+        return found
+
+    def _fold(self, before: CyclePoint, a: CyclePoint, b: CyclePoint) -> SpecialCycle:
+        """The extreme value of the parameter of a parabola through points, renewed until it stays."""
+        near, value, located = [before, a, b], a.value, False
+        for _ in range(6):
+            s = np.array([p.arclength for p in near])
+            fit = np.polyfit(s - s[1], [p.value for p in near], 2)
+            at = -0.5 * fit[1] / fit[0]
+            new = float(np.polyval(fit, at))
+            located = abs(new - value) <= 1e-6 * max(abs(value), self.options.scale)
+            value = new
+            if located:
+                break
+            point = self._interpolated(near, s[1] + at)
+            if point is None:
+                break
+            near = sorted([*near, point], key=lambda p: abs(p.arclength - s[1] - at))[:3]
+            near.sort(key=lambda p: p.arclength)
+        nearest = min(near, key=lambda p: abs(p.value - value))
+        return SpecialCycle(FOLD, nearest, value, 0.0, located)
+
+    def _interpolated(self, near: Sequence[CyclePoint], arclength: float) -> CyclePoint | None:
+        """A cycle between points, at an arclength; None where it is not found."""
+        h = max((p.motion.harmonics for p in near), key=lambda h: h.count)
+        weights = _lagrange([p.arclength for p in near], arclength)
+        c = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, near))
+        omega = float(sum(w * p.motion.omega for w, p in zip(weights, near)))
+        value = float(sum(w * p.value for w, p in zip(weights, near)))
+        first, last = near[0], near[-1]
+        row = h.resized(last.motion.coefficients) - h.resized(first.motion.coefficients)
+        extra = np.zeros(len(self.solver.unknowns((self.parameter,))))
+        extra[-1] = (last.value - first.value) / self.options.scale**2
+        condition = Condition(row * self._weight, extra, float(np.vdot(row * self._weight, c) + extra[-1] * value))
+        mu = near[0].cycle.mu | {self.parameter: value}
+        try:
+            cycle = self._solved(type(first.motion)(h, c, omega), mu, (self.parameter,), (condition,))
+        except ContinuationError:
+            return None
+        point = self._described(cycle, after=first)
+        return CyclePoint(cycle, point.value, arclength, point.exponents, False, point.tests)
+
+    def _located(self, kind: str, a: CyclePoint, b: CyclePoint, test) -> SpecialCycle:
+        """A zero of a test between two points, by false positions with halving (Illinois)."""
+        fa, fb = test(a), test(b)
+        width, located = b.arclength - a.arclength, False
+        low, high, flow, fhigh = a, b, fa, fb
+        for _ in range(8):
+            s = (low.arclength * fhigh - high.arclength * flow) / (fhigh - flow)
+            point = self._interpolated([low, high], s)
+            if point is None:
+                break
+            f = test(point)
+            if f * fhigh < 0:
+                low, flow, high, fhigh = high, fhigh, point, f
+            else:
+                flow, high, fhigh = 0.5 * flow, point, f
+            if low.arclength > high.arclength:
+                low, high, flow, fhigh = high, low, fhigh, flow
+            if min(abs(flow), abs(fhigh)) <= 1e-3 * max(abs(fa), abs(fb)) or high.arclength - low.arclength <= (
+                self.options.located * width
+            ):
+                located = True
+                break
+        share = flow / (flow - fhigh) if flow * fhigh < 0 else (0.0 if abs(flow) < abs(fhigh) else 1.0)
+        value = low.value + share * (high.value - low.value)
+        nearest = low if share < 0.5 else high
+        frequency = 0.0
+        if nearest.exponents is not None and len(nearest.exponents.values):
+            frequency = float(_crossing(nearest.exponents).imag / (2 * np.pi)) if kind in (TORUS, DOUBLING) else 0.0
+        return SpecialCycle(kind, nearest, float(value), frequency, located)
+
+
+def _lagrange(nodes: Sequence[float], x: float) -> np.ndarray:
+    nodes = np.asarray(nodes, float)
+    out = np.ones(len(nodes))
+    for i, a in enumerate(nodes):
+        for j, b in enumerate(nodes):
+            if i != j:
+                out[i] *= (x - b) / (a - b)
+    return out
+
+
+def _crossing(exponents: Exponents) -> complex:
+    """The exponent nearest to the imaginary axis."""
+    return complex(exponents.values[np.argmin(np.abs(exponents.values.real))])
+
+
+def _change(a: Exponents, b: Exponents) -> str | None:
+    """What kind of bifurcation lies between two cycles, None if none."""
+    if a.unstable == b.unstable:
+        return None
+    few, many = sorted((a, b), key=lambda e: e.unstable)
+    crossing = _crossing(min((few, many), key=lambda e: abs(_crossing(e).real)))
+    half = 0.5 * many.omega
+    if abs(many.unstable - few.unstable) % 2 == 0 and not many.is_real(crossing):
+        return TORUS
+    if abs(crossing.imag - half) < 0.05 * half:
+        return DOUBLING
+    return FOLD if crossing.imag < 0.05 * half else TORUS
+
+
+def _test_of(a: Exponents, b: Exponents):
+    """Growth rate of the exponent that crosses, as a function of a point."""
+    few, many = (a, b) if a.unstable < b.unstable else (b, a)
+    rank = few.unstable if few.unstable < len(few.values) else 0
+    index = min(rank, len(many.values) - 1)
+
+    def test(point: CyclePoint) -> float:
+        values = point.exponents.values
+        return float(values.real[min(index, len(values) - 1)])
+
+    return test

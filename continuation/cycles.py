@@ -1,0 +1,204 @@
+"""Periodic motions as Fourier series: Newton's method whose corrections are found by preconditioned Krylov iterations.
+
+The preconditioner has two levels. On a small basis, in which the equations are coupled strongly in time, the
+linearisation is projected and solved as a dense matrix, with whatever else is unknown and the conditions that go with
+it; in all other directions a smoother solves each harmonic by itself. What corrections need beyond the basis is added
+to it, so that neighbours on a branch need ever fewer iterations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from continuation.bordered_cycle import FREQUENCY, Condition, CycleLinearisation, moved, values_of
+from continuation.errors import NotConverged
+from continuation.options import require
+from continuation.periodic import PeriodicMotion
+
+#: Directions of a motion itself that belong to the basis: those above this share of the largest.
+OWN = 1e-4
+
+
+@dataclass(frozen=True)
+class CycleOptions:
+    """Options of the corrections.
+
+    Attributes
+    ----------
+    tolerance : float
+        Size of the last correction over that of the motion about its mean.
+    max_iterations : int
+        Corrections.
+    linear : float
+        What a correction may leave of its linear equations.
+    krylov : int
+        Most Krylov iterations for a correction.
+    renew_at : float
+        Contraction of the corrections above which the linearisation is renewed.
+    basis : int
+        Most directions that are learnt.
+    """
+
+    tolerance: float = 1e-5
+    max_iterations: int = 25
+    linear: float = 3e-2
+    krylov: int = 40
+    renew_at: float = 0.3
+    basis: int = 16
+
+    def __post_init__(self):
+        require(0 < self.tolerance < 0.1, "The tolerance of cycles lies between 0 and 0.1.")
+        require(self.max_iterations >= 1 and self.krylov >= 1, "At least one iteration is needed.")
+        require(self.basis >= 0, "The number of directions cannot be negative.")
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """A periodic motion that solves the equations.
+
+    Attributes
+    ----------
+    motion : PeriodicMotion
+    mu : dict
+    correction : float
+        Size of the last correction over that of the motion about its mean.
+    iterations, krylov : int
+        Corrections and Krylov iterations spent on it.
+    """
+
+    motion: PeriodicMotion
+    mu: dict
+    correction: float
+    iterations: int
+    krylov: int
+
+
+class CycleSolver:
+    """Finds periodic motions of a system one after another, each from a guess near it.
+
+    Parameters
+    ----------
+    system : continuation.periodic.PeriodicSystem
+    basis : (n, r) array
+        Directions to start with, see the module.
+    options : CycleOptions
+    """
+
+    def __init__(self, system, basis: np.ndarray, options: CycleOptions = CycleOptions()):
+        self.system, self.options = system, options
+        self._given = la.orth(np.asarray(basis, float) / np.asarray(system.scales)[:, None])
+        self._learnt = np.zeros((len(self._given), 0))
+
+    def solve(
+        self,
+        guess: PeriodicMotion,
+        mu: Mapping[str, float],
+        free: Sequence[str] = (),
+        conditions: Sequence[Condition] = (),
+    ) -> Cycle:
+        """Correct a guess.
+
+        Parameters
+        ----------
+        guess : PeriodicMotion
+        mu : mapping
+        free : sequence of str
+            Parameters that are unknown beside the motion, or `FREQUENCY` of a forced one; that of an autonomous one
+            always is.
+        conditions : sequence of Condition
+            One for each of them, their `extra` in the order of `unknowns`.
+
+        Raises
+        ------
+        NotConverged
+        """
+        free = self.unknowns(free)
+        if self.system.autonomous:
+            conditions = (self._phase(guess, len(free)), *conditions)
+        require(len(free) == len(conditions), "Each free unknown needs a condition.")
+        options, sizes, spent = self.options, [], 0
+        motion, mu, linear = guess, dict(mu), None
+        while len(sizes) < options.max_iterations:
+            unbalance = self._unbalance(motion, mu, free, conditions)
+            if not np.isfinite(unbalance).all():
+                break
+            if linear is None:
+                linear = self.linearise(motion, mu)
+                linear.prepare(free, conditions)
+            change, used, missed = linear.solve(-unbalance, options.linear, options.krylov)
+            spent += used
+            sizes.append(self._size(change, motion))
+            if not sizes[-1] < 10.0:
+                break
+            motion, mu = moved(motion, mu, free, change)
+            if motion.omega <= 0:
+                break
+            self.learn(change[: motion.coefficients.size].reshape(motion.coefficients.shape))
+            if sizes[-1] <= options.tolerance:
+                return Cycle(motion, mu, sizes[-1], len(sizes), spent)
+            slow = len(sizes) > 1 and sizes[-1] > options.renew_at * sizes[-2]
+            if slow or sizes[-1] > 0.1 or missed > 0.5:
+                linear = None
+        raise NotConverged(
+            f"No periodic motion was found near the guess: {len(sizes)} corrections, the last of "
+            f"{sizes[-1] if sizes else np.nan:.2g} of its size.",
+            "iterations",
+        )
+
+    def unknowns(self, free: Sequence[str]) -> tuple[str, ...]:
+        """All that is unknown beside the motion: the frequency first where time does not matter."""
+        free = tuple(free)
+        return (FREQUENCY, *free) if self.system.autonomous and FREQUENCY not in free else free
+
+    def _phase(self, guess: PeriodicMotion, count: int) -> Condition:
+        """No part of a change goes along the guess."""
+        weight = 1.0 / np.asarray(self.system.scales) ** 2
+        row = guess.harmonics.rate(guess.coefficients) * weight
+        row = row / max(np.sqrt(np.sum(row**2 / weight)), 1e-300)
+        return Condition(row, np.zeros(count), float(np.vdot(row, guess.coefficients)))
+
+    def _unbalance(self, motion, mu, free, conditions) -> np.ndarray:
+        force = motion.harmonics.project(self.system.residual(motion, mu))
+        extra = values_of(motion, mu, free)
+        return np.append(force.ravel(), [c.miss(motion.coefficients, extra) for c in conditions])
+
+    def _size(self, change: np.ndarray, motion: PeriodicMotion) -> float:
+        c, scale = motion.coefficients, self.system.scales
+        step = np.abs(change[: c.size].reshape(c.shape) / scale).max()
+        return float(step / max(np.abs(c[1:] / scale).max(), 1e-300))
+
+    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> CycleLinearisation:
+        """Linearisation about a motion, with the basis as it is now."""
+        return CycleLinearisation(self.system, motion, mu, self.basis_for(motion))
+
+    def basis_for(self, motion: PeriodicMotion) -> np.ndarray:
+        """Orthonormal directions (n, r) of unknowns over their scales: those of the motion itself, given, learnt."""
+        scaled = motion.coefficients[1:] / self.system.scales
+        _, sizes, found = la.svd(scaled, full_matrices=False)
+        own = found[: len(sizes)][sizes > OWN * sizes[0]].T if sizes[0] > 0 else found[:0].T
+        columns = np.hstack([own, self._given, self._learnt])
+        q, r, _ = la.qr(columns, mode="economic", pivoting=True)
+        size = np.abs(np.diag(r))
+        return np.ascontiguousarray(q[:, : len(size)][:, size > 1e-8 * size[0]])
+
+    def learn(self, rows: np.ndarray, share: float = 0.05, most: int = 6) -> bool:
+        """Add to the basis the leading directions of rows (k, n) beyond it; the oldest of those added before give way.
+
+        They take effect with the next linearisation. Whether there were any.
+        """
+        scaled = rows / self.system.scales
+        whole = np.linalg.norm(scaled)
+        if not whole > 0 or self._given.shape[1] == len(self._given):
+            return False
+        for known in (self._given, self._learnt):
+            scaled = scaled - (scaled @ known) @ known.T
+        _, sizes, found = la.svd(scaled, full_matrices=False)
+        added = found[:most][sizes[:most] > share * whole].T
+        room = max(self.options.basis - added.shape[1], 0)
+        kept = self._learnt[:, max(self._learnt.shape[1] - room, 0) :]
+        self._learnt = np.hstack([kept, added])
+        return bool(added.size)

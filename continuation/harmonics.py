@@ -1,0 +1,145 @@
+"""Truncated Fourier series: coefficients, samples over one period, and filters in time.
+
+Columns of coefficients are 1, sqrt(2) cos(k tau), sqrt(2) sin(k tau), k = 1..H, at phases tau = 2 pi i / N.  With an
+odd N > 2 H samples and coefficients are tied exactly, and so are rates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from continuation.options import require
+
+#: Samples for each harmonic: with three, products of two series keep all harmonics of the series free of aliasing.
+OVERSAMPLING = 3
+
+
+class Harmonics:
+    """Series of H harmonics on N equally spaced samples.
+
+    Parameters
+    ----------
+    count : int
+        H.
+    samples : int, optional
+        N, odd and above 2 H; the first above 3 H by default.
+
+    Examples
+    --------
+    >>> h = Harmonics(2)
+    >>> h.samples, h.size
+    (7, 5)
+    """
+
+    def __init__(self, count: int, samples: int | None = None):
+        require(count >= 1, f"A series needs at least one harmonic, not {count}.")
+        samples = (OVERSAMPLING * count + 1) | 1 if samples is None else samples
+        require(samples % 2 == 1 and samples > 2 * count, "The number of samples must be odd and above 2 H.")
+        self.count, self.samples, self.size = int(count), int(samples), 2 * int(count) + 1
+
+    @cached_property
+    def phases(self) -> np.ndarray:
+        """(N,) phases, rad."""
+        return 2 * np.pi * np.arange(self.samples) / self.samples
+
+    @cached_property
+    def basis(self) -> np.ndarray:
+        """(N, 2 H + 1): samples from coefficients."""
+        return self.basis_at(self.phases)
+
+    def basis_at(self, phases) -> np.ndarray:
+        """(len, 2 H + 1): values of the basis at phases, rad."""
+        angles = np.outer(np.asarray(phases, float), np.arange(1, self.count + 1))
+        out = np.empty((len(angles), self.size))
+        out[:, 0] = 1.0
+        out[:, 1::2], out[:, 2::2] = np.sqrt(2) * np.cos(angles), np.sqrt(2) * np.sin(angles)
+        return out
+
+    def evaluate(self, coefficients: np.ndarray) -> np.ndarray:
+        """Samples (N, ...) of coefficients (2 H + 1, ...)."""
+        return np.tensordot(self.basis, coefficients, 1)
+
+    def project(self, samples: np.ndarray) -> np.ndarray:
+        """Coefficients (2 H + 1, ...) of samples (N, ...)."""
+        return np.tensordot(self.basis.T, samples, 1) / self.samples
+
+    def rate(self, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients of the derivative by the phase."""
+        k = np.arange(1, self.count + 1).reshape((-1,) + (1,) * (coefficients.ndim - 1))
+        out = np.zeros_like(coefficients)
+        out[1::2], out[2::2] = k * coefficients[2::2], -k * coefficients[1::2]
+        return out
+
+    def complex(self, coefficients: np.ndarray) -> np.ndarray:
+        """c_k (H + 1, ...) in x = c_0 + 2 Re sum c_k exp(i k tau) of real coefficients."""
+        first = coefficients[:1].astype(complex)
+        return np.concatenate([first, (coefficients[1::2] - 1j * coefficients[2::2]) / np.sqrt(2)])
+
+    def real(self, harmonics: np.ndarray) -> np.ndarray:
+        """Undo `complex`."""
+        out = np.empty((self.size, *harmonics.shape[1:]))
+        out[0] = harmonics[0].real
+        out[1::2], out[2::2] = np.sqrt(2) * harmonics[1:].real, -np.sqrt(2) * harmonics[1:].imag
+        return out
+
+    def two_sided(self, coefficients: np.ndarray) -> np.ndarray:
+        """c_k (2 H + 1, ...), k = -H..H, of coefficients that may be complex."""
+        cosine, sine = coefficients[1::2] / np.sqrt(2), coefficients[2::2] / np.sqrt(2)
+        return np.concatenate([(cosine + 1j * sine)[::-1], coefficients[:1], cosine - 1j * sine])
+
+    def one_sided(self, harmonics: np.ndarray) -> np.ndarray:
+        """Undo `two_sided`."""
+        minus, plus = harmonics[: self.count][::-1], harmonics[self.count + 1 :]
+        out = np.empty((self.size, *harmonics.shape[1:]), complex)
+        out[0] = harmonics[self.count]
+        out[1::2], out[2::2] = (plus + minus) / np.sqrt(2), 1j * (plus - minus) / np.sqrt(2)
+        return out
+
+    def resized(self, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients of another number of harmonics made to fit: cut off, or followed by zeros."""
+        out = np.zeros((self.size, *coefficients.shape[1:]), coefficients.dtype)
+        kept = min(self.size, len(coefficients))
+        out[:kept] = coefficients[:kept]
+        return out
+
+    def turned(self, coefficients: np.ndarray, angle: float) -> np.ndarray:
+        """Coefficients of the same motion with its phase counted from `angle`."""
+        turn = np.exp(1j * angle * np.arange(self.count + 1))
+        return self.real(self.complex(coefficients) * turn.reshape((-1,) + (1,) * (coefficients.ndim - 1)))
+
+
+class Rates:
+    """What d/dt and its functions do to samples of motions ``exp(shift t)`` times a periodic function.
+
+    Parameters
+    ----------
+    harmonics : Harmonics
+    omega : float
+        Angular frequency.
+    shift : complex
+        A Floquet exponent; zero for periodic motions.
+    """
+
+    def __init__(self, harmonics: Harmonics, omega: float, shift: complex = 0.0):
+        self.harmonics, self.omega = harmonics, float(omega)
+        self.shift = shift.real if not np.imag(shift) else complex(shift)
+        self._known: dict = {}
+
+    def filter(self, function: Callable[[np.ndarray], np.ndarray] | int) -> np.ndarray:
+        """(N, N) matrix of a function of d/dt, or of an integer power of it; real for a real shift."""
+        if function not in self._known:
+            n = self.harmonics.samples
+            s = 1j * self.omega * np.fft.fftfreq(n, 1.0 / n) + self.shift
+            values = s**function if isinstance(function, int) else np.asarray(function(s))
+            matrix = np.fft.ifft(values[:, None] * np.fft.fft(np.eye(n), axis=0), axis=0)
+            self._known[function] = matrix if np.iscomplexobj(self.shift) else np.ascontiguousarray(matrix.real)
+        return self._known[function]
+
+    def apply(self, function, samples: np.ndarray) -> np.ndarray:
+        """A function of d/dt, or a power of it, applied to samples (N, ...)."""
+        if isinstance(function, int) and function == 0:
+            return samples
+        return np.tensordot(self.filter(function), samples, 1)

@@ -1,0 +1,246 @@
+"""Floquet exponents of periodic motions by Hill's method: perturbations exp(sigma t) times a Fourier series.
+
+The linearisation projected on the basis of the corrections is a small dense problem, quadratic in sigma or nearly so,
+whose leading eigenvalues come from shifted Arnoldi iterations. What their vectors miss in the full equations is
+measured, and added to the basis until it is small; how far the exponent of the shift in time is from zero measures the
+rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.linalg as la
+
+from continuation.harmonics import Harmonics
+
+#: Shifts: distance right of the axis, and how far up the band of exponents, both over omega.
+_RIGHT, _UP = 0.1, (0.0, 0.25, 0.5)
+#: Steps of each Arnoldi iteration.
+_STEPS = 60
+#: Most that the outer two harmonics may hold of a perturbation.
+_RIM = 0.05
+#: Most corrections of an eigenpair whose projection is not exact.
+_REFINED = 6
+#: What the equations of a perturbation out of the band may have beyond the series.
+_CLOSED = 1e-4
+#: Distance over omega within which turned exponents with like perturbations are one.
+_ALIKE = 0.02
+#: How far past half the frequency the imaginary part of a real negative multiplier may come out, over omega.
+_EDGE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Exponents:
+    """Leading Floquet exponents.
+
+    Attributes
+    ----------
+    values : (k,) complex array
+        1/s, sorted by growth rate, imaginary parts from 0 to omega / 2; that of the shift in time left out.
+    vectors : list of (2 H + 1, n) complex arrays
+        Coefficients of the perturbations.
+    errors : (k,) array
+        What each perturbation misses in the full equations, as a share of itself.
+    trivial : float
+        Size of the exponent of the shift in time, 1/s; zero for a forced system.
+    omega : float
+    as_found : (k,) complex array
+        Exponents that go with the vectors: the values but for whole turns.
+    """
+
+    values: np.ndarray
+    vectors: list[np.ndarray]
+    errors: np.ndarray
+    trivial: float
+    omega: float
+    as_found: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """(k,) complex."""
+        return np.exp(self.values * 2 * np.pi / self.omega)
+
+    @property
+    def unstable(self) -> int:
+        """Dimension in which perturbations grow; those that grow slower than the shift in time moves do not count."""
+        grows = self.values[self.values.real > max(2.0 * self.trivial, 1e-6 * self.omega)]
+        return int(sum(1 if self.is_real(value) else 2 for value in grows))
+
+    def is_real(self, value: complex) -> bool:
+        """Whether the multiplier of an exponent is real."""
+        near = 1e-3 * self.omega
+        return abs(value.imag) < near or abs(value.imag - 0.5 * self.omega) < near
+
+    @property
+    def stable(self) -> bool:
+        return self.unstable == 0
+
+
+def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-2, rounds: int = 2) -> Exponents:
+    """Leading exponents of the motion of a linearisation.
+
+    Parameters
+    ----------
+    solver : continuation.cycles.CycleSolver
+        Its basis grows by what perturbations miss.
+    linear : continuation.bordered_cycle.CycleLinearisation
+        At the motion itself.
+    count : int
+        Exponents wanted.
+    tolerance : float
+        Largest share that a perturbation may miss.
+    rounds : int
+        Times that the basis is made larger.
+    """
+    for left in range(rounds, -1, -1):
+        found = _of_projection(linear, count, solver.system.autonomous)
+        missed = [_missed(linear, *pair) for pair in zip(found.as_found, found.vectors)]
+        errors = np.array([share for share, _ in missed])
+        found = replace(found, errors=errors)
+        if not left or not np.any(errors > tolerance):
+            return found
+        rows = [part for share, rest in missed if share > tolerance for part in (rest.real, rest.imag)]
+        if not solver.learn(np.concatenate(rows)):
+            return found
+        linear.rebase(solver.basis_for(linear.motion))
+    return found
+
+
+def _missed(linear, sigma: complex, vector: np.ndarray) -> tuple[float, np.ndarray]:
+    """Share that a perturbation misses, and the correction (2 H + 1, n) that one pass of the smoother gives."""
+    if linear.smoother is None:
+        return 0.0, np.zeros_like(vector)
+    rest = linear.smoother(linear.operator.apply(vector, sigma))
+    scaled, whole = rest / linear.scale, np.linalg.norm(vector / linear.scale)
+    outside = scaled - (scaled @ linear.basis) @ linear.basis.T
+    return float(np.linalg.norm(outside) / whole), outside * linear.scale
+
+
+def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
+    reduced, motion = linear.reduced, linear.motion
+    omega, h = motion.omega, motion.harmonics
+    pairs = [(s, x.reshape(h.size, -1)) for s, x in _near(reduced, [omega * (_RIGHT + 1j * up) for up in _UP])]
+    inside = lambda sigma: abs(sigma.imag) <= (0.5 + _EDGE) * omega  # noqa: E731
+    pairs = [(s, x) for s, x in pairs if _is_whole(h, x) and (inside(s) or _cut_off(reduced, s, x) <= _CLOSED)]
+    found = _each_once(sorted(pairs, key=lambda pair: not inside(pair[0])), inside, omega)
+    found = sorted(found, key=lambda one: -one[0].real)[: count + 1]
+    if not linear.operator.exact:
+        found = [(f + new - s, new, x) for f, s, (new, x) in ((f, s, _refined(linear, s, x)) for f, s, x in found)]
+    trivial = 0.0
+    if autonomous and found:
+        trivial = float(abs(found.pop(int(np.argmin([abs(folded) for folded, _, _ in found])))[0]))
+    found = sorted(found, key=lambda one: -one[0].real)[:count]
+    v = linear.scale[:, None] * linear.basis
+    values, as_found = (np.array(part, complex) for part in ([one[0] for one in found], [one[1] for one in found]))
+    return Exponents(values, [x @ v.T for _, _, x in found], np.zeros(len(found)), trivial, omega, as_found)
+
+
+def _refined(linear, sigma: complex, x: np.ndarray) -> tuple[complex, np.ndarray]:
+    """An eigenpair of the projection of the operator itself, from that of what stands for it, by Newton's method with
+    the matrix of the latter.
+    """
+    reduced, omega = linear.reduced, linear.motion.omega
+    v, shape, step = linear.scale[:, None] * linear.basis, x.shape, 1e-4 * linear.motion.omega
+    x = x / np.linalg.norm(x)
+    here, ahead = reduced.matrix(complex(sigma)), reduced.matrix(complex(sigma + step))
+    size = x.size
+    matrix = np.zeros((size + 1, size + 1), complex)
+    matrix[:size, :size], matrix[:size, size] = here, (ahead - here) @ x.ravel() / step
+    matrix[size, :size] = x.ravel().conj()
+    balance = 1.0 / np.maximum(np.abs(matrix).max(axis=1), 1e-300)
+    factor = la.lu_factor(matrix * balance[:, None], check_finite=False)
+    for _ in range(_REFINED):
+        rest = (linear.operator.apply(x @ v.T, sigma) @ v).ravel()
+        change = la.lu_solve(factor, balance * np.append(-rest, 0.0), check_finite=False)
+        x, sigma = x + change[:size].reshape(shape), complex(sigma + change[size])
+        if abs(change[size]) <= 1e-5 * omega:
+            break
+    return sigma, x
+
+
+def _each_once(pairs, inside, omega: float) -> list[tuple[complex, np.ndarray]]:
+    """Perturbations with imaginary parts from 0 to omega / 2, each once.
+
+    All turns of an exponent by whole frequencies are eigenvalues, but for what the series cuts off. Those in the band
+    come first and are taken. Others are turned into it where nothing like them is known there: a perturbation that is
+    faster than the motion needs fewer harmonics as it is, and its vector stays so.
+    """
+    found: list[tuple[complex, complex, np.ndarray]] = []
+    for sigma, x in pairs:
+        folded = sigma - 1j * omega * np.round(sigma.imag / omega)
+        if folded.imag < 0:
+            folded, sigma, x = np.conj(folded), np.conj(sigma), x.conj()
+        near = 1e-6 if inside(sigma) else _ALIKE
+        if all(abs(folded - other) > near * omega for other, _, _ in found):
+            found.append((complex(folded), complex(sigma), x))
+    return found
+
+
+def _cut_off(reduced, sigma: complex, x: np.ndarray) -> float:
+    """What of a perturbation's equations lies beyond the series, over those within at the frequency of the motion."""
+    h, rates = reduced.motion.harmonics, reduced.rates(complex(sigma))
+    samples = h.evaluate(x)
+    rest = sum(term.apply(samples, rates) for term in reduced.terms)
+    beside = reduced.rates(complex(sigma + reduced.motion.omega))
+    moved = sum(term.apply(samples, beside) for term in reduced.terms) - rest
+    return float(np.linalg.norm(rest - h.evaluate(h.project(rest))) / np.linalg.norm(moved))
+
+
+def _is_whole(h: Harmonics, x: np.ndarray) -> bool:
+    weight = np.sum(np.abs(h.two_sided(x)) ** 2, axis=1)
+    rim = weight[[0, 1, -2, -1] if h.count > 3 else [0, -1]].sum()
+    return bool(rim <= _RIM * weight.sum())
+
+
+def _near(reduced, shifts) -> list[tuple[complex, np.ndarray]]:
+    """Eigenpairs of the projection near shifts; the matrix is quadratic, about each shift where something relaxes."""
+    step, found, parts = 0.25 * reduced.motion.omega, [], None
+    for shift in shifts:
+        if parts is None or not reduced.polynomial:
+            middle = 0.0 if reduced.polynomial else shift
+            here, ahead, behind = (reduced.matrix(middle + d) for d in (0.0, step, -step))
+            first, second = (ahead - behind) / (2 * step), (ahead + behind - 2 * here) / (2 * step**2)
+            parts = (here - middle * first + middle**2 * second, first - 2 * middle * second, second)
+        found += _nearest(parts, shift)
+    return found
+
+
+def _nearest(parts, shift: complex) -> list[tuple[complex, np.ndarray]]:
+    """Eigenpairs near a shift of l0 + sigma l1 + sigma^2 l2."""
+    l0, l1, l2 = parts
+    factor = la.lu_factor(l0 + shift * l1 + shift**2 * l2, check_finite=False)
+    size = len(l0)
+
+    def invert(x):
+        y, z = x[:size], x[size:]
+        top = -la.lu_solve(factor, l2 @ (z + shift * y) + l1 @ y, check_finite=False)
+        return np.append(top, y + shift * top)
+
+    return [(shift + 1.0 / value, vector[:size]) for value, vector in _arnoldi(invert, 2 * size)]
+
+
+def _arnoldi(apply, size: int) -> list[tuple[complex, np.ndarray]]:
+    """Ritz pairs of the largest eigenvalues that have converged."""
+    steps = min(_STEPS, size)
+    basis = np.zeros((size, steps + 1), complex)
+    start = np.random.default_rng(0).standard_normal(size)
+    basis[:, 0] = start / np.linalg.norm(start)
+    h = np.zeros((steps + 1, steps), complex)
+    done = steps
+    for k in range(steps):
+        w = apply(basis[:, k])
+        for _ in range(2):
+            part = basis[:, : k + 1].conj().T @ w
+            h[: k + 1, k] += part
+            w = w - basis[:, : k + 1] @ part
+        h[k + 1, k] = np.linalg.norm(w)
+        if abs(h[k + 1, k]) <= 1e-13 * np.abs(h[: k + 2, : k + 1]).max():
+            done = k + 1
+            break
+        basis[:, k + 1] = w / h[k + 1, k]
+    values, vectors = np.linalg.eig(h[:done, :done])
+    last = abs(h[done, done - 1]) if done < len(h) else 0.0
+    good = [i for i in range(done) if last * abs(vectors[-1, i]) <= 1e-9 * abs(values[i]) and values[i]]
+    return [(complex(values[i]), basis[:, :done] @ vectors[:, i]) for i in good]

@@ -1,0 +1,235 @@
+"""What a system gives so that its periodic motions can be found as Fourier series, and its linearisation about one.
+
+A motion x(t) of n unknowns is periodic with angular frequency omega; a system answers with its residual at N samples of
+one period, and is free to use rates, and filters in time for what it remembers, see `continuation.harmonics.Rates`. It
+is linearised as a sum of terms
+
+    S_outer L_i sum_j M_ji S_j R_i dx,
+
+with matrices at each sample i and functions S of d/dt, so that a motion exp(sigma t) dx of a perturbation needs the
+functions at another argument alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from continuation.harmonics import Harmonics, Rates
+
+Filter = Callable[[np.ndarray], np.ndarray] | int
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicMotion:
+    """A periodic motion.
+
+    Attributes
+    ----------
+    harmonics : Harmonics
+    coefficients : (2 H + 1, n) array
+    omega : float
+    """
+
+    harmonics: Harmonics
+    coefficients: np.ndarray
+    omega: float
+
+    @cached_property
+    def samples(self) -> np.ndarray:
+        """(N, n)."""
+        return self.harmonics.evaluate(self.coefficients)
+
+    @cached_property
+    def rates(self) -> Rates:
+        return Rates(self.harmonics, self.omega)
+
+    @property
+    def period(self) -> float:
+        return 2 * np.pi / self.omega
+
+    def at(self, phases) -> np.ndarray:
+        """Values (len, n) at phases, rad."""
+        return self.harmonics.basis_at(phases) @ self.coefficients
+
+    def rate(self, phases) -> np.ndarray:
+        """Rates (len, n) at phases, rad."""
+        return self.omega * (self.harmonics.basis_at(phases) @ self.harmonics.rate(self.coefficients))
+
+    def resized(self, count: int) -> PeriodicMotion:
+        """With another number of harmonics."""
+        other = Harmonics(count)
+        return PeriodicMotion(other, other.resized(self.coefficients), self.omega)
+
+    @property
+    def tail(self) -> float:
+        """Share that the last two harmonics have in the motion about its mean: what a longer series would change."""
+        c = self.coefficients
+        whole = np.linalg.norm(c[1:])
+        return float(np.linalg.norm(c[-4:] if len(c) > 5 else c[-2:]) / whole) if whole else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """One term of a linearisation; blocks are N matrices, or one stack (N, a, b), or None for the identity.
+
+    Attributes
+    ----------
+    middle : sequence of (filter, blocks)
+    left, right : blocks
+    outer : filter
+    """
+
+    middle: Sequence[tuple[Filter, Any]]
+    left: Any = None
+    right: Any = None
+    outer: Filter = 0
+
+    def apply(self, samples: np.ndarray, rates: Rates) -> np.ndarray:
+        """Samples (N, n) or (N, n, k) of what it makes of samples of a motion."""
+        inner = _times(self.right, samples)
+        total = sum(_times(blocks, rates.apply(function, inner)) for function, blocks in self.middle)
+        return rates.apply(self.outer, _times(self.left, total))
+
+    @property
+    def polynomial(self) -> bool:
+        """Whether d/dt enters by powers up to the second."""
+        used = [self.outer, *(function for function, _ in self.middle)]
+        return all(isinstance(f, int) or getattr(f, "polynomial", False) for f in used)
+
+    def reduced(self, basis: np.ndarray) -> Term:
+        """Its projection on a basis (n, r)."""
+        if self.left is None and self.right is None:
+            middle = [(f, np.stack([basis.T @ (block @ basis) for block in blocks])) for f, blocks in self.middle]
+            return Term(middle, outer=self.outer)
+        left = np.stack([(block.T @ basis).T for block in self.left])
+        right = np.stack([block @ basis for block in self.right])
+        return Term(self.middle, left, right, self.outer)
+
+
+def _times(blocks, samples: np.ndarray) -> np.ndarray:
+    if blocks is None:
+        return samples
+    if isinstance(blocks, np.ndarray):
+        if samples.ndim == 2:
+            return np.matmul(blocks, samples[:, :, None])[:, :, 0]
+        return np.matmul(blocks, samples)
+    return np.stack([_product(block, x) for block, x in zip(blocks, samples)])
+
+
+def _product(block, x: np.ndarray) -> np.ndarray:
+    """Product of a real block with a real or complex array, without making the block complex."""
+    if not np.iscomplexobj(x) or not sp.issparse(block):
+        return block @ x
+    flat = np.ascontiguousarray(x).reshape(len(x), -1)
+    out = block @ flat.view(float)
+    return np.ascontiguousarray(out).view(complex).reshape((block.shape[0], *x.shape[1:]))
+
+
+class PeriodicOperator:
+    """Linearisation about a periodic motion.
+
+    Parameters
+    ----------
+    motion : PeriodicMotion
+    terms : sequence of Term
+    coarse : sequence of Term, optional
+        Terms that stand for these in projections, where some have none or a dear one.
+    """
+
+    def __init__(self, motion: PeriodicMotion, terms: Sequence[Term], coarse: Sequence[Term] | None = None):
+        self.motion, self.terms = motion, tuple(terms)
+        #: Whether projections are those of the operator itself.
+        self.exact = coarse is None
+        self._coarse = self.terms if coarse is None else tuple(coarse)
+        self._rates = {0.0: motion.rates}
+
+    def rates(self, shift: complex = 0.0) -> Rates:
+        """Functions of d/dt for perturbations exp(shift t); the last few are kept."""
+        if shift not in self._rates:
+            if len(self._rates) > 4:
+                self._rates = {0.0: self.motion.rates}
+            self._rates[shift] = Rates(self.motion.harmonics, self.motion.omega, shift)
+        return self._rates[shift]
+
+    def apply(self, coefficients: np.ndarray, shift: complex = 0.0) -> np.ndarray:
+        """Coefficients (2 H + 1, n) of the change of the residual for those of a change exp(shift t) of the motion."""
+        h, rates = self.motion.harmonics, self.rates(shift)
+        samples = h.evaluate(coefficients)
+        return h.project(sum(term.apply(samples, rates) for term in self.terms))
+
+    def reduced(self, basis: np.ndarray) -> ReducedOperator:
+        """Projection on a basis (n, r) at every sample."""
+        return ReducedOperator(self.motion, [term.reduced(basis) for term in self._coarse], basis.shape[1])
+
+
+class ReducedOperator(PeriodicOperator):
+    """A linearisation in r unknowns, small enough to be a dense matrix.
+
+    Parameters
+    ----------
+    motion : PeriodicMotion
+        Of the full system.
+    terms : sequence of Term
+    size : int
+        r.
+    """
+
+    def __init__(self, motion: PeriodicMotion, terms: Sequence[Term], size: int):
+        super().__init__(motion, terms)
+        self.size = size
+        #: Whether exponents enter as powers up to the second.
+        self.polynomial = all(term.polynomial for term in terms)
+
+    def matrix(self, shift: complex = 0.0) -> np.ndarray:
+        """Dense matrix ((2 H + 1) r, (2 H + 1) r); coefficients are ordered by harmonics, unknowns within."""
+        h, r = self.motion.harmonics, self.size
+        unit = np.einsum("it,ab->iatb", h.basis, np.eye(r)).reshape(h.samples, r, h.size * r)
+        rates = self.rates(shift)
+        samples = sum(term.apply(unit, rates) for term in self.terms)
+        return h.project(samples).reshape(h.size * r, h.size * r)
+
+
+class PeriodicSystem(Protocol):
+    """A system whose periodic motions are sought.
+
+    Attributes
+    ----------
+    size : int
+        n.
+    autonomous : bool
+        Whether time shifts of a motion are motions as well; of a forced one the phase of the forcing is the phase.
+    """
+
+    size: int
+    autonomous: bool
+
+    def residual(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> np.ndarray:
+        """Residual (N, n) at the samples."""
+        ...
+
+    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> PeriodicOperator:
+        """Linearisation about a motion that need not solve the equations."""
+        ...
+
+    def coarse_basis(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> np.ndarray:
+        """(n, r) directions in which the equations are coupled in time; all of them for a small system."""
+        ...
+
+    def smoother(
+        self, operator: PeriodicOperator, mu: Mapping[str, float]
+    ) -> Callable[[np.ndarray], np.ndarray] | None:
+        """Approximate solves, coefficients (2 H + 1, n) to coefficients, good in all other directions; None where there
+        are none.
+        """
+        ...
+
+    @property
+    def scales(self) -> np.ndarray:
+        """(n,) sizes that changes of the unknowns are measured in."""
+        ...

@@ -1,0 +1,264 @@
+"""The valve in periodic motion: what `continuation` asks of a system whose cycles are sought as Fourier series.
+
+    M(q) a + h(q, v) + alpha M v + beta dF/dt + F(q) + F_h(q, h) - G(q) p = 0,     e = 0
+
+the equations of `dbvfiv.motion.equations` without a step: rates, and what relaxing layers remember, are filters of the
+samples over a period. Unknowns are (q, U) with the flow law's own U (l,); pressures p and equations e are those of its
+definition. The flow is outward.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from continuation import OutOfDomain
+from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
+from eigen import CoupledPencil, Workspace
+from eigen.pencil import FLUID_PARTS
+
+from ..errors import SolveError
+from ..flow import FlowMotion
+from ..model import ValveModel
+from .kernels import inertia_force
+from .periodic_inertia import inertia_slopes
+from .periodic_memory import MemoryTerm, PeriodicMemory
+
+#: Distance from the imaginary axis, over the angular frequency, of the matrices that smooth: clear of neutral modes.
+CLEAR = 0.15
+
+
+class PeriodicValve:
+    """Equations of a valve's periodic motions, a `continuation.periodic.PeriodicSystem`.
+
+    Parameters
+    ----------
+    rebuild : callable
+        From parameters mu, by the names of `dbvfiv.model.system.ValveSystem`, to the model for them.
+
+    Raises
+    ------
+    SolveError
+        If the valve has no flow, or fluid outside.
+    """
+
+    autonomous = True
+
+    def __init__(self, rebuild: Callable[[Mapping[str, float]], ValveModel], mu: Mapping[str, float]):
+        self._model = rebuild
+        model = rebuild(mu)
+        if not model.flow.has_fluid:
+            raise SolveError("Without flow nothing feeds an oscillation, so there are no cycles to follow.")
+        if model.outside is not None:
+            raise SolveError(
+                "With fluid outside the wall cycles are not followed: how its added mass changes with the shape within "
+                "a cycle is not among the equations; runs in time show them."
+            )
+        self.inner, self.size = model.flow.inner, model.size + model.flow.inner
+        area = float(model.mesh.rest_area[-1])
+        self._weight = area  # turns the flow's equations, Pa, into forces
+        self._workspace = Workspace()
+        scale = np.ones(model.shell.dofs.free.shape)
+        scale[:, 3:] = 2.0 / float(np.mean(model.shell.geometry.thickness))
+        jet = np.sqrt(2.0 * abs(mu["inlet"]) / mu["density"])
+        #: (n + l,): m and rad that are alike at the face of the wall, and m/s that go with them.
+        self.scales = np.append(scale[model.shell.dofs.free], np.full(self.inner, 10.0 * jet))
+
+    def model(self, mu: Mapping[str, float]) -> ValveModel:
+        """The model for parameters."""
+        return self._model(mu)
+
+    # -- parts
+    # ----
+
+    def _split(self, samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        n = self.size - self.inner
+        return samples[:, :n], samples[:, n:]
+
+    def passages(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> list[FlowMotion]:
+        """Areas and the flow's unknowns with their rates at each sample."""
+        model, rates = self.model(mu), motion.rates
+        q, u = self._split(motion.samples)
+        area = np.stack([model.rows.areas(model.nodal(x)) for x in q])
+        return [FlowMotion(*x) for x in zip(area, rates.apply(1, area), rates.apply(2, area), u, rates.apply(1, u))]
+
+    def pressures(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Pressures (N, m), Pa, and the flow's equations (N, l)."""
+        flow = self.model(mu).flow
+        p, rest = zip(*(flow.evaluate(passage, mu) for passage in self.passages(motion, mu)))
+        return np.array(p), np.array(rest)
+
+    def _memory(self, mu: Mapping[str, float]) -> PeriodicMemory | None:
+        model = self.model(mu)
+        branches = model.relaxation.branches(mu.get("loss_factor", 0.0))
+        return PeriodicMemory(model.shell, branches) if branches else None
+
+    # -- the contract
+    # ----
+
+    def residual(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> np.ndarray:
+        """Residual (N, n + l): forces, N and N m, and the flow's equations by the area of the inlet."""
+        model, rates = self.model(mu), motion.rates
+        q, _ = self._split(motion.samples)
+        v, a = rates.apply(1, q), rates.apply(2, q)
+        p, rest = self.pressures(motion, mu)
+        memory = self._memory(mu)
+        held = None if memory is None else memory.held(q, rates)
+        slow = np.stack([self._internal_force(model, x) for x in q])
+        out = slow + mu["beta"] * rates.apply(1, slow)
+        for i in range(len(q)):
+            nodal = model.nodal(q[i])
+            if held is not None:
+                out[i] += memory.force(q[i], held[i])
+            out[i] += self._inertia(model, nodal, v[i], a[i] + mu["alpha"] * v[i])
+            out[i] -= model.pressure_force(nodal, p[i])
+        return np.concatenate([out, self._weight * rest], axis=1)
+
+    @staticmethod
+    def _internal_force(model: ValveModel, q: np.ndarray) -> np.ndarray:
+        force = model.shell.force(q)
+        force[model.stops.unknowns] += model.stops.force(q)
+        return force
+
+    @staticmethod
+    def _inertia(model: ValveModel, nodal: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        shell, out = model.shell, np.zeros_like(nodal)
+        _, d1, d2 = shell.directors(nodal)
+        inertia_force(shell.mesh.quads, shell._integrals, d1, d2, model.nodal(v), model.nodal(a), out)
+        return shell.dofs.restrict(out)
+
+    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> PeriodicOperator:
+        """Linearisation about a motion; its `average` is the pencil of the mean of all samples."""
+        model, rates = self.model(mu), motion.rates
+        q, _ = self._split(motion.samples)
+        v, a = rates.apply(1, q), rates.apply(2, q)
+        slopes = [model.flow.linearise(passage, mu).parts() for passage in self.passages(motion, mu)]
+        parts = {name: np.array([one[name] for one in slopes]) for name in FLUID_PARTS}
+        p, _ = self.pressures(motion, mu)
+        memory = self._memory(mu)
+        held = None if memory is None else memory.held(q, rates)
+        own, rest, damping, mass, left, right = [], [], [], [], [], []
+        alpha = mu["alpha"]
+        for i in range(len(q)):
+            nodal = model.nodal(q[i])
+            structure = model.structure(q[i])[1]
+            m = model.mass(q[i])
+            moving = (nodal, model.nodal(v[i]), model.nodal(a[i] + alpha * v[i]))
+            by_position, by_rate = inertia_slopes(model.shell, *moving)
+            by_position = model.follower_stiffness(nodal, p[i], by_position)
+            if held is not None:
+                by_position += memory.geometric(q[i], held[i])
+            own.append(structure)
+            rest.append(by_position)
+            damping.append(by_rate + alpha * m)
+            mass.append(m)
+            left.append(model.station_forces(nodal))
+            right.append(model.rows.jacobian(nodal))
+        stiff = StiffnessDamping(mu["beta"])
+        terms = [
+            Term([(0, self._blocks(model, own))], outer=stiff),
+            Term([(0, self._blocks(model, rest)), (1, self._blocks(model, damping)), (2, self._blocks(model, mass))]),
+            self._fluid_term(left, right, parts),
+        ]
+        coarse = None
+        if memory is not None:
+            groups = zip(*(model.shell.relaxing_tangents(x) for x in q))
+            blocks = [self._blocks(model, group) for group in groups]
+            coarse = [*terms, *(Term([(0, b)], outer=phi) for b, phi in zip(blocks, memory.filters))]
+            terms.append(MemoryTerm(memory, q, self.size))
+        operator = PeriodicOperator(motion, terms, coarse)
+        means = [np.mean(x, axis=0) for x in (own, rest, damping, mass)]
+        operator.average = self._average(model, means, (left, right), parts, q, mu)
+        return operator
+
+    def _blocks(self, model: ValveModel, values) -> list[sp.csr_matrix]:
+        """Matrices (n + l, n + l), nothing on the flow's unknowns, of values on the structure's pattern."""
+        indptr, indices = model.shell.dofs.pattern
+        indptr = np.append(indptr, np.full(self.inner, indptr[-1], indptr.dtype))
+        return [sp.csr_matrix((x, indices, indptr), shape=(self.size, self.size), copy=False) for x in values]
+
+    def _fluid_term(self, left, right, parts) -> Term:
+        """- G p over the flow's equations, from areas and the flow's unknowns."""
+        a0, a1, a2, b0, b1, r0, r1, r2, s0, s1 = (parts[name] for name in FLUID_PARTS)
+        inner, w = sp.identity(self.inner, format="csr"), self._weight
+        zero = np.zeros_like(s0), np.zeros_like(b0)
+        middle = [
+            (0, np.block([[-a0, -b0], [w * r0, w * s0]])),
+            (1, np.block([[-a1, -b1], [w * r1, w * s1]])),
+            (2, np.block([[-a2, zero[1]], [w * r2, zero[0]]])),
+        ]
+        forces = [sp.block_diag((g, inner), format="csr") for g in left]
+        areas = [sp.block_diag((j, inner), format="csr") for j in right]
+        return Term(middle, forces, areas)
+
+    def _average(self, model, means, coupling, parts, q, mu) -> CoupledPencil:
+        own, rest, damping, mass = means
+        matrix, beta = model.shell.dofs.matrix, mu["beta"]
+        g, j = (sum(some) / len(some) for some in coupling)
+        relaxation = model.relaxation.stiffness(
+            mu.get("loss_factor", 0.0), lambda: model.relaxing_stiffness(q.mean(axis=0))
+        )
+        fluid = {name: part.mean(axis=0) for name, part in parts.items()}
+        return CoupledPencil(
+            matrix(mass), matrix(damping + beta * own), matrix(own + rest), g, j, relaxation=relaxation, **fluid
+        )
+
+    def smoother(self, operator: PeriodicOperator, mu: Mapping[str, float]):
+        """Solves with the averaged linearised state at each harmonic."""
+        relaxation, beta = operator.average.relaxation, mu["beta"]
+
+        def stiffening(s):
+            relaxed = 0.0 if relaxation is None else np.mean([relaxation.factors(x) for x in s], axis=1)
+            return 1.0 + relaxed + beta * s
+
+        return AveragedSolves(operator.average, operator.motion, self._weight, stiffening, self._workspace)
+
+
+@dataclass(frozen=True)
+class StiffnessDamping:
+    """1 + beta d/dt, what stiffness damping makes of the internal force."""
+
+    beta: float
+    polynomial: bool = True
+
+    def __call__(self, s):
+        return 1.0 + self.beta * s
+
+
+class AveragedSolves:
+    """T(c)^-1 of an averaged pencil, c real, for each harmonic, times what damping makes of c for i k omega.
+
+    Stiff directions answer as damped springs, and slow ones belong to the basis, so one factorisation serves all
+    harmonics.
+
+    Parameters
+    ----------
+    pencil : CoupledPencil
+    motion : PeriodicMotion
+    weight : float
+        Of the flow's equations in the residual.
+    stiffening : callable
+        Factor on the stiffness of motions exp(s t).
+    workspace : Workspace
+    """
+
+    def __init__(self, pencil, motion, weight: float, stiffening, workspace: Workspace):
+        self.size, self.weight, self.harmonics = pencil.n, weight, motion.harmonics
+        clear = CLEAR * motion.omega
+        try:
+            self._factor = workspace.shifted(pencil, clear)
+        except SingularShiftError as error:
+            raise OutOfDomain("The mean of the motion's linearisation is singular, as where stops hit hard.") from error
+        rates = 1j * motion.omega * np.arange(motion.harmonics.count + 1)
+        self._shares = stiffening(np.array([clear])) / stiffening(rates)
+
+    def __call__(self, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients (2 H + 1, n + l), real or complex, of solutions."""
+        if np.iscomplexobj(coefficients):
+            return self(coefficients.real) + 1j * self(coefficients.imag)
+        n, h = self.size, self.harmonics
+        found = [np.concatenate(self._factor.solve(x[:n], x[n:] / self.weight)) for x in coefficients]
+        return h.real(self._shares[:, None] * h.complex(np.real(np.array(found))))

@@ -1,0 +1,1 @@
+"""Branches of limit cycles along one parameter: amplitude, frequency, stability."""

@@ -1,0 +1,213 @@
+"""Figures of a branch of cycles: amplitude and frequency, envelope, phase plane, wave along the valve, spectrum."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...case.parameters import PARAMETERS
+from ...drawing.axes import HALO, colour_bar
+from ...drawing.style import (
+    ACCENT,
+    COMPUTED,
+    REST,
+    UNSTABLE,
+    new_figure,
+    parameter_label,
+    phase_looks,
+    pressure_colours,
+)
+from ..stability.place import describe_fixed
+
+if TYPE_CHECKING:
+    from .result import CycleResult, Point
+
+#: Cycles shown in the phase plane and in spectra.
+SHOWN = 7
+#: Instants of a period in the figure of the centre line.
+INSTANTS = 12
+
+
+def draw(result: CycleResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of a branch, each with its name."""
+    yield "branch", lambda: branch(result)
+    yield "envelope", lambda: envelope(result)
+    yield "phase-plane", lambda: phase_plane(result)
+    yield "centre-line-cycle", lambda: centre_line(result)
+    yield "wave", lambda: wave(result)
+    yield "spectrum", lambda: spectrum(result)
+
+
+def _title(result: CycleResult) -> str:
+    return f"{result.header.name}, {describe_fixed(result.case, result.parameter)}"
+
+
+def _values(result: CycleResult) -> np.ndarray:
+    return np.array([point.value for point in result.points]) / PARAMETERS[result.parameter].scale
+
+
+def branch(result: CycleResult) -> Figure:
+    """Amplitude and frequency over the parameter, unstable cycles dashed, special points marked."""
+    figure = new_figure(7.2, 6.0)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    x = _values(result)
+    onset = result.onset
+    for axes, name, factor, start in (
+        (top, "amplitude", 1e3, 0.0),
+        (bottom, "frequency", 1.0, onset["frequency"] if onset else np.nan),
+    ):
+        y = factor * np.array([getattr(point, name) for point in result.points])
+        if onset:
+            x_all = np.insert(x, 0, onset["value"] / PARAMETERS[result.parameter].scale)
+            _with_stability(axes, result, x_all, np.insert(y, 0, start), first=1)
+            axes.plot(x_all[0], start, "o", mfc="white", color=REST, ms=7, zorder=4, label="onset")
+        else:
+            _with_stability(axes, result, x, y)
+    _mark_special(result, top)
+    top.set_ylabel("Amplitude of one lip, mm")
+    top.set_ylim(bottom=0)
+    bottom.set_ylabel("Frequency, Hz")
+    bottom.set_xlabel(parameter_label(result.case, result.parameter))
+    top.tick_params(labelbottom=True)
+    top.set_title(_title(result), loc="left", fontweight="bold")
+    top.legend(loc="best")
+    return figure
+
+
+def _with_stability(axes, result: CycleResult, x: np.ndarray, y: np.ndarray, first: int = 0) -> None:
+    """Curves through cycles: full where both ends of a piece are stable or unknown."""
+    states = [point.stable for point in result.points]
+    states = [states[0]] * first + states
+    seen = set()
+    for k in range(len(x) - 1):
+        unstable = states[k + 1] is False or (states[k] is False and k >= first)
+        name = "unstable" if unstable else "stable" if states[k + 1] else "cycles"
+        look = {"color": UNSTABLE, "ls": "--"} if unstable else {"color": COMPUTED}
+        axes.plot(x[k : k + 2], y[k : k + 2], label=None if name in seen else name, **look)
+        seen.add(name)
+    axes.plot(x[first:], y[first:], ".", color=COMPUTED, ms=6)
+
+
+def _mark_special(result: CycleResult, axes) -> None:
+    scale = PARAMETERS[result.parameter].scale
+    for special in result.special_points:
+        x, y = special["value"] / scale, 1e3 * special["amplitude"]
+        axes.plot(x, y, "D", color=ACCENT, ms=6, zorder=5)
+        look = {"textcoords": "offset points", "fontsize": 8.5, "color": ACCENT, "path_effects": HALO}
+        axes.annotate(f"{special['kind']}\n{x:.4g}", (x, y), xytext=(8, 6), **look)
+
+
+def envelope(result: CycleResult) -> Figure:
+    """Between which displacements the lip swings, and its mean."""
+    figure = new_figure(7.0, 4.4)
+    axes = figure.subplots()
+    x = _values(result)
+    low, high, mean = (
+        1e3 * np.array([getattr(point, name) for point in result.points])
+        for name in ("lip_least", "lip_largest", "lip_mean")
+    )
+    order = np.argsort(x, kind="stable")
+    axes.fill_between(x[order], low[order], high[order], color=COMPUTED, alpha=0.12, lw=0)
+    axes.plot(x, high, ".-", color=COMPUTED, label="largest")
+    axes.plot(x, mean, "--", color=REST, label="mean")
+    axes.plot(x, low, ".-", color=ACCENT, label="least")
+    axes.set_xlabel(parameter_label(result.case, result.parameter))
+    axes.set_ylabel("Displacement of one lip, mm")
+    axes.set_ylim(bottom=min(0.0, float(low.min())))
+    axes.set_title(_title(result), loc="left", fontweight="bold")
+    axes.legend(loc="best")
+    return figure
+
+
+def _some(result: CycleResult) -> list[Point]:
+    points = [point for point in result.points if point.asked] or list(result.points)
+    return [points[i] for i in np.unique(np.linspace(0, len(points) - 1, SHOWN).round().astype(int))]
+
+
+def phase_plane(result: CycleResult) -> Figure:
+    """Orbits of some cycles in the plane of displacement and velocity of the lip."""
+    figure = new_figure(6.6, 5.2)
+    axes = figure.subplots()
+    shown = _some(result)
+    row = PARAMETERS[result.parameter]
+    for point, colour in zip(shown, pressure_colours([point.value for point in shown])):
+        lip, rate = (
+            np.append(point.orbit.lip, point.orbit.lip[0]),
+            np.append(point.orbit.lip_rate, point.orbit.lip_rate[0]),
+        )
+        look = {"ls": "--"} if point.stable is False else {}
+        axes.plot(
+            1e3 * lip, rate, color=colour, label=f"{point.value / row.scale:.4g} {row.shown_unit}".strip(), **look
+        )
+    axes.set_xlabel("Displacement of one lip, mm")
+    axes.set_ylabel("Its velocity, m/s")
+    axes.set_title(_title(result), loc="left", fontweight="bold")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=row.words, frameon=False)
+    return figure
+
+
+def centre_line(result: CycleResult) -> Figure:
+    """The line x = 0 at instants of a period of the last cycle."""
+    point = result.nearest()
+    figure = new_figure(7.4, 4.4)
+    axes = figure.subplots()
+    z, line = 1e3 * result.mesh.z, point.orbit.centre_line
+    for k, look in enumerate(phase_looks(INSTANTS)):
+        axes.plot(z, 1e3 * line[k * len(line) // INSTANTS], lw=1.3, label=f"{k}/{INSTANTS}", **look)
+    axes.set_xlabel("Distance from the lip z, mm")
+    axes.set_ylabel("Displacement in y, mm")
+    axes.set_title(_at(result, point), loc="left", fontweight="bold")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="of a period", fontsize=8)
+    return figure
+
+
+def wave(result: CycleResult) -> Figure:
+    """The motion of the line x = 0 about its mean over one period of the last cycle: a wave along the valve."""
+    point = result.nearest()
+    orbit = point.orbit
+    figure = new_figure(6.6, 4.4)
+    axes = figure.subplots()
+    moved = 1e3 * (orbit.centre_line - orbit.centre_line.mean(axis=0))
+    size = np.abs(moved).max()
+    image = axes.pcolormesh(
+        1e3 * result.mesh.z,
+        1e3 * orbit.time,
+        moved,
+        cmap="RdBu_r",
+        vmin=-size,
+        vmax=size,
+        shading="nearest",
+        rasterized=True,
+    )
+    colour_bar(figure, image, axes, "Displacement about the mean, mm")
+    axes.set_xlabel("Distance from the lip z, mm")
+    axes.set_ylabel("Time, ms")
+    axes.grid(False)
+    axes.set_title(_at(result, point), loc="left", fontweight="bold")
+    return figure
+
+
+def spectrum(result: CycleResult) -> Figure:
+    """Harmonics of the displacement of the lip of some cycles."""
+    figure = new_figure(6.8, 4.4)
+    axes = figure.subplots()
+    shown = _some(result)
+    row = PARAMETERS[result.parameter]
+    for point, colour in zip(shown, pressure_colours([point.value for point in shown])):
+        parts = 1e3 * point.orbit.lip_harmonics[1:]
+        label = f"{point.value / row.scale:.4g} {row.shown_unit}".strip()
+        axes.semilogy(np.arange(1, len(parts) + 1), parts, "o-", ms=4, lw=1.0, color=colour, label=label)
+    axes.set_xlabel("Harmonic")
+    axes.set_ylabel("Amplitude of one lip, mm")
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.set_title(_title(result), loc="left", fontweight="bold")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=row.words)
+    return figure
+
+
+def _at(result: CycleResult, point: Point) -> str:
+    row = PARAMETERS[result.parameter]
+    return f"{result.header.name}: {row.text(point.value)}, {point.frequency:.4g} Hz"

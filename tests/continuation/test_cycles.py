@@ -1,0 +1,294 @@
+"""Periodic motions as Fourier series: published orbits, exact bifurcations, exponents, honest failures."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from continuation import NotConverged
+from continuation.cycle_branch import DOUBLING, FOLD, TORUS, CycleBranchOptions, CycleTracer
+from continuation.cycles import CycleOptions, CycleSolver
+from continuation.harmonics import Harmonics, Rates
+from continuation.hill import floquet_exponents
+from continuation.krylov import gmres
+from continuation.orbits import OrbitOptions, find_orbit
+from continuation.periodic import PeriodicMotion
+from tests.systems import periodic
+from tests.systems.van_der_pol import van_der_pol as first_order_van_der_pol
+
+EXACT = CycleOptions(tolerance=1e-10)
+PHASE = 2 * np.pi * np.arange(64) / 64
+CIRCLE = np.stack([np.cos(PHASE), np.sin(PHASE)], axis=1)
+
+
+def solved(system, guess, mu, options=EXACT, **unknown):
+    solver = CycleSolver(system, system.basis, options)
+    return solver, solver.solve(guess, mu, **unknown)
+
+
+def exponents_of(solver, cycle, count=4):
+    return floquet_exponents(solver, solver.linearise(cycle.motion, cycle.mu), count)
+
+
+# -- series
+
+
+def test_series_are_exact():
+    h = Harmonics(3, 11)
+    c = np.random.default_rng(0).standard_normal((7, 2))
+    assert np.allclose(h.project(h.evaluate(c)), c)
+    assert np.allclose(h.real(h.complex(c)), c) and np.allclose(h.one_sided(h.two_sided(c)), c)
+    t = np.array([0.3, 1.7])
+    step = 1e-5
+    slope = (h.basis_at(t + step) - h.basis_at(t - step)) @ c / (2 * step)
+    assert np.allclose(h.basis_at(t) @ h.rate(c), slope, atol=1e-8)
+    assert np.allclose(Rates(h, 2.0).apply(1, h.evaluate(c)), 2.0 * h.evaluate(h.rate(c)))
+    assert np.allclose(h.basis_at(t) @ h.turned(c, 0.4), h.basis_at(t + 0.4) @ c)
+    # a filter of the rate, and a shift of it: x = exp(s t) p has (d/dt) x = exp(s t) (d/dt + s) p
+    shifted = Rates(h, 2.0, 0.5 + 1j)
+    assert np.allclose(shifted.apply(1, h.evaluate(c)), h.evaluate(2.0 * h.rate(c) + (0.5 + 1j) * c))
+    assert np.allclose(shifted.apply(lambda s: s**2, h.evaluate(c)), shifted.apply(2, h.evaluate(c)))
+
+
+def test_gmres_solves_to_its_tolerance():
+    rng = np.random.default_rng(1)
+    a = np.eye(30) + 0.1 * rng.standard_normal((30, 30)) + 0.05j * rng.standard_normal((30, 30))
+    b = rng.standard_normal(30)
+    x, count, missed = gmres(lambda v: a @ v, b, 1e-8, 30)
+    assert np.linalg.norm(a @ x - b) <= 1.01e-8 * np.linalg.norm(b) and missed <= 1e-8 and count < 30
+    assert gmres(lambda v: a @ v, np.zeros(30), 1e-8, 30)[1] == 0
+
+
+# -- orbits
+
+
+@pytest.mark.parametrize(
+    ("mu", "period", "amplitude", "multiplier"),
+    [(0.5, 6.380676, 2.002488, 0.0391769), (1.0, 6.663287, 2.008620, 8.59695e-4)],
+)
+def test_van_der_pol(mu, period, amplitude, multiplier):
+    """To the printed digits, and to those of collocation."""
+    system = periodic.van_der_pol()
+    guess = periodic.guess_of(2 * np.cos(PHASE)[:, None], 30, 1.0)
+    solver, cycle = solved(system, guess, {"mu": mu})
+    x = cycle.motion.at(np.linspace(0, 2 * np.pi, 4000))[:, 0]
+    assert abs(cycle.motion.period - period) < 5.1e-7 and abs(x.max() - amplitude) < 1.5e-6
+    found = exponents_of(solver, cycle)
+    digit = 10.0 ** (np.floor(np.log10(multiplier)) - 5)
+    assert abs(found.multipliers[0] - multiplier) < 0.51 * digit and found.trivial < 1e-8 and found.stable
+    orbit = find_orbit(first_order_van_der_pol(), 2 * CIRCLE * [1, -1], 6.4, {"mu": mu}, OrbitOptions(intervals=60))
+    assert np.isclose(cycle.motion.period, orbit.period, rtol=1e-9)
+
+
+def test_more_harmonics_leave_less():
+    """The share of the last two harmonics bounds the error of amplitude and period."""
+    system, errors, tails = periodic.van_der_pol(), [], []
+    for count in (7, 11, 15):
+        _, cycle = solved(system, periodic.guess_of(2 * np.cos(PHASE)[:, None], count, 1.0), {"mu": 1.0})
+        errors.append(abs(cycle.motion.period - 6.66328686) / 6.663)
+        tails.append(cycle.motion.tail)
+    assert np.all(np.array(errors) < tails) and errors[2] < 1e-2 * errors[0]
+
+
+def test_forced_duffing_against_integration():
+    """Forced and damped: the motion, and the multipliers of its variational equation."""
+    mu = {"w": 1.1, "d": 0.15, "e": 1.0, "f": 0.5}
+    system = periodic.duffing()
+    solver, cycle = solved(system, periodic.guess_of(-1.2 * np.sin(PHASE - 0.5)[:, None], 11, 1.0), mu)
+
+    def rate(t, u):
+        x, v, *m = u
+        m = np.reshape(m, (2, 2))
+        w = mu["w"]
+        force = (mu["f"] * np.cos(t) - x - mu["e"] * x**3 - mu["d"] * w * v) / w**2
+        slope = np.array([[0, 1], [-(1 + 3 * mu["e"] * x**2) / w**2, -mu["d"] / w]])
+        return np.concatenate([[v, force], (slope @ m).ravel()])
+
+    x0, v0 = cycle.motion.at([0.0])[0, 0], cycle.motion.rate([0.0])[0, 0]
+    run = solve_ivp(rate, (0, 2 * np.pi), [x0, v0, 1, 0, 0, 1], rtol=1e-11, atol=1e-13)
+    assert np.allclose(run.y[:2, -1], [x0, v0], atol=1e-7)
+    multipliers = np.linalg.eigvals(run.y[2:, -1].reshape(2, 2))
+    found = exponents_of(solver, cycle).multipliers
+    assert len(found) == 1  # a pair is given once
+    assert np.isclose(abs(found[0]), np.abs(multipliers[0]), rtol=1e-6)
+    assert np.isclose(np.abs(np.angle(found[0])), np.abs(np.angle(multipliers[0])), rtol=1e-5)
+
+
+def test_folds_of_the_forced_duffing():
+    """Both turning points of the resonance of a hardening spring, against the roots of one harmonic's algebra made exact
+    by small forcing.
+    """
+    mu = {"w": 0.8, "d": 0.02, "e": 0.02, "f": 0.05}
+    system = periodic.duffing()
+    solver = CycleSolver(system, system.basis, EXACT)
+    guess = periodic.guess_of(0.15 * np.cos(PHASE)[:, None], 5, 1.0)
+    first = solver.solve(guess, mu)
+    second = solver.solve(first.motion, mu | {"w": 0.82})
+    options = CycleBranchOptions(
+        step=0.05, max_step=0.4, scale=0.2, motion_scale=1.0, limits=(0.5, 1.3), max_points=150, exponents=2
+    )
+    tracer = CycleTracer(solver, "w", options)
+    tracer.start(first, second)
+    assert tracer.run() == "limit of w reached"
+    folds = [s for s in tracer.special if s.kind == FOLD]
+    assert len(folds) == 2 and all(s.located for s in folds)
+
+    # one harmonic: (1 - w^2 + 3/4 e A^2)^2 A^2 + (d w A)^2 = f^2, whose discriminant in A^2 vanishes at folds
+    def miss(w):
+        k = 0.75 * mu["e"]
+        roots = np.roots([k**2, 2 * k * (1 - w**2), (1 - w**2) ** 2 + (mu["d"] * w) ** 2, -(mu["f"] ** 2)])
+        return np.sum(np.abs(roots.imag) < 1e-9)
+
+    grid = np.linspace(0.9, 1.3, 40001)
+    counts = np.array([miss(w) for w in grid])
+    expected = grid[np.flatnonzero(np.diff(counts))]
+    assert np.allclose(sorted(s.value for s in folds), sorted(expected), rtol=2e-4)
+    inside = [p.exponents.unstable for p in tracer.points]
+    assert max(inside) == 1 and inside[0] == inside[-1] == 0
+
+
+# -- bifurcations
+
+
+def langford(u, mu):
+    x, y, z = u
+    m = mu["mu"]
+    gain = m - 3 + z + 0.2 * (1 - z**2)
+    return jnp.stack([gain * x - 0.25 * y, 0.25 * x + gain * y, m * z - (x**2 + y**2 + z**2)])
+
+
+def trace(system, guess, mu, other, name, **options):
+    solver = CycleSolver(system, system.basis, EXACT)
+    first = solver.solve(guess, mu)
+    second = solver.solve(first.motion, mu | {name: other})
+    tracer = CycleTracer(solver, name, CycleBranchOptions(**options))
+    tracer.start(first, second)
+    return tracer, tracer.run()
+
+
+def test_torus_of_langford():
+    """Neimark-Sacker at exactly mu = 2 with exponents +- i sqrt(1.2) modulo the frequency 1/4."""
+    system = periodic.of_first_order(langford, 3)
+    samples = np.hstack([CIRCLE, np.ones((64, 1))])
+    guess = periodic.guess_of(samples, 3, 0.25)
+    tracer, reason = trace(
+        system, guess, {"mu": 1.95}, 1.96, "mu", step=0.02, max_step=0.05, limits=(1.9, 2.05), located=1e-9
+    )
+    assert reason == "limit of mu reached"
+    (torus,) = tracer.special
+    assert torus.kind == TORUS and torus.located and abs(torus.value - 2.0) < 1e-6
+    turns = (np.sqrt(1.2) - 2 * np.pi * torus.frequency) / 0.25, (np.sqrt(1.2) + 2 * np.pi * torus.frequency) / 0.25
+    assert min(abs(t - round(t)) for t in turns) < 1e-4
+    assert tracer.points[0].exponents.unstable == 0 and tracer.points[-1].exponents.unstable == 2
+
+
+def test_fold_of_the_bautin_system():
+    """z' = (mu + i) z + z|z|^2 - z|z|^4: cycles mu = r^4 - r^2, fold at -1/4, exponent r d(mu)/dr."""
+
+    def rate(u, mu):
+        r2 = u[0] ** 2 + u[1] ** 2
+        gain = mu["mu"] + r2 - r2**2
+        return jnp.stack([gain * u[0] - u[1], u[0] + gain * u[1]])
+
+    system = periodic.of_first_order(rate, 2)
+    guess = periodic.guess_of(0.4 * CIRCLE, 3, 1.0)
+    tracer, reason = trace(
+        system, guess, {"mu": 0.4**4 - 0.4**2}, 0.41**4 - 0.41**2, "mu", step=0.05, max_step=0.1, limits=(-1.0, 0.3)
+    )
+    assert reason == "limit of mu reached"
+    (fold,) = tracer.special
+    assert fold.kind == FOLD and abs(fold.value + 0.25) < 1e-7
+    for point in tracer.points:
+        r = point.motion.at([0.0])
+        r = float(np.linalg.norm(r))
+        assert np.isclose(point.value, r**4 - r**2, atol=1e-9)
+        assert np.isclose(point.exponents.values[0].real, 2 * r**2 - 4 * r**4, atol=1e-6)
+
+
+def test_period_doubling_of_a_twisted_band():
+    """A cycle on a half-twisted band: multiplier -exp(-2 pi (a - mu)), doubling at mu = a."""
+    a = 0.3
+
+    def rate(u, mu):
+        x, y, p, q = u
+        r2 = x**2 + y**2
+        c, s = x / jnp.sqrt(r2), y / jnp.sqrt(r2)
+        g = mu["mu"] - a
+        m, d = 0.5 * (g - 1.0), 0.5 * (g + 1.0)
+        return jnp.stack(
+            [
+                x - y - r2 * x,
+                x + y - r2 * y,
+                (m + d * c) * p + (d * s - 0.5) * q - p**3,
+                (d * s + 0.5) * p + (m - d * c) * q - q**3,
+            ]
+        )
+
+    system = periodic.of_first_order(rate, 4)
+    guess = periodic.guess_of(np.hstack([CIRCLE, 0 * CIRCLE]), 8, 1.0)
+    tracer, _ = trace(system, guess, {"mu": 0.0}, 0.05, "mu", step=0.1, max_step=0.1, limits=(-0.1, 0.6), located=1e-9)
+    (point,) = tracer.special
+    assert point.kind == DOUBLING and abs(point.value - a) < 1e-5
+    assert np.isclose(tracer.points[0].exponents.multipliers[0], -np.exp(-2 * np.pi * a), rtol=1e-5)
+
+
+def test_events_are_located():
+    """The radius of Stuart and Landau's cycle, sqrt(mu), passes 0.6 at 0.36."""
+
+    def rate(u, mu):
+        gain = mu["mu"] - u[0] ** 2 - u[1] ** 2
+        return jnp.stack([gain * u[0] - u[1], u[0] + gain * u[1]])
+
+    system = periodic.of_first_order(rate, 2)
+    solver = CycleSolver(system, system.basis, EXACT)
+    first = solver.solve(periodic.guess_of(0.3 * CIRCLE, 2, 1.0), {"mu": 0.09})
+    second = solver.solve(first.motion, {"mu": 0.12})
+    event = {"radius": lambda cycle: float(np.linalg.norm(cycle.motion.at([0.0]))) - 0.6}
+    options = CycleBranchOptions(limits=(0.0, 0.5), values=(0.2, 0.3), located=1e-9)
+    tracer = CycleTracer(solver, "mu", options, event)
+    tracer.start(first, second)
+    told = []
+    tracer.run(told.append)
+    (special,) = tracer.special
+    assert special.kind == "radius" and abs(special.value - 0.36) < 1e-5 and special in told
+    assert {0.2, 0.3} <= {p.value for p in tracer.points if p.asked}
+    again = CycleTracer(solver, "mu", options, event)
+    again.restore(tracer.points[:3])
+    again.run()
+    assert np.isclose(again.points[-1].value, tracer.points[-1].value) and len(again.special) == 1
+
+
+# -- failures
+
+
+def test_a_guess_that_is_no_cycle():
+    system = periodic.of_first_order(lambda u, mu: jnp.stack([-u[0] - u[1], u[0] - u[1]]), 2)
+    with pytest.raises(NotConverged, match="No periodic motion"):
+        solved(system, periodic.guess_of(CIRCLE, 3, 1.0), {"mu": 0.0})
+
+
+def test_too_few_harmonics_end_a_branch_with_a_sentence():
+    system = periodic.van_der_pol()
+    guess = periodic.guess_of(2 * np.cos(PHASE)[:, None], 9, 1.0)
+    tracer, reason = trace(
+        system, guess, {"mu": 0.5}, 0.6, "mu", max_step=0.5, limits=(0.1, 9.0), tail=1e-3, max_harmonics=13
+    )
+    assert "harmonics are too few" in reason and tracer.points[-1].value > 0.9
+    assert all(p.motion.tail <= 1e-3 for p in tracer.points[2:])
+
+
+def test_bad_options():
+    with pytest.raises(ValueError, match="odd"):
+        Harmonics(3, 6)
+    with pytest.raises(ValueError, match="max_step"):
+        CycleBranchOptions(step=1.0, max_step=0.1)
+    with pytest.raises(ValueError, match="condition"):
+        system = periodic.van_der_pol()
+        solved(system, periodic.guess_of(np.cos(PHASE)[:, None], 3, 1.0), {"mu": 0.5}, free=("mu",))
+
+
+def test_motions_are_resized():
+    motion = PeriodicMotion(Harmonics(2), np.arange(10.0).reshape(5, 2), 3.0)
+    longer = motion.resized(4)
+    t = np.linspace(0, 6, 5)
+    assert np.allclose(motion.at(t), longer.at(t)) and longer.tail == 0.0 and motion.tail > 0
