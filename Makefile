@@ -34,6 +34,8 @@ reproduce: setup
 
 docs: setup
 	@$(PYTHON) -m dbvfiv.studies.case > docs/case-reference.md
+	@$(PYTHON) -m mkdocs build --strict --quiet
+	@echo "The manual is in build/site/index.html."
 
 clean:
 	rm -rf out build
