@@ -13,6 +13,7 @@ from jinja2 import Environment, StrictUndefined
 from .. import __version__
 from ..case.write import case_toml
 from ..errors import CaseError
+from ..studies.stability.place import describe_fixed
 from . import live
 from .content import Part
 from .gather import Gathered
@@ -93,13 +94,9 @@ def answers(found: Gathered) -> list[tuple[str, tuple[str, ...]]]:
 
 def setting(found: Gathered) -> str:
     """What the answers are for, in a line."""
-    case = found.case
-    drive, fluid, mesh = case.drive, case.fluid, case.mesh
-    words = [f"{drive.pressure / 1e3:.4g} kPa"]
-    if drive.kind == "flow":
-        words += [f"a fluid of {fluid.density:g} kg/m\N{SUPERSCRIPT THREE}", f"{fluid.continuity} continuity"]
-    words.append(f"{mesh.around} x {mesh.along} elements on a quarter of the valve")
-    return f"{', '.join(words)}. Made {datetime.now().astimezone():%Y-%m-%d %H:%M}."
+    case, mesh = found.case, found.case.mesh
+    words = [describe_fixed(case), f"{mesh.around} x {mesh.along} elements on a quarter of the valve"]
+    return f"At {', '.join(words)}. Made {datetime.now().astimezone():%Y-%m-%d %H:%M}."
 
 
 def _told_once(parts: list[Part]) -> list[Part]:
