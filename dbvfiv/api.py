@@ -77,12 +77,7 @@ class Valve:
         return self.session.model
 
     def plot(self, folder: str | Path = ".", format: str = "png", only: Sequence[str] = ()) -> list[Path]:
-        """Draw the valve as its case describes it, with measures, wall and layers; nothing is solved.
-
-        Examples
-        --------
-        >>> dbvfiv.load("cases/dbv6.toml").plot("figures")      # doctest: +SKIP
-        """
+        """Draw the valve as its case describes it, with measures, wall and layers; nothing is solved."""
         figures = draw_figures(described.drawers_of(self.model), only, f"case {self.name!r}")
         return write_figures(figures, folder, format)
 
@@ -145,6 +140,13 @@ class Valve:
         if not result.states:
             raise KeyboardInterrupt
         return result.states[0]
+
+    def levels(self, pressure=None, *, output: str | Path | None = None, observer: Observer | None = None):
+        """Strain levels of the built-in rubbers that agree with what their layers strain, at one or more pressures; a
+        `dbvfiv.studies.levels.result.LevelsResult`.
+        """
+        given = None if pressure is None else [pressure] if is_single(pressure) else list(pressure)
+        return self._ask({"levels.pressures": given}, {}).perform("levels", output, observer)
 
     def modes(
         self,

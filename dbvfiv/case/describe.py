@@ -47,7 +47,8 @@ class KeyInfo:
 def quantity_of(field: FieldInfo) -> Quantity | None:
     """The physical quantity of a scalar field, or of the elements of a list."""
     found = next((m for m in field.metadata if isinstance(m, Quantity)), None)
-    return found or _inner_quantity(field.annotation)
+    described = description_of(field)
+    return found or (described and described.quantity) or _inner_quantity(field.annotation)
 
 
 def _inner_quantity(annotation: Any) -> Quantity | None:

@@ -19,10 +19,13 @@ class Described:
         What it is called in the reference.
     allowed : str
         Completes "it must be ...".
+    quantity : object, optional
+        `dbvfiv.case.quantity.Quantity` by which its numbers are shown.
     """
 
     type: str
     allowed: str
+    quantity: Any = None
 
 
 def description_of(field: FieldInfo) -> Described | None:

@@ -7,18 +7,40 @@ A material card is data only; what it does under strain is the business of the
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictStr, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, StrictStr, ValidationInfo, field_validator, model_validator
 
+from .described import Described
 from .existing_file import existing_file
-from .quantity import Angle, Density, Length, Modulus, Number, Percent
+from .quantity import Angle, Density, Length, Modulus, Number, Percent, Quantity
 from .relaxing import Relaxing
 from .section import BrokenRule, Section, key
 
 RUBBERS = ("CR", "SBR", "EPDM")
 BUILT_IN = (*RUBBERS, "fibre")
+#: Tested strain levels, the first and the last, and the word for those that agree with the strains found.
+LOWEST_LEVEL, HIGHEST_LEVEL = 0.10, 0.60
+AUTO = "auto"
+_PERCENT = Quantity("", "%")
+
+
+def _strain_level(given: Any) -> Any:
+    if isinstance(given, str) and given.strip() == AUTO:
+        return AUTO
+    value = _PERCENT.parse(given)
+    if not LOWEST_LEVEL <= value <= HIGHEST_LEVEL:
+        raise ValueError("which is out of range")
+    return value
+
+
+StrainLevel = Annotated[
+    float | str,
+    BeforeValidator(_strain_level),
+    Described("plain number or choice", 'a number at least 10 % and at most 60 %, or "auto"', _PERCENT),
+]
 
 
 def _density(default: Any) -> Any:
@@ -141,12 +163,11 @@ KINDS = {c.model_fields["kind"].annotation.__args__[0]: c for c in Card.__args__
 class Materials(Section):
     """Materials by name; every table ``[materials.NAME]`` adds or replaces one."""
 
-    strain_level: Percent = key(
+    strain_level: StrainLevel = key(
         0.10,
         "Strain level of the built-in rubbers CR, SBR and EPDM; between the tested levels "
-        "10, 20, 40 and 60 % the constants are interpolated.",
-        ge=0.10,
-        le=0.60,
+        "10, 20, 40 and 60 % the constants are interpolated; auto finds for each of them the level that agrees with "
+        "what its layers strain at drive.pressure, or at the highest of steady.pressures.",
     )
     fibre_constants: Literal["program", "table"] = key(
         "program",
@@ -196,6 +217,14 @@ class Materials(Section):
         """Every name a layer may use."""
         return tuple(dict.fromkeys((*BUILT_IN, *self.named)))
 
+    def at_levels(self, levels: Mapping[str, float]) -> dict[str, Any]:
+        """Changes of a case that give built-in rubbers the constants of a level each, and leave how they relax."""
+        changes = {}
+        for name, level in levels.items():
+            own = self.named[name].model_dump(mode="json") if name in self.named else {}
+            changes[f"materials.{name}"] = own | {"kind": "shipped", "rubber": name, "strain_level": level}
+        return changes
+
     def is_built_in(self, name: str) -> bool:
         """Whether a name stands for a built-in material and not for a table that replaces it."""
         return name in BUILT_IN and isinstance(self.named.get(name, BuiltIn()), BuiltIn)
@@ -219,7 +248,8 @@ class Materials(Section):
         if not self.is_built_in(name) and name in self.named:
             return self.named[name]
         if name in RUBBERS:
-            return ShippedRubber(kind="shipped", rubber=name, strain_level=self.strain_level)
+            level = LOWEST_LEVEL if self.strain_level == AUTO else self.strain_level
+            return ShippedRubber(kind="shipped", rubber=name, strain_level=level)
         if name == "fibre":
             return HalpinTsai()
         raise KeyError(name)

@@ -12,7 +12,7 @@ from .damping import Damping
 from .downstream import Downstream
 from .gravity import Gravity
 from .load import make_case, put
-from .materials import DEFAULT_LAYERS, Layer, Materials
+from .materials import AUTO, DEFAULT_LAYERS, RUBBERS, Layer, Materials
 from .mesh import Mesh
 from .outside import Outside
 from .parameters import PARAMETERS
@@ -151,6 +151,14 @@ class Case(Section):
         if self.drive.kind != "flow" or not self.fluid.unsteady:
             return ""
         return f"{self.fluid.continuity} continuity {self.outside.words}".rstrip()
+
+    @property
+    def seeks_levels(self) -> bool:
+        """Whether strain levels of rubbers are to agree with the strains of layers, and are not known yet."""
+        used = {layer.material for layer in self.layers}
+        return self.materials.strain_level == AUTO and any(
+            name in used and self.materials.is_built_in(name) for name in RUBBERS
+        )
 
     @property
     def pressure_at(self) -> str:

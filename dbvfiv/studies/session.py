@@ -13,6 +13,7 @@ from ..model import ValveModel
 from ..model.equilibria import find_equilibrium, redescribe, rest_state
 from ..model.operating_point import operating_pressure
 from ..model.state import SteadyState
+from ..model.strain_level import agree_levels
 from ..observer import Observer
 from ..record.files import check_writable, kind_of
 from ..record.header import Header
@@ -158,10 +159,29 @@ class Session:
         SolveError
             If nothing can be found at all.
         """
+        if self.case.seeks_levels and kind != "levels":
+            return self._at_own_levels(kind, observer).perform(kind, output, observer, **choices)
         if self.case.meets_pump(kind):
             return self._at_operating_point(kind, observer).perform(kind, output, observer, **choices)
         header = Header.of(kind, self.case, self.name)
         return self._run(kind, header, output, observer, None, choices)
+
+    def _at_own_levels(self, kind: str, observer: Observer | None) -> Session:
+        """The session of the case with the strain levels that agree with its state at the pressure of a study."""
+        if self.case.meets_pump(kind) or self.case.drive.kind != "flow":
+            raise CaseError(
+                "materials.strain_level is 'auto', which needs a steady flow at a known pressure; give drive.pressure "
+                "with drive.kind = 'flow' and no operating point of a pump to look for, or a level.",
+                "materials.strain_level",
+            )
+        pressure = max(self.case.steady_pressures()) if kind == "steady" else self.case.drive.pressure
+        found = agree_levels(self.case, pressure, observer)
+        if observer is not None:
+            levels = ", ".join(f"{name} {100 * level:.4g} %" for name, level in found.levels.items())
+            observer.warn(f"Strain levels that agree with the state at {pressure:.6g} Pa: {levels}.")
+            for sentence in found.bounded():
+                observer.warn(sentence)
+        return Session(found.case, self.name, found.state)
 
     def _at_operating_point(self, kind: str, observer: Observer | None) -> Session:
         """The session of the case with the pressure at which valve and pump meet."""

@@ -1,0 +1,30 @@
+"""``dbvfiv levels``: strain levels of the rubbers that agree with the strains their layers see."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ..case import Case
+from ..request import Request
+
+ORDER = 25
+
+
+def command(
+    case: Case,
+    pressures: Annotated[
+        list[str] | None,
+        typer.Option("--pressure", "-p", metavar="P", help="Static inlet pressure; may be repeated."),
+    ] = None,
+) -> Request:
+    """Strain level of each rubber that agrees with what its layer strains (Eq. 7.1), and the flow with it.
+
+    Each rubber has the constants of a level, 10 to 60 %; with them 99 % of its layer strain by less than so much; that
+    is the next level, until both agree. `materials.strain_level = "auto"` does the same at the pressure of any other
+    command.
+
+    dbvfiv levels cases/dbv12.toml -p "18 kPa" -p "36 kPa"
+    """
+    return Request({"levels.pressures": list(pressures) if pressures else None})
