@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from continuation import OutOfDomain
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
-from eigen import CoupledPencil, Workspace
+from eigen import CoupledPencil, SingularShiftError, Workspace
 from eigen.pencil import FLUID_PARTS
 
 from ..errors import SolveError
