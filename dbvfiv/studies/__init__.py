@@ -8,5 +8,14 @@ they make, and `stability`.
 #: Every study: the name of its room, command, section of the case file and kind of result, in the order of the
 #: commands. A new study is a folder and a word here.
 KINDS = (
-    "steady", "levels", "modes", "sweep", "sensitivity", "onset", "map", "transient", "cycle", "closure",
+    "steady",
+    "levels",
+    "modes",
+    "sweep",
+    "sensitivity",
+    "onset",
+    "map",
+    "transient",
+    "cycle",
+    "closure",
 )

@@ -25,7 +25,7 @@ from ..stability.walk import StabilityWalk
 #: Values of the range that are asked whether the steady state is stable.
 SCANNED = 13
 #: Relative accuracy of an onset.
-LOCATED = 1e-6
+LOCATED = 1e-5
 #: Harmonics of the first cycles.
 HARMONICS = 4
 #: Leading modes of which the basis of the corrections is made at the start.
@@ -74,7 +74,8 @@ def find_onset(case: Case, walk: StabilityWalk, observer: Observer) -> Onset:
         observer.progress(f"steady state at {axis.parameter} = {value:.6g}")
         return cell(base.at(**{axis.parameter: value}))
 
-    scan = Scan(sample, axis.log)
+    inside = lambda value: np.asarray(walk.spectrum(base.at(**{axis.parameter: value}), MODES).eigenvalues)  # noqa: E731
+    scan = Scan(sample, axis.log, inside=inside)
     crossings = scan.run(values)
     for crossing in crossings[::-1] if case.cycle.start == "last" else crossings:
         onset = _onset_at(case, walk, scan, crossing)
@@ -117,7 +118,7 @@ def _without(case: Case, scan: Scan) -> str:
     )
 
 
-def periodic_system(case: Case, walk: StabilityWalk, place: Place) -> PeriodicValve:
+def periodic_system(case: Case, walk: StabilityWalk) -> PeriodicValve:
     """The valve's equations of periodic motions.
 
     Raises
@@ -125,7 +126,7 @@ def periodic_system(case: Case, walk: StabilityWalk, place: Place) -> PeriodicVa
     SolveError
     """
     system = ValveSystem(walk.built(Place.of(case)).model, rebuilder(case))
-    return PeriodicValve(system.model, place.mu())
+    return PeriodicValve(system.model, Place.of(case).mu())
 
 
 def cycle_solver(system: PeriodicValve, onset: Onset) -> CycleSolver:

@@ -60,11 +60,11 @@ def run(session: Session, record: GrowingRecord) -> None:
         raise CaseError("Over the density a pump has no steady state to keep; give drive.pressure.", key="cycle.over")
     record.begin("cycle", None)
     walk = StabilityWalk(case, record, session.model)
+    system = periodic_system(case, walk)
     onset = find_onset(case, walk, record)
     frequency = onset.eigenvalue.imag / (2 * np.pi)
     if not record.notes("onset"):
         record.note("onset", value=onset.value, frequency=frequency)
-    system = periodic_system(case, walk, onset.place)
     solver = cycle_solver(system, onset)
     name = PARAMETERS[axis.parameter].system_name or axis.parameter
     lip = int(session.model.shell.dofs.index[session.model.mesh.rows[0, 0], 1])

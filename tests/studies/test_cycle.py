@@ -1,0 +1,148 @@
+"""Branches of limit cycles of the valve: beside the onset, in a file, in time, and where there are none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.model.dynamics import Conditions
+from dbvfiv.motion.equations import ValveMotion
+from dbvfiv.motion.scheme import scheme
+from dbvfiv.motion.state import consistent_state
+from dbvfiv.motion.stepper import Stepper
+from dbvfiv.observer import Observer
+from dbvfiv.studies.session import Session, load_result, resume_result
+
+CASE = {
+    "mesh.around": 6,
+    "mesh.along": 8,
+    "drive.pressure": 6e3,
+    "damping.alpha": 0.0,
+    "damping.beta": 3e-3,
+    "cycle.over": "density=230:260:4",
+}
+
+
+def session_of(**changes):
+    return Session(dbvfiv.load().case.replace(CASE | {key.replace("__", "."): v for key, v in changes.items()}))
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return tmp_path_factory.mktemp("cycles") / "cycles.h5"
+
+
+@pytest.fixture(scope="module")
+def found(file):
+    return session_of().perform("cycle", file)
+
+
+def lip_after(point, steps: int) -> float:
+    """Displacement of the lip after one period in time, from the cycle."""
+    orbit, model = point.orbit, point.orbit.model
+    motion, n = ValveMotion(model, Conditions(orbit.mu["density"], 0.0, 3e-3)), model.size
+    x, v = orbit.motion.at([0.0])[0], orbit.motion.rate([0.0])[0]
+    state = consistent_state(motion, 0.0, x[:n], v[:n], x[n], orbit.mu["inlet"])
+    stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: orbit.mu["inlet"])
+    for _ in range(steps):
+        state = stepper.step(state, orbit.motion.period / steps).state
+    return float(state.q[model.shell.dofs.index[model.mesh.rows[0, 0], 1]])
+
+
+def test_amplitude_is_the_root_of_the_distance_from_the_onset(found):
+    """And the slope at the onset is the same from the first two cycles; frequencies tend to that of the onset."""
+    first, second = found.points[:2]
+    onset = found.onset["value"]
+    assert np.isclose(first.amplitude, 1e-3, rtol=2e-3)
+    slopes = [(onset - p.value) / p.amplitude**2 for p in (first, second)]
+    assert np.isclose(*slopes, rtol=0.02) and slopes[0] > 0
+    assert abs(first.frequency - found.onset["frequency"]) < 0.01 * first.frequency
+    assert first.stable and found.points[-1].stable
+
+
+def test_cycles_are_those_of_runs_in_time(found):
+    """Steps come back to where they started but for their error of second order."""
+    point = found.points[-1]
+    start = point.orbit.lip[0]
+    coarse, fine = (lip_after(point, steps) - start for steps in (60, 120))
+    assert 3.0 < coarse / fine < 5.0
+    assert abs(4 * fine - coarse) / 3 < 2e-3 * point.amplitude
+
+
+def test_values_asked_for_are_met(found):
+    assert {p.value for p in found.points if p.asked} <= set(found.case.cycle.axis.values)
+    assert found.points[-1].value == 230.0 and found.points[-1].asked
+    assert found.reason == "limit of density reached"
+
+
+def test_what_is_read_off(found):
+    point = found.points[-1]
+    orbit = point.orbit
+    assert np.isclose(point.amplitude, 0.5 * np.ptp(orbit.lip), rtol=1e-3)
+    assert np.isclose(orbit.lip_rate.max(), np.gradient(orbit.lip, orbit.time).max(), rtol=2e-2)
+    assert np.isclose(orbit.lip_harmonics[0], point.lip_mean, rtol=1e-6)
+    assert orbit.opening() > 0 and point.least_speed > 0
+    summary = found.summary()
+    assert summary["parameter"] == "density" and summary["special_points"] == []
+    for key in ("value", "amplitude", "frequency", "stable"):
+        assert all(key in row for row in summary["points"])
+    assert summary["points"][-1]["exponents"][0]["growth_rate"] < 0
+    assert any("onset" in line for line in found.lines())
+    assert found.nearest(found.points[2].value).number == 2
+
+
+def test_file_figures_and_fields(found, file, tmp_path):
+    again = load_result(file)
+    assert again.summary() == found.summary()
+    figures = again.figures()
+    assert set(figures) == {"branch", "envelope", "phase-plane", "centre-line-cycle", "wave", "spectrum"}
+    assert again.export(tmp_path / "cycle.vtkhdf").stat().st_size > 0
+
+
+class _Stopper(Observer):
+    """Interrupts after a number of cycles."""
+
+    def __init__(self, after: int):
+        self.left = after
+
+    def item(self, result):
+        self.left -= 1
+        if not self.left:
+            raise KeyboardInterrupt
+
+
+def test_interrupted_and_resumed(found, tmp_path):
+    path = tmp_path / "part.h5"
+    part = session_of(cycle__exponents=0).perform("cycle", path, _Stopper(2))
+    assert part.interrupted and len(part.points) == 2 and part.points[0].stable is None
+    whole = resume_result(path)
+    assert whole.complete and np.allclose(
+        [p.amplitude for p in whole.points[:2]], [p.amplitude for p in found.points[:2]]
+    )
+    assert whole.points[-1].value == 230.0
+    assert np.isclose(whole.points[-1].amplitude, found.points[-1].amplitude, rtol=1e-4)
+    with pytest.raises(CaseError, match="nothing to resume"):
+        resume_result(path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"cycle__over": "density=300:400:3"}, "No oscillation starts"),
+        ({"drive__kind": "uniform"}, "Without flow"),
+        ({"outside__fluid": "same", "cycle__over": "density=230:260:4"}, "fluid outside"),
+        ({"cycle__amplitude": 0.09}, "cycle.amplitude"),
+    ],
+)
+def test_what_cannot_be_followed_is_said(changes, said):
+    with pytest.raises(SolveError, match=said):
+        session_of(**changes).perform("cycle")
+
+
+def test_bad_keys():
+    with pytest.raises(CaseError, match="tail_length"):
+        session_of(cycle__over="tail_length=1:2:3").perform("cycle")
+    with pytest.raises(CaseError, match="cycle.tolerance"):
+        session_of(cycle__tolerance=0.5)
