@@ -30,6 +30,9 @@ from .studies.transient.result import TransientResult
 if TYPE_CHECKING:
     from .observer import Observer
 
+#: A result file to write; none without it.
+Output = str | Path | None
+
 
 class Valve:
     """A valve to ask questions of.
@@ -101,7 +104,7 @@ class Valve:
     @overload
     def steady(self, pressure: Iterable[float | str] | None = None) -> SteadyResult: ...
 
-    def steady(self, pressure=None, *, output: str | Path | None = None, observer: Observer | None = None):
+    def steady(self, pressure=None, *, output: Output = None, observer: Observer | None = None):
         """Equilibria.
 
         Parameters
@@ -141,7 +144,7 @@ class Valve:
             raise KeyboardInterrupt
         return result.states[0]
 
-    def levels(self, pressure=None, *, output: str | Path | None = None, observer: Observer | None = None):
+    def levels(self, pressure=None, *, output: Output = None, observer: Observer | None = None):
         """Strain levels of the built-in rubbers that agree with what their layers strain, at one or more pressures; a
         `dbvfiv.studies.levels.result.LevelsResult`.
         """
@@ -153,7 +156,7 @@ class Valve:
         pressure: float | str | None = None,
         *,
         count: int | None = None,
-        output: str | Path | None = None,
+        output: Output = None,
         observer: Observer | None = None,
         **changes: Any,
     ) -> ModesResult:
@@ -191,7 +194,7 @@ class Valve:
         over: str | None = None,
         *,
         count: int | None = None,
-        output: str | Path | None = None,
+        output: Output = None,
         observer: Observer | None = None,
         **changes: Any,
     ) -> SweepResult:
@@ -213,7 +216,7 @@ class Valve:
         of: str | Sequence[str] = (),
         *,
         mode: int | None = None,
-        output: str | Path | None = None,
+        output: Output = None,
         observer: Observer | None = None,
         **changes: Any,
     ) -> SensitivityResult:
@@ -227,11 +230,6 @@ class Valve:
             Another mode, by falling growth rate from 1.
         output, observer, changes
             As for `modes`; also pressure.
-
-        Examples
-        --------
-        >>> found = dbvfiv.load().sensitivity(["thickness", "layer 3 angle"], pressure="6 kPa")     # doctest: +SKIP
-        >>> [(s.parameter, s.growth_rate) for s in found.sensitivities]                             # doctest: +SKIP
         """
         return self._ask(sensitivity_keys(of, mode), changes).perform("sensitivity", output, observer)
 
@@ -241,7 +239,7 @@ class Valve:
         *,
         in_time: bool = False,
         compare: bool = False,
-        output: str | Path | None = None,
+        output: Output = None,
         observer: Observer | None = None,
     ) -> ClosureResult:
         """Equilibria under back pressure: whether, where and how firmly the valve shuts.
@@ -275,12 +273,7 @@ class Valve:
         return session.perform("closure", output, observer, in_time=in_time, compare=compare)
 
     def onset(
-        self,
-        over: str | None = None,
-        *,
-        output: str | Path | None = None,
-        observer: Observer | None = None,
-        **changes: Any,
+        self, over: str | None = None, *, output: Output = None, observer: Observer | None = None, **changes: Any
     ) -> OnsetResult:
         """Every onset along one parameter: where the valve loses or regains stability.
 
@@ -296,21 +289,11 @@ class Valve:
         Raises
         ------
         CaseError, SolveError
-
-        Examples
-        --------
-        >>> found = dbvfiv.load().onset("density", pressure="6 kPa")    # doctest: +SKIP
-        >>> [(p["value"], p["frequency"]) for p in found.points]        # doctest: +SKIP
         """
         return self._ask({"onset.over": over}, changes).perform("onset", output, observer)
 
     def cycle(
-        self,
-        over: str | None = None,
-        *,
-        output: str | Path | None = None,
-        observer: Observer | None = None,
-        **changes: Any,
+        self, over: str | None = None, *, output: Output = None, observer: Observer | None = None, **changes: Any
     ) -> CycleResult:
         """Limit cycles followed from an onset along one parameter.
 
@@ -326,11 +309,6 @@ class Valve:
         Raises
         ------
         CaseError, SolveError
-
-        Examples
-        --------
-        >>> found = dbvfiv.load("cases/light-fluid.toml").cycle("density=25:60:8")     # doctest: +SKIP
-        >>> [(p.value, p.amplitude, p.frequency, p.stable) for p in found.points]     # doctest: +SKIP
         """
         return self._ask({"cycle.over": over}, changes).perform("cycle", output, observer)
 
@@ -340,7 +318,7 @@ class Valve:
         y: str | None = None,
         *,
         workers: int | None = None,
-        output: str | Path | None = None,
+        output: Output = None,
         observer: Observer | None = None,
         **changes: Any,
     ) -> MapResult:
@@ -369,7 +347,7 @@ class Valve:
         self,
         duration: float | str | None = None,
         *,
-        output: str | Path | None = None,
+        output: Output = None,
         observer: Observer | None = None,
         **changes: Any,
     ) -> TransientResult:
@@ -392,11 +370,6 @@ class Valve:
             For a start or a drive that cannot be used.
         SolveError
             If there is no first state. A step that is not found ends the run, which keeps what it has.
-
-        Examples
-        --------
-        >>> run = dbvfiv.load("cases/light-fluid.toml").transient()      # doctest: +SKIP
-        >>> run.verdict["verdict"], run.history["lip_opening"]           # doctest: +SKIP
         """
         return self._ask({"transient.duration": duration}, changes).perform("transient", output, observer)
 

@@ -11,7 +11,7 @@ side edge, where it grows with every finer mesh. The mean that is reported too i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,9 +92,17 @@ class AgreedLevels:
 
 
 def agree_levels(
-    case: Case, pressure: float, observer: Observer | None = None, start: AgreedLevels | None = None
+    case: Case, pressure: float, observer: Observer | None = None, first: Mapping[str, float] | None = None
 ) -> AgreedLevels:
     """Levels of the built-in rubbers in the layers of a case that agree with its steady state at a pressure, Pa.
+
+    Parameters
+    ----------
+    case : Case
+    pressure : float, Pa
+    observer : Observer, optional
+    first : mapping of str to float, optional
+        Levels of the first round by rubber; the lowest tested ones without it.
 
     Raises
     ------
@@ -103,8 +111,8 @@ def agree_levels(
     """
     observer = Observer() if observer is None else observer
     names = [name for name in RUBBERS if case.materials.is_built_in(name) and name in {x.material for x in case.layers}]
-    levels = dict.fromkeys(names, LOWEST_LEVEL) if start is None else {n: start.levels[n] for n in names}
-    shape = None if start is None else start.state
+    levels = {name: (first or {}).get(name, LOWEST_LEVEL) for name in names}
+    shape = None
     for count in range(1, ROUNDS + 1):
         found = case.replace(case.materials.at_levels(levels))
         model = ValveModel(found)

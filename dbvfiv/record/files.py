@@ -97,6 +97,7 @@ def kind_of(path: str | Path) -> str:
 
 def _opened(path: Path) -> h5py.File:
     """A file for reading; one in single-writer mode also while it is written, or after its writer was killed."""
+    ended = False
     for _ in range(_TRIES):
         try:
             return h5py.File(path, "r", locking=False)
@@ -104,13 +105,16 @@ def _opened(path: Path) -> h5py.File:
             raise
         except OSError as error:
             plain = error
-        if not _marked_as_open(path):  # reading a cut file as a growing one would never end
-            raise plain
-        try:
-            return h5py.File(path, "r", locking=False, libver="latest", swmr=True)
-        except OSError:
-            if not is_being_written(path):
-                raise plain from None
+        if ended:
+            break
+        marked = _marked_as_open(path)  # reading a cut file as a growing one would never end
+        if marked:
+            try:
+                return h5py.File(path, "r", locking=False, libver="latest", swmr=True)
+            except OSError:
+                pass
+        # its writer may have closed it since it was tried first, so a file without one is tried once more
+        ended = not marked or not is_being_written(path)
         sleep(_PAUSE)  # caught between two writes of the same instant
     raise plain
 

@@ -27,6 +27,8 @@ from dbvfiv.studies.closure.columns import valid_rows
 from dbvfiv.studies.study import find_study
 
 CASE = {"mesh.around": 4, "mesh.along": 6, "drive.pressure": 2e3, "fluid.density": 10}
+#: A valve that has cycles.
+OSCILLATING = {"mesh.around": 6, "mesh.along": 8, "drive.pressure": 6e3, "damping.alpha": 0.0, "damping.beta": 3e-3}
 RUNS = {
     "steady": lambda valve, path: valve.steady([1e3, 2e3, 3e3], output=path),
     "modes": lambda valve, path: valve.modes(output=path),
@@ -35,6 +37,8 @@ RUNS = {
     "onset": lambda valve, path: valve.onset("alpha=0.1:30:3:log", output=path),
     "map": lambda valve, path: valve.map("density=1:100:3:log", "alpha=0.1:30:3:log", output=path),
     "transient": lambda valve, path: valve.transient("20 ms", output=path),
+    "levels": lambda valve, path: valve.levels([1e3, 2e3], output=path),
+    "cycle": lambda valve, path: valve.replace(OSCILLATING).cycle("density=236:260:2", output=path),
     "closure": lambda valve, path: valve.closure([500, 1000, 1500], output=path),
 }
 LIMIT = 120.0

@@ -18,22 +18,33 @@ def run(session: Session, record: GrowingRecord) -> None:
         raise CaseError(
             f"No layer is one of the built-in rubbers {', '.join(RUBBERS)}, which alone have strain levels.", "layers"
         )
+    kept = record.rows(LAYERS)
     done = {float(pressure) for pressure in record.column(LAYERS, "pressure")}
+    levels = levels_of(record, kept)
     record.begin("levels", len(case.levels.pressures))
-    start = None
     for pressure in case.levels.pressures:
         if pressure in done:
             continue
         try:
-            start = agree_levels(case, pressure, record, start)
+            found = agree_levels(case, pressure, record, levels)
         except SolveError as error:
             record.fail(str(error))
             continue
-        for row in rows_of(start):
-            record.append(LAYERS, row)
-        record.item(start)
-        for sentence in start.bounded():
+        rows = list(rows_of(found))
+        record.extend(LAYERS, {name: [row[name] for row in rows] for name in rows[0]})  # whole pressures or none
+        levels = found.levels
+        record.item(found)
+        for sentence in found.bounded():
             record.warn(sentence)
+
+
+def levels_of(record: GrowingRecord, count: int) -> dict[str, float] | None:
+    """Levels at the last pressure that is kept, which the next one starts from; None if there is none."""
+    if not count:
+        return None
+    pressures, names, levels = (record.column(LAYERS, name) for name in ("pressure", "material", "level"))
+    last = pressures == pressures[-1]
+    return {str(name): float(level) for name, level in zip(names[last], levels[last]) if level == level}
 
 
 STUDY = Study("levels", tables_of, run, LevelsResult)
