@@ -156,13 +156,14 @@ def _layers(axes: Axes, model: ValveModel, mesh: MeshData) -> None:
         zone = int(np.argmax(shell.zones.presence.sum(axis=1)))
     section = shell.section if shell.zones is None else shell.at_rest.sections[zone]
     element = 0 if shell.zones is None else shell.at_rest.elements[zone][0]
-    wall, place = 1e3 * mesh.thickness[element], 0.0
+    wall, place, kinds = 1e3 * mesh.thickness[element], 0.0, []
     for share, title, layer in zip(section.fractions, mesh.layer_titles(), model.case.layers):
         height = wall * share
         if height == 0:
             continue
         ply = layer.material == "fibre" or bool(layer.angle)
-        axes.barh(place + 0.5 * height, 1.0, height, color=_PLY if ply else _RUBBER, edgecolor="white", lw=1.2)
+        kinds.append((_PLY, "ply, angle from the axis") if ply else (_RUBBER, "rubber"))
+        axes.barh(place + 0.5 * height, 1.0, height, color=kinds[-1][0], edgecolor="white", lw=1.2)
         axes.text(0.02, place + 0.5 * height, title, va="center", fontsize=8)
         axes.text(0.98, place + 0.5 * height, f"{height:.3g} mm", va="center", ha="right", fontsize=8)
         place += height
@@ -174,7 +175,7 @@ def _layers(axes: Axes, model: ValveModel, mesh: MeshData) -> None:
     where = "the middle of the lip" if shell.zones is None else f"z = {1e3 * model.mesh.element_z[element]:.4g} mm"
     axes.set_title(f"Layers at {where}", loc="left", fontweight="bold")
     axes.legend(
-        handles=[Patch(color=_RUBBER, label="rubber"), Patch(color=_PLY, label="ply, angle from the axis")],
+        handles=[Patch(color=colour, label=label) for colour, label in dict.fromkeys(kinds)],
         loc="upper center",
         bbox_to_anchor=(0.5, -0.02),
         ncols=2,
