@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, Field, StrictStr, ValidationInfo, field_va
 
 from .described import Described
 from .existing_file import existing_file
+from .extent import Extent
 from .quantity import Angle, Density, Length, Modulus, Number, Percent, Quantity
 from .relaxing import Relaxing
 from .section import BrokenRule, Section, key
@@ -255,12 +256,18 @@ class Materials(Section):
         raise KeyError(name)
 
 
-class Layer(Section):
-    """One layer of the wall."""
+class _Ply(Section):
+    """What a layer is made of."""
 
     material: StrictStr = key(..., "Name of its material.", min_length=1)
     thickness: Length = key(..., "Thickness before all layers are scaled to the local wall thickness.", gt=0, le=10)
     angle: Angle = key(0.0, "Angle of material axis 1 from the valve's axis, in the tangent plane.", ge=-180, le=180)
+
+
+class Layer(Extent, _Ply):
+    """One layer of the wall: everywhere, or a filler on a part of it, which leaves the thickness of the wall as it is
+    and takes its share of it there.
+    """
 
 
 DEFAULT_LAYERS = (

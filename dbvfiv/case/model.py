@@ -95,6 +95,7 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
+        self._check_fillers()
         self.mesh.check_positions(self.valve.as_given.length)
         if self.drive.kind == "flow" and self.upstream.is_elastic and not self.fluid.unsteady:
             raise BrokenRule(
@@ -107,6 +108,27 @@ class Case(Section):
         self.downstream.check_pipe(inlet)
         self.outside.check_pipe(self.valve.outer_diameter)
         return self
+
+    def _check_fillers(self) -> None:
+        """Refuse layers of limited extent beside the valve, and places with too few points through the wall."""
+        along, around = {0.0}, {0.0}
+        for i, layer in enumerate(self.layers):
+            try:
+                layer.check_inside(self.valve.as_given.length)
+            except BrokenRule as rule:
+                raise BrokenRule(f"layers.{i}.{rule.key}", rule.given, rule.allowed) from None
+            along |= set(layer.axial_edges)
+            around |= set(layer.section_edges)
+        for z in along:
+            for s in around:
+                count = sum(layer.covers(z, s) for layer in self.layers)
+                if z < self.valve.as_given.length and s < 1 and count * self.mesh.layer_points < 2:
+                    raise BrokenRule(
+                        "layers",
+                        f"a list with {count} at z = {z:g} m and {s:g} of the section",
+                        "every place of the wall needs a layer, and two points through it that mesh.layer_points and "
+                        "its layers make",
+                    )
 
     @property
     def has_line(self) -> bool:

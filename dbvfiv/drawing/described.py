@@ -42,15 +42,15 @@ def valve_figure(model: ValveModel) -> Figure:
     _plane(figure.add_subplot(grid[1, :2]), case, mesh, 1)
     _plane(figure.add_subplot(grid[2, :2]), case, mesh, 0)
     _wall(figure, figure.add_subplot(grid[1, 2]), mesh, scale)
-    _layers(figure.add_subplot(grid[2, 2]), case, mesh)
+    _layers(figure.add_subplot(grid[2, 2]), model, mesh)
     headline(figure, _title(model))
     return figure
 
 
 def _title(model: ValveModel) -> str:
     case, shell = model.case, model.shell
-    volume = 4.0 * float(np.sum(shell.geometry.area.sum(axis=1) * shell.mesh.thickness))
-    weight = volume * float(shell.section.inertia[0])
+    density = np.atleast_2d(shell.at_rest.inertia)[:, 0]  # of the wall, by element or everywhere
+    weight = 4.0 * float(np.sum(shell.geometry.area.sum(axis=1) * shell.mesh.thickness * density))
     passage = 4e4 * (model.mesh.rest_area - model.mesh.wall_deduction)
     lip, inlet = passage[0], passage[-1]
     scaled = f", {case.valve.scale:g} times as given" if case.valve.scale != 1.0 else ""
@@ -149,13 +149,21 @@ def _wall(figure: Figure, axes: Axes, mesh: MeshData, scale: Normalize) -> None:
     colour_bar(figure, ScalarMappable(scale, _COLOURS), axes, "Wall, mm", aspect=18)
 
 
-def _layers(axes: Axes, case: Case, mesh: MeshData) -> None:
-    """Layers from inside (below) to outside where the lip is, with their angles, true to their shares."""
-    wall, place = 1e3 * mesh.thickness[0], 0.0
-    for share, title, layer in zip(mesh.layer_fractions, mesh.layer_titles(), case.layers):
+def _layers(axes: Axes, model: ValveModel, mesh: MeshData) -> None:
+    """Layers from inside (below) to outside where most of them are, with their angles, true to their shares."""
+    shell, zone = model.shell, 0
+    if shell.zones is not None:
+        zone = int(np.argmax(shell.zones.presence.sum(axis=1)))
+    section = shell.section if shell.zones is None else shell.at_rest.sections[zone]
+    element = 0 if shell.zones is None else shell.at_rest.elements[zone][0]
+    wall, place, kinds = 1e3 * mesh.thickness[element], 0.0, []
+    for share, title, layer in zip(section.fractions, mesh.layer_titles(), model.case.layers):
         height = wall * share
+        if height == 0:
+            continue
         ply = layer.material == "fibre" or bool(layer.angle)
-        axes.barh(place + 0.5 * height, 1.0, height, color=_PLY if ply else _RUBBER, edgecolor="white", lw=1.2)
+        kinds.append((_PLY, "ply, angle from the axis") if ply else (_RUBBER, "rubber"))
+        axes.barh(place + 0.5 * height, 1.0, height, color=kinds[-1][0], edgecolor="white", lw=1.2)
         axes.text(0.02, place + 0.5 * height, title, va="center", fontsize=8)
         axes.text(0.98, place + 0.5 * height, f"{height:.3g} mm", va="center", ha="right", fontsize=8)
         place += height
@@ -164,9 +172,10 @@ def _layers(axes: Axes, case: Case, mesh: MeshData) -> None:
     axes.set_xticks([])
     axes.grid(False)
     axes.set_ylabel("From the inner face, mm")
-    axes.set_title("Layers at the middle of the lip", loc="left", fontweight="bold")
+    where = "the middle of the lip" if shell.zones is None else f"z = {1e3 * model.mesh.element_z[element]:.4g} mm"
+    axes.set_title(f"Layers at {where}", loc="left", fontweight="bold")
     axes.legend(
-        handles=[Patch(color=_RUBBER, label="rubber"), Patch(color=_PLY, label="ply, angle from the axis")],
+        handles=[Patch(color=colour, label=label) for colour, label in dict.fromkeys(kinds)],
         loc="upper center",
         bbox_to_anchor=(0.5, -0.02),
         ncols=2,

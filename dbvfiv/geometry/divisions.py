@@ -36,8 +36,8 @@ class Division:
     missed: np.ndarray
 
 
-def row_division(valve: Valve, mesh: Mesh, surface: Surface) -> Division:
-    """Axial positions of the rows, m, from the lip to the flange."""
+def row_division(valve: Valve, mesh: Mesh, surface: Surface, parts=()) -> Division:
+    """Axial positions of the rows, m, from the lip to the flange; on the edges of parts of the wall too."""
     joints = surface.breaks
     if mesh.rows == "uniform":
         return divide(joints, (), mesh.along)
@@ -49,7 +49,7 @@ def row_division(valve: Valve, mesh: Mesh, surface: Surface) -> Division:
         return divide(given[[0, -1]], (), mesh.along, (given, np.arange(len(given), dtype=float)))
     wall = [step.to for step in valve.wall_map] if valve.wall == "measured" else []
     asked = [valve.scale * z for z in mesh.breaks]
-    patches = [z for patch in valve.patches for z in patch.axial_edges]
+    patches = [z for part in parts for z in part.axial_edges]
     if valve.key_points is not None:  # supports and loads change there, whatever the points do
         asked += [valve.duckbill_length, valve.duckbill_length + valve.saddle_length]
     breaks = [z for z in (*asked, *wall, *patches) if joints[0] < z < joints[-1]]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..case.extent import Extent
 from ..case.mesh import Mesh
 from ..case.valve import Valve
 from ..errors import CaseError
@@ -64,13 +66,15 @@ class ValveMesh:
         return self.rows.shape[1] - 1, self.rows.shape[0] - 1
 
 
-def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=()) -> ValveMesh:
+def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=(), parts: Sequence[Extent] = ()) -> ValveMesh:
     """Mesh a valve.
 
     Parameters
     ----------
     column_breaks : sequence of float
         Where load or supports change along the section, in the parameter of the grading.
+    parts : sequence of Extent
+        Parts of the wall, beside its patches, that rows and columns should end at.
 
     Raises
     ------
@@ -80,9 +84,10 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=()) -> ValveMesh:
         If patches of the wall leave no flow area.
     """
     surface = surface_of(valve)
-    edges = dict.fromkeys(s for patch in valve.patches for s in patch.section_edges if 0.0 < s < 1.0)
+    parts = (*valve.patches, *parts)
+    edges = dict.fromkeys(s for part in parts for s in part.section_edges if 0.0 < s < 1.0)
     column_breaks = (*column_breaks, *(inverse_grading(s, mesh.grading) for s in edges))
-    along, across = row_division(valve, mesh, surface), column_division(mesh, surface, column_breaks)
+    along, across = row_division(valve, mesh, surface, parts), column_division(mesh, surface, column_breaks)
     z, columns = along.positions, across.positions
     s = grading(columns, mesh.grading)
     points = np.stack([surface.section(level, s) for level in z])

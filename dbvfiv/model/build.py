@@ -11,10 +11,12 @@ from ..flow.terms import terms_of
 from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
 from ..geometry import ValveMesh, valve_mesh
+from ..geometry.divisions import grading
 from ..materials.damping import relaxation_from_case
 from ..materials.library import law_from_case
 from ..materials.orthotropic import OrthotropicPly
 from ..shell import Layer, Section, Shell, ShellMesh, Weight
+from ..shell.zones import Zones
 from .supports import free_unknowns
 
 
@@ -32,7 +34,8 @@ def build_section(case: Case) -> Section:
 
 def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, Shell]:
     """Mesh and shell of a case; `section` in place of the case's own wall."""
-    mesh = valve_mesh(case.valve, case.mesh, (1.0 - case.drive.unloaded_edge, 0.5))
+    fillers = [layer.enlarged(case.valve.scale) for layer in case.layers if layer.is_limited]
+    mesh = valve_mesh(case.valve, case.mesh, (1.0 - case.drive.unloaded_edge, 0.5), fillers)
     surface = ShellMesh.build(
         mesh.nodes,
         mesh.quads,
@@ -40,9 +43,16 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
         material_axis=(0.0, 0.0, 1.0),
         planes=[(mesh.rows[:, 0], 0), (mesh.rows[:, -1], 1)],
     )
-    return mesh, Shell(
-        surface, section or build_section(case), free_unknowns(mesh), case.shell.metric, case.mesh.element
-    )
+    section = section or build_section(case)
+    zones = layer_zones(case, mesh) if fillers else None
+    return mesh, Shell(surface, section, free_unknowns(mesh), case.shell.metric, case.mesh.element, zones)
+
+
+def layer_zones(case: Case, mesh: ValveMesh) -> Zones:
+    """Which layers the elements of a case have, by where their centres are."""
+    layers = [layer.enlarged(case.valve.scale) for layer in case.layers]
+    shares = grading(mesh.element_columns.mean(axis=1), case.mesh.grading)
+    return Zones.of([[layer.covers(z, s) for layer in layers] for z, s in zip(mesh.element_z, shares)])
 
 
 def build_weight(case: Case, shell: Shell) -> Weight | None:

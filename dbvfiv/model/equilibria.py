@@ -276,13 +276,13 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
             f"{model.mesh.shape[1]} elements along are too few for a row on every step of the wall and every break "
             f"asked for: those at z = {places} m fall inside elements; raise mesh.along."
         )
-    edges = {s for patch in model.case.valve.patches for s in patch.section_edges}
+    edges = {s for part in (*model.case.valve.patches, *model.case.layers) for s in part.section_edges}
     missed = [s for s in sorted(edges) if np.isclose(grading(model.mesh.missed_columns, mesh.grading), s).any()]
     if missed:
         places = ", ".join(f"{s:g}" for s in missed)
         yield (
-            f"{model.mesh.shape[0]} elements around are too few for a column on every edge of a patch: those at "
-            f"{places} of the section fall inside elements; raise mesh.around."
+            f"{model.mesh.shape[0]} elements around are too few for a column on every edge of a patch or layer: those "
+            f"at {places} of the section fall inside elements; raise mesh.around."
         )
 
 

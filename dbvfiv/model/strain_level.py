@@ -147,7 +147,9 @@ def layer_levels(model: ValveModel, state: SteadyState, levels: dict[str, float]
     """Strains of the layers of rubber at a state."""
     shell, section = model.shell, model.shell.section
     strains, each = shell.strains(state.q), section.points_per_layer
-    volume = (shell.geometry.thickness[:, None] * shell.geometry.area)[:, :, None] * section.points[:, 1]
+    weights = shell.at_rest.points[..., 1]
+    weights = weights if weights.ndim == 1 else weights[:, None]
+    volume = (shell.geometry.thickness[:, None] * shell.geometry.area)[:, :, None] * weights
     for i, layer in enumerate(section.layers):
         if layer.law.kind != MOONEY_RIVLIN:
             continue

@@ -338,7 +338,8 @@ class ValveMotion:
         d, d1, _ = shell.directors(nodal)
         kinetic = kinetic_energy(self._quads, self._integrals, d1, self.model.nodal(v))
         if shell.metric == "first-order":
-            strain = strain_energy(self._quads, shell.mesh.nodes, nodal, d, shell._reference, shell._wall)
+            parts = zip(shell.parts, shell.wall)
+            strain = sum(strain_energy(p.quads, shell.mesh.nodes, nodal, d, p.reference, wall) for p, wall in parts)
         else:
             strain = shell.energy(q)
         return float(kinetic), float(strain), self.model.stops.energy(q)

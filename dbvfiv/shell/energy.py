@@ -42,10 +42,10 @@ def section_arrays(section: Section, geometry: ReferenceGeometry, metric: str) -
 
 
 def element_arrays(
-    mesh, geometry: ReferenceGeometry, section: Section, metric: str, inplane: np.ndarray, products: np.ndarray
+    mesh, geometry: ReferenceGeometry, points: np.ndarray, metric: str, inplane: np.ndarray, products: np.ndarray
 ) -> dict:
-    """Arrays with a leading element axis that `element_energy` is mapped over; `inplane` and `products` as
-    `assumed_strain` has them.
+    """Arrays with a leading element axis that `element_energy` is mapped over; `points` (np, 2) or, of zones, (ne, np,
+    2); `inplane` and `products` as `assumed_strain` has them.
     """
     data = {
         "x": mesh.nodes[mesh.quads],
@@ -57,10 +57,12 @@ def element_arrays(
         "products": products,
         "s0": geometry.shear0,
     }
+    if points.ndim > 2:
+        data |= {"zeta": points[..., 0], "weight": points[..., 1]}
     if metric == FIRST_ORDER:
         data |= {"q": geometry.q, "qk": geometry.qk, "p": geometry.p}
     else:
-        t = geometry.thickness[:, None] * section.points[:, 0]  # (ne, np)
+        t = geometry.thickness[:, None] * points[..., 0]  # (ne, np)
         shift = np.eye(2) + t[:, None, :, None, None] * geometry.curvature[:, :, None]
         jacobian = np.linalg.det(shift)
         folded = thickness_over_radius(geometry).max(
@@ -111,7 +113,7 @@ def strains_of_shape(x, d, element, layers, metric):
     )
     shear = SHEAR_WEIGHTS * (edge - element["s0"])
     gamma = jnp.stack([shear[:, 0] + shear[:, 1], shear[:, 2] + shear[:, 3]], axis=1)
-    t = element["h"] * layers["zeta"]
+    t = element["h"] * (element if "zeta" in element else layers)["zeta"]
     if metric == FIRST_ORDER:
         membrane = jnp.einsum("pij,pj->pi", element["q"], c0)
         bending = jnp.einsum("pij,pj->pi", element["q"], c1) - jnp.einsum("pij,pj->pi", element["qk"], c0)
@@ -189,7 +191,7 @@ def element_energy(kinds, metric, unknowns, element, layers):
 
 def point_volumes(metric, element, layers):
     """Volumes (4, np) that the layer points of one element stand for, m3."""
-    weight = element["h"] * element["area"][:, None] * layers["weight"]
+    weight = element["h"] * element["area"][:, None] * (element if "zeta" in element else layers)["weight"]
     return weight * element["mu"] if metric == TRUE_METRIC else weight
 
 
@@ -217,12 +219,15 @@ class EnergyFunctions:
     does not compile anew.
     """
 
-    def __init__(self, mesh, geometry: ReferenceGeometry, section: Section, metric: str, inplane, products):
+    def __init__(
+        self, mesh, geometry: ReferenceGeometry, section: Section, metric: str, inplane, products, points=None
+    ):
         if metric not in (FIRST_ORDER, TRUE_METRIC):
             raise ValueError(f"The shell metric is '{metric}', but only '{FIRST_ORDER}' and '{TRUE_METRIC}' exist.")
         self.metric = metric
         self.kinds = tuple(int(kind) for kind in section.kinds)
-        self.elements = element_arrays(mesh, geometry, section, metric, inplane, products)
+        points = section.points if points is None else points
+        self.elements = element_arrays(mesh, geometry, points, metric, inplane, products)
         self.layers = section_arrays(section, geometry, metric)
 
     def energy(self, unknowns):
@@ -239,9 +244,11 @@ class EnergyFunctions:
 
     def material_tangent(self, unknowns, share):
         """(ne, 20, 20): material part of the Hessians, each layer's by a factor; share (nl,)."""
-        points = len(self.kinds) // len(share)
-        layers = self.layers | {"weight": self.layers["weight"] * jnp.repeat(jnp.asarray(share), points)}
-        return _materials(self.kinds, self.metric, unknowns, self.elements, layers)
+        factor = jnp.repeat(jnp.asarray(share), len(self.kinds) // len(share))
+        elements, layers = self.elements, self.layers | {"weight": self.layers["weight"] * factor}
+        if "weight" in elements:
+            elements = elements | {"weight": elements["weight"] * factor}
+        return _materials(self.kinds, self.metric, unknowns, elements, layers)
 
     def second(self, unknowns, a, b):
         """(ne, 20): second directional derivative of the force along a and b (ne, 4, 5)."""

@@ -13,7 +13,7 @@ def mass_integrals(geometry: ReferenceGeometry, section: Section) -> np.ndarray:
     """(ne, 3, 4, 4): integrals of rho t^k N_a N_b over each element, k = 0, 1, 2."""
     h = geometry.thickness
     shape = np.einsum("ep,pa,pb->eab", geometry.area, SHAPE, SHAPE)
-    moments = section.inertia[None, :] * h[:, None] ** np.arange(1, 4)
+    moments = np.atleast_2d(section.inertia) * h[:, None] ** np.arange(1, 4)
     return moments[:, :, None, None] * shape[:, None]
 
 

@@ -92,11 +92,15 @@ class WallMemory:
         for number, group in enumerate(section.relaxing):
             owner[list(group.layers)] = number
         self._owner, self.groups = owner, len(section.relaxing)
-        points, constants, scales = section.rubber_points
         member = np.repeat(owner, section.points_per_layer)[section.kinds == RUBBER]
-        stiffness = [section.wall((owner == g).astype(float))[0] for g in range(self.groups)]
-        self._walls = (np.array(stiffness), points, constants, scales, member)
+        sections = (section,) if shell.zones is None else shell.at_rest.sections
+        self._walls = [self._wall_of(part, member) for part in sections]
         self._factors: dict[float, tuple] = {}
+
+    def _wall_of(self, section, member: np.ndarray) -> tuple:
+        """What the loops take of the groups of a section."""
+        stiffness = [section.wall((self._owner == g).astype(float))[0] for g in range(self.groups)]
+        return np.array(stiffness), *section.rubber_points, member
 
     @property
     def shapes(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -119,15 +123,18 @@ class WallMemory:
         shell, count = self.shell, self.shell.mesh.element_count
         nodal = shell.dofs.expand(q)
         strain, slow = np.empty((count, 4, 8)), np.empty((count, 4, self.groups, 8))
-        fixed = (shell.mesh.quads, shell.mesh.nodes, nodal, shell.directors(nodal)[0], shell._reference)
-        slow_resultants(*fixed, *self._walls, strain, slow)
+        directors = shell.directors(nodal)[0]
+        for part, wall in zip(shell.parts, self._walls):
+            own = strain[part.elements], slow[part.elements]  # views of a wall of one zone, copies of others
+            slow_resultants(part.quads, shell.mesh.nodes, nodal, directors, part.reference, *wall, *own)
+            strain[part.elements], slow[part.elements] = own
         return strain, slow
 
     def held(self, memory: Memory) -> StepWall:
         """The wall at the state of a memory: its slow law and what its branches hold."""
         out = np.empty_like(memory.strain)
         hold_resultants(memory.branches, memory.slow, np.ones(len(self._group)), np.zeros(self.groups), out)
-        return StepWall(self.shell.section.wall(), out)
+        return StepWall(self.shell.wall, out)
 
     def step(self, memory: Memory, h: float) -> StepWall:
         """The wall at the end of a step of h, s, from the state of a memory."""
@@ -190,7 +197,7 @@ class WallMemory:
             gained[1, : len(self.times)] = taken
             by_group = np.bincount(self._group, gained[0, : len(self._group)], self.groups)
             factors = np.where(self._owner >= 0, 1.0 + by_group[self._owner], 1.0)
-            self._factors[h] = kept, gained, by_group, self.shell.section.wall(factors)
+            self._factors[h] = kept, gained, by_group, self.shell.wall_of(factors)
         return self._factors[h]
 
     def _stored(self, branches, stretch) -> np.ndarray:

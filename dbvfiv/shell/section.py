@@ -63,12 +63,23 @@ class Section:
 
     Through-thickness coordinate and weights are normalised: zeta in (-1/2, 1/2), weights summing to one; a wall of
     thickness h has t = h zeta.
+
+    Attributes
+    ----------
+    layers : tuple of Layer
+    points_per_layer : int
+    present : tuple of bool
+        Which of the layers are there; all by default. Those that are not have points without weight, so that layers are
+        numbered alike wherever a wall has how many.
     """
 
     layers: tuple[Layer, ...]
     points_per_layer: int = 2
+    present: tuple[bool, ...] = ()
 
     def __post_init__(self):
+        if self.present and (len(self.present) != len(self.layers) or not any(self.present)):
+            raise ValueError("A section needs a layer that is there, and a word on each whether it is.")
         if not self.layers:
             raise ValueError("A section needs at least one layer.")
         if min(layer.thickness for layer in self.layers) <= 0:
@@ -80,6 +91,8 @@ class Section:
     def fractions(self) -> np.ndarray:
         """Thickness of each layer over that of the wall (nl,)."""
         h = np.array([layer.thickness for layer in self.layers])
+        if self.present:
+            h = h * np.array(self.present)
         return h / h.sum()
 
     @cached_property

@@ -17,6 +17,16 @@ from .relaxed_forms import relaxed_force_form
 from .rotation import director_derivatives
 from .section import Section
 from .supports import DofMap
+from .zones import WallParts, Zones
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Elements of one zone, as the compiled loops take them."""
+
+    elements: slice | np.ndarray
+    quads: np.ndarray
+    reference: tuple
 
 
 @dataclass(frozen=True)
@@ -25,8 +35,8 @@ class StepWall:
 
     Attributes
     ----------
-    wall : tuple
-        Laws of its layers, see `Section.wall`.
+    wall : tuple of tuples
+        Laws of its layers, zone by zone, see `Section.wall`.
     held : (ne, 4, 8) array
         Resultants at each Gauss point that come on top of those of the layers.
     """
@@ -49,12 +59,20 @@ class Shell:
         loop; the other is evaluated by automatic differentiation of its energy, several times slower.
     element : str
         What is assumed about the in-plane strains, see `dbvfiv.shell.assumed_strain`.
+    zones : Zones, optional
+        Where which layers of the section are; all are everywhere by default.
 
     All states are vectors of the free unknowns (n,): displacements in m, rotations in rad. Forces are in N and N m.
     """
 
     def __init__(
-        self, mesh: ShellMesh, section: Section, free=None, metric: str = FIRST_ORDER, element: str = ENHANCED
+        self,
+        mesh: ShellMesh,
+        section: Section,
+        free=None,
+        metric: str = FIRST_ORDER,
+        element: str = ENHANCED,
+        zones: Zones | None = None,
     ):
         self.mesh = mesh
         self.section = section
@@ -64,13 +82,26 @@ class Shell:
         self.geometry = reference_geometry(mesh)
         g = self.geometry
         self.element = element
-        self._inplane = inplane_map(mesh, g, section, element)
+        self.zones = zones
+        self.at_rest = section if zones is None else WallParts(section, zones)
+        self._inplane = inplane_map(mesh, g, self.at_rest, element)
         self._products = rest_products(mesh.nodes[mesh.quads], mesh.directors[mesh.quads])
         local = np.ascontiguousarray(local_map(g) @ self._inplane)
-        self._reference = (self._products, g.shear0, local, shear_map(g), g.area, g.thickness)
-        self._wall = section.wall()
-        self._integrals = mass_integrals(g, section)
+        reference = (self._products, g.shear0, local, shear_map(g), g.area, g.thickness)
+        if zones is None:
+            self.parts = (_Part(slice(None), mesh.quads, reference),)
+        else:
+            self.parts = tuple(
+                _Part(own, mesh.quads[own], tuple(array[own] for array in reference)) for own in self.at_rest.elements
+            )
+        self.wall = self.wall_of()
+        self._integrals = mass_integrals(g, self.at_rest)
         self._frames = np.ascontiguousarray(mesh.frames)
+
+    def wall_of(self, factors: np.ndarray | None = None) -> tuple:
+        """What the compiled loops take of the wall, zone by zone; `factors` (nl,) on the stress of each layer."""
+        sections = (self.section,) if self.zones is None else self.at_rest.sections
+        return tuple(section.wall(factors) for section in sections)
 
     @property
     def size(self) -> int:
@@ -79,8 +110,9 @@ class Shell:
     @cached_property
     def energies(self) -> EnergyFunctions:
         """The automatically differentiated definition on this mesh."""
+        points = None if self.zones is None else self.at_rest.points
         parts = (self.mesh, self.geometry, self.section, self.metric)
-        return EnergyFunctions(*parts, self._inplane, self._products)
+        return EnergyFunctions(*parts, self._inplane, self._products, points)
 
     def directors(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Directors (nn, 3), first (nn, 2, 3) and second (nn, 3, 3) derivatives for nodal unknowns (nn, 5)."""
@@ -100,8 +132,10 @@ class Shell:
         nodal = self.dofs.expand(q)
         d, d1, _ = self.directors(nodal)
         out = np.zeros_like(nodal)
-        wall, held = (self._wall, None) if step is None else (step.wall, step.held)
-        shell_force(self.mesh.quads, self.mesh.nodes, nodal, d, d1, self._reference, wall, held, out)
+        walls, held = (self.wall, None) if step is None else (step.wall, step.held)
+        for part, wall in zip(self.parts, walls):
+            own = None if held is None else held[part.elements]
+            shell_force(part.quads, self.mesh.nodes, nodal, d, d1, part.reference, wall, own, out)
         return self.dofs.restrict(out)
 
     def force_and_tangent(
@@ -121,9 +155,11 @@ class Shell:
         nodal = self.dofs.expand(q)
         d, d1, d2 = self.directors(nodal)
         out = np.zeros_like(nodal)
-        fixed = (self.mesh.quads, self.mesh.nodes, nodal, d, d1, d2, self._reference)
-        wall, held = (self._wall, None) if step is None else (step.wall, step.held)
-        shell_tangent(*fixed, wall, held, True, self.dofs.slots, out, data)
+        walls, held = (self.wall, None) if step is None else (step.wall, step.held)
+        for part, wall in zip(self.parts, walls):
+            own = None if held is None else held[part.elements]
+            fixed = (part.quads, self.mesh.nodes, nodal, d, d1, d2, part.reference)
+            shell_tangent(*fixed, wall, own, True, self.dofs.slots[part.elements], out, data)
         return self.dofs.restrict(out), data
 
     def relaxing_tangents(self, q: np.ndarray) -> list[np.ndarray]:
@@ -139,9 +175,10 @@ class Shell:
             data, share = np.zeros(len(self.dofs.pattern[1])), np.zeros(len(self.section.layers))
             share[list(group.layers)] = 1.0
             if self.metric == FIRST_ORDER:
-                fixed = (self.mesh.quads, self.mesh.nodes, nodal, *directors, self._reference)
-                wall, unused = self.section.wall(share), np.zeros_like(nodal)
-                shell_tangent(*fixed, wall, None, False, self.dofs.slots, unused, data)
+                unused = np.zeros_like(nodal)
+                for part, wall in zip(self.parts, self.wall_of(share)):
+                    fixed = (part.quads, self.mesh.nodes, nodal, *directors, part.reference)
+                    shell_tangent(*fixed, wall, None, False, self.dofs.slots[part.elements], unused, data)
             else:
                 self._scatter_matrix(np.asarray(self.energies.material_tangent(self._element_unknowns(q), share)), data)
             found.append(data)
@@ -187,8 +224,11 @@ class Shell:
         return self._scatter(form.real) + 1j * self._scatter(form.imag)
 
     def strains(self, q: np.ndarray) -> np.ndarray:
-        """Green-Lagrange strains (ne, 4, np, 5) in layer axes at all integration points."""
-        return np.asarray(self.energies.strains(self._element_unknowns(q)))
+        """Green-Lagrange strains (ne, 4, np, 5) in layer axes at all integration points; none where a layer is not."""
+        strains = np.asarray(self.energies.strains(self._element_unknowns(q)))
+        if self.zones is None:
+            return strains
+        return np.where(self.at_rest.points[:, None, :, 1:] > 0, strains, 0.0)
 
     def folded_places(self) -> np.ndarray:
         """Positions (k, 3) of the integration points at which half the wall exceeds the radius of the mid-surface."""

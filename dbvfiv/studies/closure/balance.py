@@ -36,7 +36,7 @@ def force_balance(pressed: PressedShell, q: np.ndarray, pressure: float) -> Forc
     """Resultants at a state: the supports give what the internal forces at held displacements ask for."""
     mesh, dofs = pressed.mesh, pressed.shell.dofs
     nodal = pressed.nodal(q)
-    loose = Shell(mesh, pressed.shell.section, metric=pressed.shell.metric)
+    loose = Shell(mesh, pressed.shell.section, metric=pressed.shell.metric, zones=pressed.shell.zones)
     internal = loose.force(nodal.ravel()).reshape(nodal.shape)
     load = pressed.nodal_pressure_force(nodal, pressure)
     contact = np.zeros_like(nodal)

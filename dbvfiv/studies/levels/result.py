@@ -91,7 +91,7 @@ class LevelsResult(StudyResult):
     @property
     def rows(self) -> list[dict[str, Any]]:
         """A row for each pressure and layer of rubber, SI; strains as fractions."""
-        return self.record.table_rows(_TABLE)
+        return [row | {"layer": int(row["layer"])} for row in self.record.table_rows(_TABLE)]
 
     def summary(self) -> dict[str, Any]:
         plain = [
