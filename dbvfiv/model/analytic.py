@@ -13,30 +13,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..errors import SolveError
 from ..flow import FlowMotion
 from ..flow.derivatives import along
 from ..shell.mass import mass_integrals
 from ..shell.reference import SHAPE, SLOPE
 from ..shell.rotation import director
+from .outside_forms import OutsideForms
 from .valve import ValveModel
 
 #: Parameters of the damping; those of the flow law come before them.
 DAMPING = ("alpha", "beta")
-
-
-def require_forms(model: ValveModel) -> None:
-    """Refuse higher derivatives where they are not known.
-
-    Raises
-    ------
-    SolveError
-    """
-    if model.outside is not None:
-        raise SolveError(
-            "With fluid outside the wall the higher derivatives of its added mass by the shape are not known, so "
-            "whether an onset is soft or hard is not either; runs in time beside the onset tell."
-        )
 
 
 class AnalyticResidual:
@@ -62,6 +48,7 @@ class AnalyticResidual:
         self.model = model
         self.parameters = (*model.flow.names, *DAMPING)
         self._forces, self._inner = slice(model.size), (model.flow.inner,)
+        self._outside: OutsideForms | None = None
         self._arrays = {
             "flow": model.flow,
             "quads": jnp.asarray(shell.mesh.quads),
@@ -102,10 +89,9 @@ class AnalyticResidual:
     def second(self, motion, parameters, a, b) -> np.ndarray:
         """Second directional derivative (n + l,) along two motions."""
         self._check_at_rest(motion)
-        require_forms(self.model)
         motion, parameters = self._shaped(motion), self._given(parameters)
         a, b = self._shaped(a), self._shaped(b)
-        out = np.array(_form_of_remainder(motion, parameters, (a, b), self._arrays))
+        out = self._remainder_form(motion, parameters, a, b)
         form = partial(_form, self._own_form, motion[0])
         # form(a0, b0) + beta (form(a0, b1) + form(a1, b0)), in one evaluation where one of the motions has no velocity
         beta = parameters["beta"]
@@ -115,10 +101,9 @@ class AnalyticResidual:
     def third(self, motion, parameters, a, b, c) -> np.ndarray:
         """Third directional derivative (n + l,) along three motions."""
         self._check_at_rest(motion)
-        require_forms(self.model)
         motion, parameters = self._shaped(motion), self._given(parameters)
         a, b, c = self._shaped(a), self._shaped(b), self._shaped(c)
-        out = np.array(_form_of_remainder(motion, parameters, (a, b, c), self._arrays))
+        out = self._remainder_form(motion, parameters, a, b, c)
         form = partial(_form, self._own_form, motion[0])
         beta = parameters["beta"]
         out[self._forces] += form(a[0], b[0], c[0] + beta * c[1]) + beta * (
@@ -135,9 +120,19 @@ class AnalyticResidual:
     def remainder_form(self, motion, parameters, *directions) -> np.ndarray:
         """Directional derivative (n + l,), along two or three motions, of all but the shell's own force."""
         self._check_at_rest(motion)
-        require_forms(self.model)
         motion, parameters = self._shaped(motion), self._given(parameters)
-        return np.array(_form_of_remainder(motion, parameters, tuple(map(self._shaped, directions)), self._arrays))
+        return self._remainder_form(motion, parameters, *map(self._shaped, directions))
+
+    def _remainder_form(self, motion, parameters, *directions) -> np.ndarray:
+        """The same of what has its shape; with what a fluid outside adds."""
+        out = np.array(_form_of_remainder(motion, parameters, directions, self._arrays))
+        if self.model.outside is not None:
+            if self._outside is None or not np.array_equal(self._outside.q, motion[0]):
+                self._outside = OutsideForms(self.model, motion[0])
+            form = self._outside.second if len(directions) == 2 else self._outside.third
+            density = self.model.case.outside.density(parameters["density"])
+            out[self._forces] += density * form(*(direction[:3] for direction in directions))
+        return out
 
     def parameter_slope(self, motion, parameters, name: str) -> np.ndarray:
         """Derivative (n + l,) with respect to a parameter, at v = 0."""

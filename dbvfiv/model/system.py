@@ -338,7 +338,7 @@ def factored(pencil: CoupledPencil, shift: complex):
     bordered solves refine themselves.
     """
     size = max(abs(shift), 1.0)
-    for nudge in (0.0, 1e-9, -1e-8):
+    for nudge in (0.0, 1e-9, -1e-8, 1e-7, -1e-6):
         try:
             return Workspace().shifted(pencil, shift + nudge * size)
         except SingularShiftError as error:

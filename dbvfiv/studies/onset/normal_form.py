@@ -13,7 +13,6 @@ from continuation.normal_form import hopf_normal_form
 
 from ...case.parameters import PARAMETERS
 from ...errors import SolveError
-from ...model.analytic import require_forms
 from ...model.memory_forms import ValveMemoryForms
 from ...model.system import ValveSystem
 from ..case import Case
@@ -50,8 +49,6 @@ def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: 
     ------
     ContinuationError
         If the eigenvalue is not simple.
-    SolveError
-        With fluid outside, whose forms are not known.
     """
     mu = place.mu()
     omega = abs(complex(mode.eigenvalue).imag)
@@ -59,7 +56,6 @@ def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: 
     name = PARAMETERS[parameter].system_name or None if follows else None
     system = system_of(case, walk, place)
     model = system.model(mu)
-    require_forms(model)
     if place.loss_factor and model.relaxation.groups:
         forms = ValveMemoryForms(model, walk.equilibrium(place), mu)
         return hopf_normal_form_with_memory(forms, omega, np.concatenate([mode.q, mode.u]), name)
