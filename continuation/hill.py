@@ -22,7 +22,7 @@ _STEPS = 60
 #: Most that the outer two harmonics may hold of a perturbation.
 _RIM = 0.05
 #: Most corrections of an eigenpair whose projection is not exact.
-_REFINED = 12
+_REFINED = 10
 #: What the equations of a perturbation out of the band may have beyond the series.
 _CLOSED = 1e-4
 #: Distance over omega within which turned exponents with like perturbations are one.
@@ -78,7 +78,7 @@ class Exponents:
         return self.unstable == 0
 
 
-def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-2, rounds: int = 2) -> Exponents:
+def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 3e-3, rounds: int = 2) -> Exponents:
     """Leading exponents of the motion of a linearisation.
 
     Parameters
@@ -139,7 +139,7 @@ def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
 def _all_refined(linear, found, count: int) -> list[tuple[complex, complex, np.ndarray]]:
     """The leading ones corrected; what does not settle belongs to the stand-in alone."""
     kept: list[tuple[complex, complex, np.ndarray]] = []
-    for folded, sigma, x in found[: 3 * count]:
+    for folded, sigma, x in found[: count + 3]:
         new, x = _refined(linear, sigma, x)
         turned = folded + new - sigma
         if np.isfinite(new) and all(abs(turned - other) > 1e-4 * linear.motion.omega for other, _, _ in kept):
@@ -158,7 +158,7 @@ def _refined(linear, sigma: complex, x: np.ndarray) -> tuple[complex, np.ndarray
     x, last = x / np.linalg.norm(x), np.inf
     size = x.size
     for count in range(_REFINED):
-        if count < 2:  # the quadratic about a shift is off where it relaxes; the second matrix is not
+        if count < 3:  # the quadratic about a shift is off where it relaxes; later matrices are not
             here, ahead = reduced.matrix(complex(sigma)), reduced.matrix(complex(sigma + step))
             matrix = np.zeros((size + 1, size + 1), complex)
             matrix[:size, :size], matrix[:size, size] = here, (ahead - here) @ x.ravel() / step
@@ -168,10 +168,10 @@ def _refined(linear, sigma: complex, x: np.ndarray) -> tuple[complex, np.ndarray
         rest = (linear.operator.apply(x @ v.T, sigma) @ v).ravel()
         change = la.lu_solve(factor, balance * np.append(-rest, 0.0), check_finite=False)
         moved = abs(change[size])
-        if not moved <= min(0.5 * omega, 2.0 * last):
+        if not moved <= min(0.5 * omega, 4.0 * last):
             break
         x, sigma, last = x + change[:size].reshape(shape), complex(sigma + change[size]), moved
-        if moved <= 1e-5 * omega:
+        if moved <= 1e-7 * omega:
             return sigma, x
     return complex(np.nan, np.nan), x
 
