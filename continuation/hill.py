@@ -22,7 +22,7 @@ _STEPS = 60
 #: Most that the outer two harmonics may hold of a perturbation.
 _RIM = 0.05
 #: Most corrections of an eigenpair whose projection is not exact.
-_REFINED = 6
+_REFINED = 10
 #: What the equations of a perturbation out of the band may have beyond the series.
 _CLOSED = 1e-4
 #: Distance over omega within which turned exponents with like perturbations are one.
@@ -78,7 +78,7 @@ class Exponents:
         return self.unstable == 0
 
 
-def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-2, rounds: int = 2) -> Exponents:
+def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 3e-3, rounds: int = 2) -> Exponents:
     """Leading exponents of the motion of a linearisation.
 
     Parameters
@@ -125,9 +125,8 @@ def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
     inside = lambda sigma: abs(sigma.imag) <= (0.5 + _EDGE) * omega  # noqa: E731
     pairs = [(s, x) for s, x in pairs if _is_whole(h, x) and (inside(s) or _cut_off(reduced, s, x) <= _CLOSED)]
     found = _each_once(sorted(pairs, key=lambda pair: not inside(pair[0])), inside, omega)
-    found = sorted(found, key=lambda one: -one[0].real)[: count + 1]
-    if not linear.operator.exact:
-        found = [(f + new - s, new, x) for f, s, (new, x) in ((f, s, _refined(linear, s, x)) for f, s, x in found)]
+    found = sorted(found, key=lambda one: -one[0].real)
+    found = found[: count + 1] if linear.operator.exact else _all_refined(linear, found, count + 1)
     trivial = 0.0
     if autonomous and found:
         trivial = float(abs(found.pop(int(np.argmin([abs(folded) for folded, _, _ in found])))[0]))
@@ -137,27 +136,44 @@ def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
     return Exponents(values, [x @ v.T for _, _, x in found], np.zeros(len(found)), trivial, omega, as_found)
 
 
+def _all_refined(linear, found, count: int) -> list[tuple[complex, complex, np.ndarray]]:
+    """The leading ones corrected; what does not settle belongs to the stand-in alone."""
+    kept: list[tuple[complex, complex, np.ndarray]] = []
+    for folded, sigma, x in found[: count + 3]:
+        new, x = _refined(linear, sigma, x)
+        turned = folded + new - sigma
+        if np.isfinite(new) and all(abs(turned - other) > 1e-4 * linear.motion.omega for other, _, _ in kept):
+            kept.append((turned, new, x))
+        if len(kept) == count:
+            break
+    return kept
+
+
 def _refined(linear, sigma: complex, x: np.ndarray) -> tuple[complex, np.ndarray]:
     """An eigenpair of the projection of the operator itself, from that of what stands for it, by Newton's method with
-    the matrix of the latter.
+    the matrix of the latter; not a number where that does not settle.
     """
     reduced, omega = linear.reduced, linear.motion.omega
     v, shape, step = linear.scale[:, None] * linear.basis, x.shape, 1e-4 * linear.motion.omega
-    x = x / np.linalg.norm(x)
-    here, ahead = reduced.matrix(complex(sigma)), reduced.matrix(complex(sigma + step))
+    x, last = x / np.linalg.norm(x), np.inf
     size = x.size
-    matrix = np.zeros((size + 1, size + 1), complex)
-    matrix[:size, :size], matrix[:size, size] = here, (ahead - here) @ x.ravel() / step
-    matrix[size, :size] = x.ravel().conj()
-    balance = 1.0 / np.maximum(np.abs(matrix).max(axis=1), 1e-300)
-    factor = la.lu_factor(matrix * balance[:, None], check_finite=False)
-    for _ in range(_REFINED):
+    for count in range(_REFINED):
+        if count < 3:  # the quadratic about a shift is off where it relaxes; later matrices are not
+            here, ahead = reduced.matrix(complex(sigma)), reduced.matrix(complex(sigma + step))
+            matrix = np.zeros((size + 1, size + 1), complex)
+            matrix[:size, :size], matrix[:size, size] = here, (ahead - here) @ x.ravel() / step
+            matrix[size, :size] = x.ravel().conj()
+            balance = 1.0 / np.maximum(np.abs(matrix).max(axis=1), 1e-300)
+            factor = la.lu_factor(matrix * balance[:, None], check_finite=False)
         rest = (linear.operator.apply(x @ v.T, sigma) @ v).ravel()
         change = la.lu_solve(factor, balance * np.append(-rest, 0.0), check_finite=False)
-        x, sigma = x + change[:size].reshape(shape), complex(sigma + change[size])
-        if abs(change[size]) <= 1e-5 * omega:
+        moved = abs(change[size])
+        if not moved <= min(0.5 * omega, 4.0 * last):
             break
-    return sigma, x
+        x, sigma, last = x + change[:size].reshape(shape), complex(sigma + change[size]), moved
+        if moved <= 1e-7 * omega:
+            return sigma, x
+    return complex(np.nan, np.nan), x
 
 
 def _each_once(pairs, inside, omega: float) -> list[tuple[complex, np.ndarray]]:

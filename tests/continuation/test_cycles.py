@@ -115,7 +115,7 @@ def test_forced_duffing_against_integration():
 
 
 def test_folds_of_the_forced_duffing():
-    """Both turning points of the resonance of a hardening spring, against those of one harmonic, exact for
+    """Both turning points of the resonance of a hardening spring, against one harmonic's algebra, which is exact for
     small forcing.
     """
     mu = {"w": 0.8, "d": 0.02, "e": 0.02, "f": 0.05}

@@ -81,7 +81,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     reason = tracer.run(branch.keep)
     record.note(ENDED, reason=reason)
     if "no further cycle" in reason:
-        record.fail(f"The branch ends at {axis.parameter} = {tracer.points[-1].value:.6g}: {reason}.")
+        record.fail(f"The branch ends at {axis.parameter} = {tracer.points[-1].value:.6g}: {reason.rstrip('.')}.")
 
 
 class _Branch:
