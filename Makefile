@@ -18,7 +18,7 @@ verify: setup
 # flow and wall in three dimensions, end to end; installs Debian's OpenFOAM where there is none
 verify-3d: setup
 	@tools/openfoam
-	@$(PYTHON) -m pytest -s tests/cfd tests/exchange tests/wall
+	@$(PYTHON) -m pytest -s tests/cfd tests/exchange tests/verification/test_solid_wall.py
 
 bench: setup
 	@$(PYTHON) -m benchmarks

@@ -87,12 +87,12 @@ def pressure(found: FlowComparison) -> Figure:
         head = 0.5 * case.density * s["jet_velocity"] ** 2 * scale
         ideal = 1.0 - (s["lip_area"] / (0.25 * np.pi * case.pipe**2)) ** 2
         ends = 1e3 * (flange - lip) + np.array([800.0, 3000.0])
-        for loss, colour, name in (
-            (s["law_loss"], REST, "jet that widens as Borda and Carnot have it"),
-            (s["published_loss"], PUBLISHED, "the thesis's recovery"),
+        for loss, look, name in (
+            (s["law_loss"], {"color": REST, "lw": 4.0, "alpha": 0.6}, "jet that widens as Borda and Carnot have it"),
+            (s["published_loss"], {"color": PUBLISHED, "ls": "--"}, "the thesis's recovery"),
         ):
             if loss is not None:
-                axes.plot(ends, np.full(2, 1e-3 * (ideal - loss) * head), color=colour, ls="--", label=name)
+                axes.plot(ends, np.full(2, 1e-3 * (ideal - loss) * head), label=name, **look)
     axes.axvspan(0.0, 1e3 * (flange - lip), color="0.95", zorder=0)
     axes.text(500.0 * (flange - lip), axes.get_ylim()[1], "valve", ha="center", va="top", path_effects=HALO)
     axes.set(xlabel="Distance from the flange, mm", ylabel="Mean pressure over that beside the lip, kPa")

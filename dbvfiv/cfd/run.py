@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import signal
 import subprocess
 import time
 from pathlib import Path
@@ -51,7 +52,7 @@ def run_openfoam(folder: str | Path, iterations: int, observer: Observer | None 
         interrupted = False
     finally:
         if process.poll() is None:
-            process.terminate()
+            os.killpg(process.pid, signal.SIGTERM)  # the script and what it runs
             process.wait()
         observer.end(interrupted)
     if process.returncode:
