@@ -129,17 +129,41 @@ class HalpinTsai(Relaxing):
 
 
 class Fit(Relaxing):
-    """Mooney-Rivlin constants fitted to a tension test."""
+    """Rubber fitted to tests in tension, planar and biaxial tension (`dbvfiv fit` shows how well)."""
 
-    kind: Literal["fit"] = key(..., "Mooney-Rivlin rubber fitted to a tension test.")
-    path: Path = key(..., "CSV file of the tension test; relative to the case file.")
-    terms: Literal[2, 3] = key(2, "Number of constants: 2 (c10, c01) or 3 (and c11).")
+    kind: Literal["fit"] = key(..., "Rubber fitted to its tests.")
+    path: Path = key(
+        ...,
+        "CSV file of the tension test, or of several tests with a column test; relative to the case file.",
+    )
+    planar: Path | None = key(None, "CSV file of a test in planar tension (pure shear), fitted with the others.")
+    biaxial: Path | None = key(None, "CSV file of a test in equibiaxial tension, fitted with the others.")
+    law: Literal["mooney-rivlin", "neo-hookean"] = key("mooney-rivlin", "Form of its energy.")
+    terms: Literal[1, 2, 3] | None = key(
+        None, "Number of constants: mooney-rivlin 2 (c10, c01) or 3 (and c11); 2 if not given."
+    )
+    constraint: Literal["none", "non-negative", "stable"] = key(
+        "none", "On the constants: none, at least 0, or stable in every state up to stable_to."
+    )
+    stable_to: Percent | None = key(
+        None,
+        "Strain in tension up to which, or as far from rest in any state, the constants are to be stable; as far as "
+        "the tests go if not given.",
+        gt=0,
+        le=100,
+    )
+    error: Literal["absolute", "relative"] = key(
+        "absolute", "What is made small: residual stresses, or these over the measured ones."
+    )
+    cycle: Literal["first", "last"] = key(
+        "last", "Which loading is taken where the file has a column cycle: the first, or the stabilised last."
+    )
     density: Density = _density(...)
 
-    @field_validator("path", mode="after")
+    @field_validator("path", "planar", "biaxial", mode="after")
     @classmethod
-    def _find(cls, path: Path, info: ValidationInfo) -> Path:
-        return existing_file(path, info)
+    def _find(cls, path: Path | None, info: ValidationInfo) -> Path | None:
+        return None if path is None else existing_file(path, info)
 
 
 class ShippedRubber(Relaxing):

@@ -14,7 +14,7 @@ from dbvfiv.materials.damping import (
     shipped_loss_names,
 )
 from dbvfiv.materials.damping_report import DampingReport, describe_damping, outside_band
-from dbvfiv.materials.fit import UniaxialFit, fit_mooney_rivlin, uniaxial_stress
+from dbvfiv.materials.fit import RubberFit, fit_mooney_rivlin, fit_rubber, uniaxial_stress
 from dbvfiv.materials.halpin_tsai import fibre_ply, halpin_tsai, ply_from_constituents
 from dbvfiv.materials.isotropic import IsotropicElastic
 from dbvfiv.materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, PARAMETER_COUNT, Law, energy_of
@@ -23,6 +23,7 @@ from dbvfiv.materials.mooney_rivlin import MooneyRivlin
 from dbvfiv.materials.orthotropic import OrthotropicPly
 from dbvfiv.materials.prony import Prony
 from dbvfiv.materials.prony_fit import PronyFit, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
+from dbvfiv.materials.rubber_forms import form_of
 from dbvfiv.materials.rubbers import rubber, rubber_names, strain_levels
 from dbvfiv.materials.stability import StableRange, stability_margin, stability_warning, stable_range
 from dbvfiv.materials.tension_test import TensionTest, read_tension_test
@@ -40,10 +41,10 @@ __all__ = [
     "PARAMETER_COUNT",
     "Prony",
     "PronyFit",
+    "RubberFit",
     "ShippedLoss",
     "StableRange",
     "TensionTest",
-    "UniaxialFit",
     "damping_of",
     "describe_damping",
     "energy_of",
@@ -52,6 +53,8 @@ __all__ = [
     "fit_moduli",
     "fit_mooney_rivlin",
     "fit_relaxation",
+    "fit_rubber",
+    "form_of",
     "fit_tan_delta",
     "halpin_tsai",
     "law_from_card",

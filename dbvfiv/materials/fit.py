@@ -1,86 +1,77 @@
-"""Mooney-Rivlin constants from a uniaxial tension test.
+"""Constants of rubbers from tests in tension, planar and equibiaxial tension, one or several at once.
 
-The nominal stress of an incompressible bar at the stretch l,
-
-    P = 2 (l - l^-2)(W1 + W2/l),   W1 = C10 + C11 (I2 - 3),   W2 = C01 + C11 (I1 - 3),
-
-is linear in the constants, so the fit is a linear least-squares problem. Tension alone tells C10 and C01 apart badly:
-over a small range of strains their columns are nearly parallel, and the fit returns large constants of opposite sign
-that describe the test well and other states of strain badly. The condition number says how far this goes; the "stable"
-constraint keeps the constants usable.
+The nominal stress is linear in the constants of neo-Hookean, Mooney-Rivlin and Yeoh forms, so the fit is a linear
+least-squares problem; Ogden's exponents are searched for about it (see `ogden_fit`). One kind of test alone tells
+constants apart badly: over a small range of strains in tension the columns of C10 and C01 are nearly parallel, and the
+fit returns large constants of opposite sign that describe the test well and other states of strain badly. The
+condition number says how far this goes; the "stable" constraint keeps the constants usable.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import nnls
 
+from dbvfiv.materials import ogden_fit
 from dbvfiv.materials.checks import MaterialError
+from dbvfiv.materials.constrained import LEAST_MARGIN, stable_constants, states_within
+from dbvfiv.materials.hill import least_modulus
+from dbvfiv.materials.law import Law
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
-from dbvfiv.materials.stability import hill_moduli
+from dbvfiv.materials.rubber_forms import Form, equivalent_strain, form_of, invariant_columns
+from dbvfiv.materials.stability import StableRange, stable_range_of
 from dbvfiv.materials.tension_test import TensionTest
 
 CONSTRAINTS = ("none", "non-negative", "stable")
-LEAST_MARGIN = 0.01
-_MAX_CUTS = 200
-
-
-def uniaxial_columns(stretch, terms: int = 3) -> np.ndarray:
-    """Nominal stress per unit of each constant.
-
-    Parameters
-    ----------
-    stretch : array_like, shape (n,)
-    terms : int
-        2 (C10, C01) or 3 (and C11).
-
-    Returns
-    -------
-    numpy.ndarray, shape (n, terms)
-        Dimensionless. Written in the strain l - 1, so that small strains lose no digits.
-    """
-    stretch = np.asarray(stretch, dtype=float)
-    s = stretch - 1.0
-    first = 2.0 * s * (stretch**2 + stretch + 1.0) / stretch**2
-    columns = [first, first / stretch]
-    if terms == 3:
-        i1 = s**2 * (stretch + 2.0) / stretch
-        i2 = s**2 * (2.0 * stretch + 1.0) / stretch**2
-        columns.append(first * (i2 + i1 / stretch))
-    return np.stack(columns, axis=-1)
+ERRORS = ("absolute", "relative")
+#: Forms that the wall takes.
+TAKEN = ("neo-hookean", "mooney-rivlin")
+#: Of the matrix of a fit: what is smaller is noise of its arithmetic.
+_DIGITS = 1e-13
+__all__ = ["CONSTRAINTS", "ERRORS", "LEAST_MARGIN", "RubberFit", "fit_mooney_rivlin", "fit_rubber", "uniaxial_stress"]
 
 
 def uniaxial_stress(law: MooneyRivlin, stretch) -> np.ndarray:
     """Nominal stress of a rubber bar in tension or compression, Pa, at the given stretches."""
-    return uniaxial_columns(stretch) @ np.array([law.c10, law.c01, law.c11])
+    powers = form_of("mooney-rivlin", 3).powers
+    return invariant_columns("uniaxial", np.asarray(stretch, float) - 1.0, powers) @ law.parameters[:3]
 
 
 @dataclass(frozen=True)
-class UniaxialFit:
-    """Constants fitted to a tension test, and how far to trust them.
+class RubberFit:
+    """Constants fitted to tests, and how far to trust them.
 
     Attributes
     ----------
+    form : Form
+    tests : tuple of TensionTest
     constants : numpy.ndarray, shape (terms,)
-        C10, C01 and, for three terms, C11, Pa.
+        Those that W is linear in, Pa: the C_ij, or Ogden's mu_p.
+    exponents : numpy.ndarray, shape (terms,) or (0,)
+        Ogden's alpha_p.
     residuals : numpy.ndarray, shape (n,)
-        Measured minus fitted nominal stress, Pa.
+        Measured minus fitted nominal stress, Pa, test after test.
     r_squared : float
-        1 - |residuals|^2/|stress - mean|^2; NaN if all stresses are equal.
+        1 - |residuals|^2/|stress - mean|^2 over all tests; NaN if all stresses are equal.
     condition_number : float
-        Of the least-squares matrix with columns scaled to unit length.
-    covariance : numpy.ndarray, shape (terms, terms)
-        Pa^2, from the residual variance; that of the unconstrained problem even if a constraint
-        is active, in which case it overstates the scatter.
+        Of the least-squares matrix (of the Jacobian, for Ogden) with columns scaled to unit length.
+    covariance : numpy.ndarray, shape (m, m)
+        Of constants and exponents, from the residual variance; that of the unconstrained problem even if a
+        constraint is active, in which case it overstates the scatter.
     constraint : str
         "none", "non-negative" or "stable".
     active : bool
         Whether the constraint changed the answer.
     """
 
+    form: Form
+    tests: tuple[TensionTest, ...]
     constants: np.ndarray
+    exponents: np.ndarray
     residuals: np.ndarray
     r_squared: float
     condition_number: float
@@ -90,118 +81,213 @@ class UniaxialFit:
 
     @property
     def standard_errors(self) -> np.ndarray:
-        """Standard error of each constant, Pa."""
+        """Standard error of each constant, Pa, and then of each exponent."""
         return np.sqrt(np.diag(self.covariance))
 
-    def law(self, density: float) -> MooneyRivlin:
-        """The fitted rubber.
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residuals, Pa."""
+        return float(np.sqrt(np.mean(self.residuals**2)))
+
+    @property
+    def by_test(self) -> list[np.ndarray]:
+        """Residuals of each test, Pa."""
+        return np.split(self.residuals, np.cumsum([test.stress.size for test in self.tests])[:-1])
+
+    @property
+    def shear_modulus(self) -> float:
+        """At small strain, Pa; not positive for constants that no rubber has."""
+        return float(0.5 * self.form.moduli(np.zeros(3), self.exponents)[:, 0, 0] @ self.constants)
+
+    @property
+    def reach(self) -> float:
+        """Largest equivalent logarithmic strain of the tests."""
+        return max(float(equivalent_strain(test.mode, test.strain).max()) for test in self.tests)
+
+    @cached_property
+    def stable_range(self) -> StableRange:
+        """Within which stretches the constants describe a stable rubber; nowhere if they do not at rest."""
+        if self.shear_modulus <= 0.0:
+            return StableRange((1.0, 1.0), (1.0, 1.0), (1.0, 1.0), 0.0, (1.0, 1.0, 1.0))
+        return stable_range_of(self.margin)
+
+    def margin(self, log_stretches) -> np.ndarray:
+        """Least Hill modulus over 2 mu at principal logarithmic strains (..., 3) -> (...)."""
+        moduli = self.form.moduli(log_stretches, self.exponents)
+        return least_modulus(np.tensordot(moduli, self.constants, axes=([-3], [0]))) / (2.0 * self.shear_modulus)
+
+    def stress(self, mode: str, strain) -> np.ndarray:
+        """Nominal stress, Pa, at engineering strains of a kind of test."""
+        return self.form.columns(mode, strain, self.exponents) @ self.constants
+
+    def law(self, density: float) -> Law:
+        """The fitted rubber, for a wall.
 
         Raises
         ------
         MaterialError
-            If the constants give no positive shear modulus.
+            If the wall has no such law, or the constants give no positive shear modulus.
         """
-        c10, c01, *c11 = (float(c) for c in self.constants)
-        return MooneyRivlin(c10, c01, c11[0] if c11 else 0.0, density)
+        if self.form.name not in TAKEN:
+            raise MaterialError(
+                f"The wall has no law of the form {self.form.name}; it takes {' and '.join(TAKEN)}. "
+                "The fit is for comparison."
+            )
+        c10, c01, c11 = (*(float(c) for c in self.constants), 0.0, 0.0)[:3]
+        return MooneyRivlin(c10, c01, c11, density)
 
 
 def fit_mooney_rivlin(
     test: TensionTest, terms: int = 3, constraint: str = "none", stable_to: float | None = None
-) -> UniaxialFit:
-    """Fit two or three constants to a tension test by linear least squares.
+) -> RubberFit:
+    """Fit two or three constants to a tension test; see `fit_rubber`."""
+    return fit_rubber([test], form_of("mooney-rivlin", terms), constraint, stable_to)
+
+
+def fit_rubber(
+    tests: Sequence[TensionTest],
+    form: Form,
+    constraint: str = "none",
+    stable_to: float | None = None,
+    error: str = "absolute",
+) -> RubberFit:
+    """Fit a form of the energy to one or several tests at once by least squares.
 
     Parameters
     ----------
-    test : TensionTest
-    terms : int
-        2 or 3.
+    tests : sequence of TensionTest
+    form : Form
+        See `rubber_forms.form_of`.
     constraint : {"none", "non-negative", "stable"}
-        "non-negative": every constant at least 0. For two terms that suffices for stability at all strains.
-        "stable": a Hill margin (see `stability`) of at least 0.01 in every state, not only
-        tension, of equivalent logarithmic strain up to `stable_to`.
+        "non-negative": every constant at least 0 (Ogden: every mu_p alpha_p). For neo-Hookean, two-constant
+        Mooney-Rivlin, Yeoh and Ogden that suffices for stability at all strains.
+        "stable": a Hill margin (see `stability`) of at least 0.01 in every state of equivalent logarithmic strain
+        up to `stable_to`, not only in those tested.
     stable_to : float, optional
-        Engineering strain of the tension that has this equivalent strain; the largest strain of
-        the test if not given. Only for "stable".
+        Engineering strain of the tension that has this equivalent strain; the largest
+        of the tests if not given. Only for "stable".
+    error : {"absolute", "relative"}
+        What is squared and summed: stress, or stress over the measured one (points without stress do not count).
 
     Raises
     ------
     MaterialError
-        For fewer than ``terms + 1`` different strains, an unknown option, or a fit that finds no
-        positive stiffness.
+        For fewer different strains than unknowns plus one, or an unknown option.
     """
-    if terms not in (2, 3):
-        raise MaterialError(f"A Mooney-Rivlin fit has 2 or 3 terms, but {terms!r} was given.")
+    tests = tuple(tests)
     if constraint not in CONSTRAINTS:
         raise MaterialError(f"The constraint must be one of {', '.join(CONSTRAINTS)}, but {constraint!r} was given.")
-    different = np.unique(test.strain[test.strain != 0.0]).size
-    if different < terms + 1:
+    if error not in ERRORS:
+        raise MaterialError(f"The error must be one of {', '.join(ERRORS)}, but {error!r} was given.")
+    unknowns = form.terms if form.powers else 2 * form.terms
+    different = len({(test.mode, float(s)) for test in tests for s in test.strain if s != 0.0})
+    if different < unknowns + 1:
+        which = "tension test has" if len(tests) == 1 and tests[0].mode == "uniaxial" else "tests have"
         raise MaterialError(
-            f"A fit of {terms} constants needs at least {terms + 1} different strains other than zero, but the "
-            f"tension test has {different}."
+            f"A fit of {unknowns} constants needs at least {unknowns + 1} different strains other than zero, but the "
+            f"{which} {different}."
         )
-    raw = uniaxial_columns(1.0 + test.strain, terms)
-    scale = np.linalg.norm(raw, axis=0)
-    matrix = raw / scale
-    u, singular, vt = np.linalg.svd(matrix, full_matrices=False)
-    free = vt.T @ (u.T @ test.stress / singular)
-    scaled = free
-    if constraint == "non-negative":
-        scaled = nnls(matrix, test.stress)[0] if np.any(free < 0.0) else free
-    elif constraint == "stable":
-        reach = float(np.max(np.abs(test.strain))) if stable_to is None else stable_to
-        scaled = _stable(matrix, test.stress, free, scale, reach)
-    residuals = test.stress - matrix @ scaled
-    variance = np.sum((test.stress - matrix @ free) ** 2) / (test.stress.size - terms)
-    inverse = (vt.T / singular**2) @ vt
-    spread = np.sum((test.stress - test.stress.mean()) ** 2)
-    return UniaxialFit(
-        constants=scaled / scale,
+    stress = np.concatenate([test.stress for test in tests])
+    weight = _weights(stress, error)
+    states, reach = np.zeros((1, 3)), 0.0
+    if constraint == "stable":
+        far = max(float(equivalent_strain(test.mode, test.strain).max()) for test in tests)
+        reach = far if stable_to is None else float(np.log1p(stable_to)) if stable_to > -1.0 else float("nan")
+        states = states_within(reach)
+    problem = _Problem(tests, form, stress, weight, constraint, states, reach)
+    if form.powers:
+        problem.require_independent()
+        exponents, active = np.zeros(0), None
+    else:
+        exponents, active = ogden_fit.search(problem)
+    constants, free = problem.solve(exponents)
+    jacobian = problem.matrix(exponents)
+    if not form.powers:
+        jacobian = np.hstack([jacobian, ogden_fit.slopes(problem, exponents) * constants])
+    return _described(problem, exponents, constants, jacobian, active or not np.array_equal(constants, free))
+
+
+def _weights(stress: np.ndarray, error: str) -> np.ndarray:
+    """Of the residuals: one, or one over the measured stress."""
+    if error == "absolute":
+        return np.ones_like(stress)
+    size = np.abs(stress)
+    return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 0.0)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """The constants at given exponents: a linear problem with its constraint."""
+
+    tests: tuple[TensionTest, ...]
+    form: Form
+    stress: np.ndarray
+    weight: np.ndarray
+    constraint: str
+    states: np.ndarray
+    reach: float
+
+    def matrix(self, exponents) -> np.ndarray:
+        """Weighted stress per unit of each constant (n, terms)."""
+        rows = [self.form.columns(test.mode, test.strain, exponents) for test in self.tests]
+        return self.weight[:, None] * np.concatenate(rows)
+
+    @property
+    def target(self) -> np.ndarray:
+        return self.weight * self.stress
+
+    def require_independent(self) -> None:
+        """Refuse tests that leave a combination of the constants open."""
+        raw = self.matrix(())
+        size = np.linalg.norm(raw, axis=0)
+        singular = np.linalg.svd(raw / size, compute_uv=False)
+        if singular[-1] <= _DIGITS * singular[0]:
+            kinds = " and ".join(dict.fromkeys(test.mode for test in self.tests))
+            raise MaterialError(
+                f"The constants {', '.join(self.form.names)} cannot be told apart by {kinds} tests alone; add another "
+                "kind of test, or fit fewer terms."
+            )
+
+    def solve(self, exponents, constrained: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """Constants under the constraint and without it, each (terms,), Pa."""
+        raw = self.matrix(exponents)
+        scale = np.linalg.norm(raw, axis=0)
+        matrix = raw / scale
+        u, singular, vt = np.linalg.svd(matrix, full_matrices=False)
+        free = vt.T @ (u.T @ self.target / singular)
+        scaled = free
+        if constrained and self.constraint == "non-negative":
+            sign = np.sign(exponents) if len(exponents) else np.ones(len(scale))
+            scaled = sign * nnls(matrix * sign, self.target)[0] if np.any(sign * free < 0.0) else free
+        elif constrained and self.constraint == "stable":
+            moduli = self.form.moduli(self.states, exponents) / scale[:, None, None]
+            scaled = stable_constants(matrix, self.target, free, moduli, self.reach)
+        return scaled / scale, free / scale
+
+
+def _described(problem: _Problem, exponents, constants, jacobian, active: bool) -> RubberFit:
+    """The answer with its statistics."""
+    stress = problem.stress
+    model = np.concatenate([problem.form.columns(t.mode, t.strain, exponents) for t in problem.tests]) @ constants
+    residuals = stress - model
+    size = np.linalg.norm(jacobian, axis=0)
+    size[size == 0.0] = 1.0  # the exponent of a term that is not there
+    _, singular, vt = np.linalg.svd(jacobian / size, full_matrices=False)
+    free = problem.solve(exponents, constrained=False)[0]
+    left = problem.target - problem.matrix(exponents) @ free
+    variance = np.sum(left**2) / (np.count_nonzero(problem.weight) - len(size))
+    known = singular > _DIGITS * singular[0]
+    inverse = (vt[known].T / singular[known] ** 2) @ vt[known] if known.all() else np.full((len(size),) * 2, np.nan)
+    spread = np.sum((stress - stress.mean()) ** 2)
+    return RubberFit(
+        form=problem.form,
+        tests=problem.tests,
+        constants=constants,
+        exponents=np.asarray(exponents, float),
         residuals=residuals,
         r_squared=float(1.0 - np.sum(residuals**2) / spread) if spread > 0.0 else float("nan"),
-        condition_number=float(singular[0] / singular[-1]),
-        covariance=variance * inverse / np.outer(scale, scale),
-        constraint=constraint,
-        active=not np.array_equal(scaled, free),
+        condition_number=float(singular[0] / singular[-1]) if known.all() else float("inf"),
+        covariance=variance * inverse / np.outer(size, size),
+        constraint=problem.constraint,
+        active=bool(active),
     )
-
-
-def _stable(matrix, stress, free, scale, reach: float) -> np.ndarray:
-    """Least squares under Hill's inequality with a margin, by cutting planes.
-
-    Each Hill modulus less the margin is the least eigenvalue of a matrix that is linear in the constants, so an
-    eigenvector of a negative one gives a linear inequality that the answer must fulfil.
-    """
-    if not 0.0 < reach < np.inf:
-        raise MaterialError(f"stable_to must be a strain greater than 0, but {reach!r} was given.")
-    terms = scale.size
-    radius = np.log1p(reach) * np.linspace(0.0, 1.0, 21)
-    angle = np.linspace(0.0, np.pi / 3.0, 25)
-    rays = np.stack([np.cos(angle - k * 2.0 * np.pi / 3.0) for k in range(3)], axis=-1)
-    states = (radius[:, None, None] * rays).reshape(-1, 3)
-    moduli = hill_moduli(states)[:, :terms]
-    moduli[:, :2] -= LEAST_MARGIN * 4.0 * np.eye(5)  # 2 mu = 4 (C10 + C01)
-    moduli /= scale[:, None, None]
-    answer, cuts = free, np.zeros((0, terms))
-    size = np.linalg.norm(free)
-    for _ in range(_MAX_CUTS):
-        values, vectors = np.linalg.eigh(np.tensordot(moduli, answer, axes=([1], [0])))
-        worst = np.argsort(values[:, 0])[:3]
-        normals = np.einsum("sa,skab,sb->sk", vectors[worst, :, 0], moduli[worst], vectors[worst, :, 0])
-        violated = values[worst, 0] < -1e-9 * size * np.linalg.norm(normals, axis=1)
-        if not violated.any():
-            return answer
-        cuts = np.vstack([cuts, normals[violated] / np.linalg.norm(normals[violated], axis=1)[:, None]])
-        answer = _least_squares_above(matrix, stress, cuts)
-    raise MaterialError(
-        f"No stable constants were found within {_MAX_CUTS} rounds for strains up to {reach:.3g}; try a smaller "
-        "stable_to or two terms."
-    )
-
-
-def _least_squares_above(matrix, target, normals) -> np.ndarray:
-    """Least squares with ``normals @ x >= 0``, as a dual non-negative problem (Lawson & Hanson, ch. 23)."""
-    q, r = np.linalg.qr(matrix)
-    centre = q.T @ target
-    reduced = np.linalg.solve(r.T, normals.T).T  # normals R^-1
-    weights, _ = nnls(reduced.T, -centre)  # nearest point of a cone, by its polar
-    return np.linalg.solve(r, centre + reduced.T @ weights)

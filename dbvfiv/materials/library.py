@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from dbvfiv.errors import CaseError
 from dbvfiv.materials.checks import MaterialError
-from dbvfiv.materials.fit import fit_mooney_rivlin
+from dbvfiv.materials.fit import RubberFit, fit_rubber
 from dbvfiv.materials.halpin_tsai import fibre_ply, ply_from_constituents
 from dbvfiv.materials.isotropic import IsotropicElastic
 from dbvfiv.materials.law import Law
+from dbvfiv.materials.loading_cycles import loading_tests, read_tests
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
 from dbvfiv.materials.orthotropic import OrthotropicPly
+from dbvfiv.materials.rubber_forms import form_of
 from dbvfiv.materials.rubbers import rubber
-from dbvfiv.materials.tension_test import read_tension_test
 
 if TYPE_CHECKING:
     from dbvfiv.case import Case
@@ -32,13 +33,25 @@ def _halpin_tsai(card: Any) -> OrthotropicPly:
     )
 
 
+def fit_of_card(card: Any) -> RubberFit:
+    """The fit that a card of kind fit asks for.
+
+    Raises
+    ------
+    MaterialError
+        For tests or options that cannot be used.
+    """
+    tests = loading_tests(read_tests(card.path, card.planar, card.biaxial), card.cycle)
+    return fit_rubber(tests, form_of(card.law, card.terms), card.constraint, card.stable_to, card.error)
+
+
 _LAWS: dict[str, Callable[[Any], Law]] = {
     "mooney-rivlin": lambda c: MooneyRivlin(c.c10, c.c01, c.c11, c.density),
     "neo-hookean": lambda c: MooneyRivlin.neo_hookean(c.shear_modulus, c.density),
     "isotropic": lambda c: IsotropicElastic(c.youngs_modulus, c.poisson_ratio, c.density),
     "orthotropic": lambda c: OrthotropicPly(c.e1, c.e2, c.nu12, c.g12, c.g13, c.g23, c.density),
     "halpin-tsai": _halpin_tsai,
-    "fit": lambda c: fit_mooney_rivlin(read_tension_test(c.path), c.terms).law(c.density),
+    "fit": lambda c: fit_of_card(c).law(c.density),
     "shipped": lambda c: rubber(c.rubber, c.strain_level, density=c.density),
 }
 CARD_KINDS = tuple(_LAWS)

@@ -18,6 +18,7 @@ tangent that the solver's material stiffness is built from is available as a sec
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import jax
@@ -26,58 +27,13 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import brentq
 
 from dbvfiv.materials.checks import MaterialError
+from dbvfiv.materials.hill import hill_moduli, least_modulus
 from dbvfiv.materials.incompressible import plane_stress_invariants
 from dbvfiv.materials.law import MOONEY_RIVLIN, Law, energy_of
 
 MEASURES = ("hill", "tangent")
 LARGEST_LOG_STRAIN = float(np.log(10.0))
-_TRACELESS = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
 _EDGE_SAMPLES = 801
-
-
-def hill_moduli(log_stretches) -> np.ndarray:
-    """The Hill moduli per unit of each constant; they are linear in the constants.
-
-    Parameters
-    ----------
-    log_stretches : array_like, shape (..., 3)
-        Principal logarithmic strains with zero sum.
-
-    Returns
-    -------
-    numpy.ndarray, shape (..., 3, 5, 5)
-        For C10, C01 and C11 a symmetric matrix: the 2x2 block on traceless vectors, followed by
-        the three shears (23, 31, 12) on the diagonal.
-    """
-    ln = np.asarray(log_stretches, dtype=float)
-    a, b = np.exp(2.0 * ln), np.exp(-2.0 * ln)
-    # expm1 keeps I - 3 accurate near the reference state; the linear terms sum to zero.
-    i1 = np.sum(np.expm1(2.0 * ln), axis=-1)[..., None]
-    i2 = np.sum(np.expm1(-2.0 * ln), axis=-1)[..., None]
-    eye = np.eye(3)
-    cross = a[..., :, None] * b[..., None, :]
-    normal = np.stack(
-        [
-            4.0 * a[..., None] * eye,
-            4.0 * b[..., None] * eye,
-            4.0 * (a * i2 + b * i1)[..., None] * eye - 4.0 * (cross + np.swapaxes(cross, -1, -2)),
-        ],
-        axis=-3,
-    )
-    difference = np.roll(ln, -1, axis=-1) - np.roll(ln, -2, axis=-1)
-    # (a_i - a_j)/(ln l_i - ln l_j) = 2 exp(ln l_i + ln l_j) sinh(d)/d
-    slope = 4.0 * np.exp(-ln) * _sinhc(difference)
-    shear = np.stack([slope, slope * a, slope * (i2 + a * i1)], axis=-2)
-    out = np.zeros(ln.shape[:-1] + (3, 5, 5))
-    out[..., :2, :2] = _TRACELESS @ normal @ _TRACELESS.T
-    for k in range(3):
-        out[..., 2 + k, 2 + k] = shear[..., k]
-    return out
-
-
-def _sinhc(x: np.ndarray) -> np.ndarray:
-    safe = np.where(np.abs(x) < 1e-4, 1.0, x)
-    return np.where(np.abs(x) < 1e-4, 1.0 + x * x / 6.0, np.sinh(safe) / safe)
 
 
 def principal_log_strains(strains) -> np.ndarray:
@@ -118,10 +74,7 @@ def hill_margin(law: Law, log_stretches) -> np.ndarray:
     ln = np.asarray(log_stretches, dtype=float)
     valid = np.all(np.isfinite(ln), axis=-1)
     moduli = np.tensordot(hill_moduli(np.where(valid[..., None], ln, 0.0)), law.parameters[:3], axes=([-3], [0]))
-    mean = 0.5 * (moduli[..., 0, 0] + moduli[..., 1, 1])
-    lower = mean - np.hypot(0.5 * (moduli[..., 0, 0] - moduli[..., 1, 1]), moduli[..., 0, 1])
-    shears = moduli[..., [2, 3, 4], [2, 3, 4]].min(axis=-1)
-    return np.where(valid, np.minimum(lower, shears) / (2.0 * law.small_strain_shear_modulus), -np.inf)
+    return np.where(valid, least_modulus(moduli) / (2.0 * law.small_strain_shear_modulus), -np.inf)
 
 
 def stability_margin(law: Law, strains, measure: str = "hill") -> np.ndarray:
@@ -222,16 +175,28 @@ def stable_range(law: Law, directions: int = 31) -> StableRange:
     if law.kind != MOONEY_RIVLIN:
         free = (0.0, float("inf"))
         return StableRange(free, free, free, float("inf"), (float("nan"),) * 3)
+    return stable_range_of(lambda ln: hill_margin(law, ln), directions)
+
+
+def stable_range_of(margin: Callable, directions: int = 31) -> StableRange:
+    """`stable_range` of any isotropic rubber from its Hill margin.
+
+    Parameters
+    ----------
+    margin : callable
+        From principal logarithmic strains (..., 3) with zero sum to margins (...).
+    directions : int
+    """
     limits = {
         name: (
-            float(np.exp(-_distance_to_limit(law, -path))),
-            float(np.exp(_distance_to_limit(law, path))),
+            float(np.exp(-_distance_to_limit(margin, -path))),
+            float(np.exp(_distance_to_limit(margin, path))),
         )
         for name, path in _PATHS.items()
     }
     angles = np.linspace(0.0, np.pi / 3.0, directions)
     rays = np.stack([np.cos(angles - k * 2.0 * np.pi / 3.0) for k in range(3)], axis=-1)
-    reach = np.array([_distance_to_limit(law, ray) for ray in rays])
+    reach = np.array([_distance_to_limit(margin, ray) for ray in rays])
     nearest = int(np.argmin(reach))
     stretches = np.exp(np.sort(rays[nearest] * reach[nearest])) if np.isfinite(reach[nearest]) else (np.nan,) * 3
     return StableRange(
@@ -241,16 +206,16 @@ def stable_range(law: Law, directions: int = 31) -> StableRange:
     )
 
 
-def _distance_to_limit(law: Law, ray: np.ndarray) -> float:
+def _distance_to_limit(margin: Callable, ray: np.ndarray) -> float:
     """Logarithmic distance along a traceless ray to the first loss of stability, or inf."""
     largest = LARGEST_LOG_STRAIN / np.sqrt(2.0 / 3.0 * np.sum(ray**2))
     # quadratic spacing: limits of the fitted sets lie at a few per cent
     distance = largest * np.linspace(0.0, 1.0, _EDGE_SAMPLES) ** 2
-    lost = np.flatnonzero(hill_margin(law, distance[:, None] * ray) <= 0.0)
+    lost = np.flatnonzero(margin(distance[:, None] * ray) <= 0.0)
     if lost.size == 0:
         return float("inf")
     low, high = distance[lost[0] - 1], distance[lost[0]]
-    return float(brentq(lambda s: float(hill_margin(law, s * ray)), low, high, xtol=1e-13))
+    return float(brentq(lambda s: float(margin(s * ray)), low, high, xtol=1e-13))
 
 
 def stability_warning(name: str, law: Law, strains) -> str | None:

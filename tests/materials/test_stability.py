@@ -22,7 +22,8 @@ from dbvfiv.materials import (
     stability_warning,
     stable_range,
 )
-from dbvfiv.materials.stability import hill_margin, hill_moduli, principal_log_strains
+from dbvfiv.materials.hill import hill_moduli
+from dbvfiv.materials.stability import hill_margin, principal_log_strains
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "materials.md"
 

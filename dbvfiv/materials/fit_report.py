@@ -1,0 +1,270 @@
+"""What tests of a rubber give: every form of the energy compared, one of them in full, and its table to paste."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dbvfiv.materials.checks import MaterialError
+from dbvfiv.materials.fit import TAKEN, RubberFit, fit_rubber
+from dbvfiv.materials.loading_cycles import CycleReport, describe_cycles, loading_tests
+from dbvfiv.materials.rubber_forms import all_forms, form_of
+from dbvfiv.materials.tension_test import Curve, TensionTest
+
+#: Condition number above which constants say little of states that were not tested.
+ILL_CONDITIONED = 100.0
+#: Change of the largest stress from cycle to cycle below which a rubber counts as stabilised.
+STABILISED = 0.02
+
+
+@dataclass(frozen=True)
+class FitReport:
+    """Fits to the same tests.
+
+    Attributes
+    ----------
+    tests : tuple of TensionTest
+        As they were fitted.
+    cycles : list of CycleReport
+    fits : list of RubberFit
+    refused : dict of str
+        Forms that could not be fitted, and why.
+    chosen : RubberFit
+        That told in full.
+    first : RubberFit or None
+        The same form fitted to the first loading, where there are several cycles and the last is the one fitted.
+    """
+
+    tests: tuple[TensionTest, ...]
+    cycles: list[CycleReport]
+    fits: list[RubberFit]
+    refused: dict[str, str]
+    chosen: RubberFit
+    first: RubberFit | None
+
+    @property
+    def loss_factor(self) -> float | None:
+        """Mean of the loops of the last cycle of each test; None without a loop."""
+        last = {cycle.mode: cycle.loss_factor for cycle in self.cycles}
+        known = [value for value in last.values() if np.isfinite(value)]
+        return float(np.mean(known)) if known else None
+
+    def lines(self, name: str, density: float) -> list[str]:
+        """For people."""
+        return [
+            *self._of_tests(),
+            "",
+            *self._of_cycles(),
+            *self._of_forms(),
+            "",
+            *self._of_chosen(),
+            "",
+            *toml_table(self.chosen, name, density, self.loss_factor),
+        ]
+
+    def summary(self, name: str, density: float) -> dict[str, Any]:
+        """For programs; strains are fractions, stresses Pa."""
+        return {
+            "tests": [{"mode": t.mode, "points": t.stress.size, "largest_strain": t.strain.max()} for t in self.tests],
+            "cycles": [vars(cycle) for cycle in self.cycles],
+            "loss_factor": self.loss_factor,
+            "fits": [_summary(fit) for fit in self.fits],
+            "refused": self.refused,
+            "chosen": _summary(self.chosen),
+            "first_loading": None if self.first is None else _summary(self.first),
+            "toml": "\n".join(toml_table(self.chosen, name, density, self.loss_factor)),
+        }
+
+    def _of_tests(self) -> list[str]:
+        rows = [
+            f"{test.mode} {test.strain.min():.1%} to {test.strain.max():.1%} in {test.stress.size} points"
+            for test in self.tests
+        ]
+        return ["Tests: " + "; ".join(rows) + "."]
+
+    def _of_cycles(self) -> list[str]:
+        if not self.cycles:
+            return []
+        rows = ["test      cycle  largest strain  stress there, MPa  set      tan delta"]
+        for c in self.cycles:
+            loss = f"{c.loss_factor:.4f}" if np.isfinite(c.loss_factor) else "no way back"
+            rows.append(
+                f"{c.mode:9} {c.cycle:5d}  {c.peak_strain:14.1%}  {c.peak_stress / 1e6:17.4g}  {c.set_strain:7.2%}  "
+                f"{loss}"
+            )
+        for mode in dict.fromkeys(c.mode for c in self.cycles):
+            peaks = [c.peak_stress for c in self.cycles if c.mode == mode]
+            if len(peaks) > 1:
+                change = abs(peaks[-1] / peaks[-2] - 1)
+                done = "stabilised" if change <= STABILISED else "not stabilised yet"
+                rows.append(f"The largest {mode} stress changes by {change:.1%} in the last cycle: {done}.")
+        if self.first is not None:
+            ratio = self.chosen.shear_modulus / self.first.shear_modulus
+            rows.append(
+                "Fitted: the last loading, from its set. "
+                f"The first loading gives {_constants(self.first)}: shear modulus "
+                f"{self.first.shear_modulus / 1e6:.4g} MPa, of which the last cycle keeps {ratio:.0%} (Mullins)."
+            )
+        if self.loss_factor is not None:
+            rows.append(
+                f"Loss factor {self.loss_factor:.3f}, by the loops of the last cycle; it holds for their strain and "
+                "rate."
+            )
+        return [*rows, ""]
+
+    def _of_forms(self) -> list[str]:
+        rows = [f"{'form':16} {'rms, MPa':>9}  {'R2':>8}  {'condition':>9}  {'mu, MPa':>8}  stable to  wall"]
+        for fit in self.fits:
+            reach = _strain(fit.stable_range.equivalent_strain)
+            rows.append(
+                f"{fit.form.title:16} {fit.rms / 1e6:9.4g}  {fit.r_squared:8.5f}  {fit.condition_number:9.3g}  "
+                f"{fit.shear_modulus / 1e6:8.4g}  {reach:>9}  {'yes' if fit.form.name in TAKEN else 'no'}"
+            )
+        rows += [f"{title}: {why}" for title, why in self.refused.items()]
+        rows.append(
+            "Stable to: strain in tension up to which, or as far from rest in any state, the rubber is stable; the "
+            f"tests reach {_strain(max(fit.reach for fit in self.fits))}."
+        )
+        return rows
+
+    def _of_chosen(self) -> list[str]:
+        fit = self.chosen
+        limit = {"none": "no constraint", "non-negative": "constants at least 0", "stable": "stable"}[fit.constraint]
+        rows = [f"{fit.form.title}, {limit}{', which changes the answer' if fit.active else ''}: {_constants(fit)}."]
+        for test, left in zip(fit.tests, fit.by_test):
+            worst = int(np.argmax(np.abs(left)))
+            rows.append(
+                f"  {test.mode}: residual {np.sqrt(np.mean(left**2)) / 1e6:.3g} MPa rms, largest "
+                f"{left[worst] / 1e6:.3g} MPa at {test.strain[worst]:.1%}"
+            )
+        span = fit.stable_range
+        for name, (low, high) in (
+            ("uniaxial", span.uniaxial),
+            ("planar", span.pure_shear),
+            ("biaxial", span.equibiaxial),
+        ):
+            rows.append(f"  stable in {name} stretch from {low:.4g} to {high:.4g}")
+        if span.equivalent_strain < fit.reach:
+            rows.append(
+                "  Beware: these constants lose stability within the strains of the tests, in states that were not "
+                "tested; use --constraint stable, or more kinds of test."
+            )
+        if fit.condition_number > ILL_CONDITIONED:
+            rows.append(
+                f"  Beware: a condition number of {fit.condition_number:.3g} means that the constants describe these "
+                "tests and say little of other states of strain."
+            )
+        return rows
+
+
+def describe_fits(
+    curves: list[Curve],
+    law: str | None = None,
+    terms: int | None = None,
+    constraint: str = "none",
+    stable_to: float | None = None,
+    error: str = "absolute",
+    cycle: str = "last",
+) -> FitReport:
+    """Fit every form, and tell one in full.
+
+    Parameters
+    ----------
+    curves : list of Curve
+        Of `loading_cycles.read_tests`.
+    law, terms : optional
+        The form told in full; of those that the wall takes and that are stable as far as the tests reach, the one of
+        least residual if not given.
+    constraint, stable_to, error, cycle
+        See `fit.fit_rubber` and `loading_cycles.loading_tests`.
+
+    Raises
+    ------
+    MaterialError
+        For options that there are not, or tests that no form can be fitted to.
+    """
+    if law is None and terms is not None:
+        raise MaterialError("A number of terms needs the law they belong to.")
+    forms = list(all_forms())
+    wanted = None if law is None else form_of(law, terms)
+    if wanted is not None and wanted not in forms:
+        forms.append(wanted)
+    tests = loading_tests(curves, cycle)
+    fits, refused = [], {}
+    for form in forms:
+        try:
+            fits.append(fit_rubber(tests, form, constraint, stable_to, error))
+        except MaterialError as problem:
+            if form == (wanted or forms[0]):
+                raise
+            refused[form.title] = str(problem)
+    chosen = next(f for f in fits if f.form == wanted) if wanted else _best(fits)
+    many = any(c.cycle is not None and c.cycle > 1 for c in curves)
+    first = None
+    if many and cycle == "last":
+        first = fit_rubber(loading_tests(curves, "first"), chosen.form, constraint, stable_to, error)
+    return FitReport(tests, describe_cycles(curves), fits, refused, chosen, first)
+
+
+def _best(fits: list[RubberFit]) -> RubberFit:
+    """Least residual of those for the wall, the stable ones first."""
+    possible = [f for f in fits if f.form.name in TAKEN and f.shear_modulus > 0.0]
+    if not possible:
+        raise MaterialError("No fit finds a positive stiffness; does stress grow with strain in the tests?")
+    return min(possible, key=lambda f: (f.stable_range.equivalent_strain < f.reach, f.rms))
+
+
+def toml_table(fit: RubberFit, name: str, density: float, loss_factor: float | None = None) -> list[str]:
+    """The fitted rubber as a table of a case file; why there is none, as remarks, for a form that the wall lacks."""
+    if fit.form.name not in TAKEN:
+        return [f"# The wall has no law of the form {fit.form.name}; it takes {', '.join(TAKEN)} (--law)."]
+    if fit.shear_modulus <= 0.0:
+        return ["# These constants have no positive shear modulus: no wall can be made of them."]
+    kind, values = fit.form.name, dict(zip(fit.form.names, fit.constants))
+    if kind == "neo-hookean":
+        values = {"shear_modulus": fit.shear_modulus}
+    rows = [f"[materials.{name}]", f'kind = "{kind}"']
+    rows += [f'{key} = "{value / 1e6:.12g} MPa"' for key, value in values.items()]
+    rows.append(f'density = "{density:g} kg/m^3"')
+    if loss_factor is not None:
+        rows.append(f"loss_factor = {loss_factor:.4g}")
+    return rows
+
+
+def _constants(fit: RubberFit) -> str:
+    names = [*fit.form.names, *(f"alpha{p + 1}" for p in range(fit.exponents.size))]
+    errors = fit.standard_errors
+    told = []
+    for i, name in enumerate(names):
+        if i < fit.constants.size:
+            told.append(f"{name} = {fit.constants[i] / 1e6:.6g} +- {errors[i] / 1e6:.2g} MPa")
+        else:
+            told.append(f"{name} = {fit.exponents[i - fit.constants.size]:.6g} +- {errors[i]:.2g}")
+    return ", ".join(told)
+
+
+def _strain(equivalent: float) -> str:
+    """Engineering strain of the tension of an equivalent logarithmic strain."""
+    return f"{np.expm1(equivalent):.1%}" if np.isfinite(equivalent) else "no limit"
+
+
+def _summary(fit: RubberFit) -> dict[str, Any]:
+    return {
+        "law": fit.form.name,
+        "terms": fit.form.terms,
+        "constants": dict(zip(fit.form.names, fit.constants)),
+        "exponents": fit.exponents,
+        "standard_errors": fit.standard_errors,
+        "constraint": fit.constraint,
+        "active": fit.active,
+        "rms": fit.rms,
+        "r_squared": fit.r_squared,
+        "condition_number": fit.condition_number,
+        "shear_modulus": fit.shear_modulus,
+        "stable_equivalent_strain": fit.stable_range.equivalent_strain,
+        "tested_equivalent_strain": fit.reach,
+        "wall": fit.form.name in TAKEN,
+        "residuals": fit.by_test,
+    }

@@ -1,0 +1,62 @@
+"""``dbvfiv fit``: what it prints, draws and refuses, and that its table can be pasted."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dbvfiv.materials.library import law_from_card
+from dbvfiv.studies.case import load_case
+
+TRELOAR = str(Path(__file__).parents[1] / "materials" / "treloar.csv")
+
+
+def test_treloar(command_line, tmp_path):
+    outcome = command_line("fit", TRELOAR, "--law", "mooney-rivlin", "--constraint", "stable", "--plots", str(tmp_path))
+    assert outcome.status == 0 and outcome.err == ""
+    assert "Tests: uniaxial 1.0% to 661.0% in 24 points; planar" in outcome.out
+    assert (tmp_path / "fit.png").stat().st_size > 10_000
+    table = outcome.out[outcome.out.index("[materials.rubber]") :].split("\n1 figure")[0]
+    card = tomllib.loads(table)["materials"]["rubber"]
+    assert card["kind"] == "mooney-rivlin" and card["density"] == "1300 kg/m^3"
+
+
+def test_the_table_pasted_is_the_fit_from_the_case(command_line, tmp_path):
+    options = ["--law", "mooney-rivlin", "--terms", "3", "--constraint", "stable", "--stable-to", "80 %"]
+    document = json.loads(command_line("fit", TRELOAR, *options, "--name", "NR", "--json").out)
+    case = tmp_path / "my.toml"
+    case.write_text(
+        document["toml"]
+        + f"\n[materials.same]\nkind='fit'\npath='{TRELOAR}'\nterms=3\nconstraint='stable'\nstable_to='80 %'\n"
+        "density='1300 kg/m^3'\n"
+    )
+    named = load_case(case).materials.named
+    pasted, fitted = law_from_card(named["NR"]), law_from_card(named["same"])
+    np.testing.assert_allclose(pasted.parameters, fitted.parameters, rtol=1e-9)
+    assert document["chosen"]["constants"]["c11"] == pytest.approx(pasted.c11, rel=1e-9)
+    assert [f["law"] for f in document["fits"]][-1] == "ogden" and document["loss_factor"] is None
+
+
+def test_a_form_that_the_wall_lacks_is_said(command_line):
+    outcome = command_line("fit", TRELOAR, "--law", "ogden", "--terms", "3")
+    assert outcome.status == 0 and "# The wall has no law of the form ogden" in outcome.out
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (["none.csv"], "none.csv cannot be read"),
+        ([TRELOAR, "--stable-to", "-3 %"], "--stable-to is given as '-3 %'"),
+        ([TRELOAR, "--stable-to", "much"], "--stable-to is given as 'much'"),
+        ([TRELOAR, "--density", "3 m"], "--density is given as '3 m'"),
+        ([TRELOAR, "--name", "a b"], "--name 'a b' must be of letters"),
+        ([TRELOAR, "--law", "yeoh", "--terms", "7"], "2 or 3 terms, but 7"),
+        ([TRELOAR, "--terms", "3"], "needs the law"),
+        ([TRELOAR, "--planar", TRELOAR], "holds a planar test already"),
+    ],
+)
+def test_bad_requests_get_a_sentence(command_line, options, words):
+    outcome = command_line("fit", *options)
+    assert outcome.status == 2 and words in " ".join(outcome.err.split()) and "Traceback" not in outcome.err
