@@ -29,7 +29,9 @@ def command(
     without: Annotated[
         list[str] | None,
         typer.Option(
-            "--without", metavar="RUN", help="Leave out steady, modes, classes, onset, map or closure; may be repeated."
+            "--without",
+            metavar="RUN",
+            help="Leave out steady, modes, classes, onset, map, cycle or closure; may be repeated.",
         ),
     ] = None,
     overrides: Override = None,

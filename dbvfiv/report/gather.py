@@ -12,15 +12,25 @@ from ..errors import CaseError, SolveError
 from ..observer import Observer
 from ..studies.case import Case
 from ..studies.closure.result import ClosureResult
+from ..studies.cycle.result import CycleResult
 from ..studies.kept import kept_run
 from ..studies.map.result import MapResult
 from ..studies.modes.result import ModesResult
 from ..studies.onset.result import OnsetResult
 from ..studies.session import Session
+from ..studies.stability.place import Place
 from ..studies.steady.result import SteadyResult
 
 #: What runs for a report, in this order, and of which study it is.
-RUNS = {"steady": "steady", "modes": "modes", "classes": "modes", "onset": "onset", "map": "map", "closure": "closure"}
+RUNS = {
+    "steady": "steady",
+    "modes": "modes",
+    "classes": "modes",
+    "onset": "onset",
+    "map": "map",
+    "cycle": "cycle",
+    "closure": "closure",
+}
 
 
 @dataclass(frozen=True)
@@ -56,12 +66,15 @@ class Gathered:
     results : dict of StudyResult
     missing : dict of str
         Those that gave no result, and why, in a sentence.
+    not_asked : set of str
+        Those among them that were left out, or have nothing to say of this valve.
     """
 
     case: Case
     name: str
     results: dict[str, Any] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
+    not_asked: set[str] = field(default_factory=set)
 
     @property
     def steady(self) -> SteadyResult | None:
@@ -83,6 +96,11 @@ class Gathered:
     @property
     def map(self) -> MapResult | None:
         return self.results.get("map")
+
+    @property
+    def cycle(self) -> CycleResult | None:
+        """Limit cycles from the onset to this state; there where the state is unstable."""
+        return self.results.get("cycle")
 
     @property
     def closure(self) -> ClosureResult | None:
@@ -124,9 +142,17 @@ def gather(
     for name_of_run, kind in RUNS.items():
         if name_of_run in runs.leave_out:
             found.missing[name_of_run] = "It was left out."
+            found.not_asked.add(name_of_run)
+            continue
+        changes = way_to_the_cycle(found) if name_of_run == "cycle" else changes_of(name_of_run, case, runs)
+        if changes is None:
+            found.missing[name_of_run] = (
+                "The steady state is not known to be unstable beside an onset, so none was sought."
+            )
+            found.not_asked.add(name_of_run)
             continue
         try:
-            asked = session.replace(changes_of(name_of_run, case, runs))
+            asked = session.replace(changes)
             choices = {"workers": runs.workers} if kind == "map" else {}
             path = folder / f"{name}-{name_of_run}.h5"
             found.results[name_of_run] = kept_run(kind, asked, path, observer(name_of_run), **choices)
@@ -155,6 +181,21 @@ def changes_of(run: str, case: Case, runs: Runs) -> dict[str, Any]:
             "map.y": spelled(y.parameter, y, runs.cells, around=case.fluid.density),
         }
     return {}
+
+
+def way_to_the_cycle(found: Gathered) -> dict[str, Any] | None:
+    """Keys of a branch of cycles from the nearest onset to the state of the case; None where no cycle is expected."""
+    if found.modes is None or found.modes.stable is not False or found.onset is None:
+        return None
+    parameter = found.onset.parameter
+    here = Place.of(found.case).value(parameter)
+    beside = [p for p in found.onset.points if p["edge"] and (p["value"] < here) == p["gains"] and p["frequency"] > 0]
+    if not beside:
+        return None
+    nearest = min(beside, key=lambda point: abs(point["value"] - here))
+    low, high = sorted((here, nearest["value"] + 0.1 * (nearest["value"] - here)))
+    start = "first" if nearest["gains"] else "last"
+    return {"cycle.over": f"{parameter}={max(low, 0.5 * here):.9g}:{high:.9g}:4", "cycle.start": start}
 
 
 def spelled(parameter: str, axis, count: int, around: float | None = None) -> str:

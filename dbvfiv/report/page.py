@@ -19,6 +19,7 @@ from .content import Part
 from .gather import Gathered
 from .parts import PARTS
 from .parts.closure import shutting
+from .parts.cycle import cycles
 from .parts.hydraulics import opening
 from .parts.vibration import onsets, stability
 
@@ -87,6 +88,7 @@ def answers(found: Gathered) -> list[tuple[str, tuple[str, ...]]]:
         ("How far does it open, what flows?", opening(found)),
         ("Does it vibrate?", stability(found)),
         ("Where does that begin?", onsets(found)),
+        ("What does it grow into?", cycles(found)),
         ("Does it shut?", shutting(found)),
     )
     return [(question, told) for question, told in asked if any(told)]

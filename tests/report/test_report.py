@@ -24,7 +24,7 @@ SMALL = (
     "--set",
     "onset.coarse_mesh=0",
 )
-LIGHT = ("--set", "drive.pressure=6 kPa", "--set", "fluid.density=10", "--set", "damping.alpha=0")
+LIGHT = ("--set", "drive.pressure=6 kPa", "--set", "fluid.density=75", "--set", "damping.alpha=0")
 
 
 @pytest.fixture(scope="module")
@@ -40,11 +40,24 @@ def made(tmp_path_factory):
 
 def test_every_part_is_there(made):
     text = made[1].read_text()
-    for name in ("valve", "steady", "modes", "classes", "damping", "onset", "map", "closure", "strains", "case"):
+    for name in (
+        "valve",
+        "steady",
+        "modes",
+        "classes",
+        "damping",
+        "onset",
+        "map",
+        "cycle",
+        "closure",
+        "strains",
+        "case",
+    ):
         assert f'<section id="{name}">' in text
     assert "Unstable under quasi-steady continuity" in text
     assert "It was left out." in text
     assert "this installation" in text
+    assert re.search(r"An? (un)?stable limit cycle of [\d.]+ mm of each lip|limit cycle was followed to", text)
 
 
 def test_the_case_on_the_page_is_the_case(made, tmp_path):
@@ -52,7 +65,7 @@ def test_the_case_on_the_page_is_the_case(made, tmp_path):
         html.unescape(re.search(r"<pre>([^<]*)</pre></details>", made[1].read_text())[1])
     )
     case = load_case(tmp_path / "again.toml")
-    assert (case.drive.pressure, case.fluid.density, case.mesh.around) == (6e3, 10.0, 8)
+    assert (case.drive.pressure, case.fluid.density, case.mesh.around) == (6e3, 75.0, 8)
 
 
 def test_pictures_are_in_the_page_and_nothing_is_fetched(made):
@@ -81,7 +94,7 @@ def test_a_second_report_computes_nothing(made, command_line):
     arguments, page = made
     folder = page.with_suffix("")
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
-    assert set(before) == {f"dbv12-{run}.h5" for run in ("steady", "modes", "classes", "onset", "map")}
+    assert set(before) == {f"dbv12-{run}.h5" for run in ("steady", "modes", "classes", "onset", "map", "cycle")}
     outcome = command_line(*arguments, "--json")
     assert outcome.status == 0
     answers = json.loads(outcome.out)

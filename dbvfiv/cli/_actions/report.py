@@ -47,7 +47,7 @@ def report(
 
     found = gather(case, name, folder or page.with_suffix(""), runs, told)
     write_page(found, page)
-    failed = {kind: why for kind, why in found.missing.items() if kind not in without}
+    failed = {kind: why for kind, why in found.missing.items() if kind not in found.not_asked}
     said = answers(found)
     if as_json:
         print_json(

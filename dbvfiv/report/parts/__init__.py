@@ -1,6 +1,6 @@
 """The parts of a report, in the order they are read; each makes a `Part` from what was gathered, or nothing."""
 
-from . import closure, damping, hydraulics, strains, valve, vibration
+from . import closure, cycle, damping, hydraulics, strains, valve, vibration
 
 #: Functions from `Gathered` to a `Part`, or to None where there is nothing to say.
 PARTS = (
@@ -11,6 +11,7 @@ PARTS = (
     damping.part,
     vibration.onset,
     vibration.map,
+    cycle.part,
     closure.part,
     strains.part,
 )

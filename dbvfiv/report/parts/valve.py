@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...drawing.deformed import deformed
+from ...drawing.described import valve_figure
 from ...record.mesh import MeshData
 from .. import live
 from ..content import Part, Table, picture
@@ -30,6 +31,10 @@ def part(found: Gathered) -> Part:
     if state is not None:
         caption = f"The valve at {state.pressure / 1e3:.4g} kPa, true to scale; on a screen it can be turned."
         pictures = [picture("deformed", caption, lambda: deformed(state), live.valve(state))]
+    if found.results:
+        model = next(iter(found.results.values())).model
+        told = "As the case describes it: faces, measures, wall and layers."
+        pictures.insert(0, picture("described", told, lambda: valve_figure(model)))
     return Part("valve", "The valve", tuple(sentences), tuple(tables), tuple(pictures))
 
 
