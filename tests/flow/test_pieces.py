@@ -31,7 +31,7 @@ def behind(line: ElasticLine, storage=0.0) -> LineChannel:
     return LineChannel(Channel(z, FLOOR, storage), Channel(z, FLOOR, storage, terms=[line.line]), line)
 
 
-@pytest.mark.parametrize("reservoir", [True, False])
+@pytest.mark.parametrize("reservoir", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_a_pipe_in_pieces_is_the_pipe(reservoir):
     """Operators, steady flow and steps of a rigid and of an elastic line."""
     z, area = passage()
@@ -92,7 +92,7 @@ def roots(function, count: int, top: float) -> np.ndarray:
     return np.array([brentq(function, grid[i], grid[i + 1], xtol=1e-13) for i in cuts])
 
 
-@pytest.mark.parametrize("rigid", [0.0, 6.0])
+@pytest.mark.parametrize("rigid", [pytest.param(0.0, marks=pytest.mark.slow), 6.0])
 def test_organ_pipes_of_two_sections(rigid):
     """tan(w L1/c1) tan(w L2/c2) = Z2/Z1, Z = c/A, open at its far end and shut at the flange; a rigid pipe between them
     adds w L/A to Z1 tan.
@@ -127,7 +127,7 @@ def test_a_rigid_piece_at_an_end_is_its_inertance():
     assert near.inertance - bare.inertance == pytest.approx(4.0 * ratio, rel=1e-10)
 
 
-@pytest.mark.parametrize("wider", [0.15, 0.4])
+@pytest.mark.parametrize("wider", [pytest.param(0.15, marks=pytest.mark.slow), 0.4])
 def test_a_blow_at_a_change_of_section(wider):
     """It goes on as 2 Z1/(Z1 + Z2) of itself and comes back as (Z1 - Z2)/(Z1 + Z2), Z = c/A (Wylie and Streeter)."""
     (l1, c1), (l2, c2), d2 = (20.0, 800.0), (20.0, 1000.0), 0.25

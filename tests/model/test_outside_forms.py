@@ -83,6 +83,7 @@ def test_third_derivatives():
     assert motion @ force == pytest.approx(expected, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_forms_are_symmetric_and_linear():
     rng = np.random.default_rng(8)
     one, two, three = (tuple(rng.standard_normal((3, len(ZERO)))) for _ in range(3))

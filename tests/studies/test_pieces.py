@@ -38,7 +38,9 @@ def with_waves(keys):
     return keys | {"upstream.wave_speed": 700.0, "upstream.elements": 4}
 
 
-@pytest.mark.parametrize("elastic", [False, True], ids=["rigid", "elastic"])
+@pytest.mark.parametrize(
+    "elastic", [pytest.param(False, marks=pytest.mark.slow, id="rigid"), pytest.param(True, id="elastic")]
+)
 def test_two_equal_pieces_are_one_pipe(elastic):
     one, two = (load(with_waves(keys) if elastic else keys, {"steady.cracking_area": 2.0}) for keys in (ONE, TWO))
     states = [valve.steady(pressure=6e3) for valve in (one, two)]
@@ -55,10 +57,12 @@ def test_two_equal_pieces_are_one_pipe(elastic):
     assert swing > 0 and np.abs(second - first).max() < 1e-8 * np.abs(first).max()
 
 
+@pytest.mark.slow
 def test_three_routes_behind_pipes_of_each_kind():
     check_three_routes(three_routes("storage", 6e3, 100.0, mesh=(6, 8), further=MIXED), "three pipes")
 
 
+@pytest.mark.slow
 def test_over_the_density_waves_keep_their_speeds():
     """Studies over the density reduce the line at unit density."""
     found = load(MIXED).sweep("density=20:100:3:log")

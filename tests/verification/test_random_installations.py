@@ -104,13 +104,13 @@ def look_at(number: int, seed: int, conditions_each: int = 3) -> tuple[list[str]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(2))
 def test_many_installations(seed):
-    left_open, refused, unstable = look_at(75, 100 + seed)
+    left_open, refused, unstable = look_at(40, 100 + seed)
     print(
-        f"\n{unstable} of 225 unstable, {len(left_open)} left open, {len(refused)} refused",
+        f"\n{unstable} of 120 unstable, {len(left_open)} left open, {len(refused)} refused",
         *left_open,
         *refused,
         sep="\n",
     )
-    assert len(left_open) <= 4 and len(refused) <= 8 and 10 <= unstable
+    assert len(left_open) <= 2 and len(refused) <= 4 and unstable
