@@ -155,5 +155,6 @@ class ShellMotion(Motion):
         d, d1, _ = shell.directors(nodal)
         kinetic = kinetic_energy(shell.mesh.quads, shell._integrals, d1, shell.dofs.expand(v))
         return float(
-            kinetic + strain_energy(shell.mesh.quads, shell.mesh.nodes, nodal, d, shell._reference, shell._wall)
+            kinetic
+            + strain_energy(shell.mesh.quads, shell.mesh.nodes, nodal, d, shell.parts[0].reference, shell.wall[0])
         )
