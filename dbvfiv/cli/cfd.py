@@ -33,7 +33,9 @@ def command(
     ] = None,
     fineness: Annotated[
         float,
-        typer.Option("--fineness", min=0.3, max=3.0, help="Cells in each direction; 0.5 gives 26 000, 1 200 000."),
+        typer.Option(
+            "--fineness", min=0.3, max=3.0, help="Cells in each direction: 0.5 for 26 thousand, 1 for 207 thousand."
+        ),
     ] = 0.5,
     iterations: Annotated[int, typer.Option("--iterations", min=1, help="At most this many, over all runs.")] = 400,
     run: Annotated[bool, typer.Option("--run/--no-run", help="Run OpenFOAM, or only write its case.")] = True,
