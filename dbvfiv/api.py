@@ -291,12 +291,7 @@ class Valve:
         return self._ask({"onset.over": over}, changes).perform("onset", output, observer)
 
     def cycle(
-        self,
-        over: str | None = None,
-        *,
-        output: str | Path | None = None,
-        observer: Observer | None = None,
-        **changes: Any,
+        self, over: str | None = None, *, output: str | Path | None = None, observer: Any = None, **changes: Any
     ) -> CycleResult:
         """Limit cycles followed from an onset along one parameter.
 
@@ -304,19 +299,12 @@ class Valve:
         ----------
         over : str, optional
             PARAMETER=START:STOP:COUNT[:log]; cycle.over of the case by default.
-        output : path, optional
-            Result file, written cycle by cycle; `dbvfiv.resume` continues it.
-        observer, changes
-            As for `modes`; also pressure, for cycles over something else.
-
-        Raises
-        ------
-        CaseError, SolveError
+        output, observer, changes
+            As for `onset`.
 
         Examples
         --------
         >>> found = dbvfiv.load("cases/light-fluid.toml").cycle("density=25:60:8")     # doctest: +SKIP
-        >>> [(p.value, p.amplitude, p.frequency, p.stable) for p in found.points]     # doctest: +SKIP
         """
         return self._ask({"cycle.over": over}, changes).perform("cycle", output, observer)
 

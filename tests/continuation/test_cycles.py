@@ -6,7 +6,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from continuation import NotConverged
-from continuation.cycle_branch import DOUBLING, FOLD, TORUS, CycleBranchOptions, CycleTracer
+from continuation.cycle_branch import CycleTracer
+from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions
 from continuation.cycles import CycleOptions, CycleSolver
 from continuation.harmonics import Harmonics, Rates
 from continuation.hill import floquet_exponents

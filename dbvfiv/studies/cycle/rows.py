@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from continuation.cycle_branch import CyclePoint, SpecialCycle
+from continuation.cycle_points import CyclePoint, SpecialCycle
 from continuation.cycles import Cycle
 from continuation.harmonics import Harmonics
 from continuation.hill import Exponents

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from continuation.cycle_branch import CycleBranchOptions, CyclePoint, CycleTracer, SpecialCycle
+from continuation.cycle_branch import CycleTracer
+from continuation.cycle_points import CycleBranchOptions, CyclePoint, SpecialCycle
 
 from ...case.parameters import PARAMETERS
 from ...errors import CaseError
