@@ -1,4 +1,4 @@
-"""What a branch of periodic motions consists of, and the options it is followed with."""
+"""What a branch of periodic motions is made of: options, cycles, special points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from continuation.hill import Exponents
 from continuation.options import require
 
 #: Kinds of special points.
-FOLD, DOUBLING, TORUS, BRANCHING = "fold", "period doubling", "torus", "branch point"
+FOLD, DOUBLING, TORUS = "fold", "period doubling", "torus"
 
 
 @dataclass(frozen=True)

@@ -301,14 +301,12 @@ class Valve:
         ----------
         over : str, optional
             PARAMETER=START:STOP:COUNT[:log]; cycle.over of the case by default.
-        output : path, optional
-            Result file, written cycle by cycle; `dbvfiv.resume` continues it.
-        observer, changes
-            As for `modes`; also pressure, for cycles over something else.
+        output, observer, changes
+            As for `onset`.
 
-        Raises
-        ------
-        CaseError, SolveError
+        Examples
+        --------
+        >>> found = dbvfiv.load("cases/light-fluid.toml").cycle("density=25:60:8")     # doctest: +SKIP
         """
         return self._ask({"cycle.over": over}, changes).perform("cycle", output, observer)
 

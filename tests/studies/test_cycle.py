@@ -93,11 +93,30 @@ def test_what_is_read_off(found):
     assert found.nearest(found.points[2].value).number == 2
 
 
+def test_ranges_for_fatigue(found):
+    """Of each layer; those of a smaller cycle are smaller."""
+    small, large = (found.points[k].ranges for k in (0, -1))
+    layers = large.largest()
+    assert [row["layer"] for row in layers] == list(large.names) and len(layers) == 5
+    for small_row, row in zip(small.largest(), layers):
+        assert 0 < small_row["strain_range"] < row["strain_range"] < 0.5
+        assert 0 < small_row["stress_range"] < row["stress_range"]
+        assert row["strain_position"][2] < 0.56
+
+
 def test_file_figures_and_fields(found, file, tmp_path):
     again = load_result(file)
     assert again.summary() == found.summary()
     figures = again.figures()
-    assert set(figures) == {"branch", "envelope", "phase-plane", "centre-line-cycle", "wave", "spectrum"}
+    assert set(figures) == {
+        "branch",
+        "envelope",
+        "phase-plane",
+        "centre-line-cycle",
+        "wave",
+        "spectrum",
+        "stress-range",
+    }
     assert again.export(tmp_path / "cycle.vtkhdf").stat().st_size > 0
 
 

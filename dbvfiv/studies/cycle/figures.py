@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
-from ...drawing.axes import HALO, colour_bar
+from ...drawing.axes import HALO, colour_bar, headline
 from ...drawing.style import (
     ACCENT,
     COMPUTED,
+    MAGNITUDE,
     REST,
     UNSTABLE,
     new_figure,
@@ -20,6 +21,7 @@ from ...drawing.style import (
     phase_looks,
     pressure_colours,
 )
+from ...drawing.views import unrolled
 from ..stability.place import describe_fixed
 
 if TYPE_CHECKING:
@@ -39,6 +41,7 @@ def draw(result: CycleResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "centre-line-cycle", lambda: centre_line(result)
     yield "wave", lambda: wave(result)
     yield "spectrum", lambda: spectrum(result)
+    yield "stress-range", lambda: stress_range(result)
 
 
 def _title(result: CycleResult) -> str:
@@ -68,7 +71,7 @@ def branch(result: CycleResult) -> Figure:
             _with_stability(axes, result, x, y)
     _mark_special(result, top)
     top.set_ylabel("Amplitude of one lip, mm")
-    top.set_ylim(bottom=0)
+    top.set_ylim(0, 1.1e3 * max(point.amplitude for point in result.points))
     bottom.set_ylabel("Frequency, Hz")
     bottom.set_xlabel(parameter_label(result.case, result.parameter))
     top.tick_params(labelbottom=True)
@@ -97,7 +100,7 @@ def _mark_special(result: CycleResult, axes) -> None:
         x, y = special["value"] / scale, 1e3 * special["amplitude"]
         axes.plot(x, y, "D", color=ACCENT, ms=6, zorder=5)
         look = {"textcoords": "offset points", "fontsize": 8.5, "color": ACCENT, "path_effects": HALO}
-        axes.annotate(f"{special['kind']}\n{x:.4g}", (x, y), xytext=(8, 6), **look)
+        axes.annotate(f"{special['kind']}\n{x:.4g}", (x, y), xytext=(8, -7), va="top", **look)
 
 
 def envelope(result: CycleResult) -> Figure:
@@ -205,6 +208,33 @@ def spectrum(result: CycleResult) -> Figure:
     axes.xaxis.get_major_locator().set_params(integer=True)
     axes.set_title(_title(result), loc="left", fontweight="bold")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=row.words)
+    return figure
+
+
+def stress_range(result: CycleResult) -> Figure:
+    """Largest range of a stress over a period of the last cycle, in each layer on the unrolled quarter."""
+    point, mesh = result.nearest(), result.mesh
+    arc, z = unrolled(mesh)
+    values = point.ranges.stress.T / 1e6
+    columns = min(3, len(values))
+    rows = -(-len(values) // columns)
+    figure = new_figure(3.2 * columns, 4.1 * rows + 0.4)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for number, (axes, title, stress) in enumerate(zip(panels, mesh.layer_titles(), values)):
+        shape = (mesh.shape[1], mesh.shape[0])
+        image = axes.pcolormesh(arc * 1e3, z * 1e3, stress.reshape(shape), cmap=MAGNITUDE, vmin=0.0, rasterized=True)
+        colour_bar(figure, image, axes, "Range of stress, MPa", pad=0.03)
+        axes.set_title(f"{number + 1}  {title}", loc="left", fontsize=10)
+        axes.set_title(f"max {stress.max():.3g}", loc="right", fontsize=9)
+        axes.grid(False)
+        axes.tick_params(labelbottom=True, labelleft=True)
+        if number % columns == 0:
+            axes.set_ylabel("Distance from the lip z, mm")
+        if number + columns >= len(values):
+            axes.set_xlabel("Arc from the centre, mm")
+    for axes in panels[len(values) :]:
+        axes.set_visible(False)
+    headline(figure, f"Range of stress over a period, {_at(result, point)}")
     return figure
 
 

@@ -19,6 +19,7 @@ from ...record.whole_valve import WholeValve
 from ..result import StudyResult
 from ..stability.place import Place, describe_fixed, fixed_conditions, rebuilder
 from . import figures
+from .fatigue import LayerRanges, layer_ranges
 from .orbit import Orbit
 from .rows import COLUMNS, CYCLES, ENDED, SPECIAL, read_motion
 
@@ -60,6 +61,11 @@ class Point:
         name = PARAMETERS[self.result.parameter].system_name or self.result.parameter
         mu = Place.of(self.result.case).mu() | {name: float(self.value)}
         return Orbit(self.result.system.model(mu), mu, read_motion(self.result.record, self.number))
+
+    @cached_property
+    def ranges(self) -> LayerRanges:
+        """Ranges of strain and stress in the layers over a period."""
+        return layer_ranges(self.orbit)
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""

@@ -74,7 +74,9 @@ def find_onset(case: Case, walk: StabilityWalk, observer: Observer) -> Onset:
         observer.progress(f"steady state at {axis.parameter} = {value:.6g}")
         return cell(base.at(**{axis.parameter: value}))
 
-    inside = lambda value: np.asarray(walk.spectrum(base.at(**{axis.parameter: value}), MODES).eigenvalues)  # noqa: E731
+    def inside(value: float) -> np.ndarray:
+        return np.asarray(walk.spectrum(base.at(**{axis.parameter: value}), MODES).eigenvalues)
+
     scan = Scan(sample, axis.log, inside=inside)
     crossings = scan.run(values)
     for crossing in crossings[::-1] if case.cycle.start == "last" else crossings:
