@@ -157,8 +157,8 @@ def constituents_of(
     if not e2 <= e1 < largest:
         raise MaterialError(
             f"No fibre and matrix give a ply of e1 = {e1 / 1e6:g} MPa and e2 = {e2 / 1e6:g} MPa: with xi = {xi:g} and "
-            f"a fraction of {fibre_fraction:g} e1 must be at least e2 and less than {largest / 1e6:g} MPa; are warp and "
-            "weft exchanged?"
+            f"a fraction of {fibre_fraction:g} e1 must be at least e2 and less than {largest / 1e6:g} MPa; are warp "
+            "and weft exchanged?"
         )
     f = fibre_fraction
 
