@@ -74,6 +74,16 @@ class MooneyRivlin(Relaxing):
         return self
 
 
+class Yeoh(Relaxing):
+    """Incompressible W = c10 (I1 - 3) + c20 (I1 - 3)^2 + c30 (I1 - 3)^3."""
+
+    kind: Literal["yeoh"] = key(..., "Incompressible Yeoh rubber.")
+    c10: Modulus = key(..., "Factor of I1 - 3, half the shear modulus at small strain.", gt=0, le=1e12)
+    c20: Modulus = key(0.0, "Factor of (I1 - 3)^2.", ge=-1e12, le=1e12)
+    c30: Modulus = key(0.0, "Factor of (I1 - 3)^3.", ge=-1e12, le=1e12)
+    density: Density = _density(...)
+
+
 class NeoHookean(Relaxing):
     """Incompressible W = G/2 (I1 - 3)."""
 
@@ -138,9 +148,10 @@ class Fit(Relaxing):
     )
     planar: Path | None = key(None, "CSV file of a test in planar tension (pure shear), fitted with the others.")
     biaxial: Path | None = key(None, "CSV file of a test in equibiaxial tension, fitted with the others.")
-    law: Literal["mooney-rivlin", "neo-hookean"] = key("mooney-rivlin", "Form of its energy.")
+    law: Literal["mooney-rivlin", "neo-hookean", "yeoh"] = key("mooney-rivlin", "Form of its energy.")
     terms: Literal[1, 2, 3] | None = key(
-        None, "Number of constants: mooney-rivlin 2 (c10, c01) or 3 (and c11); 2 if not given."
+        None,
+        "Number of constants: mooney-rivlin 2 (c10, c01) or 3 (and c11), yeoh 3 or 2; the first of them if not given.",
     )
     constraint: Literal["none", "non-negative", "stable"] = key(
         "none", "On the constants: none, at least 0, or stable in every state up to stable_to."
@@ -181,7 +192,7 @@ class BuiltIn(Relaxing):
     kind: Literal["built-in"] = key("built-in", "What the material is without this table.")
 
 
-Card = MooneyRivlin | NeoHookean | Isotropic | Orthotropic | HalpinTsai | Fit | ShippedRubber | BuiltIn
+Card = MooneyRivlin | Yeoh | NeoHookean | Isotropic | Orthotropic | HalpinTsai | Fit | ShippedRubber | BuiltIn
 KINDS = {c.model_fields["kind"].annotation.__args__[0]: c for c in Card.__args__}
 
 

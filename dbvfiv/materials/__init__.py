@@ -27,6 +27,7 @@ from dbvfiv.materials.rubber_forms import form_of
 from dbvfiv.materials.rubbers import rubber, rubber_names, strain_levels
 from dbvfiv.materials.stability import StableRange, stability_margin, stability_warning, stable_range
 from dbvfiv.materials.tension_test import TensionTest, read_tension_test
+from dbvfiv.materials.yeoh import Yeoh
 
 __all__ = [
     "DampingReport",
@@ -45,6 +46,7 @@ __all__ = [
     "ShippedLoss",
     "StableRange",
     "TensionTest",
+    "Yeoh",
     "damping_of",
     "describe_damping",
     "energy_of",

@@ -25,11 +25,12 @@ from dbvfiv.materials.mooney_rivlin import MooneyRivlin
 from dbvfiv.materials.rubber_forms import Form, equivalent_strain, form_of, invariant_columns
 from dbvfiv.materials.stability import StableRange, stable_range_of
 from dbvfiv.materials.tension_test import TensionTest
+from dbvfiv.materials.yeoh import Yeoh
 
 CONSTRAINTS = ("none", "non-negative", "stable")
 ERRORS = ("absolute", "relative")
 #: Forms that the wall takes.
-TAKEN = ("neo-hookean", "mooney-rivlin")
+TAKEN = ("neo-hookean", "mooney-rivlin", "yeoh")
 #: Of the matrix of a fit: what is smaller is noise of its arithmetic.
 _DIGITS = 1e-13
 __all__ = ["CONSTRAINTS", "ERRORS", "LEAST_MARGIN", "RubberFit", "fit_mooney_rivlin", "fit_rubber", "uniaxial_stress"]
@@ -133,8 +134,8 @@ class RubberFit:
                 f"The wall has no law of the form {self.form.name}; it takes {' and '.join(TAKEN)}. "
                 "The fit is for comparison."
             )
-        c10, c01, c11 = (*(float(c) for c in self.constants), 0.0, 0.0)[:3]
-        return MooneyRivlin(c10, c01, c11, density)
+        first, second, third = (*(float(c) for c in self.constants), 0.0, 0.0)[:3]
+        return (Yeoh if self.form.name == "yeoh" else MooneyRivlin)(first, second, third, density)
 
 
 def fit_mooney_rivlin(

@@ -14,6 +14,8 @@ import numpy as np
 
 #: Powers (i, j) of I1 - 3 and I2 - 3 that the constants C10, C01 and C11 multiply.
 MOONEY_RIVLIN_POWERS = ((1, 0), (0, 1), (1, 1))
+#: Those of all constants a wall takes: C20 and C30 too.
+RUBBER_POWERS = (*MOONEY_RIVLIN_POWERS, (2, 0), (3, 0))
 _TRACELESS = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
 
 

@@ -67,6 +67,23 @@ def plane_stress_invariants(e) -> PlaneStressInvariants:
     return PlaneStressInvariants(i1, i2, gap, area)
 
 
+def rubber_energy(parameters, e):
+    """Energy of an incompressible sheet with S33 = 0: Mooney-Rivlin, and C20 (I1 - 3)^2 + C30 (I1 - 3)^3.
+
+    Parameters
+    ----------
+    parameters : array_like, shape (>= 5,)
+        ``[c10, c01, c11, c20, c30, ...]``, Pa.
+    e : array_like, shape (5,)
+
+    Returns
+    -------
+    scalar, J/m3. Not meaningful where det C2 <= 0, which is no deformation of a sheet.
+    """
+    i1 = plane_stress_invariants(e).i1_minus_3
+    return mooney_rivlin_energy(parameters, e) + (parameters[3] + parameters[4] * i1) * i1 * i1
+
+
 def mooney_rivlin_energy(parameters, e):
     """Three-parameter Mooney-Rivlin energy of an incompressible sheet with S33 = 0.
 

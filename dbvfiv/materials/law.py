@@ -17,7 +17,7 @@ from typing import Protocol, runtime_checkable
 import jax.numpy as jnp
 import numpy as np
 
-from dbvfiv.materials.incompressible import mooney_rivlin_energy
+from dbvfiv.materials.incompressible import rubber_energy
 
 LINEAR_ELASTIC = 0
 MOONEY_RIVLIN = 1
@@ -31,12 +31,12 @@ class Law(Protocol):
     Attributes
     ----------
     kind : int
-        ``LINEAR_ELASTIC`` (0) or ``MOONEY_RIVLIN`` (1); a class constant.
+        ``LINEAR_ELASTIC`` (0) or ``MOONEY_RIVLIN`` (1, with Yeoh's terms); a class constant.
     density : float
         Reference density, kg/m3.
     parameters : numpy.ndarray, shape (8,), float64
         Kind 0: ``[Q11, Q22, Q12, Q66, Q55, Q44, 0, 0]`` with Q55 for the 13 and Q44 for the 23
-        shear. Kind 1: ``[c10, c01, c11, 0, 0, 0, 0, 0]``. All in Pa.
+        shear. Kind 1: ``[c10, c01, c11, c20, c30, 0, 0, 0]``. All in Pa.
     small_strain_shear_modulus : float
         In-plane shear modulus (12) in the reference state, Pa.
     """
@@ -108,5 +108,5 @@ def energy_of(kind, parameters, e):
     parameters = jnp.asarray(parameters)
     e = jnp.asarray(e)
     is_rubber = jnp.asarray(kind) == MOONEY_RIVLIN
-    rubber = mooney_rivlin_energy(parameters, jnp.where(is_rubber, e, 0.0))
+    rubber = rubber_energy(parameters, jnp.where(is_rubber, e, 0.0))
     return jnp.where(is_rubber, rubber, linear_elastic_energy(parameters, e))

@@ -16,6 +16,7 @@ from dbvfiv.materials.mooney_rivlin import MooneyRivlin
 from dbvfiv.materials.orthotropic import OrthotropicPly
 from dbvfiv.materials.rubber_forms import form_of
 from dbvfiv.materials.rubbers import rubber
+from dbvfiv.materials.yeoh import Yeoh
 
 if TYPE_CHECKING:
     from dbvfiv.case import Case
@@ -47,6 +48,7 @@ def fit_of_card(card: Any) -> RubberFit:
 
 _LAWS: dict[str, Callable[[Any], Law]] = {
     "mooney-rivlin": lambda c: MooneyRivlin(c.c10, c.c01, c.c11, c.density),
+    "yeoh": lambda c: Yeoh(c.c10, c.c20, c.c30, c.density),
     "neo-hookean": lambda c: MooneyRivlin.neo_hookean(c.shear_modulus, c.density),
     "isotropic": lambda c: IsotropicElastic(c.youngs_modulus, c.poisson_ratio, c.density),
     "orthotropic": lambda c: OrthotropicPly(c.e1, c.e2, c.nu12, c.g12, c.g13, c.g23, c.density),

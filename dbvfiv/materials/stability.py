@@ -27,7 +27,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import brentq
 
 from dbvfiv.materials.checks import MaterialError
-from dbvfiv.materials.hill import hill_moduli, least_modulus
+from dbvfiv.materials.hill import RUBBER_POWERS, hill_moduli, least_modulus
 from dbvfiv.materials.incompressible import plane_stress_invariants
 from dbvfiv.materials.law import MOONEY_RIVLIN, Law, energy_of
 
@@ -73,7 +73,8 @@ def hill_margin(law: Law, log_stretches) -> np.ndarray:
     """Least Hill modulus over 2 mu at given principal logarithmic strains (..., 3) -> (...)."""
     ln = np.asarray(log_stretches, dtype=float)
     valid = np.all(np.isfinite(ln), axis=-1)
-    moduli = np.tensordot(hill_moduli(np.where(valid[..., None], ln, 0.0)), law.parameters[:3], axes=([-3], [0]))
+    by_constant = hill_moduli(np.where(valid[..., None], ln, 0.0), RUBBER_POWERS)
+    moduli = np.tensordot(by_constant, law.parameters[: len(RUBBER_POWERS)], axes=([-3], [0]))
     return np.where(valid, least_modulus(moduli) / (2.0 * law.small_strain_shear_modulus), -np.inf)
 
 

@@ -153,6 +153,35 @@ def read_curves(path: str | Path, mode: str | None = None) -> list[Curve]:
         raise MaterialError(f"Tension test {path}: {error}") from None
 
 
+def read_numbers(path: str | Path, others: dict[str, dict[str, float]]) -> dict[str, np.ndarray]:
+    """Strain, stress and further columns of a table that holds one test, in SI units.
+
+    Parameters
+    ----------
+    path : str or Path
+    others : dict
+        Names of columns that may stand beside them, and factors of their units.
+
+    Raises
+    ------
+    MaterialError
+        See `read_curves`.
+    """
+    path = Path(path)
+    rows = _rows(path)
+    columns = _columns(path, *rows[0], _COLUMNS | others)
+    found: dict[str, list[float]] = {name: [] for name in columns}
+    for line, row in rows[1:]:
+        for name, (index, unit) in columns.items():
+            found[name].append(_number(f"Tension test {path}, line {line}", name, _cell(row, index)) * unit)
+    if not found["nominal_stress"]:
+        raise MaterialError(f"Tension test {path}: there is no row of numbers below the header.")
+    values = {name: np.array(numbers) for name, numbers in found.items()}
+    if "stretch" in values:
+        values["engineering_strain"] = values.pop("stretch") - 1.0
+    return values
+
+
 def _cell(row: list[str], index: int) -> str:
     return row[index].strip() if index < len(row) else ""
 
@@ -206,15 +235,17 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
     return [(number, next(csv.reader([line], delimiter=delimiter))) for number, line in lines]
 
 
-def _columns(path: Path, line: int, header: list[str]) -> dict[str, tuple[int, float]]:
+def _columns(
+    path: Path, line: int, header: list[str], known: dict[str, dict[str, float]] = _COLUMNS
+) -> dict[str, tuple[int, float]]:
     """Index and unit factor of each known column."""
     found: dict[str, tuple[int, float]] = {}
     for index, title in enumerate(header):
         match = _HEADER.fullmatch(title)
         name = re.sub(r"\s+", "_", (match[1] if match else title).strip().lower())
-        if name not in _COLUMNS:
+        if name not in known:
             continue
-        units = _COLUMNS[name]
+        units = known[name]
         if not match or match[2] not in units:
             given = f"unit {match[2]!r} is not known" if match else "no unit is given"
             raise MaterialError(

@@ -98,7 +98,7 @@ def row_motion(rows, nodes, nodal, rate, area, area_rate):
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def _rubber_energy(c10, c01, c11, e):
+def _rubber_energy(c10, c01, c11, c20, c30, e):
     a = 1 + 2 * e[0]
     b = 1 + 2 * e[1]
     c = e[2]
@@ -108,6 +108,8 @@ def _rubber_energy(c10, c01, c11, e):
     h = (1 + (b * g * g - 2 * c * g * k + a * k * k)) / det
     i1 = (a + b - 2) + (h - 1)
     i2 = (det - 1) + (a + b) * h - g * g - k * k - 2
+    if c20 != 0.0 or c30 != 0.0:
+        return c10 * i1 + c01 * i2 + c11 * i1 * i2 + (c20 + c30 * i1) * i1 * i1
     return c10 * i1 + c01 * i2 + c11 * i1 * i2
 
 
@@ -143,6 +145,7 @@ def strain_energy(
                 density += 0.5 * stress[i] * strain[i]
             for l in range(points.shape[0]):
                 point_strain(points[l, 0], h, scales[l], strain, e)
-                density += points[l, 1] * h * _rubber_energy(constants[l, 0], constants[l, 1], constants[l, 2], e)
+                c = constants[l]
+                density += points[l, 1] * h * _rubber_energy(c[0], c[1], c[2], c[3], c[4], e)
             total += area[el, point] * density
     return total

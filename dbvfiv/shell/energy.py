@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..materials.incompressible import mooney_rivlin_energy
+from ..materials.incompressible import rubber_energy
 from ..materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, linear_elastic_energy
 from .assumed_strain import FACTORS, PAIRS, VECTORS
 from .reference import SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE, ReferenceGeometry, strain_map, thickness_over_radius
@@ -26,7 +26,7 @@ from .rotation import director
 from .section import Section
 
 FIRST_ORDER, TRUE_METRIC = "first-order", "true"
-_LAWS = {LINEAR_ELASTIC: linear_elastic_energy, MOONEY_RIVLIN: mooney_rivlin_energy}
+_LAWS = {LINEAR_ELASTIC: linear_elastic_energy, MOONEY_RIVLIN: rubber_energy}
 
 
 def section_arrays(section: Section, geometry: ReferenceGeometry, metric: str) -> dict:

@@ -1,4 +1,5 @@
-"""Stress and tangent of the incompressible Mooney-Rivlin law in plane stress, in closed form for compiled loops.
+"""Stress and tangent of incompressible rubbers in plane stress, in closed form for compiled loops: Mooney-Rivlin with
+C10, C01, C11, and powers of I1 - 3 by C20 and C30 (Yeoh).
 
 The law is defined by its energy in `dbvfiv.materials`; this is its first and second derivative with respect to [E11,
 E22, 2E12, 2E13, 2E23], checked against automatic differentiation of that energy.
@@ -34,25 +35,32 @@ def _deformation(c10, c01, c11, e):
     h2 = 2 * (h * c - g * k) * inv
     h3 = 2 * (b * g - c * k) * inv
     h4 = 2 * (a * k - c * g) * inv
-    return a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2
+    return a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2, i1
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def rubber_stress(c10, c01, c11, e, s):
+def rubber_stress(c10, c01, c11, c20, c30, e, s):
     """Fill the stress s (5,) for strains e (5,)."""
-    a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2 = _deformation(c10, c01, c11, e)
+    a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2, i1 = _deformation(c10, c01, c11, e)
     sum_ab = a + b
     s[0] = 2 * (w1 * (1 + h0) + w2 * (b + h + sum_ab * h0))
     s[1] = 2 * (w1 * (1 + h1) + w2 * (a + h + sum_ab * h1))
     s[2] = w1 * h2 + w2 * (sum_ab * h2 - 2 * c)
     s[3] = w1 * h3 + w2 * (sum_ab * h3 - 2 * g)
     s[4] = w1 * h4 + w2 * (sum_ab * h4 - 2 * k)
+    if c20 != 0.0 or c30 != 0.0:  # apart, so that the digits of the rubbers without them stay what they are
+        w = i1 * (2 * c20 + 3 * c30 * i1)
+        s[0] += 2 * w * (1 + h0)
+        s[1] += 2 * w * (1 + h1)
+        s[2] += w * h2
+        s[3] += w * h3
+        s[4] += w * h4
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def rubber_tangent(c10, c01, c11, e, s, t):
+def rubber_tangent(c10, c01, c11, c20, c30, e, s, t):
     """Fill stress s (5,) and the upper triangle of the tangent t (5, 5) for strains e (5,)."""
-    a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2 = _deformation(c10, c01, c11, e)
+    a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2, i1 = _deformation(c10, c01, c11, e)
     r = a + b
     d2 = -2 * c
     p0 = 1 + h0
@@ -99,3 +107,26 @@ def rubber_tangent(c10, c01, c11, e, s, t):
     t[3, 3] = w * h33 - 2 * w2 + 2 * c11 * h3 * q3
     t[3, 4] = w * h34 + c11 * (h3 * q4 + h4 * q3)
     t[4, 4] = w * h44 - 2 * w2 + 2 * c11 * h4 * q4
+    if c20 != 0.0 or c30 != 0.0:
+        w = i1 * (2 * c20 + 3 * c30 * i1)
+        v = 2 * c20 + 6 * c30 * i1
+        s[0] += 2 * w * p0
+        s[1] += 2 * w * p1
+        s[2] += w * h2
+        s[3] += w * h3
+        s[4] += w * h4
+        t[0, 0] += 4 * (w * h00 + v * p0 * p0)
+        t[0, 1] += 4 * (w * h01 + v * p0 * p1)
+        t[0, 2] += 2 * (w * h02 + v * p0 * h2)
+        t[0, 3] += 2 * (w * h03 + v * p0 * h3)
+        t[0, 4] += 2 * (w * h04 + v * p0 * h4)
+        t[1, 1] += 4 * (w * h11 + v * p1 * p1)
+        t[1, 2] += 2 * (w * h12 + v * p1 * h2)
+        t[1, 3] += 2 * (w * h13 + v * p1 * h3)
+        t[1, 4] += 2 * (w * h14 + v * p1 * h4)
+        t[2, 2] += w * h22 + v * h2 * h2
+        t[2, 3] += w * h23 + v * h2 * h3
+        t[2, 4] += w * h24 + v * h2 * h4
+        t[3, 3] += w * h33 + v * h3 * h3
+        t[3, 4] += w * h34 + v * h3 * h4
+        t[4, 4] += w * h44 + v * h4 * h4

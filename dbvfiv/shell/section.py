@@ -161,7 +161,7 @@ class Section:
         -------
         stiffness : (8, 8) array
             See `linear_stiffness`.
-        points, constants, scales : (k, 2), (k, 3), (k,) arrays
+        points, constants, scales : (k, 2), (k, 5), (k,) arrays
             See `rubber_points`.
         """
         if factors is None:
@@ -212,16 +212,16 @@ class Section:
         an incompressible material of shear modulus 2 (C10 + C01) does in plane stress.
         """
         total = self.linear_stiffness[:6, :6].copy()
-        for (zeta, weight), (c10, c01, _) in zip(*self.rubber_points[:2]):
+        for (zeta, weight), (c10, c01, *_) in zip(*self.rubber_points[:2]):
             rubber = 2 * (c10 + c01) * np.array([[4.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 1.0]])
             total += weight * np.kron(np.array([[1.0, zeta], [zeta, zeta**2]]), rubber)
         return total
 
     @cached_property
     def rubber_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points (k, 2), constants (k, 3) and shear scale (k,) of the points that carry rubber."""
+        """Points (k, 2), constants (k, 5) and shear scale (k,) of the points that carry rubber."""
         chosen = self.kinds == RUBBER
-        return self.points[chosen].copy(), self.parameters[chosen, :3].copy(), self.shear_scale[chosen].copy()
+        return self.points[chosen].copy(), self.parameters[chosen, :5].copy(), self.shear_scale[chosen].copy()
 
 
 def strain_rotation(c: float, s: float) -> np.ndarray:

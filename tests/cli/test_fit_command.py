@@ -39,6 +39,16 @@ def test_the_table_pasted_is_the_fit_from_the_case(command_line, tmp_path):
     assert [f["law"] for f in document["fits"]][-1] == "ogden" and document["loss_factor"] is None
 
 
+def test_a_yeoh_rubber_goes_from_its_tests_into_a_case(command_line, tmp_path):
+    outcome = command_line("fit", TRELOAR)  # the best that a wall takes
+    case = tmp_path / "my.toml"
+    case.write_text(outcome.out[outcome.out.index("[materials.rubber]") :])
+    law = law_from_card(load_case(case).materials.named["rubber"])
+    np.testing.assert_allclose(law.parameters[[0, 3, 4]] / 1e6, [0.183027, -1.41845e-3, 3.93471e-5], rtol=1e-5)
+    case.write_text("[materials.A]\nkind='yeoh'\nc10='-1 MPa'\ndensity=1300\n")
+    assert "materials.A" in command_line("case", str(case)).err
+
+
 def test_a_form_that_the_wall_lacks_is_said(command_line):
     outcome = command_line("fit", TRELOAR, "--law", "ogden", "--terms", "3")
     assert outcome.status == 0 and "# The wall has no law of the form ogden" in outcome.out

@@ -15,6 +15,7 @@ from dbvfiv.materials import (
     MaterialError,
     MooneyRivlin,
     OrthotropicPly,
+    Yeoh,
     energy_of,
     fibre_ply,
     rubber,
@@ -25,6 +26,7 @@ LAWS = {
     "SBR 10 %": rubber("SBR", 0.10),
     "CR 60 %": rubber("CR", 0.60),
     "neo-Hookean": MooneyRivlin.neo_hookean(1.1e6, 1300.0),
+    "Yeoh": Yeoh(0.3e6, -0.02e6, 0.01e6, 1300.0),
     "isotropic": IsotropicElastic(6e6, 0.49, 1300.0),
     "ply": fibre_ply(),
 }

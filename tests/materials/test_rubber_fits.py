@@ -16,6 +16,7 @@ from dbvfiv.materials.constrained import LEAST_MARGIN
 from dbvfiv.materials.fit_report import describe_fits
 from dbvfiv.materials.loading_cycles import loading_tests, read_tests
 from dbvfiv.materials.rubber_forms import MODES, THINNING, ogden_columns, ogden_slopes
+from dbvfiv.materials.stability import hill_margin
 from dbvfiv.materials.tension_test import read_curves
 
 TRELOAR = Path(__file__).parent / "treloar.csv"
@@ -173,6 +174,22 @@ def test_stable_holds_over_the_range_it_promises(which, seed, modes, far):
     assert fit.margin(states).min() > 0.5 * LEAST_MARGIN
     free = fit_rubber(tests, form)
     assert free.rms <= fit.rms * (1 + 1e-9)
+
+
+def test_the_fitted_law_of_a_wall_is_the_fit(treloar):
+    """Stress of thin sheets by the energy that the wall integrates, and its stability, against those of the fit."""
+    for name, terms in (("neo-hookean", 1), ("mooney-rivlin", 3), ("yeoh", 2), ("yeoh", 3)):
+        fit = fit_rubber(treloar, form_of(name, terms), "stable")
+        law = fit.law(1300.0)
+        assert law.small_strain_shear_modulus == pytest.approx(fit.shear_modulus, rel=1e-12)
+        across = {"uniaxial": lambda l: l**-0.5, "planar": lambda l: 1.0, "biaxial": lambda l: l}
+        for mode in MODES:
+            for stretch in (1.1, 1.8):
+                e = jnp.array([(stretch**2 - 1) / 2, (across[mode](stretch) ** 2 - 1) / 2, 0.0, 0.0, 0.0])
+                second = jax.grad(law.energy)(e)[0]
+                assert stretch * second == pytest.approx(fit.stress(mode, [stretch - 1])[0], rel=1e-10)
+        state = np.array([0.3, 0.1, -0.4])
+        assert hill_margin(law, state) == pytest.approx(fit.margin(state), rel=1e-12)
 
 
 def test_stable_and_non_negative_ogden():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.materials import IsotropicElastic, MooneyRivlin, OrthotropicPly
+from dbvfiv.materials import IsotropicElastic, MooneyRivlin, OrthotropicPly, Yeoh
 from dbvfiv.shell import Layer, Section, Shell
 from tests.shell.structures import random_state
 
@@ -40,6 +40,9 @@ def test_force_and_tangent_are_those_of_the_energy(mixed_shell, seed, stretch, t
 
 SECTIONS = {
     "rubber only": Section((Layer(MooneyRivlin(4e5, 1e5, 2e5, 1300.0), 0.012),), 3),
+    "Yeoh rubber": Section(
+        (Layer(Yeoh(4e5, -3e4, 2e4, 1300.0), 0.006), Layer(MooneyRivlin(4e5, 1e5, 2e5, 1300.0), 0.006)), 2
+    ),
     "ply only": Section((Layer(OrthotropicPly(25e6, 1e6, 0.25, 0.5e6, 0.5e6, 0.2e6, 1.0), 0.012, 30.0, 5 / 6),)),
     "one point a layer": Section(
         (Layer(IsotropicElastic(1e6, 0.3, 1.0), 0.004), Layer(MooneyRivlin(4e5, 0.0, 0.0, 1300.0), 0.008)), 1
