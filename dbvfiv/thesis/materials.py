@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..drawing.style import branch_looks, new_figure
+from ..materials.fit import uniaxial_stress
 from ..materials.halpin_tsai import ply_from_constituents
 from ..materials.rayleigh import rayleigh_constants
 from ..materials.rubbers import rubber, strain_levels
@@ -43,7 +44,7 @@ def rubber_curves(workshop: Workshop) -> Outcome:
             for level, look in zip(strain_levels(), branch_looks(4)):
                 stretch = np.linspace(1.0, 1.0 + level, 60)
                 for terms, dashes in ((3, "-"), (2, ":")):
-                    stress = nominal_tension(rubber(name, level, terms=terms), stretch) / 1e6
+                    stress = uniaxial_stress(rubber(name, level, terms=terms), stretch) / 1e6
                     label = f"{100 * level:g} %" if terms == 3 else None
                     axes.plot(100 * (stretch - 1), stress, dashes, color=look["color"], label=label)
             axes.set_title(name, loc="left")
@@ -58,16 +59,6 @@ def rubber_curves(workshop: Workshop) -> Outcome:
         "printed as a picture only, so nothing is compared in numbers."
     )
     return Outcome((told,), (), (picture("thesis-3-6", caption, draw),))
-
-
-def nominal_tension(law, stretch: np.ndarray) -> np.ndarray:
-    """Nominal stress of an incompressible Mooney-Rivlin solid in uniaxial tension, Pa.
-
-    2 (l - l^-2) (W1 + W2/l), W1 = C10 + C11 (I2 - 3), W2 = C01 + C11 (I1 - 3).
-    """
-    first, second = stretch**2 + 2 / stretch, 2 * stretch + stretch**-2
-    by_first, by_second = law.c10 + law.c11 * (second - 3), law.c01 + law.c11 * (first - 3)
-    return 2 * (stretch - stretch**-2) * (by_first + by_second / stretch)
 
 
 def ply_constants(workshop: Workshop) -> Outcome:

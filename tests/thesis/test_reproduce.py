@@ -7,9 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from dbvfiv.materials import MooneyRivlin
 from dbvfiv.thesis import ENTRIES, Number
-from dbvfiv.thesis.materials import nominal_tension
 from dbvfiv.thesis.openings import layup
 
 
@@ -27,20 +25,6 @@ def test_a_difference_is_relative_and_of_percentages_in_points():
     assert Number("gain", 15.0, 12.0, "%").difference == pytest.approx(0.03)
     assert Number("gain", 15.0, 12.0, "%").row[-1] == "+3.0 points"
     assert Number("area", 1.0).difference is None
-
-
-def test_tension_of_a_neo_hookean_bar():
-    """Nominal stress mu (l - 1/l^2), and by the derivative of the energy for three constants."""
-    stretch = np.linspace(1.0, 1.6, 7)
-    assert nominal_tension(MooneyRivlin(0.5, 0.0, 0.0, 1300.0), stretch) == pytest.approx(stretch - stretch**-2)
-    law = MooneyRivlin(-3.6, 3.8, 5.3, 1300.0)
-
-    def energy(l):
-        first, second = l**2 + 2 / l - 3, 2 * l + l**-2 - 3
-        return law.c10 * first + law.c01 * second + law.c11 * first * second
-
-    slope = np.imag(energy(stretch + 1e-30j)) / 1e-30
-    assert nominal_tension(law, stretch) == pytest.approx(slope, rel=1e-12)
 
 
 def test_layups_have_opposite_plies():
