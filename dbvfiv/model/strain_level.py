@@ -181,11 +181,12 @@ def tension_of(i1_minus_3: np.ndarray) -> np.ndarray:
     >>> round(float(tension_of(stretch**2 + 2 / stretch - 3)), 12)
     0.25
     """
-    i1 = 3.0 + np.maximum(i1_minus_3, 0.0)
+    excess = np.maximum(i1_minus_3, 0.0)
+    i1 = 3.0 + excess
     stretch = 2.0 * np.sqrt(i1 / 3.0) * np.cos(np.arccos(-((3.0 / i1) ** 1.5)) / 3.0)
-    strain = stretch - 1.0
-    for _ in range(2):  # the cosine loses half the digits near rest
-        rest = strain**2 * (3.0 + strain) / (1.0 + strain) - np.maximum(i1_minus_3, 0.0)
+    strain = np.where(excess < 1e-4, np.sqrt(excess / 3.0), stretch - 1.0)  # the cosine loses half the digits near rest
+    for _ in range(2):
+        rest = strain**2 * (3.0 + strain) / (1.0 + strain) - excess
         slope = 2.0 * (1.0 + strain) - 2.0 / (1.0 + strain) ** 2
         strain = strain - np.divide(rest, slope, out=np.zeros_like(rest), where=slope > 0)
     return np.maximum(strain, 0.0)

@@ -45,8 +45,7 @@ class PeriodicMemory:
     def __init__(self, shell: Shell, branches: Branches):
         self.shell, self.branches = shell, branches
         self.wall = WallMemory(shell, branches.strengths, branches.times)
-        none = shell.section.wall(np.zeros(len(shell.section.layers)))
-        self._none = none
+        self._none = shell.wall_of(np.zeros(len(shell.section.layers)))
         #: phi(s) of each group.
         self.filters = [BranchFilter(tuple(row), tuple(branches.times)) for row in branches.strengths]
 

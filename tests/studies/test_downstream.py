@@ -176,6 +176,7 @@ def test_walks_reach_states_against_a_pressure():
 KEYS = {"drive.pressure": 2e3, "fluid.density": 60.0, "damping.alpha": 0.0, "onset.coarse_mesh": 0}
 
 
+@pytest.mark.slow
 def test_onset_over_the_length_of_the_pipe():
     valve = load(PIPE, KEYS, FORMER)  # the mesh that has its onset at these lengths
     found = valve.onset("tail_length=0.2:60:4:log")

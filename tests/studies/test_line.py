@@ -96,6 +96,7 @@ def test_friction_moves_the_steady_state_with_the_length():
         assert walk.spectrum(there, 4).eigenvalues[0].real == pytest.approx(leading.growth_rate, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_onset_over_the_length_whether_or_not_the_steady_state_is_found_anew():
     keys = {"drive.pressure": 2e3, "fluid.density": 100.0, "damping.alpha": 0.0, "damping.beta": 1e-3}
     keys |= {"onset.coarse_mesh": 0, **FORMER}  # the mesh that has its onset at these lengths

@@ -160,6 +160,7 @@ def random_installation(rng) -> dict:
     return keys
 
 
+@pytest.mark.slow
 def test_a_hundred_random_installations():
     """None fails, and spectrum and independent count agree, or it is said."""
     rng, left_open, unstable = np.random.default_rng(11), [], 0

@@ -78,12 +78,12 @@ def test_sensitivities_are_slopes_of_the_eigenvalue():
         assert abs(sensitivity.derivative - slope) < 1e-4 * abs(slope)
 
 
-def test_an_onset_says_that_its_kind_is_not_known():
+def test_an_onset_has_a_kind_and_names_what_is_outside():
     changes = MESH | {"outside.fluid": "same", "drive.pressure": 6e3, "damping.beta": 0.003}
-    changes |= {"onset.over": "density=20:600:12:log", "onset.coarse_mesh": 0.0}
+    changes |= {"onset.over": "density=20:600:6:log", "onset.coarse_mesh": 0.0}
     found = dbvfiv.load(changes=changes).onset()
     assert found.points
-    assert all("higher derivatives of its added mass" in point["note"] for point in found.points if point["frequency"])
+    assert all(point["criticality"] in ("super", "sub") for point in found.points if point["frequency"])
     assert "with the same fluid outside, unbounded" in found.lines()[0]
     assert found.summary()["fixed"]["outside"] == "with the same fluid outside, unbounded"
 

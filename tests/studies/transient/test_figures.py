@@ -49,6 +49,7 @@ def test_figures_of_runs_say_clear_opening_and_static_pressure(run):
     assert "Static pressure, kPa" in texts(drawn["station-pressures"])
 
 
+@pytest.mark.slow
 def test_films_of_a_run_take_cycles_and_of_modes_a_mode(run, coarse_run, command_line, tmp_path, one_sentence):
     file, modes = run.path, coarse_run.states[0].modes(count=4, density=10, alpha=0)
     outcome = command_line("plot", file, "-o", tmp_path, "--only", "history", "--animate", 1)
