@@ -26,6 +26,9 @@ SMALL = (
 )
 LIGHT = ("--set", "drive.pressure=6 kPa", "--set", "fluid.density=75", "--set", "damping.alpha=0")
 
+#: What the slow test in a browser has besides.
+LEFT_OUT = [word for run in ("onset", "cycle", "closure") for word in ("--without", run)]
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
@@ -33,31 +36,18 @@ def made(tmp_path_factory):
     from dbvfiv.cli import run
 
     page = tmp_path_factory.mktemp("report") / "page.html"
-    arguments = ["report", *SMALL, *LIGHT, "--cells", "4", "--without", "closure", "-o", str(page)]
+    arguments = ["report", *SMALL, *LIGHT, "--cells", "4", *LEFT_OUT, "-o", str(page)]
     assert run(arguments) == 0
     return arguments, page
 
 
 def test_every_part_is_there(made):
     text = made[1].read_text()
-    for name in (
-        "valve",
-        "steady",
-        "modes",
-        "classes",
-        "damping",
-        "onset",
-        "map",
-        "cycle",
-        "closure",
-        "strains",
-        "case",
-    ):
+    for name in ("valve", "steady", "modes", "classes", "damping", "onset", "map", "closure", "strains", "case"):
         assert f'<section id="{name}">' in text
     assert "Unstable under quasi-steady continuity" in text
     assert "It was left out." in text
     assert "this installation" in text
-    assert re.search(r"An? (un)?stable limit cycle of [\d.]+ mm of each lip|limit cycle was followed to", text)
 
 
 def test_the_case_on_the_page_is_the_case(made, tmp_path):
@@ -94,7 +84,7 @@ def test_a_second_report_computes_nothing(made, command_line):
     arguments, page = made
     folder = page.with_suffix("")
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
-    assert set(before) == {f"dbv12-{run}.h5" for run in ("steady", "modes", "classes", "onset", "map", "cycle")}
+    assert set(before) == {f"dbv12-{run}.h5" for run in ("steady", "modes", "classes", "map")}
     outcome = command_line(*arguments, "--json")
     assert outcome.status == 0
     answers = json.loads(outcome.out)
@@ -102,7 +92,7 @@ def test_a_second_report_computes_nothing(made, command_line):
         "How far does it open, what flows?",
         "Does it vibrate?",
     ]
-    assert answers["missing"] == {"closure": "It was left out."}
+    assert answers["missing"] == dict.fromkeys(("onset", "cycle", "closure"), "It was left out.")
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
 

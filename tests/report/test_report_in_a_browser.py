@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 
 import pytest
@@ -49,6 +50,12 @@ def test_nothing_is_broken(browser):
     assert not severe, severe
     broken = browser.execute_script("return [...document.images].filter(i => !i.complete || !i.naturalWidth).length")
     assert broken == 0
+
+
+def test_the_cycle_is_told(browser):
+    text = browser.page_source
+    assert re.search(r"An? (un)?stable limit cycle of [\d.]+ mm of each lip|limit cycle was followed to", text)
+    assert '<section id="cycle">' in text and '<section id="onset">' in text
 
 
 def test_every_live_figure_is_drawn(browser):
