@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
 from ...drawing.axes import HALO, colour_bar, headline
+from ...drawing.layers import layer_panels
 from ...drawing.style import (
     ACCENT,
     COMPUTED,
-    MAGNITUDE,
     REST,
     UNSTABLE,
     new_figure,
@@ -21,7 +21,6 @@ from ...drawing.style import (
     phase_looks,
     pressure_colours,
 )
-from ...drawing.views import unrolled
 from ..stability.place import describe_fixed
 
 if TYPE_CHECKING:
@@ -213,27 +212,8 @@ def spectrum(result: CycleResult) -> Figure:
 
 def stress_range(result: CycleResult) -> Figure:
     """Largest range of a stress over a period of the last cycle, in each layer on the unrolled quarter."""
-    point, mesh = result.nearest(), result.mesh
-    arc, z = unrolled(mesh)
-    values = point.ranges.stress.T / 1e6
-    columns = min(3, len(values))
-    rows = -(-len(values) // columns)
-    figure = new_figure(3.2 * columns, 4.1 * rows + 0.4)
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for number, (axes, title, stress) in enumerate(zip(panels, mesh.layer_titles(), values)):
-        shape = (mesh.shape[1], mesh.shape[0])
-        image = axes.pcolormesh(arc * 1e3, z * 1e3, stress.reshape(shape), cmap=MAGNITUDE, vmin=0.0, rasterized=True)
-        colour_bar(figure, image, axes, "Range of stress, MPa", pad=0.03)
-        axes.set_title(f"{number + 1}  {title}", loc="left", fontsize=10)
-        axes.set_title(f"max {stress.max():.3g}", loc="right", fontsize=9)
-        axes.grid(False)
-        axes.tick_params(labelbottom=True, labelleft=True)
-        if number % columns == 0:
-            axes.set_ylabel("Distance from the lip z, mm")
-        if number + columns >= len(values):
-            axes.set_xlabel("Arc from the centre, mm")
-    for axes in panels[len(values) :]:
-        axes.set_visible(False)
+    point = result.nearest()
+    figure, _ = layer_panels(result.mesh, point.ranges.stress.T / 1e6, "Range of stress, MPa")
     headline(figure, f"Range of stress over a period, {_at(result, point)}")
     return figure
 
