@@ -11,7 +11,7 @@ from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.outside import OutsideCorrection
 from dbvfiv.studies.transient.run import Runner
 from tests.small_valves import make_valve
-from tests.studies.transient.test_runs import Stop, transient
+from tests.studies.transient.runs import Stop, transient
 from tests.verification.test_transient_modes import three_routes
 
 WATER = {"outside.fluid": "same", "fluid.density": 1000.0}

@@ -2,6 +2,7 @@
 
 import pytest
 
+from dbvfiv.studies.transient import keeping
 from tests.small_valves import make_valve
 
 
@@ -9,3 +10,9 @@ from tests.small_valves import make_valve
 def valve():
     """`valve({"fluid.density": 10})`: a coarse model with some keys changed."""
     return make_valve
+
+
+@pytest.fixture
+def all_restart_points(monkeypatch):
+    """Keep every restart point, however large."""
+    monkeypatch.setattr(keeping, "RESTART_SHARE", float("inf"))

@@ -12,9 +12,7 @@ from dbvfiv.studies.case import Case
 from dbvfiv.studies.transient.keeping import rows_to_keep
 from dbvfiv.studies.transient.tables import HISTORY, LINE, tables_of
 
-from .test_runs import SHORT, Stop, all_restart_points, transient
-
-__all__ = ["all_restart_points"]
+from .runs import SHORT, Stop, transient
 
 WAVES = {
     "upstream.length": 6.0,

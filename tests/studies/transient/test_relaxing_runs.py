@@ -16,9 +16,7 @@ from dbvfiv.studies.transient.keeping import rows_to_keep
 from dbvfiv.studies.transient.run import run_transient
 from dbvfiv.studies.transient.tables import HISTORY, MEMORY_COLUMNS, RELAXING, tables_of
 
-from .test_runs import SHORT, Stop, all_restart_points, transient
-
-__all__ = ["all_restart_points"]
+from .runs import SHORT, Stop, transient
 
 LOSSY = {"damping.model": "loss factor", "drive.pressure": 6e3, "fluid.density": 50.0}
 

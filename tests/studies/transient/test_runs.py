@@ -1,52 +1,19 @@
 """Whole runs: starts, drives, files, resuming, being killed, verdicts."""
 
-import os
-import signal
-import subprocess
-import sys
-import time
-from dataclasses import replace
-
-import h5py
 import numpy as np
 import pytest
 
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.errors import SolveError
-from dbvfiv.motion import stepper
 from dbvfiv.motion.drive import Drive
-from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.start import steady_positions
-from dbvfiv.record.header import Header
-from dbvfiv.record.journal import Journal
-from dbvfiv.record.mesh import MeshData
-from dbvfiv.record.part import RecordPart
-from dbvfiv.record.record import GrowingRecord, StoredRecord
-from dbvfiv.studies.case import Case, load_case
-from dbvfiv.studies.session import Session, load_result
-from dbvfiv.studies.transient import keeping
+from dbvfiv.studies.case import load_case
+from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient.assess import beyond_model
-from dbvfiv.studies.transient.keeping import rows_to_keep
-from dbvfiv.studies.transient.progress import Progress
-from dbvfiv.studies.transient.run import Runner, run_transient
-from dbvfiv.studies.transient.tables import HISTORY, RESTART, STATES, tables_of
+from dbvfiv.studies.transient.run import run_transient
 
-
-def transient(model, name="case", output=None, observer=None):
-    """A run of a model's case, as the command makes it."""
-    session = Session(model.case, name)
-    session.model = model
-    return session.perform("transient", output, observer)
-
-
-@pytest.fixture
-def all_restart_points(monkeypatch):
-    """Keep every restart point, however large."""
-    monkeypatch.setattr(keeping, "RESTART_SHARE", float("inf"))
-
-
-SHORT = {"transient.duration": 0.02, "transient.restart_every": 7, "transient.save_every": 0.005}
+from .runs import SHORT, transient
 
 
 def test_rest_start_opens_the_valve(valve):
@@ -170,187 +137,6 @@ def test_bad_drive_tables(tmp_path, valve, text, words):
         load_case(None, [f"transient.drive_table={table}"])
 
 
-def test_a_file_holds_the_run(tmp_path, valve):
-    model = valve(SHORT)
-    kept = transient(model, "small", tmp_path / "run.h5")
-    assert [state.time for state in kept.states] == pytest.approx([0, 0.005, 0.01, 0.015, 0.02])
-    result = load_result(tmp_path / "run.h5")
-    assert result.complete and result.kind == "transient" and result.case == model.case
-    assert all(np.array_equal(result.history[name], kept.history[name]) for name in kept.history)
-    assert [state.time for state in result.states] == pytest.approx([0, 0.005, 0.01, 0.015, 0.02])
-    lip = result.mesh.rows[0, 0]
-    assert result.states[-1].nodal[lip, 1] == result.history["lip_displacement"][-1]
-    assert result.states[2].nodal_rate[lip, 1] == result.history["lip_velocity"][10]
-    assert result.summary()["steps"] == 20 and result.summary()["decided"] is False
-    assert "lip opening" in "\n".join(result.lines())
-    export = result.export(tmp_path / "run.vtkhdf")
-    with h5py.File(export) as file:
-        assert file["VTKHDF/Steps/Values"][:] == pytest.approx([0, 0.005, 0.01, 0.015, 0.02])
-    # a state of it starts another run
-    again = run_transient(
-        type(model)(
-            model.case.replace(
-                {
-                    "transient.start": "state",
-                    "transient.start_file": str(tmp_path / "run.h5"),
-                    "transient.start_state": 2,
-                    "transient.duration": 0.002,
-                }
-            )
-        )
-    )
-    assert again.history["lip_displacement"][0] == result.history["lip_displacement"][10]
-    assert again.history["mass_flow"][0] == pytest.approx(result.history["mass_flow"][10], rel=1e-6)
-
-
-class Stop:
-    """An observer that interrupts after some steps."""
-
-    def __init__(self, after):
-        self.left = after
-
-    def item(self, row):
-        self.left -= 1
-        if self.left == 0:
-            raise KeyboardInterrupt
-
-    def __getattr__(self, name):
-        return lambda *arguments: None
-
-
-@pytest.mark.parametrize("adaptive", [False, True])
-def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive, all_restart_points):
-    # light fluid: the lips are slamming when it is interrupted
-    changes = SHORT | {
-        "transient.duration": 0.045,
-        "fluid.density": 1.2,
-        "damping.alpha": 0.0,
-        "drive.pressure": 6e3,
-        "transient.adaptive": adaptive,
-        "transient.step": 5e-4,
-        "transient.numerical_damping": 0.1,
-        "transient.local_error": 1e-4,
-    }
-    model = valve(changes)
-    whole = transient(model, output=tmp_path / "whole.h5")
-    assert whole.history["stops"].max() > 0
-    for after in (1, 66):
-        stopped = transient(model, output=tmp_path / "parts.h5", observer=Stop(after))
-        assert not stopped.complete and len(stopped.history["time"]) == after + 1
-        known = StoredRecord(tmp_path / "parts.h5", tables_of, Case)
-        assert rows_to_keep(known, model.case)[HISTORY] == 1 + 7 * (after // 7)
-        resumed = dbvfiv.resume(tmp_path / "parts.h5")
-        assert resumed.complete
-        for name in whole.history:
-            assert np.array_equal(resumed.history[name], whole.history[name]), name
-        assert [s.time for s in resumed.states] == [s.time for s in whole.states]
-        assert np.array_equal(resumed.states[-1].nodal, whole.states[-1].nodal)
-
-
-def test_a_finished_run_goes_on_to_a_later_end(tmp_path, valve):
-    path = tmp_path / "run.h5"
-    transient(valve(SHORT), output=path)
-    with pytest.raises(CaseError, match="has reached its end"):
-        dbvfiv.resume(path)
-    with pytest.raises(CaseError, match="has reached its end"):
-        dbvfiv.resume(path, duration=0.01)
-    assert load_result(path).complete
-    longer = dbvfiv.resume(path, duration=0.03)
-    assert longer.history["time"][-1] == pytest.approx(0.03) and longer.case.transient.duration == 0.03
-    assert load_result(path).complete
-
-
-def test_torn_restart_points_are_passed_over(tmp_path, valve, all_restart_points):
-    path = tmp_path / "run.h5"
-    whole = transient(valve(SHORT), output=path)
-    steps = StoredRecord(path, tables_of, Case).column(RESTART, "steps")
-    assert list(steps) == [0, 7, 14, 20]
-    with h5py.File(path, "r+") as file:
-        file["tables/restart/#"][-1] = 0  # its last row did not arrive whole
-        file["tables/history/#"].resize(14, axis=0)  # nor did the rows that the one before stands upon
-        file["log"].resize(0, axis=0)
-    known = StoredRecord(path, tables_of, Case)
-    assert rows_to_keep(known, whole.case) == {HISTORY: 8, STATES: 2, RESTART: 2}
-    resumed = dbvfiv.resume(path)
-    assert all(np.array_equal(resumed.history[name], whole.history[name]) for name in whole.history)
-
-
-def test_a_resume_that_dies_at_once_leaves_the_file_as_it_was(tmp_path, valve, monkeypatch):
-    path = tmp_path / "run.h5"
-    transient(valve(SHORT), output=path, observer=Stop(9))
-    before = path.read_bytes()
-
-    def die(self, documents):
-        raise OSError("The machine goes down.")
-
-    with monkeypatch.context() as patched:
-        patched.setattr(Journal, "write_log", die)  # when the rows are copied
-        with pytest.raises(OSError, match="goes down"):
-            dbvfiv.resume(path)
-    assert path.read_bytes() == before and [file.name for file in tmp_path.iterdir()] == ["run.h5"]
-    assert dbvfiv.resume(path).complete
-
-
-def test_restart_points_take_little_of_the_file(tmp_path, valve, monkeypatch):
-    changes = {"transient.duration": 0.3, "transient.restart_every": 7, "transient.step": 5e-4}
-    transient(valve(changes), output=tmp_path / "run.h5")
-    record = StoredRecord(tmp_path / "run.h5", tables_of, Case)
-    sizes = {table.name: keeping.row_bytes(table) * record.rows(table.name) for table in record.tables.values()}
-    first_and_last = 2 * keeping.row_bytes(record.tables[RESTART])
-    assert sizes[RESTART] - first_and_last <= keeping.RESTART_SHARE * (sizes[HISTORY] + sizes[STATES])
-    assert 2 < record.rows(RESTART) < 601 // 7
-    # but no more than so many seconds of work may be lost
-    monkeypatch.setattr(keeping, "RESTART_SECONDS", 0.0)
-    monkeypatch.setattr(keeping, "RESTART_LOSS", 0.0)
-    transient(valve(changes), output=tmp_path / "run.h5")
-    assert StoredRecord(tmp_path / "run.h5", tables_of, Case).rows(RESTART) == 2 + 600 // 7
-
-
-def test_a_run_that_fails_keeps_everything_and_says_where(tmp_path, valve, monkeypatch):
-    step = stepper.Stepper.step
-
-    def refuse(self, state, h):
-        if state.time > 0.0105:
-            raise stepper.StepFailure("Nothing helps.")
-        return step(self, state, h)
-
-    monkeypatch.setattr(stepper.Stepper, "step", refuse)
-    result = transient(valve(SHORT), output=tmp_path / "run.h5")
-    assert len(result.failures) == 1
-    assert "No step was found from 0.011 s on, after 11 steps" in result.failures[0]
-    kept = load_result(tmp_path / "run.h5")
-    assert kept.failures == result.failures and not kept.complete
-    assert kept.history["time"][-1] == pytest.approx(0.011)
-    monkeypatch.undo()
-    assert dbvfiv.resume(tmp_path / "run.h5").complete  # with better luck
-
-
-def test_a_run_that_fails_or_is_interrupted_at_once_can_be_read_and_resumed(
-    tmp_path, valve, monkeypatch, command_line, one_sentence
-):
-    path = tmp_path / "run.h5"
-
-    def refuse(self, state, h):
-        raise stepper.StepFailure("Nothing helps.")
-
-    def interrupt(self, state, h):
-        raise KeyboardInterrupt
-
-    whole = transient(valve(SHORT))
-    for step, failures in ((refuse, 1), (interrupt, 0)):
-        with monkeypatch.context() as patched:
-            patched.setattr(stepper.Stepper, "step", step)
-            result = transient(valve(SHORT), output=path)
-        assert len(result.failures) == failures and not result.complete and result.interrupted == (not failures)
-        assert result.summary()["verdict"] == "undecided" and not result.drawable
-        assert command_line("info", path).status == 0
-        for arguments in (["plot", path, "--animate", 1], ["compare", path], ["verdict", path]):
-            outcome = command_line(*arguments)
-            assert outcome.status == 2 and one_sentence(outcome.err), outcome.err
-        resumed = dbvfiv.resume(path)
-        assert resumed.complete and np.array_equal(resumed.history["mass_flow"], whole.history["mass_flow"])
-
-
 @pytest.mark.parametrize("start", ["rest", "steady", "kick"])
 @pytest.mark.parametrize("law", ["quasi-steady", "storage"])
 def test_a_valve_without_pressure_stays_as_it_is(tmp_path, valve, command_line, start, law):
@@ -376,33 +162,6 @@ def test_the_verdict_ends_the_run(valve):
     )
     run = run_transient(model)
     assert run.stopped and run.verdict.name == "steady" and run.progress.state.time < 4.0
-
-
-def test_a_resumed_run_is_ended_by_the_same_verdict(tmp_path, valve, all_restart_points):
-    changes = {
-        "transient.duration": 5.0,
-        "transient.stop_when": ["steady"],
-        "transient.numerical_damping": 0.1,
-        "transient.restart_every": 50,
-        "transient.step": 5e-3,
-        "drive.pressure": 6e3,
-        "transient.start": "kick",
-        "damping.alpha": 5.0,
-        "transient.kick_opening": 1e-6,
-    }
-    model = valve(changes)
-    whole = transient(model)
-    assert whole.stopped and whole.complete
-    judged = whole.record.notes("verdict")
-    first = next(note["steps"] for note in judged if note["decided"])
-    end = len(whole.history["time"]) - 1
-    assert first < end
-    transient(model, output=tmp_path / "run.h5", observer=Stop((first + end) // 2))
-    resumed = dbvfiv.resume(tmp_path / "run.h5")
-    assert resumed.stopped and np.array_equal(resumed.history["time"], whole.history["time"])
-    with pytest.raises(CaseError, match="was ended by its verdict"):
-        dbvfiv.resume(tmp_path / "run.h5")
-    assert load_result(tmp_path / "run.h5").complete
 
 
 def test_staggered_coupling_reaches_the_same_state(valve):
@@ -440,25 +199,6 @@ def test_impossible_starts(tmp_path, valve):
         run_transient(type(valve())(case.replace({"transient.start_state": 77})))
 
 
-def test_progress_and_history_go_through_a_file_unchanged(tmp_path, valve):
-    model, path = valve(), tmp_path / "run.h5"
-    mesh = MeshData.of(model)
-    with GrowingRecord(Header.of("transient", model.case), mesh, tables_of(mesh), path) as record:
-        run = Runner(model, replace(RunOptions.of(model.case), duration=0.003), record).start()
-    stored = StoredRecord(path, tables_of, Case)
-    again = Progress.read(stored)
-    assert all(np.array_equal(v, getattr(again.state, name)) for name, v in vars(run.progress.state).items())
-    left, right = ({n: v for n, v in vars(p).items() if n != "state"} for p in (again, run.progress))
-    assert np.isnan([left.pop("eigenvalue"), right.pop("eigenvalue")]).all()
-    assert left == right
-    part = RecordPart(stored, {HISTORY: 2})
-    assert (part.rows(HISTORY), part.rows(STATES)) == (2, stored.rows(STATES)) and part.log == stored.log
-    assert np.array_equal(part.column(HISTORY, "station_area"), run.history["station_area"][:2])
-    assert part.value(HISTORY, "time", -1) == run.history["time"][1]
-    with pytest.raises(IndexError):
-        part.value(HISTORY, "time", 2)
-
-
 def test_the_python_interface_runs_and_resumes(tmp_path):
     small = dbvfiv.load(changes={"mesh.around": 4, "mesh.along": 6, "transient.step": "2 ms"})
     path = tmp_path / "run.h5"
@@ -471,56 +211,6 @@ def test_the_python_interface_runs_and_resumes(tmp_path):
     small.steady([6e3], output=states)
     with pytest.raises(CaseError, match="kind 'steady'"):
         dbvfiv.resume(states, duration=1.0)
-
-
-@pytest.mark.slow
-def test_killed_with_signal_9_at_any_moment(tmp_path, valve):
-    """The file can be read and resumed whenever its writer dies, and loses no more than the steps since the last
-    restart point.
-    """
-    changes = [
-        "mesh.around=6",
-        "mesh.along=8",
-        "transient.duration=0.3",
-        "transient.step=5e-4",
-        "transient.save_every=0.002",
-        "transient.restart_every=7",
-    ]
-    case = valve(
-        {"transient.duration": 0.3, "transient.step": 5e-4, "transient.save_every": 0.002, "transient.restart_every": 7}
-    )
-    whole = transient(case)
-    path = tmp_path / "killed.h5"
-    command = [sys.executable, "-m", "dbvfiv", "transient", "-o", str(path)] + [
-        w for c in changes for w in ("--set", c)
-    ]
-    rng = np.random.default_rng(0)
-    found = []
-    for wait in [0.0, 0.02, *rng.uniform(0.1, 6.0, 5)]:
-        path.unlink(missing_ok=True)
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        while not (path.exists() and path.stat().st_size):  # an empty file holds the name before
-            assert process.poll() is None
-            time.sleep(0.005)
-        time.sleep(wait)
-        if process.poll() is not None:  # it was through before it could be killed
-            found.append(601)
-            continue
-        os.kill(process.pid, signal.SIGKILL)
-        process.wait()
-        known = StoredRecord(path, tables_of, Case)
-        # none if it died before the first restart point, all if it had only to leave
-        rows = 601 if known.complete else rows_to_keep(known, case.case)[HISTORY]
-        if rows:
-            read = load_result(path)
-            assert len(read.history["time"]) >= rows
-            assert np.array_equal(read.history["lip_displacement"][:rows], whole.history["lip_displacement"][:rows])
-        found.append(rows)
-        if rows < 601:
-            resumed = dbvfiv.resume(path)
-            assert all(np.array_equal(resumed.history[name], whole.history[name]) for name in whole.history)
-    assert len(set(found)) >= 3
-    assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
 
 
 def test_pressures_below_vacuum_are_told():
@@ -542,10 +232,3 @@ def test_a_valve_without_pressure_rests(valve, tmp_path):
     assert not kept.failures and kept.verdict["verdict"] != "growing"
     assert np.abs(kept.history["lip_displacement"]).max() < 1e-12
     assert load_result(tmp_path / "run.h5").lines()
-
-
-def test_a_run_without_a_step_can_be_read(valve, tmp_path):
-    hard = {"drive.pressure": 1e7, "transient.step": 0.5, "transient.duration": 1.0, "transient.smallest_step": 1.0}
-    kept = transient(valve(hard), "stuck", tmp_path / "run.h5")
-    assert kept.failures and kept.verdict["verdict"] == "undecided" and "No step" in kept.verdict["reason"]
-    assert load_result(tmp_path / "run.h5").lines() == kept.lines()

@@ -1,0 +1,112 @@
+"""Onset curves of stability maps: through the onsets of the columns, neutral, whole, or said to be not."""
+
+import numpy as np
+import pytest
+
+from dbvfiv.studies.map.column import MapColumn, MapPlan
+from dbvfiv.studies.map.curves import linked
+from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.stability.walk import StabilityWalk
+
+AXES = {
+    "map.x": "pressure=1000:12000:6",
+    "map.y": "density=1:1000:10:log",
+    "map.curve": False,
+    "map.refine": 1,
+    "map.checks": 3,
+}
+
+
+@pytest.fixture(scope="module")
+def case(coarse_case):
+    return coarse_case.replace(AXES)
+
+
+@pytest.fixture(scope="module")
+def whole(case):
+    return run_map(case)
+
+
+def test_linked_curves_go_through_all_onsets(whole):
+    curves = linked(whole.plan, whole.columns)
+    assert sum(len(curve.x) for curve in curves) == sum(len(column.onsets) for column in whole.columns)
+
+
+def test_linked_tongue_is_one_curve(case):
+    plan = MapPlan.of(case)
+    width = {2000.0: 0.1, 3000.0: 0.15, 4000.0: 0.1}
+    columns = []
+    for value in (1000.0, 2000.0, 3000.0, 4000.0, 5000.0):
+        half = width.get(value)
+        middle = 0.5
+        onsets = (
+            []
+            if half is None
+            else [
+                (0, plan.value(plan.y, middle + d), f, way, 0.0) for d, f, way in ((-half, 30.0, 1), (half, 31.0, -1))
+            ]
+        )
+        columns.append(MapColumn(value, 0, {}, np.array(onsets, float).reshape(-1, 5), 0.0))
+    (curve,) = linked(plan, tuple(columns))
+    assert len(curve.x) == 7 and curve.points()[0] == curve.points()[-1], "a tongue is closed"
+    assert not curve.exact and "not known between" in curve.reason
+
+
+@pytest.fixture(scope="module")
+def traced(coarse_case):
+    """Both laws, lightly damped, with exact curves."""
+    axes = {"map.x": "pressure=1000:12000:8", "map.y": "density=1:1000:10:log", "map.curve": True, "map.checks": 0}
+    return run_map(coarse_case.replace(axes | {"map.continuity": "both", "damping.beta": 0.001}))
+
+
+def test_curves_are_neutral_by_the_full_pencil(traced, coarse_case):
+    walk = StabilityWalk(traced.plan.case)
+    assert len(traced.curves) >= 2 and all(curve.exact and curve.mismatch < 1e-6 for curve in traced.curves)
+    for curve in traced.curves:
+        for i in (0, len(curve.x) // 3, len(curve.x) - 1):
+            place = traced.plan.place(curve.x[i], curve.y[i], traced.plan.laws[curve.law])
+            values = walk.spectrum(place).eigenvalues
+            nearest = values[np.argmin(np.abs(values - 2j * np.pi * curve.frequency[i]))]
+            assert abs(nearest.real) < 1e-6 * abs(nearest)
+
+
+def test_exact_curves_end_at_the_edges_of_the_map_or_close(traced):
+    for curve in traced.curves:
+        unit = np.column_stack([np.log(curve.y) / np.log(1000), (curve.x - 1000) / 11000])
+        for end in (unit[0], unit[-1]):
+            assert np.min([end, 1 - end]) < 0.0101 or np.allclose(unit[0], unit[-1])
+        assert np.hypot(*np.diff(unit, axis=0).T).max() < 0.25
+
+
+def test_columns_put_in_certify_what_onsets_lie_between_and_nothing_else(traced):
+    along = np.array(traced.plan.along.values)
+    put_in = [column for column in traced.columns if column.level > 0]
+    assert put_in
+    for column in put_in:
+        for law in range(2):
+            certified = np.flatnonzero(column.cells["certified"][law])
+            onsets = [row[1] for row in column.onsets if int(row[0]) == law]
+            beside = {i for value in onsets for i in (np.searchsorted(along, value) - 1, np.searchsorted(along, value))}
+            assert set(certified) == beside
+            counted = column.cells["counted"][law]
+            assert (counted[certified] == column.cells["unstable"][law][certified]).all()
+            assert (np.delete(counted, certified) == -1).all()
+
+
+def test_a_column_is_put_in_under_the_law_that_asks_for_it(coarse_case):
+    """Under the quasi-steady law no curve needs more than the grid where the other one has a tip."""
+    axes = {"map.x": "pressure=6000:30000:4", "map.y": "density=1:1000:8:log", "map.checks": 0}
+    result = run_map(coarse_case.replace(axes | {"map.continuity": "both", "damping.beta": 0.001}))
+    put_in = [column for column in result.columns if column.level > 0]
+    assert any(column.has(0) != column.has(1) for column in put_in)
+    for column in put_in:
+        for law in (0, 1):
+            assert column.has(law) == np.isfinite(column.cells["growth_rate"][law]).all()
+    assert all(curve.exact for curve in result.curves)
+
+
+def test_a_curve_that_is_not_followed_says_so(case, monkeypatch):
+    monkeypatch.setattr("dbvfiv.studies.map.run.ROUNDS", 0)
+    result = run_map(case.replace({"map.curve": True, "map.refine": 0, "map.checks": 0}))
+    assert result.curves and not any(curve.exact for curve in result.curves)
+    assert all(any(f"= {curve.x[0]:.6g}" in sentence for sentence in result.warnings) for curve in result.curves)
