@@ -5,11 +5,37 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, StrictBool, ValidationInfo, field_validator, model_validator
 
+from .described import Described
 from .parameters import PARAMETERS
 from .quantity import GRAVITY, Density, Number, Pressure, Quantity, Stiffness
 from .section import BrokenRule, Section, key
+
+#: Viscosities by name, Pa s, at 20 degC: water at 0.1 MPa (IAPWS R12-08), dry air at 0.1 MPa (Lemmon & Jacobsen 2004).
+VISCOSITIES = {"none": 0.0, "water": 1.0016e-3, "air": 1.813e-5}
+#: That of glycerol and of the heaviest sludges.
+_THICKEST = 10.0
+
+
+def _viscosity(given: Any) -> float | str:
+    if isinstance(given, str) and given.strip() in VISCOSITIES:
+        return given.strip()
+    if isinstance(given, str) and given.strip().isalpha():
+        raise ValueError("which is no word that is known here")
+    value = Quantity("Pa s", "mPa s").parse(given)
+    if not 0.0 < value <= _THICKEST:
+        raise ValueError("which is out of range")
+    return value
+
+
+Viscosity = Annotated[
+    float | str,
+    BeforeValidator(_viscosity),
+    Described(
+        "choice or viscosity", f'"none", "water", "air" or a viscosity greater than 0 and at most {_THICKEST:g} Pa s'
+    ),
+]
 
 #: A pressure that loads the valve: above zero, and within what the parameter may be.
 LoadPressure = Annotated[Pressure, Field(**PARAMETERS["pressure"].limits)]
@@ -43,9 +69,20 @@ class Fluid(Section):
         "volume under moving walls and is what predictions should rest on; new case files have it.",
     )
     unsteady: StrictBool = key(True, "Keep the unsteady term of Bernoulli's equation.")
+    viscosity: Viscosity = key(
+        "none",
+        "Viscosity of the fluid, which then loses head to the walls of the passage, laminar in narrow gaps and "
+        "turbulent in wide ones: none (the thesis), water (1.0016 mPa s) or air (0.01813 mPa s), both at 20 degC, or "
+        "a number.",
+    )
     area_floor: Number = key(
         0.05, "Smallest flow area, as a fraction of the lip gap area at rest; keeps a shut passage finite.", gt=0, lt=1
     )
+
+    @property
+    def dynamic_viscosity(self) -> float:
+        """Viscosity, Pa s; 0 without any."""
+        return VISCOSITIES.get(self.viscosity, self.viscosity)
 
 
 class Drive(Section):

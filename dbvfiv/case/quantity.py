@@ -38,6 +38,7 @@ DIMENSION = {
     "m^3/s": "volume flow",
     "kg/s": "mass flow",
     "deg": "angle",
+    "Pa s": "viscosity",
     "": "plain number",
 }
 _A = {si: f"{'an' if name[0] in 'aeiou' else 'a'} {name}" for si, name in DIMENSION.items()}

@@ -17,10 +17,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from . import derivatives
 from .heads import outward_head, reversible_head
 from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
 from .reversed import ReversibleFluid
-from .term import FlowTerm, Stream
+from .term import VISCOSITY, FlowTerm, Stream
 
 
 class Channel(FlowLaw):
@@ -46,15 +47,19 @@ class Channel(FlowLaw):
         in `levels_outside`. The levels keep their places, as the stations do.
     reversible : bool
         Let flow that is drawn in lose its head; see `dbvfiv.flow.heads`. Small motions of an outward flow are the same.
+    perimeter : (m,) array, optional
+        Arcs of the wall that the fluid wets, m; terms of a viscous fluid need them.
+    density : float, kg/m3
+        Of the fluid that equilibria are found with.
 
     Raises
     ------
     ValueError
-        If the positions do not increase, two terms share the name of a parameter, or heads and momenta do not go with
-        the square of the speeds and the speeds.
+        If the positions do not increase, two terms share the name of a parameter, or heads and momenta of a fluid
+        without viscosity do not go with the square of the speeds and the speeds.
     """
 
-    DATA = ("step", "floor", "terms", "back", "static")
+    DATA = ("step", "floor", "terms", "back", "static", "perimeter")
     STATIC = ("unsteady", "reversible")
     inner_names = ("inlet velocity",)
 
@@ -69,6 +74,8 @@ class Channel(FlowLaw):
         back: float = 0.0,
         levels: np.ndarray | None = None,
         levels_outside: np.ndarray | None = None,
+        perimeter: np.ndarray | None = None,
+        density: float = 1.0,
     ):
         self.z = np.asarray(z, float)
         self.step = np.diff(self.z)
@@ -81,6 +88,7 @@ class Channel(FlowLaw):
         self.level, self.static = float(inside[-1] - inside[0]), inside - inside[0] - (outside - outside[0])
         self.back = float(back) + self.level
         self.unsteady, self.reversible = bool(unsteady), bool(reversible)
+        self.perimeter, self.density = none if perimeter is None else np.asarray(perimeter, float), float(density)
         self.terms = tuple(terms)
         self._check_terms()
 
@@ -91,6 +99,8 @@ class Channel(FlowLaw):
             raise ValueError(f"Two parts of the flow have a parameter '{twice[0]}'.")
         parameters = self.values({"inlet": 0.0, "density": 1.0})
         for term in self.losses:
+            if term.viscous:
+                continue
             for sign in (1.0, -1.0):
                 (head, momentum), (more_head, more_momentum) = (
                     [np.asarray(part(_trial(self.count, size), parameters)) for part in (term.head, term.momentum)]
@@ -110,6 +120,15 @@ class Channel(FlowLaw):
     def losses(self) -> tuple[FlowTerm, ...]:
         """Terms that steady flow sees."""
         return tuple(term for term in self.terms if not term.drives)
+
+    @property
+    def viscous(self) -> bool:
+        """Whether the fluid has a viscosity, so that steady flow depends on its density."""
+        return any(term.viscous for term in self.terms)
+
+    def at_unit_density(self) -> dict[str, float]:
+        viscosity = next((term.viscosity for term in self.terms if term.viscous), None)
+        return {} if viscosity is None else {VISCOSITY: viscosity / np.sqrt(self.density)}
 
     @property
     def parameters(self) -> tuple[FlowParameter, ...]:
@@ -149,7 +168,7 @@ class Channel(FlowLaw):
 
     def stream(self, area, area_rate, speed, inner) -> Stream:
         """The streamline as terms see it; traceable."""
-        return Stream(area, area_rate, speed, inner, above_floor(area, self.floor))
+        return Stream(area, area_rate, speed, inner, above_floor(area, self.floor), self.perimeter, self.step)
 
     def term_heads(self, stream: Stream, parameters, terms: Sequence[FlowTerm] | None = None):
         """Heads (m,) that the terms, or some of them, add; traceable."""
@@ -182,10 +201,13 @@ class Channel(FlowLaw):
         return jnp.sqrt(2.0 * jnp.abs(parameters["inlet"] - self.back) / (parameters["density"] * ratio))[None] + 1e-3
 
     def steady(self, area, parameters):
-        """Bernoulli's pressures, which depend on ratios of areas only; heads go with the square of the discharge.
+        """Bernoulli's pressures, which depend on ratios of areas only; heads go with the square of the discharge. The
+        flow of a viscous fluid is searched for.
 
         An inlet velocity that no pressure holds back is infinite.
         """
+        if self.viscous:
+            return derivatives.solve_steady(self._without_drives(), area, parameters)
         open_ = above_floor(area, self.floor)
         total = open_**-2.0
         still = jnp.zeros_like(area)
@@ -198,6 +220,12 @@ class Channel(FlowLaw):
         pressure = inlet * (total[0] - total) / (total[0] - kinetic) + self.static
         speed = jnp.sqrt(2.0 * inlet / (parameters["density"] * jnp.where(ratio > 0, ratio, 1.0)))
         return pressure, jnp.where(ratio > 0, speed, jnp.inf)[None]
+
+    def _without_drives(self) -> Channel:
+        """The same channel with the terms that steady flow sees."""
+        leaves, kept = self._flatten()
+        leaves[self.DATA.index("terms")] = self.losses
+        return self._unflatten(kept, leaves)
 
     def stepping(self, density: float) -> ReversibleFluid:
         """Evaluators for time steps, in which the flow may run either way."""

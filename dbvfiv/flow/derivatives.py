@@ -55,6 +55,13 @@ def steady_operator(law, area, parameters):
 
 
 @jax.jit
+def steady_slope(law, area, parameters):
+    """Derivative (m,) of the steady pressures by the inlet pressure."""
+    inlet = parameters["inlet"]
+    return jax.jacfwd(lambda p: law.steady(area, parameters | {"inlet": p})[0])(inlet)
+
+
+@jax.jit
 def steady_form(law, area, parameters, directions):
     """Derivative (m,) of the steady pressures along all of a tuple of directions (m,)."""
     return along(lambda x: law.steady(x, parameters)[0], *directions)(area)

@@ -196,7 +196,7 @@ class LineChannel(FlowLaw):
 
     def __init__(self, channel: Channel, rigid: Channel, line: ElasticLine):
         self.channel, self.rigid, self.line = channel, rigid, line
-        self.floor = channel.floor
+        self.floor, self.density = channel.floor, channel.density
 
     @property
     def count(self) -> int:
@@ -235,6 +235,9 @@ class LineChannel(FlowLaw):
     def parameters(self) -> tuple[FlowParameter, ...]:
         own = FlowParameter("wave_speed", "m/s", "of the line in front", self.line.wave_speed)
         return (*self.rigid.parameters, own)
+
+    def at_unit_density(self) -> dict[str, float]:
+        return self.rigid.at_unit_density()
 
     def resolved(self, given) -> float:
         """Frequency up to which the elements resolve waves, Hz, under given parameters."""

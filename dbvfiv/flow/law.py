@@ -153,6 +153,8 @@ class FlowLaw(Traceable, ABC):
     unsteady : bool
         Whether rates matter; without, the steady law holds at every instant and the inner unknowns follow from the
         passage.
+    density : float
+        Of the fluid that equilibria are found with, kg/m3; it matters only to those of a viscous fluid.
     """
 
     inner_names: ClassVar[tuple[str, ...]] = ()
@@ -162,6 +164,7 @@ class FlowLaw(Traceable, ABC):
     static: Any = 0.0
     has_fluid: bool = True
     unsteady: bool = True
+    density: float = 1.0
 
     @property
     @abstractmethod
@@ -239,7 +242,9 @@ class FlowLaw(Traceable, ABC):
     # ----
 
     def steady_pressure(self, area: np.ndarray, inlet: float) -> np.ndarray:
-        """Pressures (m,), Pa, of steady flow driven by the inlet pressure, Pa; independent of the fluid's density."""
+        """Pressures (m,), Pa, of steady flow driven by the inlet pressure, Pa; independent of the density of a fluid
+        without viscosity.
+        """
         return np.asarray(derivatives.steady_pressure(self, area, self._driven(inlet)))
 
     def steady_operator(self, area: np.ndarray, inlet: float) -> tuple[np.ndarray, np.ndarray]:
@@ -255,9 +260,19 @@ class FlowLaw(Traceable, ABC):
         """Third directional derivative (m,) of the steady pressures."""
         return np.asarray(derivatives.steady_form(self, area, self._driven(inlet), (a, b, c)))
 
+    def steady_slope(self, area: np.ndarray, inlet: float) -> np.ndarray:
+        """Derivative (m,) of the steady pressures by the inlet pressure."""
+        return np.asarray(derivatives.steady_slope(self, area, self._driven(inlet)))
+
     def _driven(self, inlet: float) -> dict[str, float]:
-        """Parameters for steady pressures: no law's equilibria depend on density."""
-        return self.values({"inlet": inlet, "density": 1.0})
+        """Parameters for steady pressures."""
+        return self.values({"inlet": inlet, "density": self.density})
+
+    def at_unit_density(self) -> dict[str, float]:
+        """Parameters with which a fluid of unit density has the pressures of the own one, at speeds that are larger by
+        the root of its density; but for the compressibility of a line.
+        """
+        return {}
 
     def steady_inner(self, area: np.ndarray, given: Mapping[str, float]) -> np.ndarray:
         """Inner unknowns (l,) of the steady flow under given parameters."""

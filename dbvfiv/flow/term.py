@@ -6,6 +6,9 @@ from typing import Any, ClassVar, NamedTuple
 
 from .law import FlowParameter, Traceable
 
+#: Name of the parameter that a viscous term has, Pa s.
+VISCOSITY = "viscosity"
+
 
 class Stream(NamedTuple):
     """The streamline as a term sees it.
@@ -21,6 +24,10 @@ class Stream(NamedTuple):
     open_area : (m,) array, optional
         Areas that the fluid sees, m2: they stay above the floor of the channel, so that `open_area * speed` is the
         discharge.
+    perimeter : (m,) array, optional
+        Arcs of the wall that the fluid wets, m, of the same part of the section as the areas.
+    step : (m-1,) array, optional
+        Distances of the stations, m.
     """
 
     area: Any
@@ -28,6 +35,8 @@ class Stream(NamedTuple):
     speed: Any
     inner: Any
     open_area: Any = None
+    perimeter: Any = None
+    step: Any = None
 
 
 class FlowTerm(Traceable):
@@ -42,9 +51,12 @@ class FlowTerm(Traceable):
     drives : bool
         Whether its head is what the driving pressure of a steady state changes by when the flow does, as that of a
         pump: it vanishes in steady flow, then, and need not go with the square of the speeds.
+    viscous : bool
+        Whether its head depends on the Reynolds number; equilibria depend on the density of the fluid then.
     """
 
     drives: ClassVar[bool] = False
+    viscous: ClassVar[bool] = False
 
     @property
     def parameters(self) -> tuple[FlowParameter, ...]:

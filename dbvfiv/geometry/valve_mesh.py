@@ -43,6 +43,9 @@ class ValveMesh:
         nodes.
     wall_deduction : (rows,) array, m2
         Area taken by the wall (Th. 4.12-4.14), less the initial gap.
+    perimeter : (rows,) array, m
+        Arc of the inner face. A face inside a section of length L that turns by a right angle and takes the area T off
+        it has the length (L^2 - pi T)^(1/2) (Steiner).
     missed_rows, missed_columns : arrays
         Breaks, in m and in the parameter of the grading, inside elements because there are too few of them.
     """
@@ -57,6 +60,7 @@ class ValveMesh:
     element_columns: np.ndarray
     rest_area: np.ndarray
     wall_deduction: np.ndarray
+    perimeter: np.ndarray
     missed_rows: np.ndarray
     missed_columns: np.ndarray
 
@@ -115,6 +119,7 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=(), parts: Sequence[Exten
         element_columns=np.tile(np.stack([columns[:-1], columns[1:]], axis=1), (mesh.along, 1)),
         rest_area=rest_area,
         wall_deduction=taken,
+        perimeter=np.sqrt(np.array([surface.length(level) for level in z]) ** 2 - np.pi * taken),
         missed_rows=along.missed,
         missed_columns=across.missed,
     )

@@ -80,7 +80,8 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
     gap_area = mesh.rest_area[0] - mesh.wall_deduction[0]
     storage = 1.0 if case.fluid.continuity == "storage" else 0.0
     terms, floor = terms_of(case), case.fluid.area_floor * gap_area
-    given = {"back": case.downstream.pressure} | _levels(case, mesh)
+    given = {"back": case.downstream.pressure, "perimeter": mesh.perimeter, "density": case.fluid.density}
+    given |= _levels(case, mesh)
     rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, **given)
     if not case.has_waves:
         return rigid

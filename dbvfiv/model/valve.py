@@ -248,12 +248,9 @@ class ValveModel:
         return float(np.finfo(float).eps * np.linalg.norm(stiffness @ self.shell.dofs.restrict(position)))
 
     def pressure_derivative(self, q: np.ndarray, pressure: float) -> np.ndarray:
-        """Derivative (n,) of the residual by the inlet pressure; steady pressures are proportional to what it has over
-        that downstream, but for those of the levels.
-        """
+        """Derivative (n,) of the residual by the inlet pressure."""
         nodal = self.nodal(q)
-        unit = self.flow.steady_pressure(self.rows.areas(nodal), self.flow.back + 1.0) - self.flow.static
-        return -self.pressure_force(nodal, unit)
+        return -self.pressure_force(nodal, self.flow.steady_slope(self.rows.areas(nodal), pressure))
 
     def force_scale(self, q: np.ndarray, pressure: float) -> float:
         """Norm of the pressure forces and of the weight, N: what residuals are measured against."""

@@ -10,7 +10,7 @@ from ...case.quantity import number_or_text
 from ...cfd.comparison import FlowComparison
 from ...cfd.fields import read_fields
 from ...cfd.figures import draw
-from ...cfd.flow_case import FlowCase
+from ...cfd.flow_case import WATER_VISCOSITY, FlowCase
 from ...cfd.run import run_openfoam
 from ...drawing.files import draw_figures, write_figures
 from ...errors import CaseError
@@ -46,7 +46,8 @@ def compute(
         raise CaseError(f"Nothing flows in the state at {state.pressure:g} Pa of {str(file)!r}.")
     width = result.case.downstream.pipe_diameter if pipe is None else _diameter(pipe)
     density = state.mass_flow / state.volume_flow
-    case = FlowCase(result.header.name, result.mesh, state, density, width, fineness, iterations)
+    viscosity = result.case.fluid.dynamic_viscosity / density or WATER_VISCOSITY
+    case = FlowCase(result.header.name, result.mesh, state, density, width, fineness, iterations, viscosity)
     case.write(folder)
     if not run:
         written = {"written": str(folder), "cells": len(case.cells.cells)}

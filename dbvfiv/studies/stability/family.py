@@ -90,6 +90,7 @@ class ValveFamily(PencilFamily):
         storage, line = law_parts(law)
         if "wave_speed" in line:  # so that the compressibility is that of the fluid
             line["wave_speed"] *= np.sqrt(law.density)
+        line |= flow.at_unit_density()
         parts = linear.flow_parts(1.0, storage, line) if flow.has_fluid else linear.no_flow()
         if linear.added is None:
             return parts

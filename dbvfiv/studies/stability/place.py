@@ -148,12 +148,14 @@ def is_surrounding(case: Case, name: str) -> bool:
 
 def why_it_moves(case: Case, name: str) -> str:
     """Why a parameter that leaves steady states alone as a rule moves them in a case, as a clause; empty where it does
-    not: the length of a line does where it has no friction, and the density without gravity.
+    not: the length of a line does where it has no friction, and the density without gravity and viscosity.
     """
     if name == "pipe_length" and case.has_line and not case.upstream.pieces and case.upstream.has_friction:
         return "friction in the line moves the steady state with it"
     if name == "density" and case.gravity.is_there:
         return "the weight of the fluid moves the steady state with it"
+    if name == "density" and case.fluid.dynamic_viscosity:
+        return "the friction of the fluid in the passage moves the steady state with it"
     return ""
 
 
