@@ -60,7 +60,7 @@ def difference(residual, about, parameters, directions):
     return total / (2 * step) ** len(directions)
 
 
-@pytest.mark.parametrize("number, form", [(2, "second"), (3, "third")])
+@pytest.mark.parametrize("number, form", [(2, "second"), pytest.param(3, "third", marks=pytest.mark.slow)])
 def test_forms_are_derivatives(residual, about, parameters, number, form):
     directions = motions(residual, number)
     exact = getattr(residual, form)(about, parameters, *directions)

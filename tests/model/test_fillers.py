@@ -87,6 +87,7 @@ def test_layers_that_are_not_there_have_no_strains_and_no_mass():
     assert density[before] == pytest.approx(1300.0) and density[~before] == pytest.approx((12 * 1300 + 1270) / 13)
 
 
+@pytest.mark.slow
 def test_steady_modes_and_motion_know_fillers():
     """A ply in the saddle stiffens it; modes are counted twice, energies of both loops agree, rubbers relax in time."""
     filler = [RUBBER, PLY | {"begin": 0.21, "end": 0.49}, RUBBER]

@@ -77,6 +77,7 @@ def test_a_system_has_the_same_pencil(valve, state):
     assert abs(found.K - expected.K).max() < 1e-12 * abs(expected.K).max()
 
 
+@pytest.mark.slow
 def test_a_system_refuses_what_needs_its_memory(valve, state, one_sentence):
     system, n = ValveSystem(valve), valve.size
     mu = {"inlet": 6e3, "density": 10.0, "alpha": 5.0, "beta": 0.0, "loss_factor": 1.0}

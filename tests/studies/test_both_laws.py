@@ -53,6 +53,7 @@ def test_one_law_in_place_of_the_cases(command_line):
         assert document["state"]["continuity"] == law and "other_law" not in document
 
 
+@pytest.mark.slow
 def test_onsets_under_both_laws_are_those_of_each():
     found = load(**{key.replace(".", "__"): value for key, value in BOTH.items()}).onset("density=5:300:6:log")
     other = load(onset__coarse_mesh=0, onset__normal_form=False).onset("density=5:300:6:log", continuity="storage")

@@ -39,7 +39,8 @@ def with_waves(keys):
 
 
 @pytest.mark.parametrize(
-    "elastic", [pytest.param(False, marks=pytest.mark.slow, id="rigid"), pytest.param(True, id="elastic")]
+    "elastic",
+    [pytest.param(False, marks=pytest.mark.slow, id="rigid"), pytest.param(True, marks=pytest.mark.slow, id="elastic")],
 )
 def test_two_equal_pieces_are_one_pipe(elastic):
     one, two = (load(with_waves(keys) if elastic else keys, {"steady.cracking_area": 2.0}) for keys in (ONE, TWO))

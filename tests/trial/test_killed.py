@@ -27,7 +27,11 @@ def ask():
         process.stdin.close()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+#: Kinds of which many moments are tried only with the slow tests; each kind's file is written by the same code.
+DEAR = ("sweep", "sensitivity", "levels", "closure", "modes")
+
+
+@pytest.mark.parametrize("kind", [pytest.param(k, marks=pytest.mark.slow) if k in DEAR else k for k in KINDS])
 def test_killed_runs_lose_nothing_and_end_with_the_same_numbers(tmp_path, ask, kind):
     found = ask(kind=kind, folder=str(tmp_path), kills=2, in_a_row=2, seed=KINDS.index(kind))
     assert not found["wrong"] and found["kills"] >= 2 and found["reads"] >= 5, found

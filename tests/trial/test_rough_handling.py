@@ -85,7 +85,14 @@ def test_sigterm_twice_and_in_time(tmp_path):
     assert not dbvfiv.load_result(path).complete
 
 
-@pytest.mark.parametrize("number, status", [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGKILL, -9)])
+@pytest.mark.parametrize(
+    "number, status",
+    [
+        (signal.SIGTERM, 143),
+        pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow),
+        pytest.param(signal.SIGKILL, -9, marks=pytest.mark.slow),
+    ],
+)
 def test_workers_of_a_map_end_with_it(tmp_path, number, status):
     path = tmp_path / "m.h5"
     arguments = ("map", *COARSE, "--x", "density=1:100:300:log", "--y", "alpha=0.1:30:4:log", "--workers", 2)

@@ -30,7 +30,9 @@ WAVES = LINE | {"upstream.wave_speed": 300.0}
     "law, pressure, density, further",
     [
         (QUASI, 2e3, 10.0, WAVES),
-        (STORAGE, 6e3, 100.0, WAVES | {"upstream.wave_speed": 400.0, "drive.at": "line"}),
+        pytest.param(
+            STORAGE, 6e3, 100.0, WAVES | {"upstream.wave_speed": 400.0, "drive.at": "line"}, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_three_routes_behind_an_elastic_line(law, pressure, density, further):

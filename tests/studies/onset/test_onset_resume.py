@@ -77,7 +77,9 @@ def test_the_run_meets_both_meshes(whole):
     assert all(p["uncertainty"] > 0 for p in result.points)
 
 
-@pytest.mark.parametrize("where", ["scan", "location", "second mesh", "end"])
+@pytest.mark.parametrize(
+    "where", ["scan", *(pytest.param(w, marks=pytest.mark.slow) for w in ("location", "second mesh", "end"))]
+)
 def test_an_interrupted_run_goes_on(case, whole, tmp_path, where):
     complete, seen = whole
     fine = sum(mesh == 0 for mesh, _ in seen.samples)

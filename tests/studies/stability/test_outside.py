@@ -78,6 +78,7 @@ def test_sensitivities_are_slopes_of_the_eigenvalue():
         assert abs(sensitivity.derivative - slope) < 1e-4 * abs(slope)
 
 
+@pytest.mark.slow
 def test_an_onset_has_a_kind_and_names_what_is_outside():
     changes = MESH | {"outside.fluid": "same", "drive.pressure": 6e3, "damping.beta": 0.003}
     changes |= {"onset.over": "density=20:600:6:log", "onset.coarse_mesh": 0.0}

@@ -23,7 +23,7 @@ WAVES = {
 }
 
 
-@pytest.mark.parametrize("adaptive", [False, True])
+@pytest.mark.parametrize("adaptive", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive, all_restart_points):
     changes = SHORT | WAVES | {"transient.duration": 0.03, "transient.adaptive": adaptive, "transient.step": 5e-4}
     model = valve(changes | {"fluid.density": 1.2, "transient.local_error": 1e-5, "transient.numerical_damping": 0.1})
@@ -47,7 +47,7 @@ def test_nothing_is_stored_of_a_rigid_column(tmp_path, valve):
         assert "line_places" not in file["mesh"] and "line" not in file["tables/restart"]
 
 
-@pytest.mark.parametrize("law", ["quasi-steady", "storage"])
+@pytest.mark.parametrize("law", [pytest.param("quasi-steady", marks=pytest.mark.slow), "storage"])
 def test_from_rest_a_wave_has_to_arrive_first(valve, law):
     """Nothing moves for L/c; then the wave is thrown back by a valve that is all but shut: twice the pressure."""
     step = 5e-5

@@ -21,7 +21,7 @@ from .runs import SHORT, Stop, transient
 LOSSY = {"damping.model": "loss factor", "drive.pressure": 6e3, "fluid.density": 50.0}
 
 
-@pytest.mark.parametrize("adaptive", [False, True])
+@pytest.mark.parametrize("adaptive", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive, all_restart_points):
     changes = SHORT | LOSSY | {"transient.duration": 0.03, "transient.adaptive": adaptive, "transient.step": 5e-4}
     model = valve(changes | {"fluid.density": 1.2, "transient.local_error": 1e-5, "transient.numerical_damping": 0.1})

@@ -60,7 +60,10 @@ def test_kick_rings_at_the_eigenvalue(valve):
     assert np.abs(h["lip_displacement"] - still - expected).max() < 0.02 * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("beta, number", [(3e-3, 1), (0.0, 1), (0.0, 3)])
+@pytest.mark.parametrize(
+    "beta, number",
+    [(3e-3, 1), pytest.param(0.0, 1, marks=pytest.mark.slow), pytest.param(0.0, 3, marks=pytest.mark.slow)],
+)
 def test_a_kick_follows_a_leading_mode_by_the_rule_of_all_studies(valve, beta, number):
     """Without stiffness damping too, where a band of structural frequencies says what is leading."""
     changes = {"drive.pressure": 6e3, "fluid.density": 10.0, "damping.alpha": 0.0, "damping.beta": beta}
