@@ -44,10 +44,12 @@ LoadPressure = Annotated[Pressure, Field(**PARAMETERS["pressure"].limits)]
 class Shell(Section):
     """Choices of the shell theory."""
 
-    metric: Literal["first-order", "true"] = key(
+    metric: Literal["first-order", "true", "shifted"] = key(
         "first-order",
-        'Through-thickness metric, one of two words: "first-order" of Budiansky and Sanders, or "true", the exact one '
-        "(refused where half the wall exceeds the radius of the mid-surface).",
+        'Through-thickness metric, one of three words: "first-order" of Budiansky and Sanders (the thesis) gives every '
+        'layer the length of the mid-surface; "true" is the exact one, refused where half the wall exceeds the radius '
+        'of the mid-surface; "shifted" gives layers their own length, which is what layers of unlike stiffness want, '
+        "and is bounded where the wall folds.",
     )
     shear_correction_plies: Number = key(5 / 6, "Transverse-shear factor of fibre plies.", gt=0, le=1.5)
     shear_correction_rubber: Number = key(1.0, "Transverse-shear factor of all other layers.", gt=0, le=1.5)

@@ -8,6 +8,10 @@ treatments:
     Mid-surface metric and area; E(t) = c0 + t (c1 - sym(kappa c0)), Budiansky-Sanders' best first-order theory.
 ``true``
     Metric, area and quadratic strain of each parallel surface; valid while half the wall stays below the radius.
+``shifted``
+    The strains of ``first-order`` on parallel surfaces of their own length and area: S^-1/2 E(t) S^-1/2 over det S,
+    S = 1 + t kappa (Winkler and Bach's curved bar), see `reference.shifted_layers`. Right to first order in thickness
+    over radius for unlike layers too, and bounded where the wall folds.
 """
 
 from __future__ import annotations
@@ -21,11 +25,19 @@ import numpy as np
 from ..materials.incompressible import rubber_energy
 from ..materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, linear_elastic_energy
 from .assumed_strain import FACTORS, PAIRS, VECTORS
-from .reference import SHEAR_EDGES, SHEAR_WEIGHTS, SLOPE, ReferenceGeometry, strain_map, thickness_over_radius
+from .reference import (
+    SHEAR_EDGES,
+    SHEAR_WEIGHTS,
+    SLOPE,
+    ReferenceGeometry,
+    shifted_layers,
+    strain_map,
+    thickness_over_radius,
+)
 from .rotation import director
 from .section import Section
 
-FIRST_ORDER, TRUE_METRIC = "first-order", "true"
+FIRST_ORDER, TRUE_METRIC, SHIFTED = METRICS = "first-order", "true", "shifted"
 _LAWS = {LINEAR_ELASTIC: linear_elastic_energy, MOONEY_RIVLIN: rubber_energy}
 
 
@@ -59,8 +71,10 @@ def element_arrays(
     }
     if points.ndim > 2:
         data |= {"zeta": points[..., 0], "weight": points[..., 1]}
-    if metric == FIRST_ORDER:
+    if metric != TRUE_METRIC:
         data |= {"q": geometry.q, "qk": geometry.qk, "p": geometry.p}
+        if metric == SHIFTED:
+            data |= dict(zip(("shift", "turn", "mu"), shifted_layers(geometry, points)))
     else:
         t = geometry.thickness[:, None] * points[..., 0]  # (ne, np)
         shift = np.eye(2) + t[:, None, :, None, None] * geometry.curvature[:, :, None]
@@ -74,7 +88,7 @@ def element_arrays(
             raise ValueError(
                 f"The true metric is not valid at ({place}) m: half the wall exceeds the radius there, so "
                 f"the inner face folds over itself; "
-                "use the first-order metric."
+                f"use {SHIFTED!r} or {FIRST_ORDER!r}."
             )
         p = np.einsum("epac,eplcd->eplad", geometry.p, np.linalg.inv(shift))
         turn = np.einsum("pac,eai->epci", SLOPE, mesh.directors[mesh.quads])
@@ -114,11 +128,14 @@ def strains_of_shape(x, d, element, layers, metric):
     shear = SHEAR_WEIGHTS * (edge - element["s0"])
     gamma = jnp.stack([shear[:, 0] + shear[:, 1], shear[:, 2] + shear[:, 3]], axis=1)
     t = element["h"] * (element if "zeta" in element else layers)["zeta"]
-    if metric == FIRST_ORDER:
+    if metric != TRUE_METRIC:
         membrane = jnp.einsum("pij,pj->pi", element["q"], c0)
         bending = jnp.einsum("pij,pj->pi", element["q"], c1) - jnp.einsum("pij,pj->pi", element["qk"], c0)
         plane = membrane[:, None] + t[None, :, None] * bending[:, None]
         across = jnp.broadcast_to(jnp.einsum("pac,pc->pa", element["p"], gamma)[:, None], plane.shape[:2] + (2,))
+        if metric == SHIFTED:
+            plane = jnp.einsum("plij,plj->pli", element["shift"], plane)
+            across = jnp.einsum("plab,plb->pla", element["turn"], across)
     else:
         turn = jnp.einsum("pac,ai->pci", SLOPE, d)
         c2 = _half_metric(turn) - element["m2"]
@@ -192,7 +209,7 @@ def element_energy(kinds, metric, unknowns, element, layers):
 def point_volumes(metric, element, layers):
     """Volumes (4, np) that the layer points of one element stand for, m3."""
     weight = element["h"] * element["area"][:, None] * (element if "zeta" in element else layers)["weight"]
-    return weight * element["mu"] if metric == TRUE_METRIC else weight
+    return weight if metric == FIRST_ORDER else weight * element["mu"]
 
 
 def material_part(kinds, metric, unknowns, element, layers):
@@ -222,8 +239,8 @@ class EnergyFunctions:
     def __init__(
         self, mesh, geometry: ReferenceGeometry, section: Section, metric: str, inplane, products, points=None
     ):
-        if metric not in (FIRST_ORDER, TRUE_METRIC):
-            raise ValueError(f"The shell metric is '{metric}', but only '{FIRST_ORDER}' and '{TRUE_METRIC}' exist.")
+        if metric not in METRICS:
+            raise ValueError(f"The shell metric is '{metric}', but only {', '.join(map(repr, METRICS))} exist.")
         self.metric = metric
         self.kinds = tuple(int(kind) for kind in section.kinds)
         points = section.points if points is None else points

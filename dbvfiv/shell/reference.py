@@ -140,3 +140,37 @@ def thickness_over_radius(geometry: ReferenceGeometry) -> np.ndarray:
     """(ne, 4): half the wall over the smaller radius of curvature; above one the inner face folds over itself."""
     eigenvalues = np.linalg.eigvals(geometry.curvature)
     return 0.5 * geometry.thickness[:, None] * np.abs(eigenvalues).max(axis=-1)
+
+
+def shifted_layers(geometry: ReferenceGeometry, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What strains of the mid-surface become at layers of their own length.
+
+    Parameters
+    ----------
+    points : (np, 2) or, of zones, (ne, np, 2) array
+        Normalised coordinate and weight of every layer point.
+
+    Returns
+    -------
+    plane : (ne, 4, np, 3, 3) array
+        Of in-plane strains [11, 22, 2*12]: S^-1/2 E S^-1/2 in local axes.
+    across : (ne, 4, np, 2, 2) array
+        Of transverse shears: S^-1/2.
+    area : (ne, 4, np) array
+        det S over the mid-surface's area.
+    """
+    inverse = np.linalg.inv(geometry.p)
+    local = np.swapaxes(inverse, -1, -2) @ geometry.curvature @ np.swapaxes(geometry.p, -1, -2)
+    curvature, axes = np.linalg.eigh(0.5 * (local + np.swapaxes(local, -1, -2)))
+    heights = geometry.thickness[:, None] * points[..., 0]  # (ne, np)
+    stretch = bounded_stretch(heights[:, None, :, None] * curvature[:, :, None])
+    root = np.einsum("epai,epli,epbi->eplab", axes, stretch**-0.5, axes)
+    return strain_map(root), root, stretch.prod(axis=-1)
+
+
+def bounded_stretch(x: np.ndarray) -> np.ndarray:
+    """Length of a parallel surface over that of the mid-surface, 1 + x with x height times curvature.
+
+    Below x = -1/2, where the wall comes near to folding, its inverse goes on along its tangent, so it stays positive.
+    """
+    return np.where(x > -0.5, 1.0 + x, 0.25 / np.maximum(-x, 0.5))
