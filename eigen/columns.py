@@ -138,13 +138,18 @@ class ColumnSolver:
             return self._directly(reduction, conditions)
         losses = [c.loss for c in conditions]
         mixed = len(set(losses)) > 1
-        places = _spread(conditions, max(snapshots, LOSSES) if mixed else snapshots)
-        banded = any(_is_banded(family, conditions[i]) for i in places)
-        first = reduction.wide if banded else reduction.coarse
-        fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
-        # vectors corrected in a few steps are worst where most relaxes
-        checked = [*_between(places), int(np.argmax(losses))] if mixed else _between(places)
-        error = _error(reduction, fine, conditions, checked)
+        least = max(snapshots, LOSSES) if mixed else snapshots
+        # more vectors are far cheaper than every cell with the full pencil
+        for number in (least, 2 * least + 1, 4 * least + 3):
+            places = _spread(conditions, number)
+            banded = any(_is_banded(family, conditions[i]) for i in places)
+            first = reduction.wide if banded else reduction.coarse
+            fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
+            # vectors corrected in a few steps are worst where most relaxes
+            checked = [*_between(places), int(np.argmax(losses))] if mixed else _between(places)
+            error = _error(reduction, fine, conditions, checked)
+            if error <= TOLERANCE:
+                break
         column = self._on(first, fine, conditions, error, edges)
 
         def eigenvalues(condition):
