@@ -93,9 +93,11 @@ def test_what_made_a_table_exists():
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_commands_can_be_given(page, only_parsed):
-    """Those of stamps and of code blocks: every option is known, and every key that is set exists and takes its value."""
+    """Those of stamps and of code blocks: options are known, and keys that are set exist and take their values."""
     shown = [quoted for table in tables(page) for quoted in table.quoted]
-    shown += [line for block in blocks(page) for line in command_lines(block)] + indented_commands(page)
+    shown += [line for block in blocks(page) + blocks(page, "sh") for line in command_lines(block)] + indented_commands(
+        page
+    )
     if page.name == "README.md":
         shown += re.findall(r"`(dbvfiv [^`]+)`", page.read_text())
     wrong = {line: problem for line in shown if line.startswith("dbvfiv ") and (problem := only_parsed(line))}

@@ -8,6 +8,8 @@ treatments:
     Mid-surface metric and area; E(t) = c0 + t (c1 - sym(kappa c0)), Budiansky-Sanders' best first-order theory.
 ``true``
     Metric, area and quadratic strain of each parallel surface; valid while half the wall stays below the radius.
+
+Equation (T.5) of docs/theory.md.
 """
 
 from __future__ import annotations
