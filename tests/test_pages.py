@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import pkgutil
 import re
 import shlex
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -101,4 +102,22 @@ def test_commands_can_be_given(page, only_parsed):
     if page.name == "README.md":
         shown += re.findall(r"`(dbvfiv [^`]+)`", page.read_text())
     wrong = {line: problem for line in shown if line.startswith("dbvfiv ") and (problem := only_parsed(line))}
+    assert not wrong, wrong
+
+
+def test_every_figure_says_which_command_makes_it(only_parsed):
+    """tools/figures.py has each of them, and its commands can be given."""
+    spec = importlib.util.spec_from_file_location("figures", ROOT / "tools/figures.py")
+    figures = importlib.util.module_from_spec(spec)
+    sys.modules["figures"] = figures  # dataclasses look it up
+    try:
+        spec.loader.exec_module(figures)
+    finally:
+        del sys.modules["figures"]
+    made = [name for one in figures.ALL for name in one.figures.values()]
+    assert sorted(made) == sorted(path.name for path in (ROOT / "docs/figures").iterdir())
+    shown = set(re.findall(r"figures/([\w-]+\.\w+)\)", "".join(page.read_text() for page in pages())))
+    assert shown == set(made)
+    lines = [one.command.format(folder="out/figures/x") for one in figures.ALL]
+    wrong = {line: problem for line in lines if line.startswith("dbvfiv ") and (problem := only_parsed(line))}
     assert not wrong, wrong
