@@ -107,7 +107,7 @@ ALL = (
         "slam",
         'dbvfiv transient cases/dbv12.toml --set mesh.around=14 --set mesh.along=24 --set drive.pressure="6 kPa" '
         "--set fluid.density=1.2 --set damping.alpha=0 --set supports.lip_stop_columns=all "
-        '--set transient.step="0.5 ms" --set transient.duration="0.3 s"',
+        '--set transient.step="0.5 ms" --set transient.duration="0.7 s"',
         {"history.png": "transient-slamming.png"},
     ),
     Made(
