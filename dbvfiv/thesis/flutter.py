@@ -29,7 +29,11 @@ def steps(workshop: Workshop) -> Outcome:
         f"At {_DENSITY:g} kg/m3 and 6 kPa. The swing tends to a limit as the step shrinks, as in the thesis; "
         "docs/transient.md follows it to 0.1 ms, with its observed order of 2."
     )
-    return Outcome((told,), numbers, (picture("thesis-7-14", "", lambda: comparison.compare(runs)),))
+    return Outcome(
+        (told,),
+        numbers,
+        (picture("thesis-7-14", "", lambda: comparison.compare(runs, [f"{size} ms" for size in sizes])),),
+    )
 
 
 def _suddenly(workshop: Workshop, pressure: float, step: str, name: str) -> Outcome:
@@ -52,7 +56,7 @@ def _suddenly(workshop: Workshop, pressure: float, step: str, name: str) -> Outc
         runs.append(run)
         reached = f", ended at {run.history['time'][-1]:.3g} s" if run.failures else ""
         told.append(f"{word}: {run.verdict['verdict']}{reached}.")
-    return Outcome(tuple(told), (), (picture(f"thesis-{name}", "", lambda: comparison.compare(runs)),))
+    return Outcome(tuple(told), (), (picture(f"thesis-{name}", "", lambda: comparison.compare(runs, list(readings))),))
 
 
 def cycle_at_6(workshop: Workshop) -> Outcome:
