@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from tests.pages import ROOT
+
+DOCS = ROOT / "docs"
 
 
 def test_the_site_builds_without_a_warning(tmp_path):
@@ -18,4 +20,21 @@ def test_the_site_builds_without_a_warning(tmp_path):
 
 def test_every_page_is_in_the_contents():
     contents = (ROOT / "mkdocs.yml").read_text()
-    assert [page.name for page in (ROOT / "docs").glob("*.md") if page.name not in contents] == []
+    pages = [str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md")]
+    assert [page for page in pages if f": {page}\n" not in contents] == []
+
+
+def test_equations_are_numbered_and_known_to_their_modules():
+    """Each number stands at one equation, in the table with its modules, and in their docstrings."""
+    text = (DOCS / "theory.md").read_text()
+    shown = re.findall(r"^    \S.*\((T\.\d+)\)$", text, re.M)
+    assert sorted(shown, key=lambda name: int(name[2:])) == [f"T.{n}" for n in range(1, len(shown) + 1)] and shown
+    named: dict[str, set[str]] = {}
+    for numbers, modules in re.findall(r"^\| (\(T\.[^|]*) \|[^|]*\| ([^|]*) \|$", text, re.M):
+        for module in re.findall(r"`([^`]+)`", modules):
+            named.setdefault(module, set()).update(re.findall(r"T\.\d+", numbers))
+    assert set().union(*named.values()) == set(shown)
+    for package in ("dbvfiv", "eigen", "continuation"):
+        for path in (ROOT / package).rglob("*.py"):
+            said = set(re.findall(r"\((T\.\d+)\)", path.read_text()))
+            assert said == named.get(str(path.relative_to(ROOT)), set()), path

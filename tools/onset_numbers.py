@@ -1,4 +1,7 @@
-"""Onsets of the 12-inch valve at 28 x 48, for docs/stability.md: python tools/onset_numbers.py [FILE.json] [MAP.h5]
+"""Onsets of the 12-inch valve at 28 x 48, for docs/stability.md.
+
+    python tools/onset_numbers.py [FILE.json] [MAP.h5] [KEY=VALUE ...]
+
 
 Densities at 1, 2, 4 and 6 kPa, and all pressures from 0.3 to 36 kPa at 1.2, 10 and 30 kg/m3, under both continuity laws
 (alpha 0, beta 0.003), each with direct eigenvalues and independent counts on both sides, criticality, and uncertainty
@@ -26,9 +29,10 @@ MESH = (28, 48)
 LAWS = ("quasi-steady", "storage")
 
 
-def main(path: Path) -> None:
-    """Write the onsets that tests pin."""
-    case = load_case(None, [f"mesh.around={MESH[0]}", f"mesh.along={MESH[1]}", "damping.alpha=0", "damping.beta=0.003"])
+def main(path: Path, keys: list[str]) -> None:
+    """Write the onsets, of the case with some keys changed."""
+    base = [f"mesh.around={MESH[0]}", f"mesh.along={MESH[1]}", "damping.alpha=0", "damping.beta=0.003"]
+    case = load_case(None, base + keys)
     walk = StabilityWalk(case)
     done = json.loads(path.read_text()) if path.exists() else {}
 
@@ -138,7 +142,8 @@ def _cuts(line: np.ndarray, x: float) -> list[float]:
 
 
 if __name__ == "__main__":
-    numbers = Path(sys.argv[1] if len(sys.argv) > 1 else "onset-28x48.json")
-    main(numbers)
-    if len(sys.argv) > 2:
-        compare(numbers, Path(sys.argv[2]))
+    files = [word for word in sys.argv[1:] if "=" not in word]
+    numbers = Path(files[0] if files else "onset-28x48.json")
+    main(numbers, [word for word in sys.argv[1:] if "=" in word])
+    if len(files) > 1:
+        compare(numbers, Path(files[1]))

@@ -14,10 +14,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from kept import kept_run
+from kept import base_case, kept_run, takes_keys
 from scipy.optimize import brentq
-
-import dbvfiv
 
 QUANTITIES = {
     "lip amplitude, mm": ("lip_displacement", "amplitude", 1e3),
@@ -40,8 +38,9 @@ def main() -> None:
     parser.add_argument("--mesh-step", type=float, default=0.5, help="ms")
     parser.add_argument("--mesh-duration", default="0.8 s")
     parser.add_argument("--kick", default="6 mm")
+    takes_keys(parser)
     given = parser.parse_args()
-    base = dbvfiv.load().case.replace(
+    base = base_case(given).replace(
         {
             "drive.pressure": given.pressure,
             "damping.alpha": 0,

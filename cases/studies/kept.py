@@ -6,6 +6,19 @@ from pathlib import Path
 
 import dbvfiv
 from dbvfiv.api import Valve
+from dbvfiv.studies.case import load_case
+
+
+def takes_keys(parser) -> None:
+    """Let a study take `--set KEY=VALUE` as the command line does."""
+    parser.add_argument(
+        "--set", action="append", default=[], dest="keys", metavar="KEY=VALUE", help="a key of the case"
+    )
+
+
+def base_case(given):
+    """The 12-inch valve with the keys given on the command line of a study."""
+    return load_case(None, given.keys)
 
 
 def kept_run(case, path: Path, observer=None):

@@ -19,7 +19,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from kept import kept_run
+from kept import base_case, kept_run, takes_keys
 from response_figure import draw
 
 import dbvfiv
@@ -60,9 +60,10 @@ def main() -> None:
     parser.add_argument("--kick", default="1 mm")
     parser.add_argument("--back", type=float, nargs="*", help="densities of the way up; all by default")
     parser.add_argument("--theory", action="store_true", help="onset and normal form too")
+    takes_keys(parser)
     given = parser.parse_args()
     around, along = given.mesh.split("x")
-    base = dbvfiv.load().case.replace(
+    base = base_case(given).replace(
         {
             "mesh.around": int(around),
             "mesh.along": int(along),

@@ -18,9 +18,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from kept import kept_run
-
-import dbvfiv
+from kept import base_case, kept_run, takes_keys
 
 
 def main() -> None:
@@ -33,9 +31,10 @@ def main() -> None:
     parser.add_argument("--step", default="0.5 ms")
     parser.add_argument("--duration", default="0.5 s")
     parser.add_argument("--since", type=float, default=0.05, help="s")
+    takes_keys(parser)
     given = parser.parse_args()
     around, along = given.mesh.split("x")
-    base = dbvfiv.load().case.replace(
+    base = base_case(given).replace(
         {
             "mesh.around": int(around),
             "mesh.along": int(along),

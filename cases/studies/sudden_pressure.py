@@ -17,7 +17,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from kept import kept_run
+from kept import base_case, kept_run, takes_keys
 
 import dbvfiv
 from dbvfiv.drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure, style
@@ -79,11 +79,10 @@ def main() -> None:
     parser.add_argument("--mesh", default="28x48")
     parser.add_argument("--duration", default="1 s", help="of the runs at different pressures; the others take 0.5 s")
     parser.add_argument("--only", nargs="+", default=["pressures", *GROUPS], choices=["pressures", *GROUPS])
+    takes_keys(parser)
     given = parser.parse_args()
     around, along = given.mesh.split("x")
-    base = dbvfiv.load().case.replace(
-        {"mesh.around": int(around), "mesh.along": int(along), "transient.duration": MARK}
-    )
+    base = base_case(given).replace({"mesh.around": int(around), "mesh.along": int(along), "transient.duration": MARK})
     if "pressures" in given.only:
         rows, runs = pressures(base.replace(ALPHA_5 | {"transient.duration": given.duration}), given.folder)
         _write(given.folder / "pressures.csv", rows)

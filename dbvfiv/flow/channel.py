@@ -7,6 +7,8 @@ program (App. A). U is the inlet velocity. Continuity is blended between two law
 - storage * integral_in^k dA/dt ds, so 0 is the quasi-steady law of the thesis and 1 the conservation of volume under
 moving walls. Terms add losses and inertances: see `dbvfiv.flow.term`. The thesis leaves gravity out; here `levels` has
 what it does to a valve that stands upright.
+
+Equations (T.9), (T.10) and (T.11) of docs/theory.md.
 """
 
 from __future__ import annotations

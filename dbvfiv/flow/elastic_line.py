@@ -13,6 +13,8 @@ same speed and the energy is rho A_line/2 (A_in/A_line)^2 (w^2 + pi^2) a length.
 Pipes in series meet with the same flow and the same total pressure: w is one function along all of them, and each has
 its own pi. A rigid pipe among them is a length of no extent, whose inertance and loss stand at the node between its
 neighbours.
+
+Equation (T.13) of docs/theory.md.
 """
 
 from __future__ import annotations

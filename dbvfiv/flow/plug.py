@@ -9,6 +9,8 @@ which is the force of the wall on the fluid (Paidoussis 1998, Fluid-Structure In
 Coriolis and centrifugal force. The pressure behind it varies linearly across the section, so it acts along the wall's
 normal and its generalised force belongs to the motion of the centroid. In weak form, with linear w between stations,
 the centrifugal part keeps its end term -rho A U^2 w' at the outlet, as for a cantilevered pipe.
+
+Equations (T.17) and (T.18) of docs/theory.md.
 """
 
 from __future__ import annotations

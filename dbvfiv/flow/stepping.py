@@ -9,6 +9,8 @@ for them several times. Terms of a channel are evaluated by their definition.
 
 The unknown of a step is one number, the inlet velocity: it is eliminated by a scalar root, which is what lets a step
 choose between an outward flow and one drawn in. Laws with more unknowns have no evaluators here.
+
+Equation (T.9) of docs/theory.md.
 """
 
 from __future__ import annotations

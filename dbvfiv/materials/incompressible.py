@@ -14,6 +14,8 @@ With t = 2 (E11 + E22), D = 4 det E2, J = det C2 = 1 + t + D and A = adj C2 = I 
 
 where t^2 - D = 4 (E11^2 + E11 E22 + E22^2 + E12^2). The second line uses the Cayley-Hamilton
 theorem for C2. I2 - I1 is of third order in the strain.
+
+Equation (T.6) of docs/theory.md.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""How a material relaxes: a Prony series over its slow law."""
+"""How a material relaxes: a Prony series over its slow law.
+
+Equations (T.7) and (T.8) of docs/theory.md.
+"""
 
 from __future__ import annotations
 

@@ -7,6 +7,8 @@ with h the inertia quadratic in the velocities (turning directors), K_s the stru
 pressures of the unsteady flow through the areas A(q) with rates A' = J v and A'' = J a + d2A[v, v]. The unknowns are q
 and those of the flow law, the inlet velocity U for one. Small motions see K_s and, of layers with Maxwell branches,
 sum_g phi_g(lambda) K_g, with K_g the material part of the tangent of layers that relax alike.
+
+Equations (T.15) and (T.16) of docs/theory.md.
 """
 
 from __future__ import annotations

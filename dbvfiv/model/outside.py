@@ -8,6 +8,8 @@ S is symmetric and full. Of M_a the part kept is that of the r motions x_i that 
 
 which is exact for every motion made of them and leaves out at most mu_(r+1) K_s: frequencies that stand well below
 that of the first motion left out, 1/sqrt(mu_(r+1)), do not see it.
+
+Equations (T.19) and (T.20) of docs/theory.md.
 """
 
 from __future__ import annotations

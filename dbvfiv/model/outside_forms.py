@@ -8,6 +8,8 @@ Its kinetic energy is rho v' M_a(q) v / 2, so by Lagrange's equations it resists
 panels whose quadratures are frozen. It is known on the slowest motions x_i that are kept of the added mass, with X' K_s
 X = 1: displacements q count by X' K_s q, and forces f on them act as K_s X f. A motion outside of their span carries
 little fluid, see `dbvfiv.model.outside`.
+
+Equation (T.21) of docs/theory.md.
 """
 
 from __future__ import annotations

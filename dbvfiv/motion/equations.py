@@ -5,6 +5,8 @@
 F is the internal force of shell and stops and w its rate. F and the flow's psi (see `dbvfiv.flow.stepping`) are kept in
 the state as quantities of first order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent with the
 tangent without an evaluation of it.
+
+Equation (T.15) of docs/theory.md.
 """
 
 from __future__ import annotations

@@ -5,6 +5,8 @@
 the equations of `dbvfiv.motion.equations` without a step: rates, and what relaxing layers remember, are filters of the
 samples over a period. Unknowns are (q, U) with the flow law's own U (l,); pressures p and equations e are those of its
 definition. The flow is outward.
+
+Equation (T.15) of docs/theory.md.
 """
 
 from __future__ import annotations

@@ -24,6 +24,8 @@ Computers and Structures 140, 14-22): the enhancement takes away the stiffness a
 x_d.x_d in the strains along the edges, squared strains of that motion, keeps its geometric stiffness. So the edges give
 way to the centre, in whose strains there is no x_d.x_d, where warping is small beside the wall and cannot lock: x_d.x_d
 counts by its share w = y^2/(y^2 + h^2/12), y the part of x_d normal to the element and h the wall.
+
+Equations (T.2), (T.3) and (T.4) of docs/theory.md.
 """
 
 from __future__ import annotations

@@ -12,6 +12,8 @@ treatments:
     The strains of ``first-order`` on parallel surfaces of their own length and area: S^-1/2 E(t) S^-1/2 over det S,
     S = 1 + t kappa (Winkler and Bach's curved bar), see `reference.shifted_layers`. Right to first order in thickness
     over radius for unlike layers too, and bounded where the wall folds.
+
+Equation (T.5) of docs/theory.md.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@ C10, C01, C11, and powers of I1 - 3 by C20 and C30 (Yeoh).
 
 The law is defined by its energy in `dbvfiv.materials`; this is its first and second derivative with respect to [E11,
 E22, 2E12, 2E13, 2E23], checked against automatic differentiation of that energy.
+
+Equation (T.6) of docs/theory.md.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 Plies answer linearly by their integrated stiffness; rubber is integrated over points through the thickness. Strains and
 resultants are ordered membrane (3), bending (3), transverse shear (2).
+
+Equation (T.5) of docs/theory.md.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 The numbers are the six in-plane products of `assumed_strain`, their change along the directors (six), and the
 transverse shears at the edges (four); `energy.py` defines the same.
+
+Equation (T.2) of docs/theory.md.
 """
 
 from __future__ import annotations

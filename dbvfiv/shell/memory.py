@@ -10,6 +10,8 @@ Over a step h in which S changes evenly,
 
 so the wall answers as an elastic one whose layers are stiffer by the sum of the last factors, under resultants that do
 not depend on where the step ends.
+
+Equation (T.7) of docs/theory.md.
 """
 
 from __future__ import annotations

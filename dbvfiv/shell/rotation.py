@@ -2,6 +2,8 @@
 
 d(theta) = cos(r) D + sin(r)/r (theta_1 T_1 + theta_2 T_2), r^2 = theta_1^2 + theta_2^2: total, free of history and
 regular for r < pi.
+
+Equation (T.1) of docs/theory.md.
 """
 
 from __future__ import annotations

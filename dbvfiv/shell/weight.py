@@ -8,6 +8,8 @@ different densities do not balance; it turns with the director and is all that t
 A wall between two fluids displaces the mean of both: in an incompressible wall a pressure that is the same on both
 faces makes no strain, and what is left of the two that stand on its faces is their difference, which loads the
 mid-surface, and the gradient of their mean, which acts on its volume.
+
+Equation (T.12) of docs/theory.md.
 """
 
 from __future__ import annotations

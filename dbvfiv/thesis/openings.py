@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ..drawing.deformed import deformed
 from ..drawing.layers import layer_stress
-from ..report.content import picture, pictures_of
+from ..report.content import Picture, picture, pictures_of
 from ..studies.case import Case
 from ..studies.steady import comparison, discharge, passage, shapes
 from ..studies.steady.published import HEAD_DISCHARGE
+from ..studies.steady.result import SteadyResult
 from .entry import Entry, Number, Outcome, spread
 from .workshop import Workshop
 
@@ -56,7 +59,9 @@ def strain_levels(workshop: Workshop) -> Outcome:
         f"Twice the strain level gives {min(gains):.0f} to {max(gains):.0f} % more flow, about 12 % in the thesis; "
         "15 % is interpolated between the constants."
     )
-    return Outcome((told,), numbers, (_together(sets.values(), "thesis-7-2"),))
+    return Outcome(
+        (told,), numbers, (_together(sets.values(), (f"constants of {level}" for level in sets), "thesis-7-2"),)
+    )
 
 
 def fibre_angles(workshop: Workshop) -> Outcome:
@@ -70,7 +75,7 @@ def fibre_angles(workshop: Workshop) -> Outcome:
     told = "Each larger angle gives less flow at 18, 29 and 36 kPa, as in the thesis." if falls else (
         "The order of the thesis is not found at every pressure."
     )  # fmt: skip
-    return Outcome((told,), numbers, (_together(runs, "thesis-7-3"),))
+    return Outcome((told,), numbers, (_together(runs, (f"plies: {name}" for name in names), "thesis-7-3"),))
 
 
 def layup(angle: float | None) -> list[dict]:
@@ -171,9 +176,9 @@ def layer_stresses(workshop: Workshop) -> Outcome:
     return Outcome((told,), numbers, (picture("thesis-7-12", "", lambda: layer_stress(state)),))
 
 
-def _together(results, name: str):
-    found = list(results)
-    return picture(name, "", lambda: comparison.draw(found))
+def _together(results: Iterable[SteadyResult], names: Iterable[str], name: str) -> Picture:
+    found, called = list(results), list(names)
+    return picture(name, "", lambda: comparison.draw(found, called))
 
 
 ENTRIES = (

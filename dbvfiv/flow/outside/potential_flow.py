@@ -2,6 +2,8 @@
 
 Sources sigma on all panels; their normal velocities are those of the surfaces, zero on rigid ones, and on open
 panels the potential vanishes instead. Panels that never move are eliminated once.
+
+Equation (T.19) of docs/theory.md.
 """
 
 from __future__ import annotations

@@ -6,6 +6,8 @@ P_0 is the pressure that the steady state was found at. At the operating point i
 pressure the difference stands for a static lift that comes on top. H is the monotone cubic of Fritsch and Carlson
 (1980) through the rows of the pump's table, and goes on along its tangent beyond their ends, where no result is taken
 from.
+
+Equation (T.14) of docs/theory.md.
 """
 
 from __future__ import annotations

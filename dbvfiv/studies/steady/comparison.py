@@ -98,13 +98,15 @@ def _plain(values: np.ndarray) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
 
 
-def draw(results: Sequence[SteadyResult]) -> Figure:
-    """Pressure over volume flow of several runs, with the measured points that they name."""
+def draw(results: Sequence[SteadyResult], names: Sequence[str] | None = None) -> Figure:
+    """Pressure over volume flow of several runs, with the measured points that they name; without `names` they are
+    called by what tells their cases apart.
+    """
     figure = new_figure(7.0, 4.6 + 0.22 * len(results))
     axes = figure.add_subplot()
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(results)))
     found = compare(results)
-    for result, label, colour in zip(results, found.labels, colours):
+    for result, label, colour in zip(results, names or found.labels, colours):
         states = sorted(result.states, key=lambda state: state.pressure)
         flow, pressure = [1e3 * s.volume_flow for s in states], [s.pressure / 1e3 for s in states]
         axes.plot(flow, pressure, "o-", color=colour, ms=4, label=label)

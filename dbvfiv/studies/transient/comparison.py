@@ -27,18 +27,24 @@ def labels(results: Sequence[TransientResult]) -> list[str]:
     return comparing.labels(results, _QUIET)
 
 
-def compare(results: Sequence[TransientResult]) -> Figure:
+def compare(results: Sequence[TransientResult], names: Sequence[str] | None = None) -> Figure:
     """Mass flow and lip opening of several runs over time (compare Figs. 5-3 to 5-10, 7-13 and 7-14 of the thesis);
     where all end in cycles, these in phase.
+
+    Parameters
+    ----------
+    results : sequence of TransientResult
+    names : sequence of str, optional
+        What the runs are called; by what tells their cases apart without them.
     """
-    cycles = all(result.cycle for result in results)
+    cycles = all(_swings(result) for result in results)
     figure = new_figure(10.0 if cycles else 8.0, 5.6 + 0.22 * len(results))
     panels = figure.subplots(
         2, 2 if cycles else 1, sharex="col", squeeze=False, gridspec_kw={"width_ratios": [3, 2] if cycles else [1]}
     )
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(results)))
     styles = ["-", "--", "-.", ":"]
-    for i, (result, label, colour) in enumerate(zip(results, labels(results), colours)):
+    for i, (result, label, colour) in enumerate(zip(results, names or labels(results), colours)):
         h, look = result.history, {"ls": styles[i % 4], "color": colour, "lw": 0.9 if cycles else 1.4}
         parts = [(slice(None), h["time"])]
         if cycles:
@@ -64,6 +70,11 @@ def compare(results: Sequence[TransientResult]) -> Figure:
         panels[1, 1].set_xlabel("Time from the lip's way up, ms")
     figure.legend(loc="outside lower left", ncols=2 if len(results) > 3 else 1)
     return figure
+
+
+def _swings(result: TransientResult) -> bool:
+    """Whether a run ends in cycles, at least three, and not on its way to somewhere."""
+    return bool(result.cycle) and result.verdict["lip_displacement"]["cycles_observed"] >= 3
 
 
 def _last_cycles(result: TransientResult, count: int = 2) -> tuple[slice, np.ndarray]:

@@ -1,0 +1,123 @@
+"""Numbers of the manual say where they come from, and every command that it shows can be given."""
+
+from __future__ import annotations
+
+import importlib.util
+import pkgutil
+import re
+import shlex
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+import benchmarks
+from benchmarks.registry import BENCHMARKS
+from dbvfiv import cli
+from dbvfiv.cli import _run
+from dbvfiv.cli._actions import study
+from dbvfiv.studies.case import load_case
+from tests.pages import ROOT, blocks, command_lines, indented_commands, pages, tables
+
+#: The page on flow laws sets a key that its reader adds; tests/flow/test_adding_a_law.py carries it out.
+PAGES = [page for page in pages() if page.name != "adding-a-flow-law.md"]
+STAMPED = [table for page in PAGES for table in tables(page) if table.has_numbers]
+
+
+@pytest.fixture
+def only_parsed(monkeypatch, capsys):
+    """Give a command line to the program, up to the point at which it would begin to compute: options, case and keys
+    are read and checked. A case file that is not there stands for the reader's own and is left out.
+    """
+    seen = []
+
+    def read_case(path, overrides):
+        return load_case(path if path and (ROOT / path).exists() else None, overrides or ())
+
+    def perform(kind, case, request, *_):
+        changes = {key: value for key, value in request.changes.items() if value is not None}
+        seen.append(case.replace(changes) if changes else case)
+
+    class Silent:
+        def __getattr__(self, name):
+            return lambda *given, **named: None
+
+    def action(name):
+        return (
+            SimpleNamespace(read_case=read_case, perform=perform, report=study.report) if name == "study" else Silent()
+        )
+
+    names = [module.name for module in pkgutil.iter_modules(cli.__path__)]
+    for name in names:
+        module = importlib.import_module(f"dbvfiv.cli.{name}")
+        if hasattr(module, "action"):
+            monkeypatch.setattr(module, "action", action)
+    commands = _run.build()
+    monkeypatch.setattr(_run, "build", lambda: commands)
+    monkeypatch.chdir(ROOT)
+
+    def parse(line: str) -> str:
+        """Nothing, or what is wrong with the line."""
+        words = shlex.split(line)
+        status = cli.run(words[1:])
+        said = capsys.readouterr().err.strip()
+        of_the_reader = (
+            "which does not exist; it must be the name of a file" in said
+        )  # the key is known, the file theirs
+        return "" if status == 0 or of_the_reader else said or f"exit status {status}"
+
+    return parse
+
+
+def test_a_table_of_numbers_says_where_they_come_from():
+    assert len(STAMPED) > 40
+    silent = [f"{table.place} ({' | '.join(table.rows[0])[:60]})" for table in STAMPED if not table.quoted]
+    assert not silent, f"Tables without a line below that says what made them: {silent}"
+
+
+def test_what_made_a_table_exists():
+    for module in pkgutil.iter_modules(benchmarks.__path__):
+        if module.name != "__main__":
+            importlib.import_module(f"benchmarks.{module.name}")
+    wrong = []
+    for table in STAMPED:
+        for quoted in table.quoted:
+            words = quoted.split()
+            if words[0] == "python" and words[1:3] == ["-m", "benchmarks"]:
+                wrong += [f"{table.place}: no benchmark {w}" for w in words[4:] if w not in BENCHMARKS]
+            elif words[0] == "python":
+                wrong += [] if (ROOT / words[1]).exists() else [f"{table.place}: no {words[1]}"]
+            elif words[0].startswith(("tests/", "dbvfiv/", "cases/")):
+                wrong += [] if list(ROOT.glob(words[0])) else [f"{table.place}: no {words[0]}"]
+    assert not wrong, wrong
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_can_be_given(page, only_parsed):
+    """Those of stamps and of code blocks: options are known, and keys that are set exist and take their values."""
+    shown = [quoted for table in tables(page) for quoted in table.quoted]
+    shown += [line for block in blocks(page) + blocks(page, "sh") for line in command_lines(block)] + indented_commands(
+        page
+    )
+    if page.name == "README.md":
+        shown += re.findall(r"`(dbvfiv [^`]+)`", page.read_text())
+    wrong = {line: problem for line in shown if line.startswith("dbvfiv ") and (problem := only_parsed(line))}
+    assert not wrong, wrong
+
+
+def test_every_figure_says_which_command_makes_it(only_parsed):
+    """tools/figures.py has each of them, and its commands can be given."""
+    spec = importlib.util.spec_from_file_location("figures", ROOT / "tools/figures.py")
+    figures = importlib.util.module_from_spec(spec)
+    sys.modules["figures"] = figures  # dataclasses look it up
+    try:
+        spec.loader.exec_module(figures)
+    finally:
+        del sys.modules["figures"]
+    made = [name for one in figures.ALL for name in one.figures.values()]
+    assert sorted(made) == sorted(path.name for path in (ROOT / "docs/figures").iterdir())
+    shown = set(re.findall(r"figures/([\w-]+\.\w+)\)", "".join(page.read_text() for page in pages())))
+    assert shown == set(made)
+    lines = [one.command.format(folder="out/figures/x") for one in figures.ALL]
+    wrong = {line: problem for line in lines if line.startswith("dbvfiv ") and (problem := only_parsed(line))}
+    assert not wrong, wrong

@@ -1,0 +1,100 @@
+"""The tutorials, as a reader does them: their files are written, their commands given one after another, on a coarse
+mesh where a command takes one. What the text says about the outcome is held afterwards.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import typer
+
+import dbvfiv
+from dbvfiv import cli
+from dbvfiv.cli._run import build
+from tests.pages import ROOT, command_lines
+
+TUTORIALS = ROOT / "docs/tutorials"
+COARSE = (8, 14)
+pytestmark = pytest.mark.slow
+
+
+def follow(name: str, mesh: tuple[int, int] = COARSE) -> None:
+    """Write the files and give the commands of a tutorial in the working folder.
+
+    A block of TOML that begins with `# NAME.toml` is that file; every line of a block of the shell is a command.
+    """
+    commands = typer.main.get_command(build()).commands
+    keys = ("--set", f"mesh.around={mesh[0]}", "--set", f"mesh.along={mesh[1]}")
+    text = (TUTORIALS / f"{name}.md").read_text()
+    for language, body in re.findall(r"^```(\w+)\n(.*?)^```$", text, re.M | re.S):
+        if language == "toml":
+            Path(body.splitlines()[0].removeprefix("# ")).write_text(body)
+        if language == "sh":
+            for line in command_lines(body):
+                program, *words = shlex.split(line)
+                assert program == "dbvfiv", line
+                takes_keys = any("--set" in option.opts for option in commands[words[0]].params)
+                computes = words[0] != "case" and not "".join(words[1:2]).endswith(".h5")
+                status = cli.run([*words, *(keys if takes_keys and computes else ())])
+                assert status == 0, f"`{line}` ends with status {status}"
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path, monkeypatch):
+    (tmp_path / "cases").symlink_to(ROOT / "cases")
+    monkeypatch.chdir(tmp_path)
+
+
+def test_every_tutorial_is_followed():
+    mine = set(re.findall(r'follow\("([a-z-]+)"', Path(__file__).read_text()))
+    assert mine == {page.stem for page in TUTORIALS.glob("*.md")}
+
+
+def test_quick_start(capsys):
+    follow("quick-start")
+    told = capsys.readouterr().out
+    assert "Stable under storage continuity" in told and "Unstable under storage continuity" in told
+    assert "the spectrum and the independent count agree" in told
+    assert len(dbvfiv.load_result("my.h5").states) == 3
+    assert Path("figures/head-discharge.svg").exists() and Path("my.vtkhdf").exists()
+
+
+def test_own_valve():
+    follow("own-valve")
+    thin, thick = dbvfiv.load_result("six.h5"), dbvfiv.load_result("thick.h5")
+    assert thin.states[1].lip_opening == pytest.approx(0.026, abs=0.002)
+    assert 1e3 * thin.states[1].mass_flow / thin.case.fluid.density == pytest.approx(11.4, abs=0.5)
+    assert all(b.mass_flow < a.mass_flow for a, b in zip(thin.states, thick.states))
+    assert Path("both.png").exists()
+
+
+def test_is_it_stable(capsys):
+    follow("is-it-stable")
+    told = capsys.readouterr().out
+    assert not dbvfiv.load_result("modes.h5").stable
+    assert "Unstable under quasi-steady continuity" in told and "Stable under storage continuity" in told
+    (onset,) = dbvfiv.load_result("onset.h5").points
+    assert onset["criticality"] == "super" and onset["confirmed"] and 40 < onset["value"] < 120
+    assert Path("figures/sweep.png").exists() and Path("figures/stability-map.png").exists()
+
+
+def test_in_time():
+    """Rougher meshes have the onset so far up that the cycle at 40 kg/m3 all but touches."""
+    follow("in-time", (14, 24))
+    run, half, cycle = (dbvfiv.load_result(f"{name}.h5") for name in ("run", "half", "cycle"))
+    assert run.verdict["verdict"] == half.verdict["verdict"] == "limit cycle"
+    swings = [result.verdict["lip_displacement"]["amplitude"] for result in (run, half)]
+    assert swings[0] == pytest.approx(swings[1], rel=0.02)
+    lightest = cycle.nearest(40.0)
+    assert lightest.stable and swings[1] == pytest.approx(lightest.amplitude, rel=0.02)
+
+
+def test_back_pressure(capsys):
+    follow("back-pressure")
+    shut = dbvfiv.load_result("shut.h5")
+    assert all(state.closed for state in shut.states) and shut.safety.factor >= 1
+    turned = dbvfiv.load_result("turned.h5")
+    assert 0.1 < turned.closing.closing_time < 0.2
