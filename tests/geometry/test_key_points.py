@@ -187,14 +187,15 @@ def test_bad_tables(name, tmp_path, command_line, one_sentence):
     assert re.search(words, done.err)
 
 
+LOOP = [(0, 60), (30, 55), (60, 40), (70, 25), (60, 15), (45, 20), (50, 40), (70, 55), (90, 40), (100, 15), (105, 0)]
 #: What only the mesh shows.
 IMPOSSIBLE = {
     "crosses itself": (
-        "\n".join([GOOD[0], "0, 20, 0", "60, 5, 0", "20, 30, 0", "100, 8, 0", "100, 0, 0", *GOOD[4:]]),
-        r"profile 1 at z = 0 m crosses itself at x = 0.0",
+        "\n".join([GOOD[0], *(f"{x}, {y}, 0" for x, y in LOOP), *GOOD[4:]]),
+        r"profile 1 at z = 0 m crosses itself at x = 0.05348 m, y = 0.04471 m",
     ),
     "swings beyond the plane": (
-        "\n".join([GOOD[0], "0, 40, 0", "60, 40, 0", "61, 1, 0", "100, 1, 0", "101, 0, 0", *GOOD[4:]]),
+        "\n".join([GOOD[0], "0, 20, 0", "80, 20, 0", "100, 1, 0", "110, 0, 0", *GOOD[4:]]),
         r"profile 1 at z = 0 m leaves the quarter of positive x and y between its points",
     ),
     "lips wider than the flange": (

@@ -232,6 +232,7 @@ def test_steady_runs_are_compared_with_measured_data(runs, command_line, tmp_pat
         for words in ("points of flow", "points of lip area", "points of the wall", "pressures along the axis"):
             assert any(line.startswith(f"{number}: Measured") and words in line for line in done.out.splitlines())
     document = json.loads(command_line("compare", *runs, "-o", tmp_path / "both.png", "--json").out)
+    assert [run["label"] for run in document["runs"]] == ["angle 54", "angle 40"]
     ours, other = (run["measured_sections"][0]["root_mean_square"] for run in document["runs"])
     assert ours == pytest.approx(1e-3, rel=1e-6) and abs(other - ours) > 1e-5
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from ...drawing.style import REST, new_figure
 from ...errors import CaseError
 from .. import comparing
-from ..measured.figures import MEASURED, draw_sections_of
+from ..measured.figures import MEASURED, draw_section_of_runs, some_sections
 from .along import value_at
 from .result import ClosureResult
 
@@ -132,9 +132,10 @@ def draw(results: Sequence[ClosureResult]) -> Figure:
     names = comparing.labels(results, _QUIET)
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(results)))
     shapes = [result.measured.shapes for result in results]
-    count = 6 + 2 * any(part is not None for part in shapes)
-    figure = new_figure(9.6, 2.6 * count / 2 + 0.22 * len(results))
-    panels = figure.subplots(count // 2, 2).ravel()
+    sections = some_sections(shapes, 3)
+    rows = -(-(len(COLUMNS) + len(sections)) // 2)
+    figure = new_figure(9.6, 2.6 * rows + 0.22 * len(results))
+    panels = figure.subplots(rows, 2).ravel()
     for axes, (name, (factor, title, unit)) in zip(panels, COLUMNS.items()):
         for result, label, colour in zip(results, names, colours):
             pressure = np.array([point.pressure for point in result.walk])
@@ -148,7 +149,8 @@ def draw(results: Sequence[ClosureResult]) -> Figure:
         if passage is not None:
             panels[3].plot(passage.pressure / 1e3, 1e6 * passage.measured, color="black", **MEASURED)
     panels[4].axhline(0.0, color=REST, lw=0.9)
-    draw_sections_of(panels[6:], shapes, colours)
+    for axes, section in zip(panels[len(COLUMNS) :], sections):
+        draw_section_of_runs(axes, section, shapes, colours)
     for axes in panels:
         axes.set_visible(axes.has_data())
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=2 if len(results) > 3 else 1)

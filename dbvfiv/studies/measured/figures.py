@@ -72,19 +72,22 @@ def draw_section(axes: Axes, section: MeasuredSection) -> None:
     _label(axes, f"{section.title}: {told}")
 
 
-def draw_sections_of(panels: Sequence[Axes], shapes: Sequence[MeasuredShapes | None], colours: Sequence[Any]) -> None:
-    """Measured sections of the first of several runs that has some, one a panel, with the curves of all runs in their
-    colours.
-    """
+def some_sections(shapes: Sequence[MeasuredShapes | None], most: int) -> list[MeasuredSection]:
+    """At most so many sections of more than one point, of the first of several runs that has measured ones."""
     first = next((part for part in shapes if part is not None), None)
-    for axes, section in zip(panels, [] if first is None else some_of(_wide(first), len(panels))):
-        at = (section.pressure, section.z, section.face)
-        for part, colour in zip(shapes, colours):
-            curve = None if part is None else part.walls.curve(*at)
-            if curve is not None:
-                axes.plot(*closed_section(curve).T * 1e3, color=colour, lw=1.2)
-        axes.plot(*section.points.T * 1e3, color="black", **MEASURED)
-        _label(axes, section.title)
+    return [] if first is None else some_of(_wide(first), most)
+
+
+def draw_section_of_runs(
+    axes: Axes, section: MeasuredSection, shapes: Sequence[MeasuredShapes | None], colours: Sequence[Any]
+) -> None:
+    """The measured points of a section, and what several runs have computed there, in their colours."""
+    for part, colour in zip(shapes, colours):
+        curve = None if part is None else part.walls.curve(section.pressure, section.z, section.face)
+        if curve is not None:
+            axes.plot(*closed_section(curve).T * 1e3, color=colour, lw=1.2)
+    axes.plot(*section.points.T * 1e3, color="black", **MEASURED)
+    _label(axes, section.title)
 
 
 def _label(axes: Axes, title: str) -> None:

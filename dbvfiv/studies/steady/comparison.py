@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from ...drawing.style import new_figure, parameter_label
 from ...errors import CaseError
 from .. import comparing
-from ..measured.figures import MEASURED, draw_curve, draw_sections_of
+from ..measured.figures import MEASURED, draw_curve, draw_section_of_runs, some_sections
 from ..state import State
 from .between import flow_at
 from .result import SteadyResult
@@ -115,7 +115,8 @@ def draw(results: Sequence[SteadyResult]) -> Figure:
     panels = [_discharge]
     panels += [_areas] if any(part.area is not None for part in parts) else []
     panels += [_taps] if any(part.taps is not None for part in parts) else []
-    count = len(panels) + _SECTIONS * any(part is not None for part in shapes)
+    sections = some_sections(shapes, _SECTIONS)
+    count = len(panels) + len(sections)
     columns = min(count, 2)
     rows = -(-count // columns)
     size = (7.0, 4.6) if count == 1 else (10.0, 3.6 * rows)
@@ -126,7 +127,8 @@ def draw(results: Sequence[SteadyResult]) -> Figure:
     for panel, draw_panel in zip(axes, panels):
         for result, label, colour in zip(results, names, colours):
             draw_panel(panel, result, label, colour)
-    draw_sections_of(axes[len(panels) :], shapes, colours)
+    for panel, section in zip(axes[len(panels) :], sections):
+        draw_section_of_runs(panel, section, shapes, colours)
     for panel in axes:
         panel.set_visible(panel.has_data())
     axes[0].set_title("Head and discharge", loc="left", fontweight="bold")
