@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from dbvfiv.case.measured import AREA, DISCHARGE, SHAPE, TAPS, read_measured
 from dbvfiv.drawing.faces import faces
 from dbvfiv.studies.case import Case, load_case
 from dbvfiv.studies.closure import comparison as closure
+from dbvfiv.studies.measured.kept import kept_tables
 from dbvfiv.studies.measured.sections import cut, distances
 from dbvfiv.studies.steady import comparison as steady
 
@@ -121,6 +123,12 @@ def test_several_files(tmp_path):
         with pytest.raises(CaseError, match=words):
             load_case(None, [f"steady.measured={wrong}"])
     assert Case.from_dict({"steady": {"measured": None}}).steady.measured == ()  # as earlier versions wrote it
+
+
+def test_points_of_an_earlier_version_are_a_discharge():
+    record = SimpleNamespace(notes=lambda what: [{"what": what, "points": [[1e3, 2.0], [2e3, 3.0]]}])
+    (table,) = kept_tables(record)
+    assert table.holds == {DISCHARGE} and table.columns["mass_flow"] == (2.0, 3.0)
 
 
 # -- sections
