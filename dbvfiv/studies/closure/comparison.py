@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from ...drawing.style import REST, new_figure
 from ...errors import CaseError
 from .. import comparing
+from ..measured import table
 from ..measured.figures import MEASURED, draw_section_of_runs, some_sections
 from .along import value_at
 from .result import ClosureResult
@@ -46,8 +47,8 @@ class Comparison:
         By the names of `COLUMNS`; between load steps of a run by a straight line, NaN beyond them.
     critical_pressure, safety : lists of float or None
         Where the wall buckles, Pa, and the safety factor of each run.
-    measured : list of lists of str
-        What each run says of measured data.
+    measured : list of str
+        What the runs are off by from measured data.
     """
 
     labels: list[str]
@@ -55,7 +56,7 @@ class Comparison:
     values: dict[str, np.ndarray]
     critical_pressure: list[float | None]
     safety: list[float | None]
-    measured: list[list[str]]
+    measured: list[str]
 
     @property
     def remark(self) -> str:
@@ -93,7 +94,7 @@ class Comparison:
         for i, (critical, factor) in enumerate(zip(self.critical_pressure, self.safety), 1):
             buckles = "no buckling on its path" if critical is None else f"buckles at {critical / 1e3:.6g} kPa"
             lines.append(f"{i}: {buckles}{'' if factor is None else f', safety factor {factor:.3g}'}.")
-        return lines + [f"{i}: {text}" for i, texts in enumerate(self.measured, 1) for text in texts]
+        return lines + self.measured
 
 
 def _cell(value: float, sign: str = "") -> str:
@@ -123,7 +124,7 @@ def compare(results: Sequence[ClosureResult]) -> Comparison:
         values,
         [result.critical_pressure for result in results],
         [None if result.safety is None else result.safety.factor for result in results],
-        [result.measured.sentences() for result in results],
+        table.told([result.measured for result in results]),
     )
 
 

@@ -44,6 +44,12 @@ class MeasuredCurve:
         """Computed over measured less 1; NaN where there is nothing to compare."""
         return self.computed / np.where(self.measured > 0, self.measured, np.nan) - 1.0
 
+    @property
+    def off(self) -> tuple[str, dict[str, float]]:
+        """What a table of several runs says: its title, and a number for each point."""
+        names = [f"{number}: {p / 1e3:.6g} kPa" for number, p in enumerate(self.pressure, 1)]
+        return f"Computed over measured {self.what}, %", dict(zip(names, 100 * self.difference))
+
     def summary(self) -> list[dict[str, Any]]:
         """Plain SI numbers, None where there is nothing to compare."""
         rows = zip(self.pressure, self.measured, self.computed, self.difference)
@@ -93,6 +99,13 @@ class MeasuredTaps:
     def share(self) -> np.ndarray:
         """The same over the pressure that drives the flow."""
         return self.excess / np.where(self.pressure > 0, self.pressure, np.nan)
+
+    @property
+    def off(self) -> tuple[str, dict[str, float]]:
+        """What a table of several runs says: its title, and a number for each point."""
+        places = enumerate(zip(self.pressure, self.z), 1)
+        names = [f"{number}: {p / 1e3:.6g} kPa, z = {1e3 * z:.4g} mm" for number, (p, z) in places]
+        return "Pressure along the axis, computed less measured, kPa", dict(zip(names, self.excess / 1e3))
 
     def summary(self) -> list[dict[str, Any]]:
         """Plain SI numbers, None where there is nothing to compare."""

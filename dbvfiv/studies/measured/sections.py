@@ -173,6 +173,13 @@ class MeasuredShapes:
         """(k,) m, of all points."""
         return np.concatenate([section.distance for section in self.sections])
 
+    @property
+    def off(self) -> tuple[str, dict[str, float]]:
+        """What a table of several runs says: its title, and a number for each section."""
+        square = [float(np.sqrt(np.mean(section.distance**2))) for section in self.sections]
+        names = [f"{number}: {section.title}" for number, section in enumerate(self.sections, 1)]
+        return "Sections, computed from measured, root mean square, mm", dict(zip(names, 1e3 * np.array(square)))
+
     def summary(self) -> list[dict[str, Any]]:
         """Plain SI numbers of each section."""
         return [section.summary() for section in self.sections]

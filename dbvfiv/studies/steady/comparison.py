@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from ...drawing.style import new_figure, parameter_label
 from ...errors import CaseError
 from .. import comparing
+from ..measured import table
 from ..measured.figures import MEASURED, draw_curve, draw_section_of_runs, some_sections
 from ..state import State
 from .between import flow_at
@@ -37,8 +38,8 @@ class Comparison:
         Whole valve; between the states of a run by a monotone cubic, NaN beyond them.
     remark : str
         What stands in the way of comparing; empty if nothing does.
-    measured : list of lists of str
-        What each run says of measured data.
+    measured : list of str
+        What the runs are off by from measured data.
     """
 
     labels: list[str]
@@ -46,7 +47,7 @@ class Comparison:
     mass_flow: np.ndarray
     volume_flow: np.ndarray
     remark: str = ""
-    measured: Sequence[Sequence[str]] = ()
+    measured: Sequence[str] = ()
 
     @property
     def difference(self) -> np.ndarray:
@@ -72,8 +73,7 @@ class Comparison:
                 cells += f"{flow:12.5g}" if np.isfinite(flow) else f"{'-':>12}"
                 cells += (f"{off:+9.3f}" if np.isfinite(off) else f"{'-':>9}") if i else ""
             rows.append(f"{pressure / 1e3:10.6g}{cells}")
-        told = [f"{i}: {text}" for i, texts in enumerate(self.measured, 1) for text in texts]
-        return [*numbered, head, *rows, *([self.remark] if self.remark else []), *told]
+        return [*numbered, head, *rows, *([self.remark] if self.remark else []), *self.measured]
 
 
 def compare(results: Sequence[SteadyResult]) -> Comparison:
@@ -94,7 +94,7 @@ def compare(results: Sequence[SteadyResult]) -> Comparison:
     places = {result.case.pressure_at for result in results}
     remark = f"The pressures are not of one place: {' and '.join(sorted(places))}." if len(places) > 1 else ""
     flows = [np.array([_at(result, pressure, name) for result in results]) for name in ("mass_flow", "volume_flow")]
-    told = [result.measured.sentences() for result in results]
+    told = table.told([result.measured for result in results])
     return Comparison(comparing.labels(results, _QUIET), pressure, *flows, remark, told)
 
 
