@@ -246,8 +246,9 @@ def test_steady_runs_are_compared_with_measured_data(runs, command_line, tmp_pat
         )
     )
     assert "Computed over measured flow, %" in told
-    assert areas[:4] == ["1:", "4", "kPa", "-4.762"] and float(areas[4]) > -4.762  # the softer lips of 40 degrees
-    assert lips[:6] == ["1:", "8", "kPa,", "lip,", "inner", "1"] and taps[-2] == "0.2"
+    assert areas[:3] == ["1:", "4", "kPa,"] and areas[4:6] == ["cm2", "-4.762"]
+    assert float(areas[6]) > -4.762  # the softer lips of 40 degrees
+    assert lips[:8] == ["1:", "8", "kPa,", "lip,", "inner,", "3", "points", "1"] and taps[-2] == "0.2"
     document = json.loads(command_line("compare", *runs, "-o", tmp_path / "both.png", "--json").out)
     assert [run["label"] for run in document["runs"]] == ["angle 54", "angle 40"]
     ours, other = (run["measured_sections"][0]["root_mean_square"] for run in document["runs"])

@@ -57,6 +57,7 @@ def measured_closure(result: ClosureResult) -> MeasuredClosure:
     passage = None
     if areas is not None:
         pressure, area = np.array(areas)
-        passage = MeasuredCurve("passage left", "area", pressure, area, value_at(result, pressure, "least_opening"))
+        computed = value_at(result, pressure, "least_opening")
+        passage = MeasuredCurve("passage left", "area", pressure, area, computed, ("mm2", 1e6))
     shapes = points and MeasuredShapes.of(points, WallSections(result.mesh, result.states))
     return MeasuredClosure(passage, shapes)

@@ -26,6 +26,8 @@ class MeasuredCurve:
         The pressure as the case has it.
     computed : (k,) array
         Between the states; NaN beyond them.
+    unit : (str, float)
+        In which people are told what was measured, and the factor from SI.
     """
 
     what: str
@@ -33,6 +35,7 @@ class MeasuredCurve:
     pressure: np.ndarray
     measured: np.ndarray
     computed: np.ndarray
+    unit: tuple[str, float] = ("kg/s", 1.0)
 
     @property
     def excess(self) -> np.ndarray:
@@ -47,7 +50,9 @@ class MeasuredCurve:
     @property
     def off(self) -> tuple[str, dict[str, float]]:
         """What a table of several runs says: its title, and a number for each point."""
-        names = [f"{number}: {p / 1e3:.6g} kPa" for number, p in enumerate(self.pressure, 1)]
+        unit, factor = self.unit
+        points = enumerate(zip(self.pressure, factor * self.measured), 1)
+        names = [f"{number}: {p / 1e3:.6g} kPa, {value:.5g} {unit}" for number, (p, value) in points]
         return f"Computed over measured {self.what}, %", dict(zip(names, 100 * self.difference))
 
     def summary(self) -> list[dict[str, Any]]:
@@ -103,8 +108,8 @@ class MeasuredTaps:
     @property
     def off(self) -> tuple[str, dict[str, float]]:
         """What a table of several runs says: its title, and a number for each point."""
-        places = enumerate(zip(self.pressure, self.z), 1)
-        names = [f"{number}: {p / 1e3:.6g} kPa, z = {1e3 * z:.4g} mm" for number, (p, z) in places]
+        places = enumerate(zip(self.pressure / 1e3, 1e3 * self.z, self.measured / 1e3), 1)
+        names = [f"{number}: {p:.6g} kPa, z = {z:.4g} mm, {tap:.5g} kPa" for number, (p, z, tap) in places]
         return "Pressure along the axis, computed less measured, kPa", dict(zip(names, self.excess / 1e3))
 
     def summary(self) -> list[dict[str, Any]]:

@@ -142,8 +142,8 @@ _SECTIONS = 2
 
 def _discharge(axes: Axes, result: SteadyResult, label: str, colour: Any) -> None:
     states = _ordered(result)
-    axes.plot([1e3 * s.volume_flow for s in states], [s.pressure / 1e3 for s in states], "o-", color=colour, ms=4)
-    axes.lines[-1].set_label(label)
+    flow, pressure = [1e3 * s.volume_flow for s in states], [s.pressure / 1e3 for s in states]
+    axes.plot(flow, pressure, "o-", color=colour, ms=4, label=label)
     points = result.measured.discharge
     if points is not None:
         flow = 1e3 * points.measured / result.case.fluid.density

@@ -18,6 +18,8 @@ from .between import flow_at
 if TYPE_CHECKING:
     from .result import SteadyResult
 
+#: What JSON calls columns of states that were measured.
+_COLUMNS = {"mass_flow": "mass_flow", "outlet_area": "area"}
 #: What the files of steady.measured may hold.
 KINDS = (DISCHARGE, AREA, SHAPE, TAPS)
 
@@ -71,7 +73,7 @@ def measured_states(result: SteadyResult) -> MeasuredStates:
     both = joined([table for table in tables if AREA in table.holds], DISCHARGE, "mass_flow", "area")
     return MeasuredStates(
         flows and against(*flows, states, rest),
-        areas and against(*areas, states, rest, "lip area", "area", "outlet_area"),
+        areas and against(*areas, states, rest, "lip area", "outlet_area", ("cm2", 1e4)),
         points and MeasuredShapes.of(points, WallSections(result.mesh, states)),
         taps and _taps(*np.array(taps), states, result.mesh.z),
         None if both is None else np.array(both).T,
@@ -84,14 +86,15 @@ def against(
     states: Sequence[SteadyState],
     rest: float = 0.0,
     what: str = "flow",
-    column: str = "mass_flow",
     name: str = "mass_flow",
+    unit: tuple[str, float] = ("kg/s", 1.0),
 ) -> MeasuredCurve:
     """Measured numbers over pressures, Pa, against a column `name` of states; `rest` is the pressure, Pa, at which
-    nothing flows, `what` and `column` are what people and JSON call it.
+    nothing flows; people are told of `what`, in `unit` with its factor from SI.
     """
     pressure = np.array(pressure, float)
-    return MeasuredCurve(what, column, pressure, np.array(measured, float), flow_at(states, pressure, rest, name))
+    computed = flow_at(states, pressure, rest, name)
+    return MeasuredCurve(what, _COLUMNS[name], pressure, np.array(measured, float), computed, unit)
 
 
 def _taps(
