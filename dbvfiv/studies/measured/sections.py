@@ -177,8 +177,10 @@ class MeasuredShapes:
     def off(self) -> tuple[str, dict[str, float]]:
         """What a table of several runs says: its title, and a number for each section."""
         square = [float(np.sqrt(np.mean(section.distance**2))) for section in self.sections]
-        sections = enumerate(self.sections, 1)
-        names = [f"{number}: {section.title}, {len(section.points)} points" for number, section in sections]
+        names = [
+            f"{number}: {section.title}, {len(section.points)} point{'s' * (len(section.points) > 1)}"
+            for number, section in enumerate(self.sections, 1)
+        ]
         return "Sections, computed from measured, root mean square, mm", dict(zip(names, 1e3 * np.array(square)))
 
     def summary(self) -> list[dict[str, Any]]:
