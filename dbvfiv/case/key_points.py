@@ -177,10 +177,13 @@ def _check(profiles: list[KeyProfile]) -> None:
             raise ValueError(f"{where} has {len(points)} points, and a profile has three or more")
         size = max(max(abs(x), abs(y)) for x, y, _ in points)
         near = _ON_PLANE * size
+        if min(min(x, y) for x, y, _ in points) < -near:
+            raise ValueError(
+                f"{where} leaves the quarter of positive x and y, whose mirror images are the rest of the valve (a "
+                "bill with a flat bottom has no such quarter)"
+            )
         if abs(points[0][0]) > near or abs(points[-1][1]) > near:
             raise ValueError(f"{where} does not run from the centre, x = 0, to the side edge, y = 0")
-        if min(min(x, y) for x, y, _ in points) < -near:
-            raise ValueError(f"{where} leaves the quarter of positive x and y")
         if min(math.dist(a[:2], b[:2]) for a, b in zip(points, points[1:])) <= 1e-9 * size:
             raise ValueError(f"{where} has the same point twice")
     places = [profile.z for profile in profiles]

@@ -35,6 +35,7 @@ DIMENSION = {
     "Hz": "frequency",
     "N/m": "stiffness",
     "m/s": "velocity",
+    "m^2": "area",
     "m^3/s": "volume flow",
     "kg/s": "mass flow",
     "deg": "angle",

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 _SHAPE = ("lip_half_width", "lip_rise", "lip_radius", "cuff_radius", "flange_radius", "saddle")
 #: Steepest a transition may run from the axis, rad: beyond it the rows of the mesh lie in its surface.
 _STEEPEST = math.radians(80.0)
+#: Least passage between the lips at rest, over that of the flange: below it nothing flows, and rounding says how much.
+_LEAST_PASSAGE = 1e-8
 
 
 def check_key_points(valve: Valve) -> None:
@@ -64,6 +66,13 @@ def check_sections(valve: Valve) -> None:
             name,
             f"{getattr(valve, name):g} m, which leaves {4e4 * lip:.4g} cm2 between the lips at rest",
             f"the passage there must be smaller than that of the flange, {4e4 * flange:.4g} cm2",
+        )
+    if lip < _LEAST_PASSAGE * flange:
+        name = "initial_gap" if valve.initial_gap < 1e-3 * valve.lip_half_width else "lip_half_width"
+        raise BrokenRule(
+            name,
+            f"{getattr(valve, name):g} m, which leaves {4e4 * lip:.4g} cm2 between the lips at rest",
+            f"the passage there must be at least {_LEAST_PASSAGE:g} of that of the flange, {4e4 * flange:.4g} cm2",
         )
     _check_transitions(valve)
 

@@ -16,7 +16,9 @@ ORDER = 52
 def command(
     files: Annotated[
         list[Path],
-        typer.Argument(metavar="RUN.h5 RUN.h5 ...", help="Result files of transient runs, or of steady ones."),
+        typer.Argument(
+            metavar="RUN.h5 RUN.h5 ...", help="Result files of transient runs, of steady or of closure ones."
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.png", help="Figure to write.")] = Path(
         "comparison.png"
@@ -24,7 +26,8 @@ def command(
     as_json: AsJson = False,
 ) -> None:
     """Compare transient runs: their histories in one figure, their verdicts in one table; or steady runs: their head
-    and discharge in one figure, the flows at the pressures of the first and what they differ by in one table. Runs are
-    named by the case keys that tell them apart.
+    and discharge in one figure, the flows at the pressures of the first and what they differ by in one table; or
+    closure runs: seal, force, displacement, passage and stiffness over the back pressure. Measured data that they name
+    are in the figure, and what each is off by is told. Runs are named by the case keys that tell them apart.
     """
     action("compare").compare(files, output, as_json)

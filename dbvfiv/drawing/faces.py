@@ -41,6 +41,12 @@ def faces(mesh: MeshData, nodal: np.ndarray | None = None) -> tuple[np.ndarray, 
     return middle - half * moved["director"], middle + half * moved["director"]
 
 
+def closed_section(quarter: np.ndarray) -> np.ndarray:
+    """Closed curve (k, 2) through the four mirror images of a section from (0, y) to (x, 0)."""
+    right = np.concatenate([quarter, quarter[-2::-1] * [1, -1]])
+    return np.concatenate([right, right[-2::-1] * [-1, 1]])
+
+
 def offset_line(z: np.ndarray, y: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Faces of a wall in the plane x = 0 of which the line (z, y) is the middle, where its rotations are not known.
 

@@ -10,6 +10,7 @@ from scipy.interpolate import PchipInterpolator
 
 from ..case.key_points import read_key_points
 from ..case.valve import Valve
+from .crossings import check_profiles
 from .sections import Profile, key_point_sections, lip_profile, round_profile
 
 
@@ -89,9 +90,16 @@ class SmoothSurface(Surface):
 
 
 def surface_of(valve: Valve) -> Surface:
-    """Surface of a valve: from its key points if it has any, else lip, saddle, cuff, flare and flange (App. A)."""
+    """Surface of a valve: from its key points if it has any, else lip, saddle, cuff, flare and flange (App. A).
+
+    Raises
+    ------
+    ValueError
+        If a section through key points crosses itself.
+    """
     if valve.key_points is not None:
         profiles = tuple(key_point_sections(read_key_points(valve.key_points), valve.scale))
+        check_profiles(profiles)
         return SmoothSurface(profiles) if valve.key_point_skin == "smooth" else Surface(profiles)
     profiles, end = [lip_profile(0.0, valve.lip)], 0.0
     pieces = (

@@ -15,9 +15,6 @@ from .divisions import column_division, grading, inverse_grading, row_division
 from .surface import surface_of
 from .wall_area import wall_deduction
 
-#: Of the whole valve that a mesh is one of.
-QUARTERS = 4
-
 
 @dataclass(frozen=True)
 class ValveMesh:

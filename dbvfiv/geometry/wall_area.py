@@ -7,6 +7,8 @@ import numpy as np
 from ..case.valve import Valve
 from .surface import Surface
 
+#: Of the whole valve that a section is one of.
+QUARTERS = 4
 #: Pieces of a section over which a wall that varies around it is summed up.
 _FINE = 1000
 
@@ -18,7 +20,8 @@ def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
     Raises
     ------
     ValueError
-        If the wall fills the section of the lip or of the flange that key points give, or patches fill a section.
+        If the wall fills the section of the lip or of the flange that key points give, if these leave a wider passage
+        at the lip than at the flange, or if patches fill a section.
     """
     return _even_deduction(valve, z, surface) + (_patched(valve, z, surface) if valve.patches else 0.0)
 
@@ -64,6 +67,12 @@ def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float,
                 f"The key points of the {place} leave no flow area inside a half wall of {half:g} m; it must be less, "
                 f"see valve.{name}_wall_deduction."
             )
+    inside = [1e4 * QUARTERS * (surface.area(z) - taken) for z, taken in ((lip, found[0]), (flange, found[2]))]
+    if inside[0] >= inside[1]:
+        raise ValueError(
+            f"The key points leave {inside[0]:.4g} cm2 between the lips at rest; the passage there must be smaller "
+            f"than that of the flange, {inside[1]:.4g} cm2."
+        )
     return found[0], found[1], found[2]
 
 

@@ -15,7 +15,8 @@ from .result import StudyResult
 def differing_keys(results: Sequence[StudyResult], quiet: Sequence[str] = ()) -> list[str]:
     """Keys of the cases that are not the same in all runs, those left out that only steer a run (`quiet`)."""
     flat = [_flat(result.case.to_dict()) for result in results]
-    keys = [key for key in flat[0] if any(case.get(key) != flat[0][key] for case in flat)]
+    every = dict.fromkeys(key for case in flat for key in case)
+    keys = [key for key in every if any(case.get(key) != flat[0].get(key) for case in flat)]
     return [key for key in keys if key not in quiet]
 
 
@@ -52,9 +53,10 @@ def save_figure(draw: Callable[[], Figure], path: Path) -> Path:
 
 
 def _flat(data, prefix: str = "") -> dict:
-    if isinstance(data, dict):
+    tables = isinstance(data, list) and data and all(isinstance(item, dict) for item in data)
+    if isinstance(data, dict) or tables:
         found = {}
-        for key, value in data.items():
+        for key, value in enumerate(data) if tables else data.items():
             found |= _flat(value, f"{prefix}.{key}" if prefix else key)
         return found
     return {prefix: data}

@@ -64,6 +64,11 @@ BAD = {
     "lips far wider than the pipe": ("[valve]\nlip_half_width = 3", "saddle_length.*wider than the pipe.*at least"),
     "no flow area at the lips": ("[valve]\nduckbill_wall_deduction = 0.02", "no flow area between the lips"),
     "no flow area at the flange": ("[valve]\nflange_wall_deduction = 0.2", "no flow area at the flange"),
+    "lips of no width": (
+        "[valve]\nlip_half_width = 1e-9",
+        r"lip_half_width is 1e-09 m, which leaves .* at least 1e-08",
+    ),
+    "lips without a gap": ("[valve]\ninitial_gap = 1e-12", r"initial_gap is 1e-12 m, which leaves .* between the lips"),
     "wall thicker than the pipe": ("[valve]\nwall='uniform'\nwall_thickness=0.3", "fills the pipe"),
     "wall map too short": ("[valve]\nwall_map = [{ to = 0.3, thickness = 0.01 }]", "must reach.*0.56 m"),
     "wall map not increasing": (

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.case import CaseError
 from dbvfiv.case.key_points import read_key_points
 from dbvfiv.geometry import key_point_table, surface_of, valve_mesh
 from dbvfiv.studies.case import Case
@@ -156,6 +157,11 @@ BAD = {
     "does not end at the side edge": (changed(6, "40, 3, 560"), "profile 2 at z = 0.56 m does not run from"),
     "backwards": ("\n".join([GOOD[0], *GOOD[3:0:-1], *GOOD[4:]]), "profile 1 at z = 0 m does not run from"),
     "below the plane": (changed(2, "50, -15, 0"), "leaves the quarter"),
+    "flat bottom": (
+        "\n".join([GOOD[0], "0, 40, 0", "60, 20, 0", "50, -10, 0", "0, -10, 0", *GOOD[4:]]),
+        "profile 1 at z = 0 m leaves the quarter .* flat bottom has no such quarter",
+    ),
+    "to the left": (changed(2, "-50, 15, 0"), "leaves the quarter"),
     "same point twice": (changed(2, "50, 15, 0|50, 15, 0"), "has the same point twice"),
     "flange first": ("\n".join([GOOD[0], *GOOD[4:], *GOOD[1:4]]), "do not go from the lip to the flange"),
     "does not begin at the lip": ("\n".join(GOOD).replace(", 0\n", ", 7\n"), "first profile lies at z = 0.007 m"),
@@ -179,6 +185,33 @@ def test_bad_tables(name, tmp_path, command_line, one_sentence):
     message = done.err.replace("points.csv", "points").replace("case.toml", "case")
     assert one_sentence(message), message
     assert re.search(words, done.err)
+
+
+LOOP = [(0, 60), (30, 55), (60, 40), (70, 25), (60, 15), (45, 20), (50, 40), (70, 55), (90, 40), (100, 15), (105, 0)]
+#: What only the mesh shows.
+IMPOSSIBLE = {
+    "crosses itself": (
+        "\n".join([GOOD[0], *(f"{x}, {y}, 0" for x, y in LOOP), *GOOD[4:]]),
+        r"profile 1 at z = 0 m crosses itself at x = 0.05348 m, y = 0.04471 m",
+    ),
+    "swings beyond the plane": (
+        "\n".join([GOOD[0], "0, 20, 0", "80, 20, 0", "100, 1, 0", "110, 0, 0", *GOOD[4:]]),
+        r"profile 1 at z = 0 m leaves the quarter of positive x and y between its points",
+    ),
+    "lips wider than the flange": (
+        "\n".join([GOOD[0], "0, 200, 0", "140, 140, 0", "200, 0, 0", *GOOD[4:]]),
+        "leave .* cm2 between the lips at rest; the passage there must be smaller than that of the flange",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", IMPOSSIBLE)
+def test_impossible_sections(name, tmp_path, one_sentence):
+    text, words = IMPOSSIBLE[name]
+    (tmp_path / "points.csv").write_text(text)
+    with pytest.raises(CaseError, match=words) as caught:
+        dbvfiv.load(None, {"valve.key_points": str(tmp_path / "points.csv")}).session.mesh
+    assert one_sentence(str(caught.value))
 
 
 def test_the_command_writes_a_table(tmp_path, command_line):

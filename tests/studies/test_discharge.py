@@ -9,7 +9,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case import CaseError
-from dbvfiv.case.measured import read_measured
+from dbvfiv.case.measured import DISCHARGE, read_measured
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.steady.measured import against
@@ -80,9 +80,14 @@ def test_measured_points_in_any_units(tmp_path):
         "mass flow [kg/s]\thead [mH2O]\n50\t2\n": [(2 * 1000 * GRAVITY, 50.0)],
     }.items():
         file.write_text(text)
-        assert read_measured(file) == [pytest.approx(point, rel=1e-9) for point in points]
-    file.write_text("head [m], flow [L/s]\n2, 50\n")
-    assert read_measured(file, 800.0) == [pytest.approx((2 * 800 * GRAVITY, 40.0), rel=1e-9)]
+        assert rows_of(read_measured(file)) == [pytest.approx(point, rel=1e-9) for point in points]
+    file.write_text("head [m] flow [L/s]\n2 50\n")
+    assert rows_of(read_measured(file, 800.0)) == [pytest.approx((2 * 800 * GRAVITY, 40.0), rel=1e-9)]
+
+
+def rows_of(table):
+    assert table.holds == {DISCHARGE}
+    return list(zip(table.columns["pressure"], table.columns["mass_flow"]))
 
 
 @pytest.mark.parametrize(
@@ -93,8 +98,8 @@ def test_measured_points_in_any_units(tmp_path):
         ("18, 47.88\n", "columns are not told; the first line must name"),
         ("pressure [kPa], pressure [Pa]\n1, 2\n", "columns are not told"),
         ("pressure [kPa], flow [m/s]\n1, 2\n", "columns are not told"),
-        ("pressure [kPa], flow [L/s], area [cm2]\n1, 2, 3\n", "columns are not told"),
-        ("pressure [kPa], flow [L/s]\n18\n", "line 2 is not a pressure and a flow"),
+        ("pressure [kPa], flow [L/s], x [mm]\n1, 2, 3\n", "columns are not told"),
+        ("pressure [kPa], flow [L/s]\n18\n", "line 2 is not a pressure or head and a flow"),
         ("pressure [kPa], flow [L/s]\n18, many\n", "line 2 holds 'many', which is not a number"),
         ("pressure [kPa], flow [L/s]\n18, -3\n", "line 2 holds '-3', and numbers must be finite and not negative"),
         ("pressure [kPa], flow [L/s]\n18, nan\n", "line 2 holds 'nan'"),
@@ -123,20 +128,21 @@ def test_measured_points_beside_computed_ones(tmp_path, command_line):
     out = command_line("steady", *OPTIONS, *pressures, f"--set=steady.measured={file}", "-o", kept).out
     assert "Measured: 5 points" in out and "at the 4 within the pressures computed" in out
     file.unlink()  # the result holds them
-    found = dbvfiv.load_result(kept)
-    assert found.measured.difference[:3] == pytest.approx(1 / 1.1 - 1, rel=1e-6)
+    result = dbvfiv.load_result(kept)
+    found = result.measured.discharge
+    assert found.difference[:3] == pytest.approx(1 / 1.1 - 1, rel=1e-6)
     exact = load().steady(pressure=9e3).mass_flow
-    assert found.measured.computed[3] == pytest.approx(exact, rel=0.02)
-    assert np.isnan(found.measured.computed[4]) and found.summary()["measured"][4]["difference"] is None
-    labels = [text.get_text() for text in found.figures(["head-discharge"])["head-discharge"].axes[0].legend_.texts]
+    assert found.computed[3] == pytest.approx(exact, rel=0.02)
+    assert np.isnan(found.computed[4]) and result.summary()["measured"][4]["difference"] is None
+    labels = [text.get_text() for text in result.figures(["head-discharge"])["head-discharge"].axes[0].legend_.texts]
     assert "measured" in labels
 
 
 def test_measured_points_at_one_pressure():
     states = results(load(), ["6 kPa"]).states
-    found = against([(6e3, 2.0), (7e3, 2.0)], states)
+    found = against([6e3, 7e3], [2.0, 2.0], states)
     assert found.computed[0] == states[0].mass_flow and np.isnan(found.computed[1])
-    assert "none within" in against([(7e3, 2.0)], states).sentence()
+    assert "none within" in against([7e3], [2.0], states).sentence()
 
 
 # -- the line's curve, and runs beside each other
@@ -185,7 +191,7 @@ def test_steady_runs_side_by_side(runs, command_line, tmp_path):
 
 def test_what_cannot_be_compared(runs, command_line, one_sentence, tmp_path):
     other = load(drive__pressure="6 kPa").modes(count=2, output=tmp_path / "modes.h5").path
-    for files, words in (((runs[0], other), "kind 'modes'"), ((other, runs[0]), "transient and steady runs")):
+    for files, words in (((runs[0], other), "kind 'modes'"), ((other, runs[0]), "transient, steady and closure runs")):
         outcome = command_line("compare", *files, "-o", tmp_path / "no.png")
         assert outcome.status == 2 and one_sentence(outcome.err) and words in outcome.err
     still = load(drive__kind="uniform").session.replace({"steady.pressures": ["1 kPa"]})

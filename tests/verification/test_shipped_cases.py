@@ -35,6 +35,8 @@ def examine_steady(name: str, heads) -> None:
         assert state.converged and state.residual < 1e-8
         jet = np.sqrt(2 * GRAVITY * state.hydraulics.total_head)
         assert state.outlet_velocity <= jet * (1 + 1e-9)  # nothing leaves faster than its head lets it
+    heads = ", ".join(f"{head:g} m {flow:.4g} kg/s" for head, flow in zip(heads, flows))
+    print(f"\n{name}: {heads}")
 
 
 def examine_modes(name: str) -> None:
@@ -43,6 +45,8 @@ def examine_modes(name: str) -> None:
     certificate = modes.certificate
     assert modes.stable and certificate.unstable_count == certificate.unstable_count_independent == 0
     assert all(mode.residual < 1e-8 for mode in modes.modes)
+    first = modes.modes[0]
+    print(f"{name}: water at 2 m of head, leading mode {first.growth_rate:.4g} 1/s at {first.frequency:.4g} Hz")
 
 
 def test_the_wide_bill_from_rest_to_two_metres():
@@ -70,6 +74,8 @@ def test_onset_over_density(name):
         points = valve.onset(over="density=0.5:5000:25:log", pressure=0.5 * GRAVITY * 1000.0).points
         found[law] = max(point["value"] for point in points)
         assert all(point["frequency"] > 1.0 for point in points)
+        told = ", ".join(f"{p['value']:.4g} kg/m3 at {p['frequency']:.4g} Hz" for p in points)
+        print(f"\n{name}: {law} onset at half a metre {told}")
     assert found["quasi-steady"] > 2.0 * found["storage"] > 0
 
 
@@ -81,3 +87,8 @@ def test_closure_to_the_rated_back_pressure(name):
     rated = valve.case.closure.rated_pressure or max(valve.case.closure.pressures)
     assert max(state.pressure for state in found.states) >= rated
     assert all(state.closed for state in found.states) and not found.failures
+    last = max(found.states, key=lambda state: state.pressure)
+    print(
+        f"\n{name}: at {last.pressure / 1e3:g} kPa sealed {1e3 * last.lip_seal:.1f}+{1e3 * last.joint_seal:.1f} mm, "
+        f"{last.contact_force:.5g} N, {1e6 * last.least_opening:.3g} mm2 left, safety {found.safety.factor:.3g}"
+    )

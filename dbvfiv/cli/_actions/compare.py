@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from ...errors import CaseError
+from ...studies.closure import comparison as closure
 from ...studies.session import load_result
 from ...studies.steady import comparison as steady
 from ...studies.transient import comparison as transient
 from .._output import print_json
 
 #: Kinds of results that can be compared.
-_KINDS = ("transient", "steady")
+_KINDS = ("transient", "steady", "closure")
 
 
 def compare(files: Sequence[Path], output: Path, as_json: bool) -> None:
@@ -28,19 +30,25 @@ def compare(files: Sequence[Path], output: Path, as_json: bool) -> None:
     for file, result in zip(files, results):
         if result.kind not in _KINDS:
             raise CaseError(
-                f"{str(file)!r} holds a result of kind {result.kind!r}; {' and '.join(_KINDS)} runs can be compared."
+                f"{str(file)!r} holds a result of kind {result.kind!r}; {', '.join(_KINDS[:-1])} "
+                f"and {_KINDS[-1]} runs can be compared."
             )
         if result.kind != results[0].kind:
             raise CaseError(
                 f"{str(file)!r} holds a result of kind {result.kind!r} and {str(files[0])!r} one of kind "
                 f"{results[0].kind!r}; runs of one kind can be compared."
             )
-    (_compare_transient if results[0].kind == "transient" else _compare_steady)(files, results, output, as_json)
+    if results[0].kind == "transient":
+        _compare_transient(files, results, output, as_json)
+    else:
+        _compare_states({"steady": steady, "closure": closure}[results[0].kind], files, results, output, as_json)
 
 
-def _compare_steady(files: Sequence[Path], results: Sequence[Any], output: Path, as_json: bool) -> None:
-    found = steady.compare(results)
-    path = steady.save_comparison(results, output)
+def _compare_states(
+    kind: ModuleType, files: Sequence[Path], results: Sequence[Any], output: Path, as_json: bool
+) -> None:
+    found = kind.compare(results)
+    path = kind.save_comparison(results, output)
     if as_json:
         runs = [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, found.labels, results)]
         print_json({"runs": runs, "comparison": found.summary(), "remark": found.remark, "figure": str(path)})

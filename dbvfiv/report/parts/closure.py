@@ -11,6 +11,9 @@ _CAPTIONS = {
     "closure-curve": "How the passage shuts as the back pressure rises.",
     "side-views": "The shut valve from the side.",
     "contact-map": "Where the faces meet.",
+    "measured-passage": "The passage left, as measured and as computed.",
+    "measured-sections": "Sections of the wall as measured and as computed.",
+    "measured-centre-line": "The wall in the middle of the wide side, as measured and as computed.",
     "buckling-shape": "The shape into which the wall buckles.",
 }
 

@@ -11,10 +11,13 @@ from .missing import not_there, said_by
 TITLE = "Opening and flow"
 _CAPTIONS = {
     "head-discharge": "Pressure over flow; points on a screen answer to the pointer.",
+    "area-pressure": "Area at the lip over the pressure, with what was measured.",
     "operating-point": "Where valve, line and pump meet.",
     "passage": "Area, velocity and pressure along the passage.",
     "lip-shapes": "Inner and outer face of the lip.",
     "centre-line": "The wall in the middle of the wide side.",
+    "measured-sections": "Sections of the wall as measured and as computed.",
+    "measured-centre-line": "The wall in the middle of the wide side, as measured and as computed.",
 }
 
 

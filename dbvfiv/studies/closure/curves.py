@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from ...drawing.axes import HALO, headline, limits, log_axis
 from ...drawing.faces import faces
 from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, kilopascals, new_figure, pressure_colours, some_of
+from ..measured.figures import draw_curve
 from .figures import supports_of
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ def draw(result: ClosureResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     if result.walk:
         yield "closure-curve", lambda: closure_curve(result)
     yield "passage", lambda: passage(result)
+    if result.measured.passage is not None:
+        yield "measured-passage", lambda: measured_passage(result)
     if result.opened:
         yield "reversal", lambda: reversal(result)
     if result.closing is not None:
@@ -106,6 +109,20 @@ def passage(result: ClosureResult) -> Figure:
     )
     log_axis(axes.yaxis, _SHUT, 4e6 * max(float(state.opening.max()) for state in states))
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4)
+    return figure
+
+
+def measured_passage(result: ClosureResult) -> Figure:
+    """Narrowest passage left over the back pressure, with what was measured."""
+    figure = new_figure(6.4, 4.2)
+    axes = figure.add_subplot()
+    draw_curve(axes, [(p.pressure, p.least_opening) for p in result.walk], result.measured.passage, 1e6, "computed")
+    axes.set_xlabel("Back pressure, kPa")
+    axes.set_ylabel("Narrowest passage between the inner faces, mm²")
+    axes.set_xlim(left=0)
+    axes.set_ylim(bottom=0)
+    axes.set_title(f"Passage left, {supports_of(result)}", loc="left", fontweight="bold")
+    axes.legend()
     return figure
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from pydantic import StrictBool, StrictInt
+from pydantic import StrictBool, StrictInt, ValidationInfo, field_validator
 
+from ...case.measured import AREA, MEASURED_FILES, SHAPE, find_measured
 from ...case.parameters import PARAMETERS
 from ...case.physics import LoadPressure
 from ...case.quantity import Length, Number, Pressure, Time
@@ -64,6 +66,13 @@ class Keys(Section):
     arclength: StrictBool = key(
         True, "Go on along the equilibrium path by arclength when load steps end at a limit point."
     )
+    measured: Annotated[tuple[Path, ...], MEASURED_FILES] = key(
+        (),
+        "CSV of measured points that figures and tables show beside the computed ones, one file or several, relative "
+        "to the case file. The first line names the columns with units: a back pressure with the area of the narrowest "
+        "passage left (pressure [kPa], area [mm2]), or with points of sections of the wall (pressure [kPa], z [mm], "
+        "face, x [mm], y [mm]; without z at the lip, without face on the inner one).",
+    )
     reversal_time: Time = key(
         0.2, "Time in which the drive turns from open_pressure to as much back pressure.", gt=0, le=1e3
     )
@@ -74,3 +83,8 @@ class Keys(Section):
         "storage; quasi-steady they stop it at once, and the "
         "pressure of the incompressible fluid knows no bounds.",
     )
+
+    @field_validator("measured", mode="before")
+    @classmethod
+    def _find_measured(cls, given: Any, info: ValidationInfo) -> Any:
+        return find_measured(given, info, (AREA, SHAPE))

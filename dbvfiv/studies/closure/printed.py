@@ -20,6 +20,7 @@ def verdict(result: ClosureResult) -> list[str]:
         *(part.sentence for part in result.classes),
         *([] if safety is None else [safety.sentence]),
         *([] if result.closing is None else _closing(result.closing)),
+        *result.measured.sentences(),
     ]
 
 

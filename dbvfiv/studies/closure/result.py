@@ -19,6 +19,7 @@ from ...record.record import Record, plain
 from ...record.table import printed_head, printed_row
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
+from ..measured.figures import draw_shapes
 from ..result import StudyResult
 from ..session import Session
 from ..state import State, states_of
@@ -39,6 +40,7 @@ from .columns import (
     SUMMARY,
     valid_rows,
 )
+from .measured import MeasuredClosure, measured_closure
 from .model import ClosureModel, closure_model
 from .pressed_state import PressedState
 from .printed import verdict
@@ -188,6 +190,11 @@ class ClosureResult(StudyResult):
         return min(shut) if shut else None
 
     @cached_property
+    def measured(self) -> MeasuredClosure:
+        """Measured data beside the states."""
+        return measured_closure(self)
+
+    @cached_property
     def safety(self) -> SafetyFactor | None:
         """How far the valve is from its first limit; None if no equilibrium was found."""
         return find_safety(self)
@@ -215,6 +222,7 @@ class ClosureResult(StudyResult):
             "opened": [state.summary() for state in self.opened],
             "reversal": None if self.closing is None else self.closing.summary(),
             "reference_opening": self.reference_opening,
+            **self.measured.summary(),
             "failures": list(self.failures),
             "warnings": list(self.warnings),
             "interrupted": not self.complete,
@@ -254,6 +262,7 @@ class ClosureResult(StudyResult):
             return
         yield from figures.draw(self)
         yield from curves.draw(self)
+        yield from draw_shapes(self.measured.shapes)
         yield from layers.draw(self, pressure)
         if self.compared is not None and self.compared.states:
             for name, draw in self.compared.drawers(pressure):

@@ -8,10 +8,12 @@ from ...errors import SolveError
 from ...record.record import GrowingRecord
 from ...record.table import printed_head, printed_row
 from ..case import Case
+from ..measured.kept import keep_measured
 from ..session import Session
 from ..study import Study
 from .closing import closing_valve, run_closing, shut_below
 from .columns import COMPARED, REVERSAL, SUMMARY, tables_of, void_rows
+from .measured import KINDS
 from .model import CONTACT, HELD_LIPS, closure_model
 from .opened import turn_back
 from .result import ClosureResult
@@ -29,6 +31,7 @@ def run(session: Session, record: GrowingRecord, in_time: bool = False, compare:
     else:
         record.note("asked", in_time=in_time, compare=compare)
     case, pressures = session.case, session.case.closure.pressures
+    keep_measured(record, "closure.measured", case.closure.measured, KINDS, case.fluid.density)
     record.begin("closure", len(pressures) * (2 if compare else 1))
     if case.gravity.is_there:
         record.warn("Gravity has no part in back pressure: wall and fluid weigh nothing in these states.")

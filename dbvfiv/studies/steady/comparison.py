@@ -9,11 +9,15 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...drawing.style import new_figure, parameter_label
 from ...errors import CaseError
 from .. import comparing
+from ..measured import table
+from ..measured.figures import MEASURED, draw_curve, draw_section_of_runs, some_sections
+from ..state import State
 from .between import flow_at
 from .result import SteadyResult
 
@@ -34,6 +38,8 @@ class Comparison:
         Whole valve; between the states of a run by a monotone cubic, NaN beyond them.
     remark : str
         What stands in the way of comparing; empty if nothing does.
+    measured : list of str
+        What the runs are off by from measured data.
     """
 
     labels: list[str]
@@ -41,6 +47,7 @@ class Comparison:
     mass_flow: np.ndarray
     volume_flow: np.ndarray
     remark: str = ""
+    measured: Sequence[str] = ()
 
     @property
     def difference(self) -> np.ndarray:
@@ -66,7 +73,7 @@ class Comparison:
                 cells += f"{flow:12.5g}" if np.isfinite(flow) else f"{'-':>12}"
                 cells += (f"{off:+9.3f}" if np.isfinite(off) else f"{'-':>9}") if i else ""
             rows.append(f"{pressure / 1e3:10.6g}{cells}")
-        return [*numbered, head, *rows, *([self.remark] if self.remark else [])]
+        return [*numbered, head, *rows, *([self.remark] if self.remark else []), *self.measured]
 
 
 def compare(results: Sequence[SteadyResult]) -> Comparison:
@@ -87,7 +94,8 @@ def compare(results: Sequence[SteadyResult]) -> Comparison:
     places = {result.case.pressure_at for result in results}
     remark = f"The pressures are not of one place: {' and '.join(sorted(places))}." if len(places) > 1 else ""
     flows = [np.array([_at(result, pressure, name) for result in results]) for name in ("mass_flow", "volume_flow")]
-    return Comparison(comparing.labels(results, _QUIET), pressure, *flows, remark)
+    told = table.told([result.measured for result in results])
+    return Comparison(comparing.labels(results, _QUIET), pressure, *flows, remark, told)
 
 
 def _at(result: SteadyResult, pressure: np.ndarray, name: str) -> np.ndarray:
@@ -99,28 +107,72 @@ def _plain(values: np.ndarray) -> list[float | None]:
 
 
 def draw(results: Sequence[SteadyResult], names: Sequence[str] | None = None) -> Figure:
-    """Pressure over volume flow of several runs, with the measured points that they name; without `names` they are
-    called by what tells their cases apart.
+    """Pressure over volume flow of several runs, with the measured points that they name; where there are measured
+    areas, pressures along the axis or sections, a panel of each. Without `names` they are called by what tells their
+    cases apart.
     """
-    figure = new_figure(7.0, 4.6 + 0.22 * len(results))
-    axes = figure.add_subplot()
+    parts = [result.measured for result in results]
+    shapes = [part.shapes for part in parts]
+    panels = [_discharge]
+    panels += [_areas] if any(part.area is not None for part in parts) else []
+    panels += [_taps] if any(part.taps is not None for part in parts) else []
+    sections = some_sections(shapes, _SECTIONS)
+    count = len(panels) + len(sections)
+    columns = min(count, 2)
+    rows = -(-count // columns)
+    size = (7.0, 4.6) if count == 1 else (10.0, 3.6 * rows)
+    figure = new_figure(size[0], size[1] + 0.22 * len(results))
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(results)))
-    found = compare(results)
-    for result, label, colour in zip(results, names or found.labels, colours):
-        states = sorted(result.states, key=lambda state: state.pressure)
-        flow, pressure = [1e3 * s.volume_flow for s in states], [s.pressure / 1e3 for s in states]
-        axes.plot(flow, pressure, "o-", color=colour, ms=4, label=label)
-        if result.measured is not None:
-            points = result.measured
-            flow = 1e3 * points.mass_flow / result.case.fluid.density
-            axes.plot(flow, points.pressure / 1e3, "x", color=colour, ms=7, label=f"measured, {label}")
+    names = names or comparing.labels(results, _QUIET)
+    for panel, draw_panel in zip(axes, panels):
+        for result, label, colour in zip(results, names, colours):
+            draw_panel(panel, result, label, colour)
+    for panel, section in zip(axes[len(panels) :], sections):
+        draw_section_of_runs(panel, section, shapes, colours)
+    for panel in axes:
+        panel.set_visible(panel.has_data())
+    axes[0].set_title("Head and discharge", loc="left", fontweight="bold")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=2 if len(results) > 3 else 1)
+    return figure
+
+
+#: Most measured sections beside the other panels.
+_SECTIONS = 2
+
+
+def _discharge(axes: Axes, result: SteadyResult, label: str, colour: Any) -> None:
+    states = _ordered(result)
+    flow, pressure = [1e3 * s.volume_flow for s in states], [s.pressure / 1e3 for s in states]
+    axes.plot(flow, pressure, "o-", color=colour, ms=4, label=label)
+    points = result.measured.discharge
+    if points is not None:
+        flow = 1e3 * points.measured / result.case.fluid.density
+        axes.plot(flow, points.pressure / 1e3, color=colour, label=f"measured, {label}", **MEASURED)
     axes.set_xlabel("Flow, L/s")
-    axes.set_ylabel(parameter_label(results[0].case, "pressure"))
+    axes.set_ylabel(parameter_label(result.case, "pressure"))
     axes.set_xlim(left=0)
     axes.set_ylim(bottom=0)
-    axes.set_title("Head and discharge", loc="left", fontweight="bold")
-    figure.legend(loc="outside lower left", ncols=2 if len(results) > 3 else 1)
-    return figure
+
+
+def _areas(axes: Axes, result: SteadyResult, label: str, colour: Any) -> None:
+    computed = [(state.pressure, state.outlet_area) for state in _ordered(result)]
+    draw_curve(axes, computed, result.measured.area, 1e4, label, (colour, colour))
+    axes.set_xlabel(parameter_label(result.case, "pressure"))
+    axes.set_ylabel("Flow area at the lip, cm²")
+
+
+def _taps(axes: Axes, result: SteadyResult, label: str, colour: Any) -> None:
+    """What was computed less what was measured, over the place."""
+    taps = result.measured.taps
+    if taps is not None:
+        axes.plot(1e3 * taps.z, taps.excess / 1e3, color=colour, **MEASURED)
+    axes.set_xlabel("Distance from the lip z, mm")
+    axes.set_ylabel("Pressure, computed less measured, kPa")
+
+
+def _ordered(result: SteadyResult) -> list[State]:
+    return sorted(result.states, key=lambda state: state.pressure)
 
 
 def save_comparison(results: Sequence[SteadyResult], path: Path) -> Path:

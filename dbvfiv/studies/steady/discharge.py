@@ -19,6 +19,7 @@ from ...drawing.style import (
     pressure_colours,
     some_of,
 )
+from ..measured.figures import MEASURED, draw_curve
 from . import published
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ def draw(result: SteadyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     if result.case.drive.kind == "flow":
         yield "head-discharge", lambda: head_discharge(result)
         yield "area-discharge", lambda: area_discharge(result)
+        if result.measured.area is not None:
+            yield "area-pressure", lambda: area_pressure(result)
         yield "jet-velocity", lambda: jet_velocity(result)
         if result.case.has_line:
             yield "operating-point", lambda: operating_point(result)
@@ -61,9 +64,9 @@ def head_discharge(result: SteadyResult) -> Figure:
             mew=1.6,
             ms=7,
         )
-    if result.measured is not None:
-        points = result.measured
-        axes.plot(points.mass_flow, points.pressure / 1e3, "x", color="black", label="measured", mew=1.6, ms=7)
+    points = result.measured.discharge
+    if points is not None:
+        axes.plot(points.measured, points.pressure / 1e3, color="black", label="measured", **MEASURED)
     return _finish(figure, axes, "Head and discharge")
 
 
@@ -98,7 +101,18 @@ def area_discharge(result: SteadyResult) -> Figure:
     axes.plot(
         [s.mass_flow for s in states], [s.outlet_area * 1e4 for s in states], "o-", color=COMPUTED, label=_name(result)
     )
+    both = result.measured.discharged_area
+    if both is not None:
+        axes.plot(both[:, 0], both[:, 1] * 1e4, color="black", label="measured", **MEASURED)
     return _finish(figure, axes, "Lip area and discharge")
+
+
+def area_pressure(result: SteadyResult) -> Figure:
+    """Lip area over the static inlet pressure, with what was measured."""
+    figure, axes = _axes(parameter_label(result.case, "pressure"), "Flow area at the lip, cm²")
+    computed = [(s.pressure, s.outlet_area) for s in ordered(result)]
+    draw_curve(axes, computed, result.measured.area, 1e4, _name(result))
+    return _finish(figure, axes, "Lip area and pressure")
 
 
 def jet_velocity(result: SteadyResult) -> Figure:

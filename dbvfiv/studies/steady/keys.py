@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated, Any
 
 from pydantic import StrictInt, ValidationInfo, field_validator
 
-from ...case.measured import read_measured
+from ...case.measured import AREA, DISCHARGE, MEASURED_FILES, SHAPE, TAPS, find_measured
 from ...case.physics import LoadPressure
 from ...case.quantity import Number
 from ...case.section import Section, key
@@ -26,22 +27,20 @@ class Keys(Section):
         gt=1,
         le=100,
     )
-    measured: Path | None = key(
-        None,
-        "CSV of measured points that figures and tables show beside the computed ones: a pressure as drive.pressure "
-        "has it, or a head of the fluid, and a flow; the first line names both with units (pressure [kPa], flow "
-        "[L/s]); relative to the case file.",
+    measured: Annotated[tuple[Path, ...], MEASURED_FILES] = key(
+        (),
+        "CSV of measured points that figures and tables show beside the computed ones, one file or several, "
+        "relative to the case file. The first line names the columns with units: a pressure as drive.pressure has "
+        "it, or a head of the fluid, with a flow, the area at the lip or both (pressure [kPa], flow [L/s], area "
+        "[cm2]); with points of sections of the wall (pressure [kPa], z [mm], face, x [mm], y [mm]; without z at "
+        "the lip, without face on the inner one); or with static pressures along the axis (pressure [kPa], z [mm], "
+        "tap [kPa]).",
     )
     tolerance: Number = key(1e-8, "Residual, relative to the load, at which Newton stops.", gt=0, le=1e-2)
     max_iterations: StrictInt = key(30, "Newton iterations of one load step.", ge=1, le=10000)
     min_step: Number = key(1e-4, "Smallest load step, relative to the target, before giving up.", gt=0, le=1)
 
-    @field_validator("measured", mode="after")
+    @field_validator("measured", mode="before")
     @classmethod
-    def _find_measured(cls, path: Path | None, info: ValidationInfo) -> Path | None:
-        context = info.context or {}
-        if path is None or not context.get("check_files", True):
-            return path
-        path = Path(context.get("folder", ".")) / path
-        read_measured(path, context.get("density"))
-        return path.resolve()
+    def _find_measured(cls, given: Any, info: ValidationInfo) -> Any:
+        return find_measured(given, info, (DISCHARGE, AREA, SHAPE, TAPS))

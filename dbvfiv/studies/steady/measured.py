@@ -1,60 +1,115 @@
-"""Measured points beside computed ones."""
+"""Measured data beside steady states: discharge, lip area, sections of the wall, pressures along the axis."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...case.measured import AREA, DISCHARGE, SHAPE, TAPS
 from ...model.state import SteadyState
+from ..measured.curves import MeasuredCurve, MeasuredTaps, lacking, state_at
+from ..measured.kept import joined, kept_tables
+from ..measured.sections import MeasuredShapes, WallSections
 from .between import flow_at
 
-#: Kind of the note of a record that holds them.
-NOTE = "measured"
+if TYPE_CHECKING:
+    from .result import SteadyResult
+
+#: What JSON calls columns of states that were measured.
+_COLUMNS = {"mass_flow": "mass_flow", "outlet_area": "area"}
+#: What the files of steady.measured may hold.
+KINDS = (DISCHARGE, AREA, SHAPE, TAPS)
 
 
 @dataclass(frozen=True)
-class Measured:
-    """Points of a measured discharge curve, and what was computed there.
+class MeasuredStates:
+    """What was measured, each None where it was not.
 
     Attributes
     ----------
-    pressure, mass_flow : (k,) arrays, Pa, kg/s
-        As drive.pressure has it; whole valve.
-    computed : (k,) array, kg/s
-        Between the states by a cubic; NaN beyond them.
+    discharge : MeasuredCurve or None
+        Mass flow, kg/s, over the pressure.
+    area : MeasuredCurve or None
+        Flow area at the lip, m2, over the pressure.
+    shapes : MeasuredShapes or None
+        Sections of the wall.
+    taps : MeasuredTaps or None
+        Static pressures along the axis.
+    discharged_area : (k, 2) array or None
+        Mass flow, kg/s, and area, m2, of the rows of tables that have both.
     """
 
-    pressure: np.ndarray
-    mass_flow: np.ndarray
-    computed: np.ndarray
+    discharge: MeasuredCurve | None = None
+    area: MeasuredCurve | None = None
+    shapes: MeasuredShapes | None = None
+    taps: MeasuredTaps | None = None
+    discharged_area: np.ndarray | None = None
 
-    @property
-    def difference(self) -> np.ndarray:
-        """Computed over measured flow less 1; NaN where there is nothing to compare."""
-        flows = np.where(self.mass_flow > 0, self.mass_flow, np.nan)
-        return self.computed / flows - 1.0
+    def __iter__(self) -> Iterator[MeasuredCurve | MeasuredShapes | MeasuredTaps]:
+        return (part for part in (self.discharge, self.area, self.shapes, self.taps) if part is not None)
 
-    def summary(self) -> list[dict[str, Any]]:
-        """Plain SI numbers, None where there is nothing to compare."""
-        rows = zip(self.pressure, self.mass_flow, self.computed, self.difference)
-        names = ("pressure", "mass_flow", "computed_mass_flow", "difference")
-        return [{n: float(x) if np.isfinite(x) else None for n, x in zip(names, row)} for row in rows]
+    def sentences(self) -> list[str]:
+        """For people, one of each."""
+        return [part.sentence() for part in self]
 
-    def sentence(self) -> str:
-        """For people."""
-        known = self.difference[np.isfinite(self.difference)]
-        begin = f"Measured: {len(self.pressure)} point{'s' * (len(self.pressure) > 1)}"
-        if not len(known):
-            return f"{begin}, none within the pressures computed."
-        low, high = (f"{100 * share:+.3g}" for share in (known.min(), known.max()))
-        spread = f"{low} to {high}" if low != high else low
-        return f"{begin}; computed flow over measured {spread} % at the {len(known)} within the pressures computed."
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON; empty lists of what was not measured."""
+        parts = {"measured": self.discharge, "measured_area": self.area, "measured_sections": self.shapes}
+        parts["measured_taps"] = self.taps
+        return {name: part.summary() if part is not None else [] for name, part in parts.items()}
 
 
-def against(points: Sequence[Sequence[float]], states: Sequence[SteadyState], rest: float = 0.0) -> Measured:
-    """Measured points (Pa, kg/s) against states; `rest` is the pressure, Pa, at which nothing flows."""
-    pressure, mass_flow = np.array(points, float).T
-    return Measured(pressure, mass_flow, flow_at(states, pressure, rest))
+def measured_states(result: SteadyResult) -> MeasuredStates:
+    """What a result holds of measured data, against its states."""
+    tables, states, rest = kept_tables(result.record), result.states, result.case.rest_pressure
+    flows, areas = joined(tables, DISCHARGE, "pressure", "mass_flow"), joined(tables, AREA, "pressure", "area")
+    points, taps = (
+        joined(tables, kind, *names)
+        for kind, names in ((SHAPE, ("pressure", "z", "face", "x", "y")), (TAPS, ("pressure", "z", "tap")))
+    )
+    both = joined([table for table in tables if AREA in table.holds], DISCHARGE, "mass_flow", "area")
+    return MeasuredStates(
+        flows and against(*flows, states, rest),
+        areas and against(*areas, states, rest, "lip area", "outlet_area", ("cm2", 1e4)),
+        points and MeasuredShapes.of(points, WallSections(result.mesh, states)),
+        taps and _taps(*np.array(taps), states, result.mesh.z),
+        None if both is None else np.array(both).T,
+    )
+
+
+def against(
+    pressure: Sequence[float],
+    measured: Sequence[float],
+    states: Sequence[SteadyState],
+    rest: float = 0.0,
+    what: str = "flow",
+    name: str = "mass_flow",
+    unit: tuple[str, float] = ("kg/s", 1.0),
+) -> MeasuredCurve:
+    """Measured numbers over pressures, Pa, against a column `name` of states; `rest` is the pressure, Pa, at which
+    nothing flows; people are told of `what`, in `unit` with its factor from SI.
+    """
+    pressure = np.array(pressure, float)
+    computed = flow_at(states, pressure, rest, name)
+    return MeasuredCurve(what, _COLUMNS[name], pressure, np.array(measured, float), computed, unit)
+
+
+def _taps(
+    pressure: np.ndarray,
+    z: np.ndarray,
+    measured: np.ndarray,
+    states: Sequence[SteadyState],
+    stations: np.ndarray,
+) -> MeasuredTaps:
+    """Taps against the pressures at the stations, m, of states that flow, which run straight between stations."""
+    flowing = [state for state in states if state.mass_flow > 0]
+    computed = np.full(len(z), np.nan)
+    for p in set(pressure):
+        chosen, state = pressure == p, state_at(flowing, p)
+        if state is not None:
+            along = state.station_pressure + state.outlet_pressure
+            computed[chosen] = np.interp(z[chosen], stations, along, left=np.nan, right=np.nan)
+    return MeasuredTaps(pressure, z, measured, computed, lacking(flowing, pressure))

@@ -17,9 +17,11 @@ from ...record.table import TableSpec, printed_head, printed_row
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
 from ..load_path import WAY_ON, way_on_shapes
+from ..measured.figures import draw_shapes
 from ..result import StudyResult
 from ..state import State, gather_states, states_of
-from . import cracking, discharge, hydraulics, measured, passage, shapes
+from . import cracking, discharge, hydraulics, passage, shapes
+from .measured import MeasuredStates, measured_states
 
 STATES = "states"
 
@@ -50,11 +52,10 @@ class SteadyResult(StudyResult):
         names = cracking.Cracking.__dataclass_fields__
         return cracking.Cracking(**{name: notes[-1][name] for name in names}) if notes else None
 
-    @property
-    def measured(self) -> measured.Measured | None:
-        """Measured points beside the states; None where none are given."""
-        notes = self.record.notes(measured.NOTE)
-        return measured.against(notes[-1]["points"], self.states, self.case.rest_pressure) if notes else None
+    @cached_property
+    def measured(self) -> MeasuredStates:
+        """Measured data beside the states."""
+        return measured_states(self)
 
     def only(self, *states: State) -> SteadyResult:
         """A result with some of its states."""
@@ -69,7 +70,7 @@ class SteadyResult(StudyResult):
         return {
             "points": [state.summary() for state in self.states],
             "cracking": self.cracking and self.cracking.summary(),
-            "measured": self.measured.summary() if self.measured else [],
+            **self.measured.summary(),
             "failures": list(self.failures),
             "warnings": list(self.warnings),
             "interrupted": not self.complete,
@@ -83,9 +84,7 @@ class SteadyResult(StudyResult):
         lines, cracking = hydraulics.lines(self.case, self.states), self.cracking
         if cracking is not None and self.states:
             lines.append(cracking.sentence(max(state.pressure for state in self.states)))
-        if self.measured:
-            lines.append(self.measured.sentence())
-        return lines
+        return [*lines, *self.measured.sentences()]
 
     def shortfall(self) -> str | None:
         if not self.failures:
@@ -103,6 +102,7 @@ class SteadyResult(StudyResult):
         yield from discharge.draw(self)
         yield from shapes.draw(self)
         yield from passage.draw(self)
+        yield from draw_shapes(self.measured.shapes)
         yield from deformed.draw(self, pressure)
         yield from layers.draw(self, pressure)
 

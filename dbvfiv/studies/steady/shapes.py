@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing.faces import faces
+from ...drawing.faces import closed_section, faces
 from ...drawing.style import REST, kilopascals, new_figure, pressure_colours, pressure_heading, pressure_name, some_of
 from ...drawing.views import mark_pieces
 from .discharge import ordered
@@ -30,12 +29,12 @@ def lip_shapes(result: SteadyResult) -> Figure:
     figure = new_figure(7.2, 4.6)
     axes = figure.add_subplot()
     lip = result.mesh.rows[0]
-    axes.plot(*_closed(faces(result.mesh)[0][lip, :2]).T * 1e3, color=REST, lw=1.2, ls="--", label="at rest")
+    axes.plot(*closed_section(faces(result.mesh)[0][lip, :2]).T * 1e3, color=REST, lw=1.2, ls="--", label="at rest")
     states = some_of(ordered(result))
     for state, colour in zip(states, pressure_colours([s.pressure for s in states])):
         inner, outer = faces(result.mesh, state.nodal)
-        axes.plot(*_closed(inner[lip, :2]).T * 1e3, color=colour, label=kilopascals(state.pressure))
-    axes.plot(*_closed(outer[lip, :2]).T * 1e3, color=colour, lw=0.9, label="its outer face")
+        axes.plot(*closed_section(inner[lip, :2]).T * 1e3, color=colour, label=kilopascals(state.pressure))
+    axes.plot(*closed_section(outer[lip, :2]).T * 1e3, color=colour, lw=0.9, label="its outer face")
     axes.set_aspect("equal")
     axes.set_xlabel("x, mm")
     axes.set_ylabel("y, mm")
@@ -69,9 +68,3 @@ def centre_line(result: SteadyResult) -> Figure:
     lower.set_title("Side edge, y = 0", loc="left", fontweight="bold")
     upper.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title=pressure_heading(result.case))
     return figure
-
-
-def _closed(quarter: np.ndarray) -> np.ndarray:
-    """Closed curve (k, 2) through the four mirror images of a quarter from (0, y) to (x, 0)."""
-    right = np.concatenate([quarter, quarter[-2::-1] * [1, -1]])
-    return np.concatenate([right, right[-2::-1] * [-1, 1]])

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 
-from ...case.measured import read_measured
-from ...errors import CaseError, SolveError
+from ...errors import SolveError
 from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_warnings
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
@@ -14,10 +13,11 @@ from ...record.states import read_states, shown_summary, state_row
 from ...record.table import printed_head, printed_row
 from ..case import Case
 from ..load_path import go_on, way_on
+from ..measured.kept import keep_measured
 from ..session import Session
 from ..study import Study
-from . import measured
 from .cracking import NOTE, find_cracking
+from .measured import KINDS
 from .result import STATES, SteadyResult, tables_of
 
 
@@ -26,13 +26,13 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
 
     A pressure that is not reached is a failure, and the list goes on from the last equilibrium.
     """
-    model, pressures = session.model, session.case.steady.pressures
+    model, pressures, case = session.model, session.case.steady.pressures, session.case
     path = LoadPath(model, SteadyOptions.of(session.case), observer=record)
     states = read_states(record, STATES)
     known = {state.pressure for state in states}
     if states:
         go_on(path, record, STATES, len(states) - 1, states[-1])
-    _keep_measured(session.case, record)
+    keep_measured(record, "steady.measured", case.steady.measured, KINDS, case.fluid.density)
     record.begin("steady", len(pressures))
     for sentence in model_warnings(model):
         record.warn(sentence)
@@ -54,24 +54,7 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
     if model.flow.has_fluid and states and not record.notes(NOTE):
         record.progress("cracking pressure")
         with suppress(SolveError):  # none is given then
-            record.note(NOTE, **find_cracking(model, states, session.case.steady.cracking_area).summary())
-
-
-def _keep_measured(case: Case, record: GrowingRecord) -> None:
-    """Put the measured points of a case into the record, so that its file has them.
-
-    Raises
-    ------
-    CaseError
-        If their file has gone.
-    """
-    if case.steady.measured is None or record.notes(measured.NOTE):
-        return
-    try:
-        points = read_measured(case.steady.measured, case.fluid.density)
-    except ValueError as error:
-        raise CaseError(f"steady.measured is given as {str(case.steady.measured)!r}, {error}.") from None
-    record.note(measured.NOTE, points=points)
+            record.note(NOTE, **find_cracking(model, states, case.steady.cracking_area).summary())
 
 
 def print_live(case: Case) -> Callable[[SteadyState], str]:
