@@ -63,13 +63,19 @@ class CycleTracer:
         ]
 
     def run(self, tell: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None) -> str:
-        """Go on until the parameter leaves its limits, the points are used up or no cycle is found; why it ended."""
+        """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
+        is found; why it ended.
+        """
         options = self.options
         step = options.step
         while len(self.points) < options.max_points:
             done, step, again = self._advance(step)
             if done is None:
                 self.reason = again
+                return self.reason
+            if self._turned():
+                del self.points[-1]
+                self.reason = f"the cycles shrink to nothing beyond {self.parameter} = {self.points[-1].value:.6g}"
                 return self.reason
             for special in self._between(self.points[-2], self.points[-1]):
                 self.special.append(special)
@@ -83,6 +89,13 @@ class CycleTracer:
                 return self.reason
         self.reason = "points used up"
         return self.reason
+
+    def _turned(self) -> bool:
+        """Whether the last motion is opposite to the one before: between them the branch has met an onset, and goes back
+        on itself with the phase turned by half a period.
+        """
+        a, b = (p.motion for p in self.points[-2:])
+        return bool(np.sum(b.harmonics.resized(a.coefficients)[1:] * b.coefficients[1:] * self._weight) < 0)
 
     def _direction(self) -> float:
         return float(np.sign(self.points[-1].value - self.points[-2].value))

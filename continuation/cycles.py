@@ -124,11 +124,14 @@ class CycleSolver:
         motion, mu, linear = guess, dict(mu), None
         while len(sizes) < options.max_iterations:
             unbalance = self._unbalance(motion, mu, free, conditions)
+            shape = motion.coefficients.shape
             if not np.isfinite(unbalance).all():
                 break
             if linear is None:
                 linear = self.linearise(motion, mu)
-                linear.prepare(free, conditions)
+                linear.prepare(
+                    free, conditions, unbalance[: motion.coefficients.size].reshape(motion.coefficients.shape)
+                )
             change, used, missed = linear.solve(-unbalance, options.linear, options.krylov)
             spent += used
             sizes.append(self._size(change, motion))
@@ -137,7 +140,7 @@ class CycleSolver:
             motion, mu = moved(motion, mu, free, change)
             if motion.omega <= 0:
                 break
-            self.learn(change[: motion.coefficients.size].reshape(motion.coefficients.shape))
+            self.learn(change[: motion.coefficients.size].reshape(shape))
             if sizes[-1] <= options.tolerance:
                 return Cycle(motion, mu, sizes[-1], len(sizes), spent)
             slow = len(sizes) > 1 and sizes[-1] > options.renew_at * sizes[-2]
@@ -185,15 +188,15 @@ class CycleSolver:
         size = np.abs(np.diag(r))
         return np.ascontiguousarray(q[:, : len(size)][:, size > 1e-8 * size[0]])
 
-    def learn(self, rows: np.ndarray, share: float = 0.05, most: int = 6) -> bool:
+    def learn(self, rows: np.ndarray, share: float = 0.05, most: int = 6) -> np.ndarray:
         """Add to the basis the leading directions of rows (k, n) beyond it; the oldest of those added before give way.
 
-        They take effect with the next linearisation. Whether there were any.
+        They take effect with the next linearisation. Those that were added, (n, k).
         """
         scaled = rows / self.system.scales
         whole = np.linalg.norm(scaled)
         if not whole > 0 or self._given.shape[1] == len(self._given):
-            return False
+            return np.zeros((len(self._given), 0))
         for known in (self._given, self._learnt):
             scaled = scaled - (scaled @ known) @ known.T
         _, sizes, found = la.svd(scaled, full_matrices=False)
@@ -201,4 +204,4 @@ class CycleSolver:
         room = max(self.options.basis - added.shape[1], 0)
         kept = self._learnt[:, max(self._learnt.shape[1] - room, 0) :]
         self._learnt = np.hstack([kept, added])
-        return bool(added.size)
+        return added

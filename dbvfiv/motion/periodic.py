@@ -50,13 +50,7 @@ class PeriodicValve:
     def __init__(self, rebuild: Callable[[Mapping[str, float]], ValveModel], mu: Mapping[str, float]):
         self._model = rebuild
         model = rebuild(mu)
-        if not model.flow.has_fluid:
-            raise SolveError("Without flow nothing feeds an oscillation, so there are no cycles to follow.")
-        if model.outside is not None:
-            raise SolveError(
-                "With fluid outside the wall cycles are not followed: how its added mass changes with the shape within "
-                "a cycle is not among the equations; runs in time show them."
-            )
+        check_periodic(model)
         self.inner, self.size = model.flow.inner, model.size + model.flow.inner
         area = float(model.mesh.rest_area[-1])
         self._weight = area  # turns the flow's equations, Pa, into forces
@@ -107,7 +101,7 @@ class PeriodicValve:
         p, rest = self.pressures(motion, mu)
         memory = self._memory(mu)
         held = None if memory is None else memory.held(q, rates)
-        slow = np.stack([self._internal_force(model, x) for x in q])
+        slow = np.stack([model.internal_force(x) for x in q])
         out = slow + mu["beta"] * rates.apply(1, slow)
         for i in range(len(q)):
             nodal = model.nodal(q[i])
@@ -116,12 +110,6 @@ class PeriodicValve:
             out[i] += self._inertia(model, nodal, v[i], a[i] + mu["alpha"] * v[i])
             out[i] -= model.pressure_force(nodal, p[i])
         return np.concatenate([out, self._weight * rest], axis=1)
-
-    @staticmethod
-    def _internal_force(model: ValveModel, q: np.ndarray) -> np.ndarray:
-        force = model.shell.force(q)
-        force[model.stops.unknowns] += model.stops.force(q)
-        return force
 
     @staticmethod
     def _inertia(model: ValveModel, nodal: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -217,6 +205,22 @@ class PeriodicValve:
         return AveragedSolves(operator.average, operator.motion, self._weight, stiffening, self._workspace)
 
 
+def check_periodic(model: ValveModel) -> None:
+    """Refuse a valve whose periodic motions these equations do not cover.
+
+    Raises
+    ------
+    SolveError
+    """
+    if not model.flow.has_fluid:
+        raise SolveError("Without flow nothing feeds an oscillation, so there are no cycles to follow.")
+    if model.outside is not None:
+        raise SolveError(
+            "With fluid outside the wall cycles are not followed: how its added mass changes with the shape within "
+            "a cycle is not among the equations; runs in time show them."
+        )
+
+
 @dataclass(frozen=True)
 class StiffnessDamping:
     """1 + beta d/dt, what stiffness damping makes of the internal force."""
@@ -260,5 +264,5 @@ class AveragedSolves:
         if np.iscomplexobj(coefficients):
             return self(coefficients.real) + 1j * self(coefficients.imag)
         n, h = self.size, self.harmonics
-        found = [np.concatenate(self._factor.solve(x[:n], x[n:] / self.weight)) for x in coefficients]
-        return h.real(self._shares[:, None] * h.complex(np.real(np.array(found))))
+        found = np.vstack(self._factor.solve(coefficients[:, :n].T, coefficients[:, n:].T / self.weight)).T
+        return h.real(self._shares[:, None] * h.complex(np.real(found)))

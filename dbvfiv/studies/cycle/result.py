@@ -16,11 +16,11 @@ from ...record.fields import motion
 from ...record.table import printed_head, printed_row
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
+from ..orbits.orbit import Orbit
 from ..result import StudyResult
 from ..stability.place import Place, describe_fixed, fixed_conditions, rebuilder
 from . import figures
 from .fatigue import LayerRanges, layer_ranges
-from .orbit import Orbit
 from .rows import COLUMNS, CYCLES, ENDED, SPECIAL, read_motion
 
 #: Steps of a period for ParaView.

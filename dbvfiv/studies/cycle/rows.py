@@ -16,7 +16,7 @@ from ...record.layout import Column, Shown
 from ...record.mesh import MeshData
 from ...record.record import Record
 from ...record.table import TableSpec
-from .orbit import Orbit
+from ..orbits.orbit import Orbit
 
 CYCLES, SERIES, SPECIAL, ENDED = "cycles", "series", "special", "ended"
 #: Floquet exponents kept of each cycle.
