@@ -91,8 +91,8 @@ class CycleTracer:
         return self.reason
 
     def _turned(self) -> bool:
-        """Whether the last motion is opposite to the one before: between them the branch has met an onset, and goes back
-        on itself with the phase turned by half a period.
+        """Whether the last motion is opposite to the one before: between them the branch has met an onset, and goes
+        back on itself with the phase turned by half a period.
         """
         a, b = (p.motion for p in self.points[-2:])
         return bool(np.sum(b.harmonics.resized(a.coefficients)[1:] * b.coefficients[1:] * self._weight) < 0)
