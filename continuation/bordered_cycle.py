@@ -63,11 +63,13 @@ class CycleLinearisation:
     mu : mapping
     basis : (n, r) array
         Orthonormal in unknowns over their scales.
+    few : bool
+        Linearise at as few samples as tell the harmonics apart: less work, good for corrections.
     """
 
-    def __init__(self, system, motion, mu, basis: np.ndarray):
+    def __init__(self, system, motion, mu, basis: np.ndarray, few: bool = False):
         self.system, self.motion, self.mu = system, motion, dict(mu)
-        self.operator = system.linearise(motion, mu)
+        self.operator = system.linearise(motion.at_fewest_samples() if few else motion, mu)
         self.smoother = system.smoother(self.operator, mu)
         self.scale, self.basis = np.asarray(system.scales), basis
         self._known: dict[str, np.ndarray] = {}

@@ -111,7 +111,7 @@ class CycleTracer:
                 said = str(error)
                 step *= 0.4
                 continue
-            grown = 1.6 if cycle.iterations <= 4 else (0.7 if cycle.iterations >= 9 else 1.0)
+            grown = 2.0 if cycle.iterations <= 6 else (0.7 if cycle.iterations >= 10 else 1.0)
             return point, min(max(step * grown, options.min_step), options.max_step), ""
         return None, step, f"no further cycle was found: {said}"
 
@@ -181,11 +181,12 @@ class CycleTracer:
 
     def _accept(self, cycle: Cycle, asked: bool) -> CyclePoint:
         """Take a cycle as the next point, with the phase of the one before."""
-        point = self._described(cycle, asked)
+        point = self.described(cycle, asked)
         self.points.append(point)
         return point
 
-    def _described(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
+    def described(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
+        """A cycle with its exponents and what events make of it; `after` is the point it follows, the last without."""
         after = self.points[-1] if after is None and self.points else after
         exponents = None
         if self.options.exponents:
@@ -257,7 +258,7 @@ class CycleTracer:
             cycle = self._solved(type(first.motion)(h, c, omega), mu, (self.parameter,), (condition,))
         except ContinuationError:
             return None
-        point = self._described(cycle, after=first)
+        point = self.described(cycle, after=first)
         return CyclePoint(cycle, point.value, arclength, point.exponents, False, point.tests)
 
     def _located(self, kind: str, a: CyclePoint, b: CyclePoint, test) -> SpecialCycle:

@@ -128,7 +128,7 @@ class CycleSolver:
             if not np.isfinite(unbalance).all():
                 break
             if linear is None:
-                linear = self.linearise(motion, mu)
+                linear = self.linearise(motion, mu, few=True)
                 linear.prepare(
                     free, conditions, unbalance[: motion.coefficients.size].reshape(motion.coefficients.shape)
                 )
@@ -174,9 +174,9 @@ class CycleSolver:
         step = np.abs(change[: c.size].reshape(c.shape) / scale).max()
         return float(step / max(np.abs(c[1:] / scale).max(), 1e-300))
 
-    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> CycleLinearisation:
-        """Linearisation about a motion, with the basis as it is now."""
-        return CycleLinearisation(self.system, motion, mu, self.basis_for(motion))
+    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float], few: bool = False) -> CycleLinearisation:
+        """Linearisation about a motion, with the basis as it is now; see `CycleLinearisation`."""
+        return CycleLinearisation(self.system, motion, mu, self.basis_for(motion), few)
 
     def basis_for(self, motion: PeriodicMotion) -> np.ndarray:
         """Orthonormal directions (n, r) of unknowns over their scales: those of the motion itself, given, learnt."""

@@ -78,7 +78,7 @@ class Exponents:
         return self.unstable == 0
 
 
-def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 3e-3, rounds: int = 2) -> Exponents:
+def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-3, rounds: int = 3) -> Exponents:
     """Leading exponents of the motion of a linearisation.
 
     Parameters

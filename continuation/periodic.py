@@ -20,6 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from continuation.blocks import SparseBlocks
 from continuation.harmonics import Harmonics, Rates
 
 Filter = Callable[[np.ndarray], np.ndarray] | int
@@ -66,6 +67,11 @@ class PeriodicMotion:
         other = Harmonics(count)
         return PeriodicMotion(other, other.resized(self.coefficients), self.omega)
 
+    def at_fewest_samples(self) -> PeriodicMotion:
+        """The same with 2 H + 1 samples."""
+        count = self.harmonics.count
+        return PeriodicMotion(Harmonics(count, 2 * count + 1), self.coefficients, self.omega)
+
     @property
     def tail(self) -> float:
         """Share that the last two harmonics have in the motion about its mean: what a longer series would change."""
@@ -76,7 +82,8 @@ class PeriodicMotion:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """One term of a linearisation; blocks are N matrices, or one stack (N, a, b), or None for the identity.
+    """One term of a linearisation; blocks are N matrices, a `SparseBlocks`, one stack (N, a, b), or None for the
+    identity.
 
     Attributes
     ----------
@@ -115,16 +122,9 @@ class Term:
 
 def _projected(blocks, basis: np.ndarray, known: np.ndarray | None) -> np.ndarray:
     """V^T A V (N, r, r) of matrices A at each sample; `known` holds the part of the first columns of V."""
-    if known is None:
-        return np.stack([basis.T @ (block @ basis) for block in blocks])
-    old = known.shape[1]
-    out = np.empty((len(known), basis.shape[1], basis.shape[1]))
-    out[:, :old, :old] = known
-    added = np.ascontiguousarray(basis[:, old:])
-    for one, block in zip(out, blocks):
-        one[:, old:] = basis.T @ (block @ added)
-        one[old:, :old] = (block.T @ added).T @ basis[:, :old]
-    return out
+    if isinstance(blocks, SparseBlocks):
+        return blocks.projected(basis, known)
+    return np.stack([basis.T @ (block @ basis) for block in blocks])
 
 
 def _times(blocks, samples: np.ndarray) -> np.ndarray:

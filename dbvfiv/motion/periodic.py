@@ -16,6 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from continuation import OutOfDomain
+from continuation.blocks import SparseBlocks
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
 from eigen import CoupledPencil, SingularShiftError, Workspace
 from eigen.pencil import FLUID_PARTS
@@ -128,45 +129,43 @@ class PeriodicValve:
         p, _ = self.pressures(motion, mu)
         memory = self._memory(mu)
         held = None if memory is None else memory.held(q, rates)
-        own, rest, damping, mass, left, right = [], [], [], [], [], []
-        alpha = mu["alpha"]
+        values = np.empty((4, len(q), len(model.shell.dofs.pattern[1])))
+        own, rest, damping, mass = values
+        left, right, alpha = [], [], mu["alpha"]
         for i in range(len(q)):
             nodal = model.nodal(q[i])
-            structure = model.structure(q[i])[1]
-            m = model.mass(q[i])
+            own[i] = model.structure(q[i])[1]
+            mass[i] = model.mass(q[i])
             moving = (nodal, model.nodal(v[i]), model.nodal(a[i] + alpha * v[i]))
             by_position, by_rate = inertia_slopes(model.shell, *moving)
-            by_position = model.follower_stiffness(nodal, p[i], by_position)
+            rest[i] = model.follower_stiffness(nodal, p[i], by_position)
             if held is not None:
-                by_position += memory.geometric(q[i], held[i])
-            own.append(structure)
-            rest.append(by_position)
-            damping.append(by_rate + alpha * m)
-            mass.append(m)
+                rest[i] += memory.geometric(q[i], held[i])
+            damping[i] = by_rate + alpha * mass[i]
             left.append(model.station_forces(nodal))
             right.append(model.rows.jacobian(nodal))
         stiff = StiffnessDamping(mu["beta"])
+        blocks = [self._blocks(model, part) for part in values]
         terms = [
-            Term([(0, self._blocks(model, own))], outer=stiff),
-            Term([(0, self._blocks(model, rest)), (1, self._blocks(model, damping)), (2, self._blocks(model, mass))]),
+            Term([(0, blocks[0])], outer=stiff),
+            Term(list(enumerate(blocks[1:]))),
             self._fluid_term(left, right, parts),
         ]
         coarse = None
         if memory is not None:
             groups = zip(*(model.shell.relaxing_tangents(x) for x in q))
-            blocks = [self._blocks(model, group) for group in groups]
-            coarse = [*terms, *(Term([(0, b)], outer=phi) for b, phi in zip(blocks, memory.filters))]
+            relaxing = [self._blocks(model, np.array(group)) for group in groups]
+            coarse = [*terms, *(Term([(0, b)], outer=phi) for b, phi in zip(relaxing, memory.filters))]
             terms.append(MemoryTerm(memory, q, self.size))
         operator = PeriodicOperator(motion, terms, coarse)
-        means = [np.mean(x, axis=0) for x in (own, rest, damping, mass)]
-        operator.average = self._average(model, means, (left, right), parts, q, mu)
+        operator.average = self._average(model, values.mean(axis=1), (left, right), parts, q, mu)
         return operator
 
-    def _blocks(self, model: ValveModel, values) -> list[sp.csr_matrix]:
-        """Matrices (n + l, n + l), nothing on the flow's unknowns, of values on the structure's pattern."""
+    def _blocks(self, model: ValveModel, values: np.ndarray) -> SparseBlocks:
+        """Matrices (n + l, n + l), nothing on the flow's unknowns, of values (N, nnz) on the structure's pattern."""
         indptr, indices = model.shell.dofs.pattern
         indptr = np.append(indptr, np.full(self.inner, indptr[-1], indptr.dtype))
-        return [sp.csr_matrix((x, indices, indptr), shape=(self.size, self.size), copy=False) for x in values]
+        return SparseBlocks(values, indices, indptr, (self.size, self.size))
 
     def _fluid_term(self, left, right, parts) -> Term:
         """- G p over the flow's equations, from areas and the flow's unknowns."""

@@ -97,6 +97,12 @@ def cycles_along(case: Case, plan: MapPlan, column: MapColumn, law: int, walk: S
                 _take(plan, found, item, follower)
 
         tracer.start(*first)
+        ends = sorted((along, tracer.points[0].value))
+        for value in (v for v in plan.along.values if ends[0] < v < ends[1]):
+            try:
+                keep(tracer.described(follower.beside(onset, first[0], value), True))
+            except SolveError as error:
+                reasons.append(str(error))
         reason = tracer.run(keep)
         if "no further cycle" in reason:
             at = PARAMETERS[plan.along.parameter].text(tracer.points[-1].value)

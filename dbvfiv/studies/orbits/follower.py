@@ -31,7 +31,7 @@ STEP = 0.1
 #: Harmonics of the first cycles.
 HARMONICS = 4
 #: Amplitude of the second cycle over that of the first.
-SECOND = 1.3
+SECOND = 2.0
 #: The lips just touch at their middle.
 TOUCHING = "lips touch"
 
@@ -85,24 +85,52 @@ class Follower:
             )
         wave = np.zeros((HARMONICS + 1, self.system.size), complex)
         wave[0], wave[1] = np.concatenate([q, inner]), 0.5 * amplitude * shape / shape[self.lip]
-        motion = PeriodicMotion(h, h.real(wave), abs(onset.eigenvalue.imag))
-        found: list[Cycle] = []
-        for factor in (1.0, SECOND):
-            coefficients = motion.coefficients.copy()
-            coefficients[1:] *= factor
-            row = np.zeros_like(coefficients)
-            row[1, self.lip] = 1.0
-            condition = Condition(row, np.zeros(2), float(coefficients[1, self.lip]))
-            guess = PeriodicMotion(h, coefficients, motion.omega)
-            try:
-                found.append(self.solver.solve(guess, mu, (self.name,), (condition,)))
-            except ContinuationError as error:
-                raise SolveError(
-                    f"The oscillation that starts at {self.parameter} = {onset.value:.6g} was not found with an "
-                    f"amplitude of {factor * amplitude * 1e3:.3g} mm (cycle.amplitude): {error}"
-                ) from error
-            motion, mu = found[-1].motion, found[-1].mu
-        return found[0], found[1]
+        small = PeriodicMotion(h, h.real(wave), abs(onset.eigenvalue.imag))
+        first = self._of_amplitude(onset, small, mu, amplitude)
+        # to leading order parameter, frequency and mean change with the square of the amplitude, as the normal form has
+        # it, and harmonic k with its power k
+        change = first.motion.coefficients - small.coefficients
+        powers = np.append(2.0, np.repeat(np.arange(1.0, HARMONICS + 1), 2))[:, None]
+        guess = PeriodicMotion(
+            h,
+            small.coefficients * np.append(1.0, np.full(h.size - 1, SECOND))[:, None] + change * SECOND**powers,
+            small.omega + (first.motion.omega - small.omega) * SECOND**2,
+        )
+        value = mu[self.name] + (first.mu[self.name] - mu[self.name]) * SECOND**2
+        return first, self._of_amplitude(onset, guess, mu | {self.name: value}, SECOND * amplitude)
+
+    def _of_amplitude(self, onset: Onset, guess: PeriodicMotion, mu: dict, amplitude: float) -> Cycle:
+        """The cycle near a guess whose first harmonic moves the lip by an amplitude, m."""
+        row = np.zeros_like(guess.coefficients)
+        row[1, self.lip] = 1.0
+        condition = Condition(row, np.zeros(2), float(amplitude / np.sqrt(2.0)))
+        try:
+            return self.solver.solve(guess, mu, (self.name,), (condition,))
+        except ContinuationError as error:
+            raise SolveError(
+                f"The oscillation that starts at {self.parameter} = {onset.value:.6g} was not found with an amplitude "
+                f"of {amplitude * 1e3:.3g} mm (cycle.amplitude): {error}"
+            ) from error
+
+    def beside(self, onset: Onset, first: Cycle, value: float) -> Cycle:
+        """The cycle at a value between an onset and the first cycle of its branch, guessed by the root of the distance
+        from the onset.
+
+        Raises
+        ------
+        SolveError
+        """
+        share = np.sqrt((value - onset.value) / (first.mu[self.name] - onset.value))
+        coefficients = first.motion.coefficients.copy()
+        coefficients[1:] *= share
+        guess = PeriodicMotion(first.motion.harmonics, coefficients, first.motion.omega)
+        try:
+            found = self.solver.solve(guess, first.mu | {self.name: value})
+        except ContinuationError as error:
+            raise SolveError(f"No cycle was found at {self.parameter} = {value:.6g}: {error}") from error
+        if np.linalg.norm(found.motion.coefficients[1:]) < 0.2 * np.linalg.norm(coefficients[1:]):
+            raise SolveError(f"No cycle was found at {self.parameter} = {value:.6g}, but the steady state.")
+        return found
 
     def tracer(self, values: Sequence[float], first: PeriodicMotion) -> CycleTracer:
         """What follows a branch that has a motion `first` on it through ascending values of the parameter."""
