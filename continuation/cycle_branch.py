@@ -71,6 +71,9 @@ class CycleTracer:
         while len(self.points) < options.max_points:
             done, step, again = self._advance(step)
             if done is None:
+                for special in self._ahead():
+                    self.special.append(special)
+                    tell(special)
                 self.reason = again
                 return self.reason
             if self._turned():
@@ -261,35 +264,83 @@ class CycleTracer:
         point = self.described(cycle, after=first)
         return CyclePoint(cycle, point.value, arclength, point.exponents, False, point.tests)
 
+    def _ahead(self) -> list[SpecialCycle]:
+        """Events just ahead of a branch that does not go on, as where motions cease to be smooth at one."""
+        found = [self._approached(name) for name in self.events] if len(self.points) > 2 else []
+        return [special for special in found if special is not None]
+
+    def _approached(self, name: str) -> SpecialCycle | None:
+        """A zero of an event that is only met from one side, by secants from there; None if there is none near."""
+        near, options = list(self.points[-3:]), self.options
+        whole = max(abs(p.tests[name]) for p in self.points)
+        for _ in range(8):
+            ahead = _zero_ahead(near, name)
+            if not 0 <= ahead <= options.max_step:
+                return None
+            if abs(near[-1].tests[name]) <= 1e-3 * whole:
+                break
+            steps = (near[-1].arclength + share * ahead for share in (0.9, 0.5, 0.2))
+            point = next(filter(None, (self._interpolated(near[-3:], s) for s in steps)), None)
+            if point is None:
+                break
+            if point.tests[name] * near[-1].tests[name] <= 0:
+                return self._located(name, near[-1], point, lambda p: p.tests[name])
+            near.append(point)
+        last = near[-3:]
+        weights = _lagrange([p.arclength for p in last], last[-1].arclength + _zero_ahead(near, name))
+        value = float(sum(w * p.value for w, p in zip(weights, last)))
+        return SpecialCycle(name, last[-1], value, 0.0, abs(last[-1].tests[name]) <= 1e-2 * whole)
+
     def _located(self, kind: str, a: CyclePoint, b: CyclePoint, test) -> SpecialCycle:
         """A zero of a test between two points, by false positions with halving (Illinois)."""
         fa, fb = test(a), test(b)
         width, located = b.arclength - a.arclength, False
         low, high, flow, fhigh = a, b, fa, fb
+        met = [(fa, a), (fb, b)]
         for _ in range(8):
             s = (low.arclength * fhigh - high.arclength * flow) / (fhigh - flow)
             point = self._interpolated([low, high], s)
             if point is None:
                 break
             f = test(point)
+            met.append((f, point))
             if f * fhigh < 0:
                 low, flow, high, fhigh = high, fhigh, point, f
             else:
                 flow, high, fhigh = 0.5 * flow, point, f
             if low.arclength > high.arclength:
                 low, high, flow, fhigh = high, low, fhigh, flow
-            if min(abs(flow), abs(fhigh)) <= 1e-3 * max(abs(fa), abs(fb)) or high.arclength - low.arclength <= (
+            if min(abs(f) for f, _ in met) <= 1e-3 * max(abs(fa), abs(fb)) or high.arclength - low.arclength <= (
                 self.options.located * width
             ):
                 located = True
                 break
-        share = flow / (flow - fhigh) if flow * fhigh < 0 else (0.0 if abs(flow) < abs(fhigh) else 1.0)
-        value = low.value + share * (high.value - low.value)
-        nearest = low if share < 0.5 else high
+        met.sort(key=lambda one: abs(one[0]))
+        nearest, value = met[0][1], _value_at_zero(met[:3], low.value, high.value)
         frequency = 0.0
         if nearest.exponents is not None and len(nearest.exponents.values):
             frequency = float(_crossing(nearest.exponents).imag / (2 * np.pi)) if kind in (TORUS, DOUBLING) else 0.0
-        return SpecialCycle(kind, nearest, float(value), frequency, located)
+        return SpecialCycle(kind, nearest, value, frequency, located)
+
+
+def _value_at_zero(met: Sequence[tuple[float, CyclePoint]], one: float, other: float) -> float:
+    """The parameter where a test vanishes, from tests and points by decreasing nearness: by the polynomial through all,
+    or through two where that leaves the bracket.
+    """
+    for some in (met, met[:2]):
+        tests = [f for f, _ in some]
+        if len(set(tests)) == len(tests):
+            value = float(sum(w * p.value for w, (_, p) in zip(_lagrange(tests, 0.0), some)))
+            if min(one, other) <= value <= max(one, other):
+                return value
+    return float(met[0][1].value)
+
+
+def _zero_ahead(points: Sequence[CyclePoint], name: str) -> float:
+    """Arclength from the last point to the zero of an event on the secant of the last two; infinite without."""
+    a, b = points[-2:]
+    slope = (b.tests[name] - a.tests[name]) / (b.arclength - a.arclength)
+    return -b.tests[name] / slope if slope else np.inf
 
 
 def _lagrange(nodes: Sequence[float], x: float) -> np.ndarray:

@@ -128,14 +128,14 @@ class CycleSolver:
             if not np.isfinite(unbalance).all():
                 break
             if linear is None:
-                linear = self.linearise(motion, mu, few=True)
+                linear = self.linearise(motion, mu, few=not sizes)  # all samples where few were not enough
                 linear.prepare(
                     free, conditions, unbalance[: motion.coefficients.size].reshape(motion.coefficients.shape)
                 )
             change, used, missed = linear.solve(-unbalance, options.linear, options.krylov)
             spent += used
             sizes.append(self._size(change, motion))
-            if not sizes[-1] < 10.0:
+            if not sizes[-1] < 10.0 or (len(sizes) > 8 and sizes[-1] > max(0.5 * sizes[-4], 1e-3)):
                 break
             motion, mu = moved(motion, mu, free, change)
             if motion.omega <= 0:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from continuation import NotConverged
+from continuation import NotConverged, OutOfDomain
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions
 from continuation.cycles import CycleOptions, CycleSolver
@@ -247,7 +247,8 @@ def test_period_doubling_of_an_adaptive_control_system():
     assert reason == "limit of a reached"
     (point,) = tracer.special
     assert point.kind == DOUBLING and point.located
-    assert abs(point.value - 0.6303020) < 1e-7 and abs(point.point.motion.period - 6.364071) < 1e-6
+    there = tracer.solver.solve(point.point.motion, {"a": point.value, "b": 1.0})
+    assert abs(point.value - 0.6303020) < 6e-8 and abs(there.motion.period - 6.364071) < 6e-7
     for kept in (*tracer.points[2:], point.point):
         pair = kept.exponents.multipliers
         product = np.prod(pair) if len(pair) == 2 else np.abs(pair[0]) ** 2  # a pair is given once
@@ -294,6 +295,33 @@ def test_events_are_located():
     again.restore(tracer.points[:3])
     again.run()
     assert np.isclose(again.points[-1].value, tracer.points[-1].value) and len(again.special) == 1
+
+
+def test_an_event_that_ends_a_branch_is_located_from_one_side():
+    """Motions that reach x = -0.6 are refused, and the radius sqrt(mu) is that at 0.36."""
+
+    def rate(u, mu):
+        gain = mu["mu"] - u[0] ** 2 - u[1] ** 2
+        return jnp.stack([gain * u[0] - u[1], u[0] + gain * u[1]])
+
+    class Walled(periodic.SmallPeriodic):
+        def residual(self, motion, mu):
+            if np.linalg.norm(motion.samples, axis=1).max() > 0.6 + 1e-9:
+                raise OutOfDomain("beyond the wall")
+            return super().residual(motion, mu)
+
+    system = Walled(lambda u, v, a, t, mu: v - rate(u, mu), 2)
+    solver = CycleSolver(system, system.basis, EXACT)
+    first = solver.solve(periodic.guess_of(0.3 * CIRCLE, 2, 1.0), {"mu": 0.09})
+    second = solver.solve(first.motion, {"mu": 0.12})
+    event = {"wall": lambda cycle: 0.6 - float(np.linalg.norm(cycle.motion.at([0.0])))}
+    tracer = CycleTracer(solver, "mu", CycleBranchOptions(limits=(0.0, 0.5)), event)
+    tracer.start(first, second)
+    told = []
+    assert "no further cycle" in tracer.run(told.append)
+    (special,) = tracer.special
+    assert special.kind == "wall" and special.located and special in told
+    assert abs(special.value - 0.36) < 1e-4
 
 
 # -- failures
