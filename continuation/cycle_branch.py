@@ -9,9 +9,17 @@ import numpy as np
 
 from continuation.bordered_cycle import Condition
 from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions, CyclePoint, SpecialCycle
+from continuation.cycle_zeros import (
+    change_between,
+    crossing_of,
+    growth_of_crossing,
+    lagrange,
+    value_at_zero,
+    zero_ahead,
+)
 from continuation.cycles import Cycle, CycleSolver
 from continuation.errors import ContinuationError, NotConverged
-from continuation.hill import Exponents, floquet_exponents
+from continuation.hill import floquet_exponents
 from continuation.options import require
 
 
@@ -52,12 +60,20 @@ class CycleTracer:
 
     def start(self, first: Cycle, second: Cycle, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
         """Begin with two cycles; the branch goes on from the second, away from the first."""
-        for cycle in (first, second):
-            tell(self._accept(cycle, False))
+        self.begin(first, False, tell)
+        self.extend(second, False, tell)
+
+    def begin(self, first: Cycle, asked: bool, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
+        """Begin with one cycle; `extend` gives the way to go."""
+        tell(self._accept(first, asked))
+
+    def extend(self, cycle: Cycle, asked: bool, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
+        """Take a cycle as the next point."""
+        tell(self._accept(cycle, asked))
 
     def restore(self, points: Sequence[CyclePoint]) -> None:
-        """Go on from points that are known, two at least."""
-        require(len(points) >= 2, "A branch goes on from two points at least.")
+        """Go on from points that are known; `extend` where there is but one."""
+        require(len(points) >= 1, "A branch goes on from one point at least.")
         self.points = [
             replace(p, tests={name: float(event(p.cycle)) for name, event in self.events.items()}) for p in points
         ]
@@ -121,20 +137,33 @@ class CycleTracer:
     def _target(self, step: float) -> float | None:
         """The next value that is asked for, or the limit, where it lies within the step."""
         here, ahead = self.points[-1].value, self._direction()
-        reach = self._slope() * step
+        reach = (self._value_at(step) - here) * ahead
         wanted = [v for v in (*self.options.values, *self.options.limits) if np.isfinite(v)]
-        wanted = [v for v in wanted if 1e-9 * self.options.scale < (v - here) * ahead <= 1.3 * abs(reach)]
+        wanted = [v for v in wanted if 1e-9 * self.options.scale < (v - here) * ahead <= 1.5 * reach]
         return min(wanted, key=lambda v: abs(v - here)) if wanted else None
 
-    def _slope(self) -> float:
-        """Change of the parameter over that of the arclength at the last point."""
-        a, b = self.points[-2:]
-        return (b.value - a.value) / (b.arclength - a.arclength)
+    def _value_at(self, step: float) -> float:
+        """The parameter a step ahead, by the polynomial through the last points."""
+        last = self.points[-4:]
+        weights = lagrange([p.arclength for p in last], last[-1].arclength + step)
+        return float(sum(w * p.value for w, p in zip(weights, last)))
+
+    def _way_to(self, target: float, step: float) -> float:
+        """Step at which that polynomial has a value that lies about a step ahead."""
+        low, high = 0.0, 2.0 * step
+        side = self._direction()
+        if (self._value_at(high) - target) * side < 0:
+            a, b = self.points[-2:]
+            return abs((target - b.value) * (b.arclength - a.arclength) / (b.value - a.value))
+        while high - low > 1e-3 * step:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if (self._value_at(middle) - target) * side >= 0 else (middle, high)
+        return high
 
     def _step(self, step: float, target: float | None) -> Cycle:
         last = self.points[-1]
         if target is not None:
-            step = abs((target - last.value) / self._slope())
+            step = self._way_to(target, step)
         motion, value = self._predict(last.arclength + step)
         mu = last.cycle.mu | {self.parameter: value if target is None else target}
         if target is not None:
@@ -163,11 +192,10 @@ class CycleTracer:
         h = last[-1].motion.harmonics
         if last[-1].motion.tail > 0.4 * self.options.tail and h.count + 2 <= self.options.max_harmonics:
             h = type(h)(h.count + 2)
-        weights = _lagrange([p.arclength for p in last], arclength)
+        weights = lagrange([p.arclength for p in last], arclength)
         coefficients = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, last))
         omega = float(sum(w * p.motion.omega for w, p in zip(weights, last)))
-        value = float(sum(w * p.value for w, p in zip(weights, last)))
-        return type(last[-1].motion)(h, coefficients, omega), value
+        return type(last[-1].motion)(h, coefficients, omega), self._value_at(arclength - last[-1].arclength)
 
     def _plane(self, motion, value: float) -> Condition:
         """Normal to the way from the last point, through the prediction."""
@@ -219,9 +247,9 @@ class CycleTracer:
             if a.tests[name] * b.tests[name] < 0:
                 found.append(self._located(name, a, b, lambda p, n=name: p.tests[n]))
         if a.exponents is not None and b.exponents is not None:
-            change = _change(a.exponents, b.exponents)
+            change = change_between(a.exponents, b.exponents)
             if change is not None and not (change == FOLD):
-                found.append(self._located(change, a, b, _test_of(a.exponents, b.exponents)))
+                found.append(self._located(change, a, b, growth_of_crossing(a.exponents, b.exponents)))
         return found
 
     def _fold(self, before: CyclePoint, a: CyclePoint, b: CyclePoint) -> SpecialCycle:
@@ -247,7 +275,7 @@ class CycleTracer:
     def _interpolated(self, near: Sequence[CyclePoint], arclength: float) -> CyclePoint | None:
         """A cycle between points, at an arclength; None where it is not found."""
         h = max((p.motion.harmonics for p in near), key=lambda h: h.count)
-        weights = _lagrange([p.arclength for p in near], arclength)
+        weights = lagrange([p.arclength for p in near], arclength)
         c = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, near))
         omega = float(sum(w * p.motion.omega for w, p in zip(weights, near)))
         value = float(sum(w * p.value for w, p in zip(weights, near)))
@@ -274,7 +302,7 @@ class CycleTracer:
         near, options = list(self.points[-3:]), self.options
         whole = max(abs(p.tests[name]) for p in self.points)
         for _ in range(8):
-            ahead = _zero_ahead(near, name)
+            ahead = zero_ahead(near, name)
             if not 0 <= ahead <= options.max_step:
                 return None
             if abs(near[-1].tests[name]) <= 1e-3 * whole:
@@ -287,7 +315,7 @@ class CycleTracer:
                 return self._located(name, near[-1], point, lambda p: p.tests[name])
             near.append(point)
         last = near[-3:]
-        weights = _lagrange([p.arclength for p in last], last[-1].arclength + _zero_ahead(near, name))
+        weights = lagrange([p.arclength for p in last], last[-1].arclength + zero_ahead(near, name))
         value = float(sum(w * p.value for w, p in zip(weights, last)))
         return SpecialCycle(name, last[-1], value, 0.0, abs(last[-1].tests[name]) <= 1e-2 * whole)
 
@@ -316,70 +344,8 @@ class CycleTracer:
                 located = True
                 break
         met.sort(key=lambda one: abs(one[0]))
-        nearest, value = met[0][1], _value_at_zero(met[:3], low.value, high.value)
+        nearest, value = met[0][1], value_at_zero(met[:3], low.value, high.value)
         frequency = 0.0
         if nearest.exponents is not None and len(nearest.exponents.values):
-            frequency = float(_crossing(nearest.exponents).imag / (2 * np.pi)) if kind in (TORUS, DOUBLING) else 0.0
+            frequency = float(crossing_of(nearest.exponents).imag / (2 * np.pi)) if kind in (TORUS, DOUBLING) else 0.0
         return SpecialCycle(kind, nearest, value, frequency, located)
-
-
-def _value_at_zero(met: Sequence[tuple[float, CyclePoint]], one: float, other: float) -> float:
-    """The parameter where a test vanishes, from tests and points by decreasing nearness: by the polynomial through all,
-    or through two where that leaves the bracket.
-    """
-    for some in (met, met[:2]):
-        tests = [f for f, _ in some]
-        if len(set(tests)) == len(tests):
-            value = float(sum(w * p.value for w, (_, p) in zip(_lagrange(tests, 0.0), some)))
-            if min(one, other) <= value <= max(one, other):
-                return value
-    return float(met[0][1].value)
-
-
-def _zero_ahead(points: Sequence[CyclePoint], name: str) -> float:
-    """Arclength from the last point to the zero of an event on the secant of the last two; infinite without."""
-    a, b = points[-2:]
-    slope = (b.tests[name] - a.tests[name]) / (b.arclength - a.arclength)
-    return -b.tests[name] / slope if slope else np.inf
-
-
-def _lagrange(nodes: Sequence[float], x: float) -> np.ndarray:
-    nodes = np.asarray(nodes, float)
-    out = np.ones(len(nodes))
-    for i, a in enumerate(nodes):
-        for j, b in enumerate(nodes):
-            if i != j:
-                out[i] *= (x - b) / (a - b)
-    return out
-
-
-def _crossing(exponents: Exponents) -> complex:
-    """The exponent nearest to the imaginary axis."""
-    return complex(exponents.values[np.argmin(np.abs(exponents.values.real))])
-
-
-def _change(a: Exponents, b: Exponents) -> str | None:
-    """What kind of bifurcation lies between two cycles, None if none."""
-    if a.unstable == b.unstable:
-        return None
-    few, many = sorted((a, b), key=lambda e: e.unstable)
-    crossing = _crossing(min((few, many), key=lambda e: abs(_crossing(e).real)))
-    half = 0.5 * many.omega
-    if abs(many.unstable - few.unstable) % 2 == 0 and not many.is_real(crossing):
-        return TORUS
-    if abs(crossing.imag - half) < 0.05 * half:
-        return DOUBLING
-    return FOLD if crossing.imag < 0.05 * half else TORUS
-
-
-def _test_of(a: Exponents, b: Exponents):
-    """Growth rate of the exponent that crosses, as a function of a point."""
-    few, many = (a, b) if a.unstable < b.unstable else (b, a)
-    rank = few.unstable if few.unstable < len(few.values) else 0
-    index = min(rank, len(many.values) - 1)
-
-    def test(point: CyclePoint) -> float:
-        values = point.exponents.values
-        return float(values.real[min(index, len(values) - 1)])
-
-    return test

@@ -45,7 +45,7 @@ class CycleOptions:
 
     tolerance: float = 1e-5
     max_iterations: int = 25
-    linear: float = 3e-2
+    linear: float = 0.1
     krylov: int = 40
     renew_at: float = 0.3
     basis: int = 16

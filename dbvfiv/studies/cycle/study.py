@@ -7,18 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import CyclePoint, SpecialCycle
 
-from ...errors import CaseError
+from ...errors import CaseError, SolveError
 from ...motion.periodic import check_periodic
 from ...record.record import GrowingRecord
 from ...record.table import printed_head, printed_row
 from ..case import Case
 from ..orbits.follower import Follower
+from ..orbits.onset import MODES
 from ..session import Session
 from ..stability.place import check_scan
 from ..stability.walk import StabilityWalk
 from ..study import Study
+from .given import given_motion
 from .result import CycleResult
 from .rows import (
     COLUMNS,
@@ -33,6 +36,9 @@ from .rows import (
     tables_of,
 )
 from .start import find_onset
+
+#: Distance of the second cycle from one of a file, over the range.
+AWAY = 0.02
 
 
 @dataclass(frozen=True)
@@ -54,10 +60,17 @@ def run(session: Session, record: GrowingRecord) -> None:
     check_periodic(session.model)
     record.begin("cycle", None)
     walk = StabilityWalk(case, record, session.model)
+    if case.cycle.start == "file":
+        _from_file(case, walk, record)
+    else:
+        _from_onset(case, walk, record)
+
+
+def _from_onset(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
+    axis = case.cycle.axis
     onset = find_onset(case, walk, record)
-    frequency = onset.eigenvalue.imag / (2 * np.pi)
     if not record.notes("onset"):
-        record.note("onset", value=onset.value, frequency=frequency)
+        record.note("onset", value=onset.value, frequency=onset.eigenvalue.imag / (2 * np.pi))
     follower = Follower(case, walk, onset.place, axis.parameter, onset.spectrum)
     keeper = _Keeper(record, follower)
     known = read_points(record, onset.place.mu(), follower.name)
@@ -69,17 +82,56 @@ def run(session: Session, record: GrowingRecord) -> None:
     else:
         tracer = follower.tracer(axis.values, known[0].motion)
         tracer.restore(known)
-    reason = tracer.run(keeper.keep)
-    record.note(ENDED, reason=reason)
-    if "no further cycle" in reason:
-        record.fail(f"The branch ends at {axis.parameter} = {tracer.points[-1].value:.6g}: {reason.rstrip('.')}.")
+    keeper.follow(tracer)
+
+
+def _from_file(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
+    """Down from the motion of the file, then up from there."""
+    axis = case.cycle.axis
+    given = given_motion(case, walk)
+    record.progress(f"the cycle at {axis.parameter} = {given.value:.6g}")
+    follower = Follower(case, walk, given.place, axis.parameter, walk.spectrum(given.place, MODES))
+    ended = {note["leg"] for note in record.notes(ENDED)}
+    low, high = axis.values[0], axis.values[-1]
+    for leg, end in enumerate((low, high)):
+        if leg in ended or given.value == end:
+            continue
+        keeper = _Keeper(record, follower, leg)
+        known = read_points(record, given.place.mu(), follower.name, leg)
+        if not known:
+            cycle = follower.near(given.motion, given.value)
+            tracer = follower.tracer(axis.values, cycle.motion)
+            tracer.begin(cycle, given.value in axis.values, keeper.keep)
+        else:
+            tracer = follower.tracer(axis.values, known[0].motion)
+            tracer.restore(known)
+        if len(tracer.points) < 2:
+            step = np.clip(end - given.value, -AWAY * (high - low), AWAY * (high - low))
+            try:
+                second = follower.near(tracer.points[0].motion, float(given.value + step))
+            except SolveError as error:
+                keeper.end(tracer, f"no further cycle was found: {error}")
+                continue
+            tracer.extend(second, False, keeper.keep)
+        keeper.follow(tracer)
 
 
 class _Keeper:
     """Keeps the cycles of a branch in a record as they are found."""
 
-    def __init__(self, record: GrowingRecord, follower: Follower):
-        self.record, self.follower = record, follower
+    def __init__(self, record: GrowingRecord, follower: Follower, leg: int = 0):
+        self.record, self.follower, self.leg = record, follower, leg
+
+    def follow(self, tracer: CycleTracer) -> None:
+        """Follow a leg to its end."""
+        self.end(tracer, tracer.run(self.keep))
+
+    def end(self, tracer: CycleTracer, reason: str) -> None:
+        """Note why a leg ended."""
+        self.record.note(ENDED, reason=reason, leg=self.leg)
+        if "no further cycle" in reason:
+            at = f"{self.follower.parameter} = {tracer.points[-1].value:.6g}"
+            self.record.fail(f"The branch ends at {at}: {reason.rstrip('.')}.")
 
     def keep(self, item: CyclePoint | SpecialCycle) -> None:
         """Keep a cycle, or a special point."""
@@ -90,7 +142,7 @@ class _Keeper:
             record.progress(f"{item.kind} at {follower.parameter} = {item.value:.6g}")
             return
         orbit = follower.orbit(item.cycle)
-        row = cycle_row(item, orbit)
+        row = cycle_row(item, orbit, self.leg)
         # the series first: the row vouches for it
         record.extend(SERIES, series_rows(record.rows(CYCLES), item.motion, orbit.model.size))
         record.append(CYCLES, row)

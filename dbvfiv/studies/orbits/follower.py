@@ -123,12 +123,20 @@ class Follower:
         share = np.sqrt((value - onset.value) / (first.mu[self.name] - onset.value))
         coefficients = first.motion.coefficients.copy()
         coefficients[1:] *= share
-        guess = PeriodicMotion(first.motion.harmonics, coefficients, first.motion.omega)
+        return self.near(PeriodicMotion(first.motion.harmonics, coefficients, first.motion.omega), value)
+
+    def near(self, guess: PeriodicMotion, value: float) -> Cycle:
+        """The cycle near a motion, at a value of the parameter.
+
+        Raises
+        ------
+        SolveError
+        """
         try:
-            found = self.solver.solve(guess, first.mu | {self.name: value})
+            found = self.solver.solve(guess, self.place.mu() | {self.name: value})
         except ContinuationError as error:
             raise SolveError(f"No cycle was found at {self.parameter} = {value:.6g}: {error}") from error
-        if np.linalg.norm(found.motion.coefficients[1:]) < 0.2 * np.linalg.norm(coefficients[1:]):
+        if np.linalg.norm(found.motion.coefficients[1:]) < 0.2 * np.linalg.norm(guess.coefficients[1:]):
             raise SolveError(f"No cycle was found at {self.parameter} = {value:.6g}, but the steady state.")
         return found
 
