@@ -63,13 +63,11 @@ class CycleLinearisation:
     mu : mapping
     basis : (n, r) array
         Orthonormal in unknowns over their scales.
-    few : bool
-        Linearise at as few samples as tell the harmonics apart: less work, good for corrections.
     """
 
-    def __init__(self, system, motion, mu, basis: np.ndarray, few: bool = False):
+    def __init__(self, system, motion, mu, basis: np.ndarray):
         self.system, self.motion, self.mu = system, motion, dict(mu)
-        self.operator = system.linearise(motion.at_fewest_samples() if few else motion, mu)
+        self.operator = system.linearise(motion, mu)
         self.smoother = system.smoother(self.operator, mu)
         self.scale, self.basis = np.asarray(system.scales), basis
         self._known: dict[str, np.ndarray] = {}
@@ -117,6 +115,15 @@ class CycleLinearisation:
                 self._known[name] = self._column(name, force)
         shape = (len(self.free), *self.motion.coefficients.shape)
         self.columns = np.array([self._known[name] for name in self.free]).reshape(shape)
+        self.factor()
+
+    def factor(self) -> None:
+        """Factor the projection with the unknowns and conditions it has, as after an extension of the basis.
+
+        Raises
+        ------
+        SingularSystem
+        """
         v = self.scale[:, None] * self.basis
         matrix, free = self.reduced.matrix(), len(self.free)
         whole = np.zeros((len(matrix) + free, len(matrix) + free))
@@ -156,11 +163,15 @@ class CycleLinearisation:
         """Change for which `apply` gives `rhs` within a tolerance on preconditioned residuals, iterations, what is
         left.
         """
-        shape, size = self.motion.coefficients.shape, self.motion.coefficients.size
-        units = np.append(
-            np.tile(self.scale, shape[0]), np.maximum(np.abs(values_of(self.motion, self.mu, self.free)), 1e-9)
-        )
+        units = self.units
         start = self._precondition(rhs) / units
         x, count, missed = gmres(lambda y: self._precondition(self.apply(units * y)) / units, start, tolerance, most)
-        assert len(x) == size + len(self.free)
         return units * x, count, missed
+
+    @property
+    def units(self) -> np.ndarray:
+        """Sizes that changes of coefficients and free unknowns are measured in."""
+        free = np.maximum(np.abs(values_of(self.motion, self.mu, self.free)), 1e-9)
+        c = self.motion.coefficients
+        whole = max(float(np.abs(c[1:] / self.scale).max()), 1e-300)
+        return np.append(np.tile(whole * self.scale, len(c)), free)

@@ -53,14 +53,27 @@ class CycleTracer:
         self.points: list[CyclePoint] = []
         self.special: list[SpecialCycle] = []
         self.reason = "running"
+        self._origin: list[CyclePoint] = []
         self._weight = 1.0 / (np.asarray(solver.system.scales) * options.motion_scale) ** 2
 
     # -- the branch
     # ----
 
-    def start(self, first: Cycle, second: Cycle, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
-        """Begin with two cycles; the branch goes on from the second, away from the first."""
+    def start(
+        self,
+        first: Cycle,
+        second: Cycle,
+        tell: Callable[[CyclePoint], None] = lambda item: None,
+        origin: Cycle | None = None,
+    ) -> None:
+        """Begin with two cycles; the branch goes on from the second, away from the first.
+
+        `origin` is what it starts from, at rest at an onset; it helps predictions and is no point of the branch.
+        """
         self.begin(first, False, tell)
+        if origin is not None:
+            length = -self._distance(self.points[0], origin)
+            self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
         self.extend(second, False, tell)
 
     def begin(self, first: Cycle, asked: bool, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
@@ -144,9 +157,13 @@ class CycleTracer:
 
     def _value_at(self, step: float) -> float:
         """The parameter a step ahead, by the polynomial through the last points."""
-        last = self.points[-4:]
+        last = self._last()
         weights = lagrange([p.arclength for p in last], last[-1].arclength + step)
         return float(sum(w * p.value for w, p in zip(weights, last)))
+
+    def _last(self) -> list[CyclePoint]:
+        """Points that predictions are made of."""
+        return [*self._origin, *self.points][-4:]
 
     def _way_to(self, target: float, step: float) -> float:
         """Step at which that polynomial has a value that lies about a step ahead."""
@@ -188,7 +205,7 @@ class CycleTracer:
 
     def _predict(self, arclength: float):
         """Motion and parameter ahead by the polynomial through the last points."""
-        last = self.points[-4:]
+        last = self._last()
         h = last[-1].motion.harmonics
         if last[-1].motion.tail > 0.4 * self.options.tail and h.count + 2 <= self.options.max_harmonics:
             h = type(h)(h.count + 2)
@@ -221,7 +238,7 @@ class CycleTracer:
         after = self.points[-1] if after is None and self.points else after
         exponents = None
         if self.options.exponents:
-            linear = self.solver.linearise(cycle.motion, cycle.mu)
+            linear = self.solver.linearise(cycle.motion, cycle.mu, perturbed=True)
             exponents = floquet_exponents(self.solver, linear, self.options.exponents)
         value = cycle.mu[self.parameter]
         tests = {name: float(event(cycle)) for name, event in self.events.items()}
@@ -229,8 +246,8 @@ class CycleTracer:
         return CyclePoint(cycle, value, length, exponents, asked, tests)
 
     def _distance(self, point: CyclePoint, cycle: Cycle) -> float:
-        c = cycle.motion.coefficients
-        change = c - cycle.motion.harmonics.resized(point.motion.coefficients)
+        h = max(cycle.motion.harmonics, point.motion.harmonics, key=lambda h: h.count)
+        change = h.resized(cycle.motion.coefficients) - h.resized(point.motion.coefficients)
         moved = (cycle.mu[self.parameter] - point.value) / self.options.scale
         return float(np.sqrt(np.sum(change**2 * self._weight) + moved**2))
 

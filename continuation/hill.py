@@ -90,7 +90,7 @@ def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-3, r
     count : int
         Exponents wanted.
     tolerance : float
-        Largest share that a perturbation may miss.
+        Largest share that either of the leading two may miss; four times as much for the others.
     rounds : int
         Times that the basis is made larger.
     """
@@ -99,10 +99,11 @@ def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-3, r
         missed = [_missed(linear, *pair) for pair in zip(found.as_found, found.vectors)]
         errors = np.array([share for share, _ in missed])
         found = replace(found, errors=errors)
-        if not left or not np.any(errors > tolerance):
+        limits = tolerance * np.where(np.arange(len(errors)) < 2, 1.0, 4.0)
+        if not left or not np.any(errors > limits):
             return found
-        rows = [part for share, rest in missed if share > tolerance for part in (rest.real, rest.imag)]
-        if not linear.extend(solver.learn(np.concatenate(rows))):
+        rows = [p for (share, rest), most in zip(missed, limits) if share > most for p in (rest.real, rest.imag)]
+        if not linear.extend(solver.learn_perturbations(np.concatenate(rows))):
             return found
     return found
 

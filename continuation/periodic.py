@@ -67,11 +67,6 @@ class PeriodicMotion:
         other = Harmonics(count)
         return PeriodicMotion(other, other.resized(self.coefficients), self.omega)
 
-    def at_fewest_samples(self) -> PeriodicMotion:
-        """The same with 2 H + 1 samples."""
-        count = self.harmonics.count
-        return PeriodicMotion(Harmonics(count, 2 * count + 1), self.coefficients, self.omega)
-
     @property
     def tail(self) -> float:
         """Share that the last two harmonics have in the motion about its mean: what a longer series would change."""

@@ -76,9 +76,9 @@ def _from_onset(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
     known = read_points(record, onset.place.mu(), follower.name)
     if len(known) < 2:
         record.progress(f"first cycles, beside {axis.parameter} = {onset.value:.6g}")
-        first = follower.from_onset(onset)
-        tracer = follower.tracer(axis.values, first[0].motion)
-        tracer.start(*first, tell=keeper.keep)
+        rest, first, second = follower.from_onset(onset)
+        tracer = follower.tracer(axis.values, first.motion)
+        tracer.start(first, second, keeper.keep, rest)
     else:
         tracer = follower.tracer(axis.values, known[0].motion)
         tracer.restore(known)

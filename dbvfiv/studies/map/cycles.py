@@ -86,21 +86,21 @@ def cycles_along(case: Case, plan: MapPlan, column: MapColumn, law: int, walk: S
             if onset is None:
                 continue
             follower = Follower(case, walk, place, plan.along.parameter, onset.spectrum)
-            first = follower.from_onset(onset)
+            rest, first, second = follower.from_onset(onset)
         except SolveError as error:
             reasons.append(str(error))
             continue
-        tracer = follower.tracer(plan.along.values, first[0].motion)
+        tracer = follower.tracer(plan.along.values, first.motion)
 
         def keep(item: CyclePoint | SpecialCycle, follower: Follower = follower) -> None:
             if isinstance(item, CyclePoint) and item.asked:
                 _take(plan, found, item, follower)
 
-        tracer.start(*first)
+        tracer.start(first, second, origin=rest)
         ends = sorted((along, tracer.points[0].value))
         for value in (v for v in plan.along.values if ends[0] < v < ends[1]):
             try:
-                keep(tracer.described(follower.beside(onset, first[0], value), True))
+                keep(tracer.described(follower.beside(onset, first, value), True))
             except SolveError as error:
                 reasons.append(str(error))
         reason = tracer.run(keep)

@@ -27,7 +27,7 @@ from .orbit import Orbit
 #: Displacement of the lip, m, that a step of one along the branch stands for.
 UNIT = 10e-3
 #: First step along a branch.
-STEP = 0.1
+STEP = 0.2
 #: Harmonics of the first cycles.
 HARMONICS = 4
 #: Amplitude of the second cycle over that of the first.
@@ -67,8 +67,9 @@ class Follower:
         #: Number of the displacement in y of the lip at x = z = 0 among the unknowns.
         self.lip = int(model.shell.dofs.index[model.mesh.rows[0, 0], 1])
 
-    def from_onset(self, onset: Onset) -> tuple[Cycle, Cycle]:
-        """Two small cycles beside an onset, of the amplitude asked for and somewhat more.
+    def from_onset(self, onset: Onset) -> tuple[Cycle, Cycle, Cycle]:
+        """The steady state at an onset, as a cycle at rest, and two small cycles beside it, of the amplitude asked for
+        and somewhat more.
 
         Raises
         ------
@@ -97,7 +98,9 @@ class Follower:
             small.omega + (first.motion.omega - small.omega) * SECOND**2,
         )
         value = mu[self.name] + (first.mu[self.name] - mu[self.name]) * SECOND**2
-        return first, self._of_amplitude(onset, guess, mu | {self.name: value}, SECOND * amplitude)
+        still = small.coefficients * (np.arange(h.size) == 0)[:, None]
+        rest = Cycle(PeriodicMotion(h, still, small.omega), mu, 0.0, 0, 0)
+        return rest, first, self._of_amplitude(onset, guess, mu | {self.name: value}, SECOND * amplitude)
 
     def _of_amplitude(self, onset: Onset, guess: PeriodicMotion, mu: dict, amplitude: float) -> Cycle:
         """The cycle near a guess whose first harmonic moves the lip by an amplitude, m."""
@@ -149,7 +152,7 @@ class Follower:
             step=min(STEP, asked.max_step),
             min_step=min(1e-4, asked.max_step),
             max_step=asked.max_step,
-            scale=0.5 * (values[-1] - values[0]),
+            scale=values[-1] - values[0],
             motion_scale=UNIT * whole / swing,
             limits=(values[0], values[-1]),
             values=tuple(values),
