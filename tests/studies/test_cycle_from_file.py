@@ -50,6 +50,14 @@ def test_both_ways_from_a_cycle_and_resumed(file, tmp_path):
     assert "branch" in whole.figures()
 
 
+def test_over_another_parameter(file):
+    """From the nearest cycle of a branch over the density to one over the pressure."""
+    (there,) = (p for p in load_result(file).points if p.value == 230.0)
+    found = started(file, cycle__over="pressure=5.9 kPa:6 kPa:2", fluid__density=230.0).perform("cycle")
+    assert found.points[0].value == 6e3 and found.points[-1].value == 5.9e3
+    assert np.isclose(found.points[0].amplitude, there.amplitude, rtol=1e-4)
+
+
 @pytest.mark.slow
 def test_from_a_run_in_time(file, tmp_path):
     """The cycle is that of the branch from the onset; the run's steps leave it a little off."""

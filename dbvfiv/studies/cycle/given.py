@@ -93,6 +93,9 @@ def given_motion(case: Case, walk: StabilityWalk) -> Given:
 def _cycle_of(case: Case, result):
     """Cycle `cycle.start_cycle` of a result, counted in the order of its table."""
     number, points = case.cycle.start_cycle, sorted(result.points, key=lambda point: point.number)
+    if number is None and result.parameter != case.cycle.axis.parameter and points:
+        return result.nearest(Place.of(case).value(result.parameter))
+    number = -1 if number is None else number
     if not -len(points) <= number < len(points):
         raise CaseError(
             f"{str(case.cycle.start_file)!r} holds {len(points)} cycles, so there is no cycle {number}.",

@@ -33,8 +33,10 @@ class Keys(Section):
         "Result file of the motion to start from, relative to the case file: of a branch of cycles, or of a run in "
         "time that has settled on a cycle. Its value of the parameter is taken, and all else from this case.",
     )
-    start_cycle: StrictInt = key(
-        -1, "Which cycle of a branch in start_file, from 0 in the order of its table; negative ones count from the end."
+    start_cycle: StrictInt | None = key(
+        None,
+        "Which cycle of a branch in start_file, from 0 in the order of its table; negative ones count from the end. "
+        "Without it the last one; of a branch over another parameter the one nearest to this case's value of that.",
     )
     amplitude: Length = key(
         1e-3, "Displacement of one lip in y, half its swing, of the first cycle, near the onset.", gt=0, le=0.1
