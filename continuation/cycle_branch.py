@@ -59,26 +59,28 @@ class CycleTracer:
     # -- the branch
     # ----
 
-    def start(
+    def start(self, first: Cycle, second: Cycle, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
+        """Begin with two cycles; the branch goes on from the second, away from the first."""
+        self.begin(first, False, tell)
+        self.extend(second, False, tell)
+
+    def begin(
         self,
         first: Cycle,
-        second: Cycle,
+        asked: bool,
         tell: Callable[[CyclePoint], None] = lambda item: None,
         origin: Cycle | None = None,
     ) -> None:
-        """Begin with two cycles; the branch goes on from the second, away from the first.
+        """Begin with one cycle; `extend` gives the way to go.
 
-        `origin` is what it starts from, at rest at an onset; it helps predictions and is no point of the branch.
+        `origin` is what the branch starts from, at rest at an onset; it helps predictions and is no point of the
+        branch.
         """
-        self.begin(first, False, tell)
+        point = self._accept(first, asked)
         if origin is not None:
-            length = -self._distance(self.points[0], origin)
+            length = -self._distance(point, origin)
             self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
-        self.extend(second, False, tell)
-
-    def begin(self, first: Cycle, asked: bool, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
-        """Begin with one cycle; `extend` gives the way to go."""
-        tell(self._accept(first, asked))
+        tell(point)
 
     def extend(self, cycle: Cycle, asked: bool, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
         """Take a cycle as the next point."""
@@ -98,6 +100,9 @@ class CycleTracer:
         options = self.options
         step = options.step
         while len(self.points) < options.max_points:
+            if len(self.points) > 1 and self._is_over():
+                self.reason = f"limit of {self.parameter} reached"
+                return self.reason
             done, step, again = self._advance(step)
             if done is None:
                 for special in self._ahead():
@@ -113,14 +118,13 @@ class CycleTracer:
                 self.special.append(special)
                 tell(special)
             tell(self.points[-1])
-            low, high = options.limits
-            ahead = self._direction()
-            value = self.points[-1].value
-            if (value <= low and ahead < 0) or (value >= high and ahead > 0):
-                self.reason = f"limit of {self.parameter} reached"
-                return self.reason
-        self.reason = "points used up"
+        self.reason = f"limit of {self.parameter} reached" if self._is_over() else "points used up"
         return self.reason
+
+    def _is_over(self) -> bool:
+        """Whether the branch has left the range, or reached its end."""
+        (low, high), ahead, value = self.options.limits, self._direction(), self.points[-1].value
+        return bool((value <= low and ahead < 0) or (value >= high and ahead > 0))
 
     def _turned(self) -> bool:
         """Whether the last motion is opposite to the one before: between them the branch has met an onset, and goes

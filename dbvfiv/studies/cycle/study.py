@@ -76,9 +76,10 @@ def _from_onset(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
     known = read_points(record, onset.place.mu(), follower.name)
     if len(known) < 2:
         record.progress(f"first cycles, beside {axis.parameter} = {onset.value:.6g}")
-        rest, first, second = follower.from_onset(onset)
-        tracer = follower.tracer(axis.values, first.motion)
-        tracer.start(first, second, keeper.keep, rest)
+        keeper.known = len(known)
+        tracer, missed = follower.begin(onset, axis.values, keeper.keep)
+        for sentence in missed:
+            record.warn(sentence)
     else:
         tracer = follower.tracer(axis.values, known[0].motion)
         tracer.restore(known)
@@ -121,6 +122,8 @@ class _Keeper:
 
     def __init__(self, record: GrowingRecord, follower: Follower, leg: int = 0):
         self.record, self.follower, self.leg = record, follower, leg
+        #: Of the cycles to come, how many the record holds already.
+        self.known = 0
 
     def follow(self, tracer: CycleTracer) -> None:
         """Follow a leg to its end."""
@@ -140,6 +143,9 @@ class _Keeper:
             orbit = follower.orbit(item.point.cycle)
             record.note(SPECIAL, **special_note(item, follower.parameter, orbit))
             record.progress(f"{item.kind} at {follower.parameter} = {item.value:.6g}")
+            return
+        if self.known:
+            self.known -= 1
             return
         orbit = follower.orbit(item.cycle)
         row = cycle_row(item, orbit, self.leg)

@@ -86,23 +86,12 @@ def cycles_along(case: Case, plan: MapPlan, column: MapColumn, law: int, walk: S
             if onset is None:
                 continue
             follower = Follower(case, walk, place, plan.along.parameter, onset.spectrum)
-            rest, first, second = follower.from_onset(onset)
+            keep = _Cells(plan, found, follower).take
+            tracer, missed = follower.begin(onset, plan.along.values, keep)
         except SolveError as error:
             reasons.append(str(error))
             continue
-        tracer = follower.tracer(plan.along.values, first.motion)
-
-        def keep(item: CyclePoint | SpecialCycle, follower: Follower = follower) -> None:
-            if isinstance(item, CyclePoint) and item.asked:
-                _take(plan, found, item, follower)
-
-        tracer.start(first, second, origin=rest)
-        ends = sorted((along, tracer.points[0].value))
-        for value in (v for v in plan.along.values if ends[0] < v < ends[1]):
-            try:
-                keep(tracer.described(follower.beside(onset, first, value), True))
-            except SolveError as error:
-                reasons.append(str(error))
+        reasons += missed
         reason = tracer.run(keep)
         if "no further cycle" in reason:
             at = PARAMETERS[plan.along.parameter].text(tracer.points[-1].value)
@@ -121,16 +110,24 @@ def _is_covered(plan: MapPlan, found: CycleCells, along: float, direction: float
     return bool(len(beyond)) and not np.isnan(found.amplitude[beyond[0]])
 
 
-def _take(plan: MapPlan, found: CycleCells, point: CyclePoint, follower: Follower) -> None:
-    cell = int(np.argmin(np.abs(np.asarray(plan.along.values) - point.value)))
-    low, high = follower.orbit(point.cycle).lip_extremes
-    amplitude, growing = 0.5 * (high - low), -1 if point.exponents is None else point.exponents.unstable
-    if not np.isnan(found.amplitude[cell]):
-        before = found.growing[cell] <= 0, found.amplitude[cell]
-        if before > (growing <= 0, amplitude):
+class _Cells:
+    """Takes cycles at the values of a column into its cells."""
+
+    def __init__(self, plan: MapPlan, found: CycleCells, follower: Follower):
+        self.values, self.found, self.follower = np.asarray(plan.along.values), found, follower
+
+    def take(self, item: CyclePoint | SpecialCycle) -> None:
+        """Take a cycle that was asked for, unless the cell has a better one."""
+        if not isinstance(item, CyclePoint) or not item.asked:
             return
-    found.amplitude[cell], found.growing[cell] = amplitude, growing
-    found.frequency[cell] = point.motion.omega / (2 * np.pi)
+        found, cell = self.found, int(np.argmin(np.abs(self.values - item.value)))
+        low, high = self.follower.orbit(item.cycle).lip_extremes
+        amplitude, growing = 0.5 * (high - low), -1 if item.exponents is None else item.exponents.unstable
+        known = found.growing[cell] <= 0, found.amplitude[cell]
+        if not np.isnan(known[1]) and known > (growing <= 0, amplitude):
+            return
+        found.amplitude[cell], found.growing[cell] = amplitude, growing
+        found.frequency[cell] = item.motion.omega / (2 * np.pi)
 
 
 def keep_cycles(record: GrowingRecord, plan: MapPlan, value: float, law: int, found: CycleCells) -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from continuation import ContinuationError
 from continuation.bordered_cycle import Condition
 from continuation.cycle_branch import CycleTracer
-from continuation.cycle_points import CycleBranchOptions
+from continuation.cycle_points import CycleBranchOptions, CyclePoint
 from continuation.cycles import Cycle, CycleOptions, CycleSolver
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
@@ -142,6 +142,31 @@ class Follower:
         if np.linalg.norm(found.motion.coefficients[1:]) < 0.2 * np.linalg.norm(guess.coefficients[1:]):
             raise SolveError(f"No cycle was found at {self.parameter} = {value:.6g}, but the steady state.")
         return found
+
+    def begin(
+        self, onset: Onset, values: Sequence[float], tell: Callable[[CyclePoint], None]
+    ) -> tuple[CycleTracer, list[str]]:
+        """What follows the branch of an onset through ascending values, its first cycles found and told of: two small
+        ones, and those at the values nearer to the onset; and why some of the latter were not found.
+
+        Raises
+        ------
+        SolveError
+        """
+        rest, first, second = self.from_onset(onset)
+        ends, cycles, missed = sorted((onset.value, second.mu[self.name])), [first, second], []
+        for value in (v for v in values if ends[0] < v < ends[1]):
+            try:
+                cycles.append(self.beside(onset, first, value))
+            except SolveError as error:
+                missed.append(str(error))
+        cycles.sort(key=lambda cycle: abs(cycle.mu[self.name] - onset.value))
+        tracer = self.tracer(values, first.motion)
+        asked = [cycle.mu[self.name] in values for cycle in cycles]
+        tracer.begin(cycles[0], asked[0], tell, rest)
+        for cycle, is_asked in zip(cycles[1:], asked[1:]):
+            tracer.extend(cycle, is_asked, tell)
+        return tracer, missed
 
     def tracer(self, values: Sequence[float], first: PeriodicMotion) -> CycleTracer:
         """What follows a branch that has a motion `first` on it through ascending values of the parameter."""

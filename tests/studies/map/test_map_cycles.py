@@ -46,7 +46,7 @@ def test_cells_have_the_cycles_of_branches(found):
     assert unstable.any() and not unstable.all()
     assert (np.isfinite(amplitude) == unstable).all() and (growing[unstable] == 0).all()
     assert (growing[~unstable] == -1).all()
-    change = {"drive.pressure": 6e3, "cycle.over": "density=225:255:3"}
+    change = {"drive.pressure": 6e3, "cycle.over": "density=225:255:3", "cycle.exponents": 0}
     branch = session_of().replace(change).perform("cycle")
     (point,) = (p for p in branch.points if p.value == 225.0)
     assert np.isclose(amplitude[0, 1], point.amplitude, rtol=1e-3)
@@ -70,22 +70,22 @@ class _Stopper(Observer):
 
 
 def test_interrupted_and_resumed(found, tmp_path):
-    part = session_of().perform("map", tmp_path / "part.h5", _Stopper())
+    part = session_of(cycle__exponents=0).perform("map", tmp_path / "part.h5", _Stopper())
     assert part.interrupted and np.isnan(part.cycle_grid("amplitude")[0, :, 1]).all()
     assert np.isfinite(part.cycle_grid("amplitude")[0, 0, 0])
     whole = resume_result(tmp_path / "part.h5")
     assert whole.complete
-    assert np.allclose(whole.cycle_grid("amplitude"), found.cycle_grid("amplitude"), rtol=1e-6, equal_nan=True)
+    assert np.allclose(whole.cycle_grid("amplitude"), found.cycle_grid("amplitude"), rtol=1e-4, equal_nan=True)
 
 
 def test_cells_without_a_cycle_say_why():
-    result = session_of(map__x="pressure=6 kPa:6 kPa:1", cycle__amplitude=0.09).perform("map")
+    result = session_of(map__x="pressure=5.9 kPa:6 kPa:2", cycle__amplitude=0.09).perform("map")
     assert np.isnan(result.cycle_grid("amplitude")).all()
     said = [line for line in result.lines() if "without a cycle" in line]
-    assert len(said) == 1 and "6 kPa" in said[0] and "cycle.amplitude" in said[0]
+    assert len(said) == 2 and "5.9 kPa" in said[0] and "cycle.amplitude" in said[0]
     assert "cycle-amplitude" not in result.figures()
 
 
 def test_without_being_asked_there_are_none():
-    result = session_of(map__x="pressure=6 kPa:6 kPa:1", map__cycles=False).perform("map")
+    result = session_of(map__x="pressure=5.9 kPa:6 kPa:2", map__cycles=False).perform("map")
     assert "cycle_amplitude" not in result.summary() and np.isnan(result.cycle_grid("amplitude")).all()
