@@ -14,8 +14,8 @@ from continuation.periodic import PeriodicMotion
 
 #: Name of omega among free unknowns.
 FREQUENCY = "frequency"
-#: Relative step of central differences by omega and by parameters.
-_STEP = 1e-5
+#: Relative step of differences by omega and by parameters.
+_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +73,13 @@ class CycleLinearisation:
         self._known: dict[str, np.ndarray] = {}
         self._coarse = None
 
-    def _column(self, name: str) -> np.ndarray:
-        """Derivative (2 H + 1, n) of the residual by a free unknown."""
+    def _column(self, name: str, force: np.ndarray) -> np.ndarray:
+        """Derivative (2 H + 1, n) of the residual, `force` at the motion, by a free unknown."""
         at = values_of(self.motion, self.mu, (name,))[0]
         step = _STEP * max(abs(at), 1e-6)
-        still, sides = np.zeros(self.motion.coefficients.size), []
-        for sign in (1, -1):
-            motion, mu = moved(self.motion, self.mu, (name,), np.append(still, sign * step))
-            sides.append(motion.harmonics.project(self.system.residual(motion, mu)))
-        return (sides[0] - sides[1]) / (2 * step)
+        still = np.zeros(self.motion.coefficients.size)
+        motion, mu = moved(self.motion, self.mu, (name,), np.append(still, step))
+        return (motion.harmonics.project(self.system.residual(motion, mu)) - force) / step
 
     @property
     def reduced(self):
@@ -90,12 +88,22 @@ class CycleLinearisation:
             self._coarse = self.operator.reduced(self.scale[:, None] * self.basis)
         return self._coarse
 
-    def rebase(self, basis: np.ndarray) -> None:
-        """Take another basis."""
-        self.basis, self._coarse = basis, None
+    def extend(self, directions: np.ndarray) -> bool:
+        """Add directions (n, k) to the basis, the first columns of the one before; whether there was anything new."""
+        beyond = directions
+        for _ in range(2):
+            beyond = beyond - self.basis @ (self.basis.T @ beyond)
+        vectors, sizes, _ = la.svd(beyond, full_matrices=False)
+        added = vectors[:, sizes > 1e-6 * np.linalg.norm(directions)]
+        if not added.shape[1]:
+            return False
+        known, self.basis = self.reduced, np.hstack([self.basis, added])
+        self._coarse = self.operator.reduced(self.scale[:, None] * self.basis, known)
+        return True
 
-    def prepare(self, free: Sequence[str], conditions: Sequence[Condition]) -> None:
-        """Take free unknowns and as many conditions, and factor the projection with them.
+    def prepare(self, free: Sequence[str], conditions: Sequence[Condition], force: np.ndarray) -> None:
+        """Take free unknowns, as many conditions and the residual (2 H + 1, n) at the motion, and factor the projection
+        with them.
 
         Raises
         ------
@@ -104,9 +112,18 @@ class CycleLinearisation:
         self.free, self.conditions = tuple(free), tuple(conditions)
         for name in self.free:
             if name not in self._known:
-                self._known[name] = self._column(name)
+                self._known[name] = self._column(name, force)
         shape = (len(self.free), *self.motion.coefficients.shape)
         self.columns = np.array([self._known[name] for name in self.free]).reshape(shape)
+        self.factor()
+
+    def factor(self) -> None:
+        """Factor the projection with the unknowns and conditions it has, as after an extension of the basis.
+
+        Raises
+        ------
+        SingularSystem
+        """
         v = self.scale[:, None] * self.basis
         matrix, free = self.reduced.matrix(), len(self.free)
         whole = np.zeros((len(matrix) + free, len(matrix) + free))
@@ -146,11 +163,15 @@ class CycleLinearisation:
         """Change for which `apply` gives `rhs` within a tolerance on preconditioned residuals, iterations, what is
         left.
         """
-        shape, size = self.motion.coefficients.shape, self.motion.coefficients.size
-        units = np.append(
-            np.tile(self.scale, shape[0]), np.maximum(np.abs(values_of(self.motion, self.mu, self.free)), 1e-9)
-        )
+        units = self.units
         start = self._precondition(rhs) / units
         x, count, missed = gmres(lambda y: self._precondition(self.apply(units * y)) / units, start, tolerance, most)
-        assert len(x) == size + len(self.free)
         return units * x, count, missed
+
+    @property
+    def units(self) -> np.ndarray:
+        """Sizes that changes of coefficients and free unknowns are measured in."""
+        free = np.maximum(np.abs(values_of(self.motion, self.mu, self.free)), 1e-9)
+        c = self.motion.coefficients
+        whole = max(float(np.abs(c[1:] / self.scale).max()), 1e-300)
+        return np.append(np.tile(whole * self.scale, len(c)), free)

@@ -9,9 +9,17 @@ import numpy as np
 
 from continuation.bordered_cycle import Condition
 from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions, CyclePoint, SpecialCycle
+from continuation.cycle_zeros import (
+    change_between,
+    crossing_of,
+    growth_of_crossing,
+    lagrange,
+    value_at_zero,
+    zero_ahead,
+)
 from continuation.cycles import Cycle, CycleSolver
 from continuation.errors import ContinuationError, NotConverged
-from continuation.hill import Exponents, floquet_exponents
+from continuation.hill import floquet_exponents
 from continuation.options import require
 
 
@@ -45,6 +53,7 @@ class CycleTracer:
         self.points: list[CyclePoint] = []
         self.special: list[SpecialCycle] = []
         self.reason = "running"
+        self._origin: list[CyclePoint] = []
         self._weight = 1.0 / (np.asarray(solver.system.scales) * options.motion_scale) ** 2
 
     # -- the branch
@@ -52,37 +61,77 @@ class CycleTracer:
 
     def start(self, first: Cycle, second: Cycle, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
         """Begin with two cycles; the branch goes on from the second, away from the first."""
-        for cycle in (first, second):
-            tell(self._accept(cycle, False))
+        self.begin(first, False, tell)
+        self.extend(second, False, tell)
+
+    def begin(
+        self,
+        first: Cycle,
+        asked: bool,
+        tell: Callable[[CyclePoint], None] = lambda item: None,
+        origin: Cycle | None = None,
+    ) -> None:
+        """Begin with one cycle; `extend` gives the way to go.
+
+        `origin` is what the branch starts from, at rest at an onset; it helps predictions and is no point of the
+        branch.
+        """
+        point = self._accept(first, asked)
+        if origin is not None:
+            length = -self._distance(point, origin)
+            self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
+        tell(point)
+
+    def extend(self, cycle: Cycle, asked: bool, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
+        """Take a cycle as the next point."""
+        tell(self._accept(cycle, asked))
 
     def restore(self, points: Sequence[CyclePoint]) -> None:
-        """Go on from points that are known, two at least."""
-        require(len(points) >= 2, "A branch goes on from two points at least.")
+        """Go on from points that are known; `extend` where there is but one."""
+        require(len(points) >= 1, "A branch goes on from one point at least.")
         self.points = [
             replace(p, tests={name: float(event(p.cycle)) for name, event in self.events.items()}) for p in points
         ]
 
     def run(self, tell: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None) -> str:
-        """Go on until the parameter leaves its limits, the points are used up or no cycle is found; why it ended."""
+        """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
+        is found; why it ended.
+        """
         options = self.options
         step = options.step
         while len(self.points) < options.max_points:
+            if len(self.points) > 1 and self._is_over():
+                self.reason = f"limit of {self.parameter} reached"
+                return self.reason
             done, step, again = self._advance(step)
             if done is None:
+                for special in self._ahead():
+                    self.special.append(special)
+                    tell(special)
                 self.reason = again
+                return self.reason
+            if self._turned():
+                del self.points[-1]
+                self.reason = f"the cycles shrink to nothing beyond {self.parameter} = {self.points[-1].value:.6g}"
                 return self.reason
             for special in self._between(self.points[-2], self.points[-1]):
                 self.special.append(special)
                 tell(special)
             tell(self.points[-1])
-            low, high = options.limits
-            ahead = self._direction()
-            value = self.points[-1].value
-            if (value <= low and ahead < 0) or (value >= high and ahead > 0):
-                self.reason = f"limit of {self.parameter} reached"
-                return self.reason
-        self.reason = "points used up"
+        self.reason = f"limit of {self.parameter} reached" if self._is_over() else "points used up"
         return self.reason
+
+    def _is_over(self) -> bool:
+        """Whether the branch has left the range, or reached its end."""
+        (low, high), ahead, value = self.options.limits, self._direction(), self.points[-1].value
+        return bool((value <= low and ahead < 0) or (value >= high and ahead > 0))
+
+    def _turned(self) -> bool:
+        """Whether the last motion is opposite to the one before: between them the branch has met an onset, and goes
+        back on itself with the phase turned by half a period.
+        """
+        a, b = (p.motion for p in self.points[-2:])
+        return bool(np.sum(b.harmonics.resized(a.coefficients)[1:] * b.coefficients[1:] * self._weight) < 0)
 
     def _direction(self) -> float:
         return float(np.sign(self.points[-1].value - self.points[-2].value))
@@ -98,27 +147,44 @@ class CycleTracer:
                 said = str(error)
                 step *= 0.4
                 continue
-            grown = 1.6 if cycle.iterations <= 4 else (0.7 if cycle.iterations >= 9 else 1.0)
+            grown = 2.0 if cycle.iterations <= 6 else (0.7 if cycle.iterations >= 10 else 1.0)
             return point, min(max(step * grown, options.min_step), options.max_step), ""
         return None, step, f"no further cycle was found: {said}"
 
     def _target(self, step: float) -> float | None:
         """The next value that is asked for, or the limit, where it lies within the step."""
         here, ahead = self.points[-1].value, self._direction()
-        reach = self._slope() * step
+        reach = (self._value_at(step) - here) * ahead
         wanted = [v for v in (*self.options.values, *self.options.limits) if np.isfinite(v)]
-        wanted = [v for v in wanted if 1e-9 * self.options.scale < (v - here) * ahead <= 1.3 * abs(reach)]
+        wanted = [v for v in wanted if 1e-9 * self.options.scale < (v - here) * ahead <= 1.5 * reach]
         return min(wanted, key=lambda v: abs(v - here)) if wanted else None
 
-    def _slope(self) -> float:
-        """Change of the parameter over that of the arclength at the last point."""
-        a, b = self.points[-2:]
-        return (b.value - a.value) / (b.arclength - a.arclength)
+    def _value_at(self, step: float) -> float:
+        """The parameter a step ahead, by the polynomial through the last points."""
+        last = self._last()
+        weights = lagrange([p.arclength for p in last], last[-1].arclength + step)
+        return float(sum(w * p.value for w, p in zip(weights, last)))
+
+    def _last(self) -> list[CyclePoint]:
+        """Points that predictions are made of."""
+        return [*self._origin, *self.points][-4:]
+
+    def _way_to(self, target: float, step: float) -> float:
+        """Step at which that polynomial has a value that lies about a step ahead."""
+        low, high = 0.0, 2.0 * step
+        side = self._direction()
+        if (self._value_at(high) - target) * side < 0:
+            a, b = self.points[-2:]
+            return abs((target - b.value) * (b.arclength - a.arclength) / (b.value - a.value))
+        while high - low > 1e-3 * step:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if (self._value_at(middle) - target) * side >= 0 else (middle, high)
+        return high
 
     def _step(self, step: float, target: float | None) -> Cycle:
         last = self.points[-1]
         if target is not None:
-            step = abs((target - last.value) / self._slope())
+            step = self._way_to(target, step)
         motion, value = self._predict(last.arclength + step)
         mu = last.cycle.mu | {self.parameter: value if target is None else target}
         if target is not None:
@@ -143,15 +209,14 @@ class CycleTracer:
 
     def _predict(self, arclength: float):
         """Motion and parameter ahead by the polynomial through the last points."""
-        last = self.points[-4:]
+        last = self._last()
         h = last[-1].motion.harmonics
         if last[-1].motion.tail > 0.4 * self.options.tail and h.count + 2 <= self.options.max_harmonics:
             h = type(h)(h.count + 2)
-        weights = _lagrange([p.arclength for p in last], arclength)
+        weights = lagrange([p.arclength for p in last], arclength)
         coefficients = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, last))
         omega = float(sum(w * p.motion.omega for w, p in zip(weights, last)))
-        value = float(sum(w * p.value for w, p in zip(weights, last)))
-        return type(last[-1].motion)(h, coefficients, omega), value
+        return type(last[-1].motion)(h, coefficients, omega), self._value_at(arclength - last[-1].arclength)
 
     def _plane(self, motion, value: float) -> Condition:
         """Normal to the way from the last point, through the prediction."""
@@ -168,15 +233,16 @@ class CycleTracer:
 
     def _accept(self, cycle: Cycle, asked: bool) -> CyclePoint:
         """Take a cycle as the next point, with the phase of the one before."""
-        point = self._described(cycle, asked)
+        point = self.described(cycle, asked)
         self.points.append(point)
         return point
 
-    def _described(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
+    def described(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
+        """A cycle with its exponents and what events make of it; `after` is the point it follows, the last without."""
         after = self.points[-1] if after is None and self.points else after
         exponents = None
         if self.options.exponents:
-            linear = self.solver.linearise(cycle.motion, cycle.mu)
+            linear = self.solver.linearise(cycle.motion, cycle.mu, perturbed=True)
             exponents = floquet_exponents(self.solver, linear, self.options.exponents)
         value = cycle.mu[self.parameter]
         tests = {name: float(event(cycle)) for name, event in self.events.items()}
@@ -184,8 +250,8 @@ class CycleTracer:
         return CyclePoint(cycle, value, length, exponents, asked, tests)
 
     def _distance(self, point: CyclePoint, cycle: Cycle) -> float:
-        c = cycle.motion.coefficients
-        change = c - cycle.motion.harmonics.resized(point.motion.coefficients)
+        h = max(cycle.motion.harmonics, point.motion.harmonics, key=lambda h: h.count)
+        change = h.resized(cycle.motion.coefficients) - h.resized(point.motion.coefficients)
         moved = (cycle.mu[self.parameter] - point.value) / self.options.scale
         return float(np.sqrt(np.sum(change**2 * self._weight) + moved**2))
 
@@ -202,9 +268,9 @@ class CycleTracer:
             if a.tests[name] * b.tests[name] < 0:
                 found.append(self._located(name, a, b, lambda p, n=name: p.tests[n]))
         if a.exponents is not None and b.exponents is not None:
-            change = _change(a.exponents, b.exponents)
+            change = change_between(a.exponents, b.exponents)
             if change is not None and not (change == FOLD):
-                found.append(self._located(change, a, b, _test_of(a.exponents, b.exponents)))
+                found.append(self._located(change, a, b, growth_of_crossing(a.exponents, b.exponents)))
         return found
 
     def _fold(self, before: CyclePoint, a: CyclePoint, b: CyclePoint) -> SpecialCycle:
@@ -230,7 +296,7 @@ class CycleTracer:
     def _interpolated(self, near: Sequence[CyclePoint], arclength: float) -> CyclePoint | None:
         """A cycle between points, at an arclength; None where it is not found."""
         h = max((p.motion.harmonics for p in near), key=lambda h: h.count)
-        weights = _lagrange([p.arclength for p in near], arclength)
+        weights = lagrange([p.arclength for p in near], arclength)
         c = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, near))
         omega = float(sum(w * p.motion.omega for w, p in zip(weights, near)))
         value = float(sum(w * p.value for w, p in zip(weights, near)))
@@ -244,77 +310,63 @@ class CycleTracer:
             cycle = self._solved(type(first.motion)(h, c, omega), mu, (self.parameter,), (condition,))
         except ContinuationError:
             return None
-        point = self._described(cycle, after=first)
+        point = self.described(cycle, after=first)
         return CyclePoint(cycle, point.value, arclength, point.exponents, False, point.tests)
+
+    def _ahead(self) -> list[SpecialCycle]:
+        """Events just ahead of a branch that does not go on, as where motions cease to be smooth at one."""
+        found = [self._approached(name) for name in self.events] if len(self.points) > 2 else []
+        return [special for special in found if special is not None]
+
+    def _approached(self, name: str) -> SpecialCycle | None:
+        """A zero of an event that is only met from one side, by secants from there; None if there is none near."""
+        near, options = list(self.points[-3:]), self.options
+        whole = max(abs(p.tests[name]) for p in self.points)
+        for _ in range(8):
+            ahead = zero_ahead(near, name)
+            if not 0 <= ahead <= options.max_step:
+                return None
+            if abs(near[-1].tests[name]) <= 1e-3 * whole:
+                break
+            steps = (near[-1].arclength + share * ahead for share in (0.9, 0.5, 0.2))
+            point = next(filter(None, (self._interpolated(near[-3:], s) for s in steps)), None)
+            if point is None:
+                break
+            if point.tests[name] * near[-1].tests[name] <= 0:
+                return self._located(name, near[-1], point, lambda p: p.tests[name])
+            near.append(point)
+        last = near[-3:]
+        weights = lagrange([p.arclength for p in last], last[-1].arclength + zero_ahead(near, name))
+        value = float(sum(w * p.value for w, p in zip(weights, last)))
+        return SpecialCycle(name, last[-1], value, 0.0, abs(last[-1].tests[name]) <= 1e-2 * whole)
 
     def _located(self, kind: str, a: CyclePoint, b: CyclePoint, test) -> SpecialCycle:
         """A zero of a test between two points, by false positions with halving (Illinois)."""
         fa, fb = test(a), test(b)
         width, located = b.arclength - a.arclength, False
         low, high, flow, fhigh = a, b, fa, fb
+        met = [(fa, a), (fb, b)]
         for _ in range(8):
             s = (low.arclength * fhigh - high.arclength * flow) / (fhigh - flow)
             point = self._interpolated([low, high], s)
             if point is None:
                 break
             f = test(point)
+            met.append((f, point))
             if f * fhigh < 0:
                 low, flow, high, fhigh = high, fhigh, point, f
             else:
                 flow, high, fhigh = 0.5 * flow, point, f
             if low.arclength > high.arclength:
                 low, high, flow, fhigh = high, low, fhigh, flow
-            if min(abs(flow), abs(fhigh)) <= 1e-3 * max(abs(fa), abs(fb)) or high.arclength - low.arclength <= (
+            if min(abs(f) for f, _ in met) <= 1e-3 * max(abs(fa), abs(fb)) or high.arclength - low.arclength <= (
                 self.options.located * width
             ):
                 located = True
                 break
-        share = flow / (flow - fhigh) if flow * fhigh < 0 else (0.0 if abs(flow) < abs(fhigh) else 1.0)
-        value = low.value + share * (high.value - low.value)
-        nearest = low if share < 0.5 else high
+        met.sort(key=lambda one: abs(one[0]))
+        nearest, value = met[0][1], value_at_zero(met[:3], low.value, high.value)
         frequency = 0.0
         if nearest.exponents is not None and len(nearest.exponents.values):
-            frequency = float(_crossing(nearest.exponents).imag / (2 * np.pi)) if kind in (TORUS, DOUBLING) else 0.0
-        return SpecialCycle(kind, nearest, float(value), frequency, located)
-
-
-def _lagrange(nodes: Sequence[float], x: float) -> np.ndarray:
-    nodes = np.asarray(nodes, float)
-    out = np.ones(len(nodes))
-    for i, a in enumerate(nodes):
-        for j, b in enumerate(nodes):
-            if i != j:
-                out[i] *= (x - b) / (a - b)
-    return out
-
-
-def _crossing(exponents: Exponents) -> complex:
-    """The exponent nearest to the imaginary axis."""
-    return complex(exponents.values[np.argmin(np.abs(exponents.values.real))])
-
-
-def _change(a: Exponents, b: Exponents) -> str | None:
-    """What kind of bifurcation lies between two cycles, None if none."""
-    if a.unstable == b.unstable:
-        return None
-    few, many = sorted((a, b), key=lambda e: e.unstable)
-    crossing = _crossing(min((few, many), key=lambda e: abs(_crossing(e).real)))
-    half = 0.5 * many.omega
-    if abs(many.unstable - few.unstable) % 2 == 0 and not many.is_real(crossing):
-        return TORUS
-    if abs(crossing.imag - half) < 0.05 * half:
-        return DOUBLING
-    return FOLD if crossing.imag < 0.05 * half else TORUS
-
-
-def _test_of(a: Exponents, b: Exponents):
-    """Growth rate of the exponent that crosses, as a function of a point."""
-    few, many = (a, b) if a.unstable < b.unstable else (b, a)
-    rank = few.unstable if few.unstable < len(few.values) else 0
-    index = min(rank, len(many.values) - 1)
-
-    def test(point: CyclePoint) -> float:
-        values = point.exponents.values
-        return float(values.real[min(index, len(values) - 1)])
-
-    return test
+            frequency = float(crossing_of(nearest.exponents).imag / (2 * np.pi)) if kind in (TORUS, DOUBLING) else 0.0
+        return SpecialCycle(kind, nearest, value, frequency, located)

@@ -38,9 +38,9 @@ class CycleOptions:
     krylov : int
         Most Krylov iterations for a correction.
     renew_at : float
-        Contraction of the corrections above which the linearisation is renewed.
-    basis : int
-        Most directions that are learnt.
+        Contraction of two corrections above which the linearisation is renewed.
+    basis, perturbations : int
+        Most directions that are learnt of corrections, and of perturbations.
     """
 
     tolerance: float = 1e-5
@@ -49,11 +49,12 @@ class CycleOptions:
     krylov: int = 40
     renew_at: float = 0.3
     basis: int = 16
+    perturbations: int = 24
 
     def __post_init__(self):
         require(0 < self.tolerance < 0.1, "The tolerance of cycles lies between 0 and 0.1.")
         require(self.max_iterations >= 1 and self.krylov >= 1, "At least one iteration is needed.")
-        require(self.basis >= 0, "The number of directions cannot be negative.")
+        require(min(self.basis, self.perturbations) >= 0, "The number of directions cannot be negative.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +93,7 @@ class CycleSolver:
         self.system, self.options = system, options
         self._given = la.orth(np.asarray(basis, float) / np.asarray(system.scales)[:, None])
         self._learnt = np.zeros((len(self._given), 0))
+        self._of_perturbations = np.zeros((len(self._given), 0))
 
     def solve(
         self,
@@ -124,25 +126,28 @@ class CycleSolver:
         motion, mu, linear = guess, dict(mu), None
         while len(sizes) < options.max_iterations:
             unbalance = self._unbalance(motion, mu, free, conditions)
+            shape = motion.coefficients.shape
             if not np.isfinite(unbalance).all():
                 break
             if linear is None:
-                linear = self.linearise(motion, mu)
-                linear.prepare(free, conditions)
+                linear, steps = self.linearise(motion, mu), []
+                linear.prepare(free, conditions, unbalance[: motion.coefficients.size].reshape(shape))
             change, used, missed = linear.solve(-unbalance, options.linear, options.krylov)
+            change = _updated(change, steps, linear.units)
             spent += used
             sizes.append(self._size(change, motion))
-            if not sizes[-1] < 10.0:
+            if not sizes[-1] < 10.0 or (len(sizes) > 8 and sizes[-1] > max(0.5 * sizes[-4], 1e-3)):
                 break
             motion, mu = moved(motion, mu, free, change)
             if motion.omega <= 0:
                 break
-            self.learn(change[: motion.coefficients.size].reshape(motion.coefficients.shape))
+            learnt = self.learn(change[: motion.coefficients.size].reshape(shape))
             if sizes[-1] <= options.tolerance:
                 return Cycle(motion, mu, sizes[-1], len(sizes), spent)
-            slow = len(sizes) > 1 and sizes[-1] > options.renew_at * sizes[-2]
-            if slow or sizes[-1] > 0.1 or missed > 0.5:
+            if _is_slow(sizes[-len(steps) :], options.renew_at) or sizes[-1] > 0.5 or missed > 0.5:
                 linear = None
+            elif sizes[-1] > 100 * options.tolerance and learnt.shape[1] and linear.extend(learnt):
+                linear.factor()
         raise NotConverged(
             f"No periodic motion was found near the guess: {len(sizes)} corrections, the last of "
             f"{sizes[-1] if sizes else np.nan:.2g} of its size.",
@@ -171,34 +176,71 @@ class CycleSolver:
         step = np.abs(change[: c.size].reshape(c.shape) / scale).max()
         return float(step / max(np.abs(c[1:] / scale).max(), 1e-300))
 
-    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> CycleLinearisation:
-        """Linearisation about a motion, with the basis as it is now."""
-        return CycleLinearisation(self.system, motion, mu, self.basis_for(motion))
+    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float], perturbed: bool = False) -> CycleLinearisation:
+        """Linearisation about a motion, with the basis as it is now; with that of perturbations too where these are
+        asked for.
+        """
+        return CycleLinearisation(self.system, motion, mu, self.basis_for(motion, perturbed))
 
-    def basis_for(self, motion: PeriodicMotion) -> np.ndarray:
-        """Orthonormal directions (n, r) of unknowns over their scales: those of the motion itself, given, learnt."""
+    def basis_for(self, motion: PeriodicMotion, perturbed: bool = False) -> np.ndarray:
+        """Orthonormal directions (n, r) of unknowns over their scales: those of the motion itself, given, learnt; and
+        of perturbations.
+        """
         scaled = motion.coefficients[1:] / self.system.scales
         _, sizes, found = la.svd(scaled, full_matrices=False)
         own = found[: len(sizes)][sizes > OWN * sizes[0]].T if sizes[0] > 0 else found[:0].T
-        columns = np.hstack([own, self._given, self._learnt])
+        others = (self._of_perturbations,) if perturbed else ()
+        columns = np.hstack([own, self._given, self._learnt, *others])
         q, r, _ = la.qr(columns, mode="economic", pivoting=True)
         size = np.abs(np.diag(r))
         return np.ascontiguousarray(q[:, : len(size)][:, size > 1e-8 * size[0]])
 
-    def learn(self, rows: np.ndarray, share: float = 0.05, most: int = 6) -> bool:
-        """Add to the basis the leading directions of rows (k, n) beyond it; the oldest of those added before give way.
-
-        They take effect with the next linearisation. Whether there were any.
+    def learn(self, rows: np.ndarray, share: float = 0.05, most: int = 6) -> np.ndarray:
+        """Add the leading directions (n, k) of corrections (k, n) beyond the basis to it, and return these; the oldest
+        of those added before give way. They take effect with the next linearisation.
         """
+        added = self._beyond(rows, (self._given, self._learnt), share, most)
+        self._learnt = _newest(self._learnt, added, self.options.basis)
+        return added
+
+    def learn_perturbations(self, rows: np.ndarray, share: float = 0.05, most: int = 6) -> np.ndarray:
+        """Add leading directions (n, k) of what perturbations (k, n) lack to the basis for them, and return these."""
+        added = self._beyond(rows, (self._given, self._learnt, self._of_perturbations), share, most)
+        self._of_perturbations = _newest(self._of_perturbations, added, self.options.perturbations)
+        return added
+
+    def _beyond(self, rows: np.ndarray, knowns: Sequence[np.ndarray], share: float, most: int) -> np.ndarray:
         scaled = rows / self.system.scales
         whole = np.linalg.norm(scaled)
         if not whole > 0 or self._given.shape[1] == len(self._given):
-            return False
-        for known in (self._given, self._learnt):
+            return np.zeros((len(self._given), 0))
+        for known in knowns:
             scaled = scaled - (scaled @ known) @ known.T
         _, sizes, found = la.svd(scaled, full_matrices=False)
-        added = found[:most][sizes[:most] > share * whole].T
-        room = max(self.options.basis - added.shape[1], 0)
-        kept = self._learnt[:, max(self._learnt.shape[1] - room, 0) :]
-        self._learnt = np.hstack([kept, added])
-        return bool(added.size)
+        return found[:most][sizes[:most] > share * whole].T
+
+
+def _updated(change: np.ndarray, steps: list[np.ndarray], units: np.ndarray) -> np.ndarray:
+    """A correction by a linearisation elsewhere, with what the corrections before it say of the difference: Broyden's
+    method, by the steps alone (Kelley 1995, ch. 7). It matters where a perturbation is nearly neutral. Added to the
+    steps.
+    """
+    z = change / units
+    for one, other in zip(steps[:-1], steps[1:]):
+        z = z + other * (one @ z) / (one @ one)
+    if steps:
+        share = (steps[-1] @ z) / (steps[-1] @ steps[-1])
+        z = z / (1.0 - np.clip(share, -1.0, 0.6))
+    steps.append(z)
+    return z * units
+
+
+def _is_slow(sizes: Sequence[float], contraction: float) -> bool:
+    """Whether the last two corrections by one linearisation became no smaller than that."""
+    return len(sizes) > 2 and sizes[-1] > contraction * sizes[-2] and sizes[-2] > contraction * sizes[-3]
+
+
+def _newest(known: np.ndarray, added: np.ndarray, most: int) -> np.ndarray:
+    """Columns with more behind them, the first of which give way."""
+    room = max(most - added.shape[1], 0)
+    return np.hstack([known[:, max(known.shape[1] - room, 0) :], added])

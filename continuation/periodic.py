@@ -20,6 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from continuation.blocks import SparseBlocks
 from continuation.harmonics import Harmonics, Rates
 
 Filter = Callable[[np.ndarray], np.ndarray] | int
@@ -76,7 +77,8 @@ class PeriodicMotion:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """One term of a linearisation; blocks are N matrices, or one stack (N, a, b), or None for the identity.
+    """One term of a linearisation; blocks are N matrices, a `SparseBlocks`, one stack (N, a, b), or None for the
+    identity.
 
     Attributes
     ----------
@@ -102,14 +104,22 @@ class Term:
         used = [self.outer, *(function for function, _ in self.middle)]
         return all(isinstance(f, int) or getattr(f, "polynomial", False) for f in used)
 
-    def reduced(self, basis: np.ndarray) -> Term:
-        """Its projection on a basis (n, r)."""
+    def reduced(self, basis: np.ndarray, known: Term | None = None) -> Term:
+        """Its projection on a basis (n, r), dense at each sample; `known` is that on the first columns of the basis."""
         if self.left is None and self.right is None:
-            middle = [(f, np.stack([basis.T @ (block @ basis) for block in blocks])) for f, blocks in self.middle]
+            before = [None] * len(self.middle) if known is None else [blocks for _, blocks in known.middle]
+            middle = [(f, _projected(blocks, basis, old)) for (f, blocks), old in zip(self.middle, before)]
             return Term(middle, outer=self.outer)
         left = np.stack([(block.T @ basis).T for block in self.left])
         right = np.stack([block @ basis for block in self.right])
-        return Term(self.middle, left, right, self.outer)
+        return Term([(f, left @ blocks) for f, blocks in self.middle], right=right, outer=self.outer)
+
+
+def _projected(blocks, basis: np.ndarray, known: np.ndarray | None) -> np.ndarray:
+    """V^T A V (N, r, r) of matrices A at each sample; `known` holds the part of the first columns of V."""
+    if isinstance(blocks, SparseBlocks):
+        return blocks.projected(basis, known)
+    return np.stack([basis.T @ (block @ basis) for block in blocks])
 
 
 def _times(blocks, samples: np.ndarray) -> np.ndarray:
@@ -163,9 +173,11 @@ class PeriodicOperator:
         samples = h.evaluate(coefficients)
         return h.project(sum(term.apply(samples, rates) for term in self.terms))
 
-    def reduced(self, basis: np.ndarray) -> ReducedOperator:
-        """Projection on a basis (n, r) at every sample."""
-        return ReducedOperator(self.motion, [term.reduced(basis) for term in self._coarse], basis.shape[1])
+    def reduced(self, basis: np.ndarray, known: ReducedOperator | None = None) -> ReducedOperator:
+        """Projection on a basis (n, r) at every sample; `known` is that on the first columns of the basis."""
+        before = [None] * len(self._coarse) if known is None else known.terms
+        terms = [term.reduced(basis, old) for term, old in zip(self._coarse, before)]
+        return ReducedOperator(self.motion, terms, basis.shape[1])
 
 
 class ReducedOperator(PeriodicOperator):
@@ -176,6 +188,7 @@ class ReducedOperator(PeriodicOperator):
     motion : PeriodicMotion
         Of the full system.
     terms : sequence of Term
+        With dense blocks, and nothing on their left.
     size : int
         r.
     """
@@ -185,14 +198,41 @@ class ReducedOperator(PeriodicOperator):
         self.size = size
         #: Whether exponents enter as powers up to the second.
         self.polynomial = all(term.polynomial for term in terms)
+        self._sums: dict[tuple[Filter, Filter], np.ndarray] = {}
+        for term in (term for term in terms if term.right is None):
+            for function, blocks in term.middle:
+                key = term.outer, function
+                self._sums[key] = self._sums[key] + blocks if key in self._sums else blocks
 
     def matrix(self, shift: complex = 0.0) -> np.ndarray:
         """Dense matrix ((2 H + 1) r, (2 H + 1) r); coefficients are ordered by harmonics, unknowns within."""
-        h, r = self.motion.harmonics, self.size
-        unit = np.einsum("it,ab->iatb", h.basis, np.eye(r)).reshape(h.samples, r, h.size * r)
-        rates = self.rates(shift)
-        samples = sum(term.apply(unit, rates) for term in self.terms)
-        return h.project(samples).reshape(h.size * r, h.size * r)
+        h, r, rates = self.motion.harmonics, self.size, self.rates(shift)
+        total = np.zeros((h.size**2, r * r))
+        for (outer, function), blocks in self._sums.items():
+            inner = rates.apply(function, h.basis)
+            weights = np.einsum("ti,is->tsi", self._projection(outer, rates), inner).reshape(h.size**2, h.samples)
+            total = total + _by_parts(weights, blocks.reshape(h.samples, r * r))
+        total = total.reshape(h.size, h.size, r, r).transpose(0, 2, 1, 3).reshape(h.size * r, h.size * r)
+        for term in (term for term in self.terms if term.right is not None):
+            inner = (term.right[:, :, None, :] * h.basis[:, None, :, None]).reshape(h.samples, -1, h.size * r)
+            sums = sum(_by_parts(blocks, rates.apply(f, inner)) for f, blocks in term.middle)
+            total = total + np.tensordot(self._projection(term.outer, rates), sums, 1).reshape(total.shape)
+        return total
+
+    def _projection(self, outer: Filter, rates: Rates) -> np.ndarray:
+        """(2 H + 1, N): coefficients of samples that a filter is applied to."""
+        h = self.motion.harmonics
+        plain = h.basis.T / h.samples
+        return plain if isinstance(outer, int) and outer == 0 else plain @ rates.filter(outer)
+
+
+def _by_parts(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Product of two matrices, or stacks, one of which may be complex; the other stays real."""
+    if np.iscomplexobj(left):
+        return left.real @ right + 1j * (left.imag @ right)
+    if np.iscomplexobj(right):
+        return left @ right.real + 1j * (left @ right.imag)
+    return left @ right
 
 
 class PeriodicSystem(Protocol):

@@ -18,6 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from continuation import OutOfDomain
+from continuation.blocks import SparseBlocks
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
 from eigen import CoupledPencil, SingularShiftError, Workspace
 from eigen.pencil import FLUID_PARTS
@@ -52,13 +53,7 @@ class PeriodicValve:
     def __init__(self, rebuild: Callable[[Mapping[str, float]], ValveModel], mu: Mapping[str, float]):
         self._model = rebuild
         model = rebuild(mu)
-        if not model.flow.has_fluid:
-            raise SolveError("Without flow nothing feeds an oscillation, so there are no cycles to follow.")
-        if model.outside is not None:
-            raise SolveError(
-                "With fluid outside the wall cycles are not followed: how its added mass changes with the shape within "
-                "a cycle is not among the equations; runs in time show them."
-            )
+        check_periodic(model)
         self.inner, self.size = model.flow.inner, model.size + model.flow.inner
         area = float(model.mesh.rest_area[-1])
         self._weight = area  # turns the flow's equations, Pa, into forces
@@ -109,7 +104,7 @@ class PeriodicValve:
         p, rest = self.pressures(motion, mu)
         memory = self._memory(mu)
         held = None if memory is None else memory.held(q, rates)
-        slow = np.stack([self._internal_force(model, x) for x in q])
+        slow = np.stack([model.internal_force(x) for x in q])
         out = slow + mu["beta"] * rates.apply(1, slow)
         for i in range(len(q)):
             nodal = model.nodal(q[i])
@@ -118,12 +113,6 @@ class PeriodicValve:
             out[i] += self._inertia(model, nodal, v[i], a[i] + mu["alpha"] * v[i])
             out[i] -= model.pressure_force(nodal, p[i])
         return np.concatenate([out, self._weight * rest], axis=1)
-
-    @staticmethod
-    def _internal_force(model: ValveModel, q: np.ndarray) -> np.ndarray:
-        force = model.shell.force(q)
-        force[model.stops.unknowns] += model.stops.force(q)
-        return force
 
     @staticmethod
     def _inertia(model: ValveModel, nodal: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -142,45 +131,43 @@ class PeriodicValve:
         p, _ = self.pressures(motion, mu)
         memory = self._memory(mu)
         held = None if memory is None else memory.held(q, rates)
-        own, rest, damping, mass, left, right = [], [], [], [], [], []
-        alpha = mu["alpha"]
+        values = np.empty((4, len(q), len(model.shell.dofs.pattern[1])))
+        own, rest, damping, mass = values
+        left, right, alpha = [], [], mu["alpha"]
         for i in range(len(q)):
             nodal = model.nodal(q[i])
-            structure = model.structure(q[i])[1]
-            m = model.mass(q[i])
+            own[i] = model.structure(q[i])[1]
+            mass[i] = model.mass(q[i])
             moving = (nodal, model.nodal(v[i]), model.nodal(a[i] + alpha * v[i]))
             by_position, by_rate = inertia_slopes(model.shell, *moving)
-            by_position = model.follower_stiffness(nodal, p[i], by_position)
+            rest[i] = model.follower_stiffness(nodal, p[i], by_position)
             if held is not None:
-                by_position += memory.geometric(q[i], held[i])
-            own.append(structure)
-            rest.append(by_position)
-            damping.append(by_rate + alpha * m)
-            mass.append(m)
+                rest[i] += memory.geometric(q[i], held[i])
+            damping[i] = by_rate + alpha * mass[i]
             left.append(model.station_forces(nodal))
             right.append(model.rows.jacobian(nodal))
         stiff = StiffnessDamping(mu["beta"])
+        blocks = [self._blocks(model, part) for part in values]
         terms = [
-            Term([(0, self._blocks(model, own))], outer=stiff),
-            Term([(0, self._blocks(model, rest)), (1, self._blocks(model, damping)), (2, self._blocks(model, mass))]),
+            Term([(0, blocks[0])], outer=stiff),
+            Term(list(enumerate(blocks[1:]))),
             self._fluid_term(left, right, parts),
         ]
         coarse = None
         if memory is not None:
             groups = zip(*(model.shell.relaxing_tangents(x) for x in q))
-            blocks = [self._blocks(model, group) for group in groups]
-            coarse = [*terms, *(Term([(0, b)], outer=phi) for b, phi in zip(blocks, memory.filters))]
+            relaxing = [self._blocks(model, np.array(group)) for group in groups]
+            coarse = [*terms, *(Term([(0, b)], outer=phi) for b, phi in zip(relaxing, memory.filters))]
             terms.append(MemoryTerm(memory, q, self.size))
         operator = PeriodicOperator(motion, terms, coarse)
-        means = [np.mean(x, axis=0) for x in (own, rest, damping, mass)]
-        operator.average = self._average(model, means, (left, right), parts, q, mu)
+        operator.average = self._average(model, values.mean(axis=1), (left, right), parts, q, mu)
         return operator
 
-    def _blocks(self, model: ValveModel, values) -> list[sp.csr_matrix]:
-        """Matrices (n + l, n + l), nothing on the flow's unknowns, of values on the structure's pattern."""
+    def _blocks(self, model: ValveModel, values: np.ndarray) -> SparseBlocks:
+        """Matrices (n + l, n + l), nothing on the flow's unknowns, of values (N, nnz) on the structure's pattern."""
         indptr, indices = model.shell.dofs.pattern
         indptr = np.append(indptr, np.full(self.inner, indptr[-1], indptr.dtype))
-        return [sp.csr_matrix((x, indices, indptr), shape=(self.size, self.size), copy=False) for x in values]
+        return SparseBlocks(values, indices, indptr, (self.size, self.size))
 
     def _fluid_term(self, left, right, parts) -> Term:
         """- G p over the flow's equations, from areas and the flow's unknowns."""
@@ -217,6 +204,22 @@ class PeriodicValve:
             return 1.0 + relaxed + beta * s
 
         return AveragedSolves(operator.average, operator.motion, self._weight, stiffening, self._workspace)
+
+
+def check_periodic(model: ValveModel) -> None:
+    """Refuse a valve whose periodic motions these equations do not cover.
+
+    Raises
+    ------
+    SolveError
+    """
+    if not model.flow.has_fluid:
+        raise SolveError("Without flow nothing feeds an oscillation, so there are no cycles to follow.")
+    if model.outside is not None:
+        raise SolveError(
+            "With fluid outside the wall cycles are not followed: how its added mass changes with the shape within "
+            "a cycle is not among the equations; runs in time show them."
+        )
 
 
 @dataclass(frozen=True)
@@ -262,5 +265,5 @@ class AveragedSolves:
         if np.iscomplexobj(coefficients):
             return self(coefficients.real) + 1j * self(coefficients.imag)
         n, h = self.size, self.harmonics
-        found = [np.concatenate(self._factor.solve(x[:n], x[n:] / self.weight)) for x in coefficients]
-        return h.real(self._shares[:, None] * h.complex(np.real(np.array(found))))
+        found = np.vstack(self._factor.solve(coefficients[:, :n].T, coefficients[:, n:].T / self.weight)).T
+        return h.real(self._shares[:, None] * h.complex(np.real(found)))

@@ -2,7 +2,7 @@
 
 A room holds the study's keys of the case file (`keys`), how it runs (`study`), what comes of it (`result`), its figures
 and its command. What several rooms share lies beside them: the `session` that they ask, the `study` and `result` that
-they make, `measured` data beside what they compute, and `stability`.
+they make, `measured` data beside what they compute, `stability`, and the `orbits` of limit cycles.
 """
 
 #: Every study: the name of its room, command, section of the case file and kind of result, in the order of the

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from continuation import NotConverged
+from continuation import NotConverged, OutOfDomain
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions
 from continuation.cycles import CycleOptions, CycleSolver
@@ -233,6 +233,44 @@ def test_period_doubling_of_a_twisted_band():
     assert np.isclose(tracer.points[0].exponents.multipliers[0], -np.exp(-2 * np.pi * a), rtol=1e-5)
 
 
+def test_period_doubling_of_an_adaptive_control_system():
+    """u' = v, v' = w, w' = -a w - b v - u + u^2, of the manual of MATCONT: at b = 1 doubling at a = 0.6303020, period
+    6.364071. Volumes shrink by exp(-a T) over a period, so that the product of both multipliers is that.
+    """
+    system = periodic.of_first_order(
+        lambda u, mu: jnp.stack([u[1], u[2], -mu["a"] * u[2] - mu["b"] * u[1] - u[0] + u[0] ** 2]), 3
+    )
+    wave = 0.2 * np.stack([np.cos(PHASE), -np.sin(PHASE), -np.cos(PHASE)], axis=1)
+    options = {"step": 0.05, "max_step": 0.2, "limits": (0.55, 1.0), "located": 1e-9, "tail": 1e-7, "max_harmonics": 40}
+    guess = periodic.guess_of(wave, 9, 1.0)
+    tracer, reason = trace(system, guess, {"a": 0.97, "b": 1.0}, 0.96, "a", **options)
+    assert reason == "limit of a reached"
+    (point,) = tracer.special
+    assert point.kind == DOUBLING and point.located
+    there = tracer.solver.solve(point.point.motion, {"a": point.value, "b": 1.0})
+    assert abs(point.value - 0.6303020) < 6e-8 and abs(there.motion.period - 6.364071) < 6e-7
+    for kept in (*tracer.points[2:], point.point):
+        pair = kept.exponents.multipliers
+        product = np.prod(pair) if len(pair) == 2 else np.abs(pair[0]) ** 2  # a pair is given once
+        assert np.isclose(product, np.exp(-kept.value * kept.motion.period), rtol=1e-5)
+
+
+def test_a_branch_between_two_onsets_ends_at_the_second():
+    """z' = (mu (1 - mu) + i) z - z|z|^2: radius sqrt(mu (1 - mu)), back on itself beyond 1."""
+
+    def rate(u, mu):
+        gain = mu["mu"] * (1 - mu["mu"]) - u[0] ** 2 - u[1] ** 2
+        return jnp.stack([gain * u[0] - u[1], u[0] + gain * u[1]])
+
+    system = periodic.of_first_order(rate, 2)
+    guess = periodic.guess_of(0.2 * CIRCLE, 2, 1.0)
+    options = {"step": 0.1, "max_step": 0.1, "limits": (-1.0, 2.0), "max_points": 60}
+    tracer, reason = trace(system, guess, {"mu": 0.04}, 0.06, "mu", **options)
+    assert "shrink to nothing" in reason and len(tracer.points) < 30
+    assert 0.95 < tracer.points[-1].value < 1.0
+    assert all(0 < p.value < 1 for p in tracer.points)
+
+
 def test_events_are_located():
     """The radius of Stuart and Landau's cycle, sqrt(mu), passes 0.6 at 0.36."""
 
@@ -257,6 +295,33 @@ def test_events_are_located():
     again.restore(tracer.points[:3])
     again.run()
     assert np.isclose(again.points[-1].value, tracer.points[-1].value) and len(again.special) == 1
+
+
+def test_an_event_that_ends_a_branch_is_located_from_one_side():
+    """Motions that reach x = -0.6 are refused, and the radius sqrt(mu) is that at 0.36."""
+
+    def rate(u, mu):
+        gain = mu["mu"] - u[0] ** 2 - u[1] ** 2
+        return jnp.stack([gain * u[0] - u[1], u[0] + gain * u[1]])
+
+    class Walled(periodic.SmallPeriodic):
+        def residual(self, motion, mu):
+            if np.linalg.norm(motion.samples, axis=1).max() > 0.6 + 1e-9:
+                raise OutOfDomain("beyond the wall")
+            return super().residual(motion, mu)
+
+    system = Walled(lambda u, v, a, t, mu: v - rate(u, mu), 2)
+    solver = CycleSolver(system, system.basis, EXACT)
+    first = solver.solve(periodic.guess_of(0.3 * CIRCLE, 2, 1.0), {"mu": 0.09})
+    second = solver.solve(first.motion, {"mu": 0.12})
+    event = {"wall": lambda cycle: 0.6 - float(np.linalg.norm(cycle.motion.at([0.0])))}
+    tracer = CycleTracer(solver, "mu", CycleBranchOptions(limits=(0.0, 0.5)), event)
+    tracer.start(first, second)
+    told = []
+    assert "no further cycle" in tracer.run(told.append)
+    (special,) = tracer.special
+    assert special.kind == "wall" and special.located and special in told
+    assert abs(special.value - 0.36) < 1e-4
 
 
 # -- failures

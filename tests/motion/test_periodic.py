@@ -10,6 +10,7 @@ from continuation.periodic import PeriodicMotion
 from dbvfiv.errors import SolveError
 from dbvfiv.model.dynamics import Conditions, dynamic_residual
 from dbvfiv.motion.periodic import PeriodicValve
+from dbvfiv.motion.start import steady_positions
 from tests.small_valves import find_open_state, make_valve
 
 MU = MappingProxyType({"inlet": 12e3, "density": 40.0, "alpha": 3.0, "beta": 2e-3, "loss_factor": 0.0})
@@ -83,6 +84,18 @@ def test_residual_is_that_of_the_equations_of_motion():
         assert np.allclose(found[i, n:] / float(model.mesh.rest_area[-1]), rest, rtol=1e-6, atol=1e-3)
 
 
+@pytest.mark.parametrize("direction", ["none", "-z"])
+def test_a_steady_state_is_a_periodic_motion(direction):
+    """With the weight of wall and fluid among the forces too."""
+    model = make_valve({"gravity.direction": direction, "fluid.density": 900.0})
+    q, mu = steady_positions(model, 2e4), dict(MU) | {"inlet": 2e4, "density": 900.0}
+    inner = model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)
+    c = np.zeros((5, model.size + len(inner)))
+    c[0] = np.concatenate([q, inner])
+    rest = PeriodicValve(lambda _: model, mu).residual(PeriodicMotion(Harmonics(2), c, 200.0), mu)
+    assert np.abs(rest).max() < 1e-6 * model.force_scale(q, 2e4)
+
+
 def test_projections_are_those_of_the_operator():
     """With exponents too."""
     model, mu, system = valve_of("storage")
@@ -92,6 +105,8 @@ def test_projections_are_those_of_the_operator():
     x = np.random.default_rng(3).standard_normal((motion.harmonics.size, 3)) + 0j
     for shift in (0.0, 20.0 + 50.0j):
         whole = operator.apply(x @ basis.T, shift) @ basis
+        part = operator.reduced(basis, operator.reduced(basis[:, :2]))  # the first two known
+        assert np.allclose(part.matrix(shift), operator.reduced(basis).matrix(shift), rtol=1e-9, atol=1e-9)
         small = (operator.reduced(basis).matrix(shift) @ x.ravel()).reshape(x.shape)
         assert np.allclose(whole, small, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
 

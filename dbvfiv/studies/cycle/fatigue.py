@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...shell.recovery import layer_fields
-from .orbit import Orbit
+from ..orbits.orbit import Orbit
 
 #: Instants of a period at which layers are looked at.
 INSTANTS = 16

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
-from pydantic import StrictInt
+from pydantic import StrictInt, ValidationInfo, field_validator, model_validator
 
 from ...case.axis import Axis
+from ...case.existing_file import existing_file
 from ...case.parameters import listed
 from ...case.quantity import Length, Number
-from ...case.section import Section, key
+from ...case.section import BrokenRule, Section, key
 from ...case.stability_axis import StabilityRange, parse_stability_axis
 
 
@@ -21,8 +23,20 @@ class Keys(Section):
         f"The parameter to move: {listed(notes=True)}; with =START:STOP:COUNT[:log] behind it for another range than "
         "the usual one. Cycles are given at these values, and at those that the branch needs between them.",
     )
-    start: Literal["last", "first"] = key(
-        "last", "The onset that the branch starts at: that of the largest value of the range, or of the smallest."
+    start: Literal["last", "first", "file"] = key(
+        "last",
+        "Where the branch starts: at the onset of the largest value of the range, at that of the smallest, or at a "
+        "motion of a result file, from which it goes both ways.",
+    )
+    start_file: Path | None = key(
+        None,
+        "Result file of the motion to start from, relative to the case file: of a branch of cycles, or of a run in "
+        "time that has settled on a cycle. Its value of the parameter is taken, and all else from this case.",
+    )
+    start_cycle: StrictInt | None = key(
+        None,
+        "Which cycle of a branch in start_file, from 0 in the order of its table; negative ones count from the end. "
+        "Without it the last one; of a branch over another parameter the one nearest to this case's value of that.",
     )
     amplitude: Length = key(
         1e-3, "Displacement of one lip in y, half its swing, of the first cycle, near the onset.", gt=0, le=0.1
@@ -38,6 +52,22 @@ class Keys(Section):
     exponents: StrictInt = key(4, "Floquet exponents looked for; 0 leaves stability out.", ge=0, le=20)
     max_step: Number = key(0.5, "Largest step along the branch, a step of one being 10 mm of the lip.", gt=0, le=10)
     max_points: StrictInt = key(100, "Most cycles of the branch.", ge=2, le=100_000)
+
+    @field_validator("start_file", mode="after")
+    @classmethod
+    def _find_start(cls, path: Path | None, info: ValidationInfo) -> Path | None:
+        return path if path is None else existing_file(path, info)
+
+    @model_validator(mode="after")
+    def _starts_somewhere(self) -> Keys:
+        if (self.start == "file") != (self.start_file is not None):
+            given = (
+                "none with start = 'file'"
+                if self.start_file is None
+                else f"{str(self.start_file)!r} with start = {self.start!r}"
+            )
+            raise BrokenRule("start_file", given, "it goes with start = 'file' and only with that")
+        return self
 
     @property
     def axis(self) -> Axis:

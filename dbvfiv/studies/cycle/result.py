@@ -16,11 +16,11 @@ from ...record.fields import motion
 from ...record.table import printed_head, printed_row
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
+from ..orbits.orbit import Orbit
 from ..result import StudyResult
 from ..stability.place import Place, describe_fixed, fixed_conditions, rebuilder
 from . import figures
 from .fatigue import LayerRanges, layer_ranges
-from .orbit import Orbit
 from .rows import COLUMNS, CYCLES, ENDED, SPECIAL, read_motion
 
 #: Steps of a period for ParaView.
@@ -82,7 +82,7 @@ class Point:
 
 
 class CycleResult(StudyResult):
-    """A branch of limit cycles, in the order it was followed.
+    """A branch of limit cycles, in the order in which they lie on it.
 
     Attributes
     ----------
@@ -105,7 +105,8 @@ class CycleResult(StudyResult):
 
     @cached_property
     def points(self) -> tuple[Point, ...]:
-        return tuple(Point(self, number) for number in range(self.record.rows(CYCLES)))
+        found = [Point(self, number) for number in range(self.record.rows(CYCLES))]
+        return tuple([p for p in found if p.leg == 1][::-1] + [p for p in found if p.leg == 0])
 
     @cached_property
     def special_points(self) -> list[dict[str, Any]]:
@@ -121,8 +122,8 @@ class CycleResult(StudyResult):
     @property
     def reason(self) -> str:
         """Why the branch ended."""
-        notes = self.record.notes(ENDED)
-        return notes[-1]["reason"] if notes else "the run ended before the branch did"
+        reasons = [note["reason"] for note in self.record.notes(ENDED)]
+        return "; ".join(dict.fromkeys(reasons)) or "the run ended before the branch did"
 
     @cached_property
     def system(self) -> ValveSystem:

@@ -16,7 +16,7 @@ from ...record.layout import Column, Shown
 from ...record.mesh import MeshData
 from ...record.record import Record
 from ...record.table import TableSpec
-from .orbit import Orbit
+from ..orbits.orbit import Orbit
 
 CYCLES, SERIES, SPECIAL, ENDED = "cycles", "series", "special", "ended"
 #: Floquet exponents kept of each cycle.
@@ -69,6 +69,9 @@ COLUMNS = (
     Column("krylov", "", "Krylov iterations", "i8"),
     Column("arclength", "", "Along the branch"),
     Column("asked", "", "Whether the value is one of those asked for", "bool"),
+    Column(
+        "leg", "", "1 on the way up from a start within the range, after the way down from there; 0 elsewhere", "i8"
+    ),
 )
 _SERIES = (
     Column("cycle", "", "Number of the cycle, from 0", "i8"),
@@ -85,8 +88,8 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     return TableSpec(CYCLES, COLUMNS, wide), TableSpec(SERIES, _SERIES, series)
 
 
-def cycle_row(point: CyclePoint, orbit: Orbit) -> dict[str, Any]:
-    """A cycle as a row of its table."""
+def cycle_row(point: CyclePoint, orbit: Orbit, leg: int) -> dict[str, Any]:
+    """A cycle of a leg of the branch as a row of its table."""
     flow, speeds = orbit.flow
     low, high = orbit.lip_extremes
     exponents, wide = point.exponents, np.full((3, KEPT), np.nan)
@@ -116,6 +119,7 @@ def cycle_row(point: CyclePoint, orbit: Orbit) -> dict[str, Any]:
         "krylov": point.cycle.krylov,
         "arclength": point.arclength,
         "asked": point.asked,
+        "leg": leg,
     }
 
 
@@ -148,10 +152,14 @@ def read_motion(record: Record, number: int) -> PeriodicMotion:
     return PeriodicMotion(Harmonics(count), c, 2 * np.pi * float(record.value(CYCLES, "frequency", number)))
 
 
-def read_points(record: Record, mu: dict, name: str) -> list[CyclePoint]:
-    """Cycles that a record holds, for a branch to go on from; `name` is the parameter's among `mu`."""
+def read_points(record: Record, mu: dict, name: str, leg: int = 0) -> list[CyclePoint]:
+    """Cycles of a leg that a record holds, that at which all start among them, for a branch to go on from; `name` is
+    the parameter's among `mu`.
+    """
     found = []
     for number in range(record.rows(CYCLES)):
+        if number and record.value(CYCLES, "leg", number) != leg:
+            continue
         value = {c.name: record.value(CYCLES, c.name, number) for c in COLUMNS}
         motion = read_motion(record, number)
         exponents = None

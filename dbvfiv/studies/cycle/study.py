@@ -8,18 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from continuation.cycle_branch import CycleTracer
-from continuation.cycle_points import CycleBranchOptions, CyclePoint, SpecialCycle
+from continuation.cycle_points import CyclePoint, SpecialCycle
 
-from ...case.parameters import PARAMETERS
-from ...errors import CaseError
+from ...errors import CaseError, SolveError
+from ...motion.periodic import check_periodic
 from ...record.record import GrowingRecord
 from ...record.table import printed_head, printed_row
 from ..case import Case
+from ..orbits.follower import Follower
+from ..orbits.onset import MODES
 from ..session import Session
 from ..stability.place import check_scan
 from ..stability.walk import StabilityWalk
 from ..study import Study
-from .orbit import Orbit
+from .given import given_motion
 from .result import CycleResult
 from .rows import (
     COLUMNS,
@@ -33,14 +35,10 @@ from .rows import (
     special_note,
     tables_of,
 )
-from .start import cycle_solver, find_onset, first_cycles, periodic_system
+from .start import find_onset
 
-#: Displacement of the lip, m, that a step of one along the branch stands for.
-UNIT = 10e-3
-#: First step along a branch.
-STEP = 0.1
-#: The lips just touch at their middle.
-TOUCHING = "lips touch"
+#: Distance of the second cycle from one of a file, over the range.
+AWAY = 0.02
 
 
 @dataclass(frozen=True)
@@ -59,73 +57,98 @@ def run(session: Session, record: GrowingRecord) -> None:
     check_scan(case, axis.parameter)
     if axis.parameter == "density" and case.has_pump:
         raise CaseError("Over the density a pump has no steady state to keep; give drive.pressure.", key="cycle.over")
+    check_periodic(session.model)
     record.begin("cycle", None)
     walk = StabilityWalk(case, record, session.model)
-    system = periodic_system(case, walk)
+    if case.cycle.start == "file":
+        _from_file(case, walk, record)
+    else:
+        _from_onset(case, walk, record)
+
+
+def _from_onset(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
+    axis = case.cycle.axis
     onset = find_onset(case, walk, record)
-    frequency = onset.eigenvalue.imag / (2 * np.pi)
     if not record.notes("onset"):
-        record.note("onset", value=onset.value, frequency=frequency)
-    solver = cycle_solver(system, onset)
-    name = PARAMETERS[axis.parameter].system_name or axis.parameter
-    lip = int(session.model.shell.dofs.index[session.model.mesh.rows[0, 0], 1])
-    branch = _Branch(record, system, name, axis.parameter)
-    known = read_points(record, onset.place.mu(), name)
+        record.note("onset", value=onset.value, frequency=onset.eigenvalue.imag / (2 * np.pi))
+    follower = Follower(case, walk, onset.place, axis.parameter, onset.spectrum)
+    keeper = _Keeper(record, follower)
+    known = read_points(record, onset.place.mu(), follower.name)
     if len(known) < 2:
         record.progress(f"first cycles, beside {axis.parameter} = {onset.value:.6g}")
-        first = first_cycles(solver, onset, name, lip, case, walk.equilibrium(onset.place))
-        tracer = branch.tracer(solver, case, first[0].motion, lip)
-        tracer.start(*first, tell=branch.keep)
+        keeper.known = len(known)
+        tracer, missed = follower.begin(onset, axis.values, keeper.keep)
+        for sentence in missed:
+            record.warn(sentence)
     else:
-        tracer = branch.tracer(solver, case, known[0].motion, lip)
+        tracer = follower.tracer(axis.values, known[0].motion)
         tracer.restore(known)
-    reason = tracer.run(branch.keep)
-    record.note(ENDED, reason=reason)
-    if "no further cycle" in reason:
-        record.fail(f"The branch ends at {axis.parameter} = {tracer.points[-1].value:.6g}: {reason.rstrip('.')}.")
+    keeper.follow(tracer)
 
 
-class _Branch:
+def _from_file(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
+    """Down from the motion of the file, then up from there."""
+    axis = case.cycle.axis
+    given = given_motion(case, walk)
+    record.progress(f"the cycle at {axis.parameter} = {given.value:.6g}")
+    follower = Follower(case, walk, given.place, axis.parameter, walk.spectrum(given.place, MODES))
+    ended = {note["leg"] for note in record.notes(ENDED)}
+    low, high = axis.values[0], axis.values[-1]
+    for leg, end in enumerate((low, high)):
+        if leg in ended or given.value == end:
+            continue
+        keeper = _Keeper(record, follower, leg)
+        known = read_points(record, given.place.mu(), follower.name, leg)
+        if not known:
+            cycle = follower.near(given.motion, given.value)
+            tracer = follower.tracer(axis.values, cycle.motion)
+            tracer.begin(cycle, given.value in axis.values, keeper.keep)
+        else:
+            tracer = follower.tracer(axis.values, known[0].motion)
+            tracer.restore(known)
+        if len(tracer.points) < 2:
+            step = np.clip(end - given.value, -AWAY * (high - low), AWAY * (high - low))
+            try:
+                second = follower.near(tracer.points[0].motion, float(given.value + step))
+            except SolveError as error:
+                keeper.end(tracer, f"no further cycle was found: {error}")
+                continue
+            tracer.extend(second, False, keeper.keep)
+        keeper.follow(tracer)
+
+
+class _Keeper:
     """Keeps the cycles of a branch in a record as they are found."""
 
-    def __init__(self, record: GrowingRecord, system, name: str, parameter: str):
-        self.record, self.system, self.name, self.parameter = record, system, name, parameter
+    def __init__(self, record: GrowingRecord, follower: Follower, leg: int = 0):
+        self.record, self.follower, self.leg = record, follower, leg
+        #: Of the cycles to come, how many the record holds already.
+        self.known = 0
 
-    def tracer(self, solver, case: Case, first, lip: int) -> CycleTracer:
-        """A tracer of the branch that begins with a motion `first`."""
-        asked, axis = case.cycle, case.cycle.axis
-        swing = np.sqrt(2.0) * np.linalg.norm(first.coefficients[1:3, lip])
-        whole = np.linalg.norm(first.coefficients[1:] / self.system.scales)
-        width = axis.values[-1] - axis.values[0]
-        options = CycleBranchOptions(
-            step=min(STEP, asked.max_step),
-            min_step=min(1e-4, asked.max_step),
-            max_step=asked.max_step,
-            scale=0.5 * width,
-            motion_scale=UNIT * whole / swing,
-            limits=(axis.values[0], axis.values[-1]),
-            values=axis.values,
-            max_points=asked.max_points,
-            exponents=asked.exponents,
-            tail=asked.tolerance,
-            max_harmonics=asked.max_harmonics,
-        )
-        return CycleTracer(solver, self.name, options, {TOUCHING: lambda cycle: self.orbit(cycle).lip_extremes[0]})
+    def follow(self, tracer: CycleTracer) -> None:
+        """Follow a leg to its end."""
+        self.end(tracer, tracer.run(self.keep))
 
-    def orbit(self, cycle) -> Orbit:
-        """What is looked at of a cycle."""
-        return Orbit(self.system.model(cycle.mu), cycle.mu, cycle.motion)
+    def end(self, tracer: CycleTracer, reason: str) -> None:
+        """Note why a leg ended."""
+        self.record.note(ENDED, reason=reason, leg=self.leg)
+        if "no further cycle" in reason:
+            at = f"{self.follower.parameter} = {tracer.points[-1].value:.6g}"
+            self.record.fail(f"The branch ends at {at}: {reason.rstrip('.')}.")
 
     def keep(self, item: CyclePoint | SpecialCycle) -> None:
         """Keep a cycle, or a special point."""
-        record = self.record
+        record, follower = self.record, self.follower
         if isinstance(item, SpecialCycle):
-            orbit = self.orbit(item.point.cycle)
-            record.note(SPECIAL, **special_note(item, self.parameter, orbit))
-            record.progress(f"{item.kind} at {self.parameter} = {item.value:.6g}")
+            orbit = follower.orbit(item.point.cycle)
+            record.note(SPECIAL, **special_note(item, follower.parameter, orbit))
+            record.progress(f"{item.kind} at {follower.parameter} = {item.value:.6g}")
             return
-        orbit = self.orbit(item.cycle)
-        row = cycle_row(item, orbit)
+        if self.known:
+            self.known -= 1
+            return
+        orbit = follower.orbit(item.cycle)
+        row = cycle_row(item, orbit, self.leg)
         # the series first: the row vouches for it
         record.extend(SERIES, series_rows(record.rows(CYCLES), item.motion, orbit.model.size))
         record.append(CYCLES, row)

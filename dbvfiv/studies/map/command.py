@@ -37,6 +37,9 @@ def command(
         int | None, typer.Option("--workers", "-w", metavar="N", min=1, help="Processes that share the columns.")
     ] = None,
     symmetry: ClassesOption = None,
+    cycles: Annotated[
+        bool, typer.Option("--cycles", help="Amplitude of the limit cycle in each cell that has one.")
+    ] = False,
 ) -> Request:
     """Growth rate of the leading mode over two parameters, with the exact onset curves.
 
@@ -46,6 +49,9 @@ def command(
     point of a curve is neutral by the full matrices (map.curve).
 
     With --symmetry all the cells are asked in every class of motion too, and the most unstable one is named.
+
+    With --cycles branches of limit cycles are followed from the onsets of each column, as the section cycle of the case
+    says; that takes seconds a cell.
 
     With -o every finished column is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash. Under mpiexec with
     mpi4py the columns are shared among its processes.
@@ -63,5 +69,6 @@ def command(
         "map.continuity": "both" if both else None,
         "map.workers": workers,
         "map.symmetry": symmetry,
+        "map.cycles": cycles or None,
     }
     return Request(changes)

@@ -13,7 +13,7 @@ from scipy.ndimage import distance_transform_edt, label
 
 from ...case.parameters import PARAMETERS
 from ...drawing.axes import HALO, colour_bar, headline, limits, log_axis
-from ...drawing.style import MOTION, SIGNED, new_figure, parameter_label
+from ...drawing.style import MAGNITUDE, MOTION, SIGNED, new_figure, parameter_label
 from ..stability.place import describe_fixed
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ def draw(result: MapResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     if any(not column.failure for column in result.columns):
         yield "stability-map", lambda: stability_map(result)
         yield "leading-frequency", lambda: leading_frequency(result)
+    if np.isfinite(result.cycle_grid("amplitude")).any():
+        yield "cycle-amplitude", lambda: cycle_amplitude(result)
 
 
 def stability_map(result: MapResult) -> Figure:
@@ -60,6 +62,29 @@ def leading_frequency(result: MapResult) -> Figure:
         _curves(axes, result, law)
         label_regions(axes, result, law)
     colour_bar(figure, mesh, panels, "Frequency of the leading mode, Hz", pad=0.015)
+    _headline(figure, result)
+    return figure
+
+
+def cycle_amplitude(result: MapResult) -> Figure:
+    """Amplitude of the limit cycle where there is one; unstable cells without one are hatched, unstable cycles
+    dotted.
+    """
+    amplitude = 1e3 * result.cycle_grid("amplitude")
+    unstable, growing = result.grid("unstable"), result.cycle_grid("growing")
+    norm = matplotlib.colors.Normalize(0.0, float(np.nanmax(amplitude)))
+    figure, panels = _panels(result)
+    x, y = (np.asarray(_shown(axis, np.asarray(axis.values))) for axis in (result.plan.x, result.plan.y))
+    for law, axes in enumerate(panels):
+        lacking = np.isnan(amplitude[law]) & (unstable[law] != 0)
+        shown = np.where(lacking, np.nan, np.nan_to_num(amplitude[law]))
+        mesh = _cells(axes, result, shown, matplotlib.colormaps[MAGNITUDE].with_extremes(under="white"), norm)
+        still = np.where(np.isnan(amplitude[law]) & ~lacking, 1.0, np.nan)
+        axes.pcolormesh(_edges(result.plan.x), _edges(result.plan.y), still, cmap="gray", vmin=0.0, vmax=1.0)
+        rows, columns = np.nonzero(growing[law] > 0)
+        axes.plot(x[columns], y[rows], ".", color="black", ms=3)
+        _curves(axes, result, law)
+    colour_bar(figure, mesh, panels, "Amplitude of the limit cycle, one lip, mm", pad=0.015)
     _headline(figure, result)
     return figure
 

@@ -25,7 +25,11 @@ class Keys(Section):
     )
     checks: StrictInt = key(4, "Cells compared with the full pencil, spread over the map.", ge=0, le=1000)
     workers: StrictInt = key(1, "Processes that share the columns.", ge=1, le=1024)
-
+    cycles: StrictBool = key(
+        False,
+        "Follow limit cycles from the onsets of each column of the grid, as the section cycle says: their amplitude in "
+        "each cell.",
+    )
     symmetry: Literal["SS", "all"] = key(
         "SS",
         "Classes of motion looked at: SS is that of the model, all adds those in which the lips sway in y (SA), the "

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from ..result import StudyResult
 from ..stability.classes import NOTE as CLASS_NOTE
 from ..stability.place import describe_fixed, fixed_conditions
-from . import classes, figures
+from . import classes, cycles, figures
 from .checks import Check
 from .column import MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, linked
@@ -61,6 +61,12 @@ class MapResult(StudyResult):
         """growth_rate, frequency, second, unstable, counted, certified or how on the grid (laws, y, x)."""
         return grid_of(self.plan, self.columns, name)
 
+    def cycle_grid(self, name: str) -> np.ndarray:
+        """amplitude, frequency or growing of the limit cycles on the grid (laws, y, x); see
+        `dbvfiv.studies.map.cycles`.
+        """
+        return cycles.cycle_grid(self.record, self.plan, name)
+
     @property
     def moved(self) -> tuple[str, ...]:
         """Parameters that are not the same all over the map."""
@@ -92,18 +98,23 @@ class MapResult(StudyResult):
     def _picture(self, law: int) -> dict[str, Any]:
         tables = self.grid("growth_rate")[law], self.grid("frequency")[law]
         leading = {"leading": classes.leading_of(*tables, self.classes)} if self.classes else {}
+        followed = cycles.summary_of(self.record, self.plan, law) if self.case.map.cycles else {}
         mine = [curve for curve in self.curves if curve.law == law]
-        return {
-            "continuity": LAWS.get(self.plan.laws[law], self.plan.laws[law]),
-            "growth_rate": self.grid("growth_rate")[law].tolist(),
-            "frequency": self.grid("frequency")[law].tolist(),
-            "unstable_count": self.grid("unstable")[law].tolist(),
-            "unstable_count_independent": self.grid("counted")[law].tolist(),
-            "certified": self.grid("certified")[law].astype(bool).tolist(),
-            "onset_curves": [curve.points() for curve in mine],
-            "onset_frequencies": [curve.frequency.tolist() for curve in mine],
-            "onset_curves_exact": [bool(curve.exact) for curve in mine],
-        } | leading
+        return (
+            {
+                "continuity": LAWS.get(self.plan.laws[law], self.plan.laws[law]),
+                "growth_rate": self.grid("growth_rate")[law].tolist(),
+                "frequency": self.grid("frequency")[law].tolist(),
+                "unstable_count": self.grid("unstable")[law].tolist(),
+                "unstable_count_independent": self.grid("counted")[law].tolist(),
+                "certified": self.grid("certified")[law].astype(bool).tolist(),
+                "onset_curves": [curve.points() for curve in mine],
+                "onset_frequencies": [curve.frequency.tolist() for curve in mine],
+                "onset_curves_exact": [bool(curve.exact) for curve in mine],
+            }
+            | leading
+            | followed
+        )
 
     def shortfall(self) -> str | None:
         gaps = len(self.failures)
@@ -117,6 +128,8 @@ class MapResult(StudyResult):
         for i in range(len(self.plan.laws)):
             lines.append(self._cells_line(i))
             lines += [self._curve_line(curve) for curve in self.curves if curve.law == i]
+            if self.case.map.cycles:
+                lines += cycles.sentences(self.record, self.plan, i)
         lines += [self._class_line(note) for note in self.classes]
         if self.checks:
             worst = max(check.error for check in self.checks)

@@ -18,6 +18,9 @@ from ..study import nothing_to_resume
 from .checks import Check
 from .column import CELLS, MapColumn, MapPlan
 from .curves import OnsetCurve
+from .cycles import ROWS as CYCLE_ROWS
+from .cycles import SPEC as CYCLE_SPEC
+from .cycles import vouched_rows
 
 COLUMNS, CELL_ROWS, ONSETS = "columns", "cells", "onsets"
 _COLUMNS = (
@@ -66,7 +69,7 @@ _OF_ONSET = ("law", "along", "frequency", "direction", "residual")
 def tables_of(_mesh: MeshData | None) -> tuple[TableSpec, ...]:
     """Tables of a map. Curves and checks are notes."""
     cells = TableSpec(CELL_ROWS, _CELLS, chunk=512)
-    return TableSpec(COLUMNS, _COLUMNS), cells, TableSpec(ONSETS, _ONSETS)
+    return TableSpec(COLUMNS, _COLUMNS), cells, TableSpec(ONSETS, _ONSETS), CYCLE_SPEC
 
 
 class KeepColumns(Observer):
@@ -149,7 +152,8 @@ def read_columns(record: Record, plan: MapPlan) -> list[MapColumn]:
 
 
 def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
-    """Rows that a map goes on from: cells and onsets of a column that was cut off before its own row are left out.
+    """Rows that a map goes on from: cells, onsets and cycles of a column that was cut off before what vouches for
+    them are left out.
 
     Raises
     ------
@@ -160,12 +164,16 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
         raise nothing_to_resume("map", known.path)
     count = known.rows(COLUMNS)
     if not count:
-        return {CELL_ROWS: 0, ONSETS: 0}
+        return {CELL_ROWS: 0, ONSETS: 0, CYCLE_ROWS: 0}
     plan = MapPlan.of(case)
     first, onset, onsets = (
         known.value(COLUMNS, name, count - 1) for name in ("first_cell", "first_onset", "onset_count")
     )
-    return {CELL_ROWS: int(first) + len(plan.laws) * len(plan.along.values), ONSETS: int(onset) + int(onsets)}
+    return {
+        CELL_ROWS: int(first) + len(plan.laws) * len(plan.along.values),
+        ONSETS: int(onset) + int(onsets),
+        CYCLE_ROWS: vouched_rows(known, plan),
+    }
 
 
 def keep_curves(record: GrowingRecord, curves: Iterable[OnsetCurve]) -> None:

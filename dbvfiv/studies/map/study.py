@@ -9,6 +9,7 @@ from ..stability.walk import StabilityWalk
 from ..study import Study
 from .classes import look_at_classes
 from .column import MapPlan
+from .cycles import follow_cycles
 from .result import MapResult
 from .rows import KeepColumns, keep_checks, keep_curves, known_columns, rows_to_keep, tables_of
 from .run import run_map
@@ -36,6 +37,7 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     keep_checks(record, found.checks)
     keep_curves(record, found.curves)
     look_at_classes(case, record, walk)
+    follow_cycles(case, record, plan, list(found.columns), walk)
 
 
 STUDY = Study("map", tables_of, run, MapResult, rows_to_keep=rows_to_keep)

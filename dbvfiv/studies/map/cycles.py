@@ -1,0 +1,188 @@
+"""Limit cycles over a map: from the onsets of each column of the grid branches are followed along it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from continuation.cycle_points import CyclePoint, SpecialCycle
+
+from ...case.parameters import PARAMETERS
+from ...errors import SolveError
+from ...record.layout import Column
+from ...record.record import GrowingRecord, Record
+from ...record.table import TableSpec
+from ..case import Case
+from ..orbits.follower import Follower
+from ..orbits.onset import onset_at
+from ..stability.walk import StabilityWalk
+from .column import MapColumn, MapPlan
+
+ROWS, DONE = "cycles", "cycles of a column"
+_COLUMNS = (
+    Column("across", "SI", "Value of the parameter across"),
+    Column("along", "SI", "Value of the parameter along"),
+    Column("law", "", "Number of the continuity law", "i8"),
+    Column("amplitude", "m", "Half the swing of the displacement in y of one lip at x = z = 0; NaN without a cycle"),
+    Column("frequency", "Hz", "Of the cycle"),
+    Column(
+        "growing", "", "Dimension in which perturbations of the cycle grow; -1 without a cycle or where not asked", "i8"
+    ),
+)
+#: What is kept of each cell.
+CELLS = ("amplitude", "frequency", "growing")
+SPEC = TableSpec(ROWS, _COLUMNS, chunk=512)
+
+
+class CycleCells(NamedTuple):
+    """Cycles along one column under one law.
+
+    Attributes
+    ----------
+    amplitude, frequency : (cells,) arrays
+        NaN where no cycle was found.
+    growing : (cells,) int array
+    said : str
+        Why cells that are unstable have none; empty where all have one.
+    """
+
+    amplitude: np.ndarray
+    frequency: np.ndarray
+    growing: np.ndarray
+    said: str
+
+    @classmethod
+    def blank(cls, cells: int) -> CycleCells:
+        """No cycles."""
+        return cls(np.full(cells, np.nan), np.full(cells, np.nan), np.full(cells, -1), "")
+
+
+def follow_cycles(case: Case, record: GrowingRecord, plan: MapPlan, columns: list[MapColumn], walk: StabilityWalk):
+    """Cycles of all columns of the grid, where they are asked for and not in the record yet."""
+    if not case.map.cycles:
+        return
+    known = read_cycles(record, plan)
+    for law in range(len(plan.laws)):
+        for column in columns:
+            if column.level or not column.has(law) or (column.value, law) in known:
+                continue
+            record.progress(f"cycles at {plan.across.parameter} = {column.value:.6g}")
+            keep_cycles(record, plan, column.value, law, cycles_along(case, plan, column, law, walk))
+
+
+def cycles_along(case: Case, plan: MapPlan, column: MapColumn, law: int, walk: StabilityWalk) -> CycleCells:
+    """Cycles in the cells of a column: of the branches from its onsets, each until it ends; where several pass, the
+    stable one of largest amplitude.
+    """
+    found, reasons = CycleCells.blank(len(plan.along.values)), []
+    unstable = column.cells["unstable"][law] > 0
+    for number, along, frequency, direction, _ in column.onsets:
+        if int(number) != law or not frequency or _is_covered(plan, found, along, direction):
+            continue
+        place = plan.place(column.value, along, plan.laws[law])
+        try:
+            onset = onset_at(walk, place, along, 2j * np.pi * frequency)
+            if onset is None:
+                continue
+            follower = Follower(case, walk, place, plan.along.parameter, onset.spectrum)
+            keep = _Cells(plan, found, follower).take
+            tracer, missed = follower.begin(onset, plan.along.values, keep)
+        except SolveError as error:
+            reasons.append(str(error))
+            continue
+        reasons += missed
+        reason = tracer.run(keep)
+        if "no further cycle" in reason:
+            at = PARAMETERS[plan.along.parameter].text(tracer.points[-1].value)
+            reasons.append(f"the branch ends at {at}: {reason}")
+    lacking = int((unstable & np.isnan(found.amplitude)).sum())
+    if not lacking:
+        return found
+    why = "; ".join(dict.fromkeys(r.rstrip(".") for r in reasons)) or "no onset of an oscillation leads there"
+    return found._replace(said=f"{lacking} unstable cells without a cycle: {why}.")
+
+
+def _is_covered(plan: MapPlan, found: CycleCells, along: float, direction: float) -> bool:
+    """Whether a branch has been through the cell next to an onset, on its unstable side."""
+    values = np.asarray(plan.along.values)
+    beyond = np.flatnonzero(values > along) if direction > 0 else np.flatnonzero(values < along)[::-1]
+    return bool(len(beyond)) and not np.isnan(found.amplitude[beyond[0]])
+
+
+class _Cells:
+    """Takes cycles at the values of a column into its cells."""
+
+    def __init__(self, plan: MapPlan, found: CycleCells, follower: Follower):
+        self.values, self.found, self.follower = np.asarray(plan.along.values), found, follower
+
+    def take(self, item: CyclePoint | SpecialCycle) -> None:
+        """Take a cycle that was asked for, unless the cell has a better one."""
+        if not isinstance(item, CyclePoint) or not item.asked:
+            return
+        found, cell = self.found, int(np.argmin(np.abs(self.values - item.value)))
+        low, high = self.follower.orbit(item.cycle).lip_extremes
+        amplitude, growing = 0.5 * (high - low), -1 if item.exponents is None else item.exponents.unstable
+        known = found.growing[cell] <= 0, found.amplitude[cell]
+        if not np.isnan(known[1]) and known > (growing <= 0, amplitude):
+            return
+        found.amplitude[cell], found.growing[cell] = amplitude, growing
+        found.frequency[cell] = item.motion.omega / (2 * np.pi)
+
+
+def keep_cycles(record: GrowingRecord, plan: MapPlan, value: float, law: int, found: CycleCells) -> None:
+    """Keep a column; the note vouches for its rows."""
+    cells = len(plan.along.values)
+    places = {"across": np.full(cells, value), "along": np.array(plan.along.values), "law": np.full(cells, law)}
+    record.extend(ROWS, places | {name: getattr(found, name) for name in CELLS})
+    record.note(DONE, value=value, law=law, text=found.said)
+
+
+def read_cycles(record: Record, plan: MapPlan) -> dict[tuple[float, int], CycleCells]:
+    """Finished columns by value and law."""
+    cells = len(plan.along.values)
+    columns = {name: record.column(ROWS, name) for name in CELLS}
+    return {
+        (note["value"], note["law"]): CycleCells(
+            *(columns[name][i * cells : (i + 1) * cells] for name in CELLS), note["text"]
+        )
+        for i, note in enumerate(record.notes(DONE))
+    }
+
+
+def vouched_rows(record: Record, plan: MapPlan) -> int:
+    """Rows of finished columns."""
+    return len(record.notes(DONE)) * len(plan.along.values)
+
+
+def cycle_grid(record: Record, plan: MapPlan, name: str) -> np.ndarray:
+    """A quantity of `CELLS` on the grid, (laws, y values, x values)."""
+    known, blank = read_cycles(record, plan), getattr(CycleCells.blank(len(plan.along.values)), name)
+    table = np.array(
+        [
+            [getattr(known[value, law], name) if (value, law) in known else blank for value in plan.across.values]
+            for law in range(len(plan.laws))
+        ]
+    )
+    return table if plan.transposed else table.transpose(0, 2, 1)
+
+
+def summary_of(record: Record, plan: MapPlan, law: int) -> dict[str, Any]:
+    """Plain tables (y, x) for JSON."""
+    return {f"cycle_{name}": cycle_grid(record, plan, name)[law].tolist() for name in CELLS}
+
+
+def sentences(record: Record, plan: MapPlan, law: int) -> list[str]:
+    """Which cells have a cycle, and why unstable ones have none."""
+    amplitude, growing = (cycle_grid(record, plan, name)[law] for name in ("amplitude", "growing"))
+    there = ~np.isnan(amplitude)
+    said = [f"  limit cycles in {int(there.sum())} cells, {int((there & (growing > 0)).sum())} of them unstable"]
+    if there.any():
+        said[0] += f", amplitude {1e3 * np.nanmin(amplitude):.4g} to {1e3 * np.nanmax(amplitude):.4g} mm of one lip"
+    row = PARAMETERS[plan.across.parameter]
+    said += [
+        f"  {row.text(note['value'])}: {note['text']}"
+        for note in record.notes(DONE)
+        if note["law"] == law and note["text"]
+    ]
+    return said

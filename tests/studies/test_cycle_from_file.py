@@ -1,0 +1,91 @@
+"""Branches of limit cycles that start from a cycle of another branch, or from a run in time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbvfiv.errors import CaseError
+from dbvfiv.observer import Observer
+from dbvfiv.studies.session import load_result, resume_result
+from tests.studies.test_cycle import session_of
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("cycles") / "cycles.h5"
+    session_of(cycle__over="density=230:250:2", cycle__exponents=0).perform("cycle", path)
+    return path
+
+
+def started(file, **changes):
+    given = {"cycle__start": "file", "cycle__start_file": str(file), "cycle__over": "density=226:233:2"}
+    return session_of(**given | {"cycle__exponents": 0} | changes)
+
+
+class _Stopper(Observer):
+    """Interrupts once the way up has begun."""
+
+    def __init__(self):
+        self.last = np.inf
+
+    def item(self, result):
+        if result.value > self.last:
+            raise KeyboardInterrupt
+        self.last = result.value
+
+
+def test_both_ways_from_a_cycle_and_resumed(file, tmp_path):
+    (there,) = (p for p in load_result(file).points if p.value == 230.0)
+    path = tmp_path / "ways.h5"
+    part = started(file).perform("cycle", path, _Stopper())
+    assert part.interrupted and {p.leg for p in part.points} == {0, 1}
+    whole = resume_result(path)
+    values = [p.value for p in whole.points]
+    assert whole.complete and whole.onset is None
+    assert values == sorted(values, reverse=True) and {values[0], values[-1]} == {233.0, 226.0}
+    (again,) = (p for p in whole.points if p.value == 230.0)
+    assert np.isclose(again.amplitude, there.amplitude, rtol=1e-4)
+    assert np.all(np.diff([p.amplitude for p in whole.points]) > 0)
+    assert "branch" in whole.figures()
+
+
+def test_over_another_parameter(file):
+    """From the nearest cycle of a branch over the density to one over the pressure."""
+    (there,) = (p for p in load_result(file).points if p.value == 230.0)
+    found = started(file, cycle__over="pressure=5.9 kPa:6 kPa:2", fluid__density=230.0).perform("cycle")
+    assert found.points[0].value == 6e3 and found.points[-1].value == 5.9e3
+    assert np.isclose(found.points[0].amplitude, there.amplitude, rtol=1e-4)
+
+
+@pytest.mark.slow
+def test_from_a_run_in_time(file, tmp_path):
+    """The cycle is that of the branch from the onset; the run's steps leave it a little off."""
+    (there,) = (p for p in load_result(file).points if p.value == 230.0)
+    path = tmp_path / "run.h5"
+    run = {"start": "kick", "kick_opening": there.amplitude, "step": 1e-3, "duration": 1.5}
+    changes = {f"transient__{key}": value for key, value in run.items()} | {"fluid__density": 230.0}
+    result = session_of(**changes, transient__stop_when=["limit cycle"]).perform("transient", path)
+    assert result.verdict["verdict"] == "limit cycle"
+    found = started(path, cycle__over="density=229:230:2").perform("cycle")
+    assert found.points[0].value == 230.0 and np.isclose(found.points[0].amplitude, there.amplitude, rtol=1e-4)
+    assert found.points[-1].value == 229.0
+
+
+def test_files_that_nothing_starts_from(file, tmp_path):
+    with pytest.raises(CaseError, match=r"cycle.start_file.*none with start = 'file'"):
+        session_of(cycle__start="file")
+    with pytest.raises(CaseError, match=r"beyond the range from 100 kg/m³ to 200 kg/m³"):
+        started(file, cycle__over="density=100:200:2").perform("cycle")
+    with pytest.raises(CaseError, match="there is no cycle 99"):
+        started(file, cycle__start_cycle=99).perform("cycle")
+    with pytest.raises(CaseError, match="belongs to a mesh of"):
+        started(file, mesh__around=4).perform("cycle")
+    other = tmp_path / "steady.h5"
+    session_of().perform("steady", other)
+    with pytest.raises(CaseError, match="of kind 'steady'"):
+        started(other).perform("cycle")
+    run = tmp_path / "short.h5"
+    session_of(transient__duration=2e-3, fluid__density=230.0).perform("transient", run)
+    with pytest.raises(CaseError, match="has not settled on a cycle"):
+        started(run).perform("cycle")
