@@ -15,6 +15,7 @@ from .family import Condition, PencilFamily
 from .phase_count import phase_counts
 from .reduction import FamilyReduction, ReducedFamily, StaticSolver
 from .search import leading_modes
+from .snapshots import between, spread
 from .winding import unstable_count
 
 #: Estimated relative error of an eigenvalue above which a cell is treated directly.
@@ -141,12 +142,12 @@ class ColumnSolver:
         least = max(snapshots, LOSSES) if mixed else snapshots
         # more vectors are far cheaper than every cell with the full pencil
         for number in (least, 2 * least + 1, 4 * least + 3):
-            places = _spread(conditions, number)
+            places = spread(conditions, number)
             banded = any(_is_banded(family, conditions[i]) for i in places)
             first = reduction.wide if banded else reduction.coarse
             fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
             # vectors corrected in a few steps are worst where most relaxes
-            checked = [*_between(places), int(np.argmax(losses))] if mixed else _between(places)
+            checked = [*between(places), int(np.argmax(losses))] if mixed else between(places)
             error = _error(reduction, fine, conditions, checked)
             if error <= TOLERANCE:
                 break
@@ -389,16 +390,3 @@ def _column(leading, values, counts: _Counts, error: float) -> Column:
         band=counts.band,
         leading=[row[:KEPT] for row in leading],
     )
-
-
-def _spread(conditions, number: int) -> list[int]:
-    """Indices of conditions spread over the list."""
-    return sorted({int(round(x)) for x in np.linspace(0, len(conditions) - 1, min(number, len(conditions)))})
-
-
-def _between(places: list[int]) -> list[int]:
-    """The middle of the widest gap between places, the first of several."""
-    if len(places) < 2:
-        return places
-    gaps = [(b - a, -a, (a + b) // 2) for a, b in zip(places[:-1], places[1:])]
-    return [max(gaps)[2]]

@@ -7,6 +7,8 @@ faces, dp/ds = 12 mu U/h^2 with D = 2 h. Fast flow is Dean's turbulent channel (
 of 0.073 Re_h^(-1/4) rho U^2/2 on either face with Re_h = |U| h/nu. They meet at Re_c, where the power makes one of the
 two, within 9 per cent of the larger; a real channel stays laminar up to 1.5 Re_c. Both are developed flows: on a short
 wide passage the boundary layers leave a core that loses nothing, and friction here is an upper bound.
+
+Equation (T.22) of docs/theory.md.
 """
 
 from __future__ import annotations
