@@ -260,11 +260,16 @@ class StoredRecord(Record):
             self.mesh = read_mesh(file) if "mesh" in file else None
             self.tables = {table.name: table for table in tables(self.mesh)}
             self._log = read_log(file)
+            self._absent = {name for name, table in self.tables.items() if table.later and name not in file["tables"]}
             for table in self.tables.values():
+                if table.name in self._absent:
+                    continue
                 missing = [c.name for c in table.columns if c.name not in file["tables"][table.name]]
                 if missing:
                     raise KeyError(f"{table.name}/{missing[0]}")
-            self._count = {name: read_rows(file["tables"][name]) for name in self.tables}
+            self._count = {
+                name: 0 if name in self._absent else read_rows(file["tables"][name]) for name in self.tables
+            }
             self.header = replace(read_header(file, case_model), complete=self.complete)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -289,6 +294,9 @@ class StoredRecord(Record):
 
     def _read(self, table: str, name: str, rows: slice | int) -> Any:
         column = next(c for c in self.tables[table].columns if c.name == name)
+        if table in self._absent:
+            spec = self.tables[table]
+            return np.empty((0, *spec.shape(column)), spec.dtype(column))[rows]
         with reading(self.path) as file:
             return read_column(file["tables"][table], column, rows)
 

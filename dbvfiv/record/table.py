@@ -30,12 +30,15 @@ class TableSpec:
         Shape of one row of the columns that are not scalars.
     chunk : int
         Rows of scalar columns that are stored together; those with a shape are stored row by row up to 64 kB.
+    later : bool
+        Files of earlier versions do not have it; they are read as if it had no rows.
     """
 
     name: str
     columns: tuple[Column, ...]
     shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
     chunk: int = 64
+    later: bool = False
 
     def create(self, parent: h5py.Group) -> None:
         """Make the empty columns in a file."""

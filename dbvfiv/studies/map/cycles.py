@@ -32,7 +32,7 @@ _COLUMNS = (
 )
 #: What is kept of each cell.
 CELLS = ("amplitude", "frequency", "growing")
-SPEC = TableSpec(ROWS, _COLUMNS, chunk=512)
+SPEC = TableSpec(ROWS, _COLUMNS, chunk=512, later=True)
 
 
 class CycleCells(NamedTuple):

@@ -329,3 +329,13 @@ def test_the_band_of_modes_is_that_of_the_map(coarse_case):
     result = run_map(coarse_case.replace(UNDAMPED | axes))
     assert result.grid("frequency")[0].max() <= 60.0
     assert any("up to 60 Hz" in sentence or "up to 59.94 Hz" in sentence for sentence in result.warnings)
+
+
+def test_a_file_of_an_earlier_version_has_no_cycles(coarse_case, tmp_path):
+    """It reads as one in which none were asked for."""
+    path = tmp_path / "map.h5"
+    axes = {"map.x": "pressure=2000:4000:2", "map.y": "density=1:1000:3:log", "map.curve": False, "map.checks": 0}
+    lines = Valve(coarse_case.replace(axes)).map(output=path).lines()
+    with h5py.File(path, "r+", libver="latest") as file:
+        del file["tables/cycles"]
+    assert load_result(path).lines() == lines
