@@ -138,14 +138,6 @@ def test_reference_mode(given):
     held("docs/modes.md", [part.replace("−", "-") for part in said.groups()], found)
 
 
-def test_modes_of_the_six_inch_valve(given):
-    table = table_of("your-own-valve.md", "static head | storage")
-    for row in table.rows[1:]:
-        said = given(made(table).replace('"2 m"', f'"{row[0]}"'))
-        for cell, modes in zip(row[1:], (said["modes"], said["other_law"]["modes"]), strict=True):
-            held(table.place, numbers(cell.replace("1/s", ""))[:2], leading_oscillation(modes))
-
-
 def test_classes_of_motion(given):
     table = table_of("modes.md", "inlet pressure")
     for row in table.rows[1:]:
