@@ -48,7 +48,7 @@ class SparseBlocks:
     def _combined(self) -> tuple[np.ndarray, list[sp.csr_matrix]]:
         """Weights (N, k) and k matrices that the N are sums of: those of their singular vectors that count."""
         sizes, vectors = np.linalg.eigh(self.values @ self.values.T)
-        kept = sizes > max(LEFT_OUT**2 * sizes[-1], 0.0)
+        kept = sizes >= LEFT_OUT**2 * sizes[-1] if LEFT_OUT else np.ones(len(sizes), bool)
         weights = np.ascontiguousarray(vectors[:, kept])
         return weights, [self._matrix(row) for row in weights.T @ self.values]
 

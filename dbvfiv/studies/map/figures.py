@@ -84,6 +84,7 @@ def cycle_amplitude(result: MapResult) -> Figure:
         rows, columns = np.nonzero(growing[law] > 0)
         axes.plot(x[columns], y[rows], ".", color="black", ms=3)
         _curves(axes, result, law)
+        label_regions(axes, result, law)
     colour_bar(figure, mesh, panels, "Amplitude of the limit cycle, one lip, mm", pad=0.015)
     _headline(figure, result)
     return figure
