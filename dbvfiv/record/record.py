@@ -267,9 +267,7 @@ class StoredRecord(Record):
                 missing = [c.name for c in table.columns if c.name not in file["tables"][table.name]]
                 if missing:
                     raise KeyError(f"{table.name}/{missing[0]}")
-            self._count = {
-                name: 0 if name in self._absent else read_rows(file["tables"][name]) for name in self.tables
-            }
+            self._count = {name: 0 if name in self._absent else read_rows(file["tables"][name]) for name in self.tables}
             self.header = replace(read_header(file, case_model), complete=self.complete)
 
     def __getstate__(self) -> dict[str, Any]:
