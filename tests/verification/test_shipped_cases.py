@@ -90,5 +90,5 @@ def test_closure_to_the_rated_back_pressure(name):
     last = max(found.states, key=lambda state: state.pressure)
     print(
         f"\n{name}: at {last.pressure / 1e3:g} kPa sealed {1e3 * last.lip_seal:.1f}+{1e3 * last.joint_seal:.1f} mm, "
-        f"{last.contact_force:.5g} N, {1e6 * last.least_opening:.3g} mm2 left, safety {found.safety.factor:.3g}"
+        f"{last.contact_force:.5g} N, {1e6 * last.least_opening:.3g} mm2 left\n{found.safety.sentence}"
     )
