@@ -48,8 +48,8 @@ def only_parsed(monkeypatch, capsys):
         )
 
     names = [module.name for module in pkgutil.iter_modules(cli.__path__)]
-    for name in names:
-        module = importlib.import_module(f"dbvfiv.cli.{name}")
+    modules = [importlib.import_module(f"dbvfiv.cli.{name}") for name in names]  # all of them before any is changed
+    for module in modules:
         if hasattr(module, "action"):
             monkeypatch.setattr(module, "action", action)
     commands = _run.build()
