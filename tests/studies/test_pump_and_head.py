@@ -62,7 +62,10 @@ def test_the_command_line_gives_the_operating_point(command_line, operating, tmp
     assert f"{operating.pressure / 1e3:.6g}" in out
 
 
-@pytest.mark.parametrize("waves", [{}, {"upstream.wave_speed": 1000.0, "mesh.along": 12, "mesh.around": 8}])
+@pytest.mark.parametrize(
+    "waves",
+    [{}, pytest.param({"upstream.wave_speed": 1000.0, "mesh.along": 12, "mesh.around": 8}, marks=pytest.mark.slow)],
+)
 def test_modes_see_the_slope_and_sweeps_keep_the_pressure(waves):
     point = load(waves, PUMP).steady().states[0].pressure
     fixed = load(waves, {"drive.pressure": point, "modes.count": 2}).modes()

@@ -168,7 +168,7 @@ FILLING: dict[str, tuple[str, ...]] = {
 }
 
 
-@pytest.mark.parametrize("kind", FILLING)
+@pytest.mark.parametrize("kind", [k if k == "steady" else pytest.param(k, marks=pytest.mark.slow) for k in FILLING])
 def test_a_full_disk(small_disk, one_sentence, kind):
     path = small_disk / "r.h5"
     mesh = ("--set", "mesh.around=6", "--set", "mesh.along=10", "--set", "drive.pressure=2 kPa")
@@ -192,7 +192,7 @@ FULL = {
 }
 
 
-@pytest.mark.parametrize("kind", FULL)
+@pytest.mark.parametrize("kind", [k if k == "map" else pytest.param(k, marks=pytest.mark.slow) for k in FULL])
 def test_no_room_for_what_was_found(small_disk, one_sentence, kind):
     (further, taken), path = FULL[kind], small_disk / "r.h5"
     with open(small_disk / "other", "wb") as other:
