@@ -183,6 +183,7 @@ def test_work_against_branches_is_that_of_their_forces(mixed_walls):
     assert off[-1] < 1e-3 and min(observed_order(off)) > 1.9
 
 
+@pytest.mark.slow
 def test_the_tangent_of_a_step_is_the_slope_of_its_force(mixed_walls):
     shell, old, new = mixed_walls
     wall = ShellMotion(shell).wall

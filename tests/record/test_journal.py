@@ -102,6 +102,7 @@ def test_going_on_keeps_rows_and_says_anew_what_failed(tmp_path):
     assert again.complete and not again.failures and list(again.column("states", "x")) == [0, 1]
 
 
+@pytest.mark.slow
 def test_killed_writers_leave_whole_rows(tmp_path):
     random = np.random.default_rng(1)
     for number in range(6):

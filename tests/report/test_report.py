@@ -80,6 +80,7 @@ def test_a_remark_is_made_once(made):
     assert warnings and len(warnings) == len(set(warnings))
 
 
+@pytest.mark.slow
 def test_a_second_report_computes_nothing(made, command_line):
     arguments, page = made
     folder = page.with_suffix("")

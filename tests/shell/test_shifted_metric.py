@@ -51,6 +51,7 @@ def turned_by_a_moment(shell: Shell) -> float:
     return float(np.einsum("nr,nr->n", slopes, nodal[end, 3:]).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moduli", [MODULI, MODULI[::-1]])
 def test_a_curved_bar_of_unlike_layers(moduli):
     s0, s1, s2 = integrals(moduli)

@@ -146,6 +146,7 @@ def count_of_random(rng, conditions_each: int) -> list[str]:
     return left_open
 
 
+@pytest.mark.slow
 def test_random_discharges():
     """None fails, and spectrum and independent count agree, or it is said."""
     rng = np.random.default_rng(23)
@@ -187,6 +188,7 @@ def test_onset_over_the_length_of_the_pipe():
         assert min(abs(mode.growth_rate) for mode in there) < 1e-4
 
 
+@pytest.mark.slow
 def test_sensitivity_to_the_length_of_the_pipe():
     (found,) = load(PIPE, KEYS).steady(pressure=2e3).sensitivity("tail_length").sensitivities
     low, high = (
@@ -196,6 +198,7 @@ def test_sensitivity_to_the_length_of_the_pipe():
     assert found.growth_rate == pytest.approx((high - low) / 0.04, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_modes_over_the_length_of_the_pipe_are_those_of_each_length():
     found = load(PIPE, KEYS).sweep("tail_length=1:50:5:log")
     assert found.certified
@@ -205,6 +208,7 @@ def test_modes_over_the_length_of_the_pipe_are_those_of_each_length():
         assert growth == pytest.approx(leading.growth_rate, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_map_over_the_length_of_the_pipe():
     found = load(PIPE, KEYS, {"map.x": "density=10:200:3:log", "map.y": "tail_length=1:20:3:log"}).map()
     assert not found.failures and found.grid("certified").all()

@@ -72,6 +72,7 @@ def test_verdicts_name_the_continuity_law(command_line):
     assert "continuity" not in command_line("modes", *options, "--in-vacuo").out
 
 
+@pytest.mark.slow
 def test_modes_over_the_length_are_those_of_each_length():
     found = load(LIGHT, LINE).sweep("pipe_length=1:50:5:log")
     assert found.certified
@@ -118,6 +119,7 @@ def test_map_over_the_length(tmp_path):
     assert growth[-1, -1] == pytest.approx(leading.growth_rate, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_sensitivity_to_the_length():
     for line in (LINE, FRICTION):
         (found,) = load(LIGHT, line).steady(pressure="6 kPa").sensitivity("pipe_length").sensitivities

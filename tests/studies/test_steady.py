@@ -179,6 +179,7 @@ def test_uniform_pressure():
     assert state.converged and state.mass_flow == 0.0 and state.lip_displacement > 0
 
 
+@pytest.mark.slow
 def test_a_state_without_a_finite_flow_is_an_error():
     """Lips 100 mm apart at rest open beyond the flange: before, a flow of inf was "converged"."""
     model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16, "valve.initial_gap": "100 mm"}))

@@ -23,6 +23,7 @@ def leading(*keys):
     return load(*keys).modes(count=4).modes[0].growth_rate
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("over", ["wave_speed=150:1200:3:log", "pipe_length=2:18:3:log", "density=2:50:3:log"])
 def test_modes_along_a_parameter_are_those_of_each_value(over):
     found = load({"sweep.checks": 2}).sweep(over, count=4)

@@ -208,6 +208,7 @@ def test_two_incommensurate_lines_are_no_cycle():
     assert judge(t, np.sin(W * t) + 0.5 * np.sin(1.6180339887 * W * t)).name == "irregular"
 
 
+@pytest.mark.slow
 def test_beats_seen_for_long_are_not_taken_for_growth_at_any_moment():
     t = np.linspace(0, 120, 60001)
     beat = np.sin(W * t) + 0.3 * np.sin(1.01 * W * t)

@@ -108,6 +108,7 @@ def _arch(elements: int = 24, radius=0.5, angle=0.5, wall=0.01) -> PressedShell:
     return PressedShell(Shell(mesh, isotropic_section(E, NU, wall), free), None, -1.0)
 
 
+@pytest.mark.slow
 def test_an_arch_snaps_at_a_limit_point_and_is_followed_beyond_it():
     model = _arch()
     lowest = []
@@ -137,6 +138,7 @@ def test_an_arch_snaps_at_a_limit_point_and_is_followed_beyond_it():
         assert back.pressure == pytest.approx(bottom.pressure, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_pressed_system_agree_with_differences():
     model = _arch(6)
     system = PressedSystem(model, 1e3)

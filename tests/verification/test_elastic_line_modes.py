@@ -39,6 +39,7 @@ def test_three_routes_behind_an_elastic_line(law, pressure, density, further):
     check_three_routes(three_routes(law, pressure, density, further=further), law)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law, speed", [(QUASI, 300.0), (STORAGE, 1000.0)])
 def test_balances_of_line_and_valve(law, speed):
     """What the reservoir gives is in the line, lost on the way or handed to the valve; that is the work of the flange's

@@ -101,6 +101,7 @@ def test_three_routes_behind_a_pipe(law, pressure, density, further):
     check_three_routes(three_routes(law, pressure, density, further=further), law)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [QUASI, STORAGE])
 def test_balances_of_line_and_valve(law):
     """What the reservoir gives is in the column, lost on the way or handed to the valve; what enters the valve leaves

@@ -91,6 +91,7 @@ def layup(angle: float | None) -> list[dict]:
     return layers
 
 
+@pytest.mark.slow
 def test_fibre_angle_orders_the_curves():
     """No fibre, 36, 45, 54 degrees: the larger the angle, the stiffer the lips (Th. Fig. 7-3)."""
     found = {angle: flows(layers=layup(angle)) for angle in (None, 36.0, 45.0, 54.0)}
@@ -100,6 +101,7 @@ def test_fibre_angle_orders_the_curves():
         assert np.all(found[looser] > found[stiffer])
 
 
+@pytest.mark.slow
 def test_strain_levels_order_the_curves():
     """10, 20, 40, 60 %: rubber softens with the strain that its constants were fitted to (Th. Figs. 3-6, 7-2)."""
     found = [flows(materials__strain_level=level) for level in ("10 %", "20 %", "40 %", "60 %")]

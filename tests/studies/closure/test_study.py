@@ -204,6 +204,7 @@ def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
     assert passage.area[-1] == pytest.approx(0.25 * np.pi * inner**2, rel=0.02)
 
 
+@pytest.mark.slow
 def test_energy_balances_to_1e_8_on_request_from_the_first_touch_on(case):
     """Work of the pressure, work of renewing multipliers, strain energy and contact potential, with load steps as they
     are.

@@ -221,6 +221,7 @@ def test_killed_run_resumes(case, whole, tmp_path):
     same(result, whole)
 
 
+@pytest.mark.slow
 def test_workers_find_the_same_digits_also_when_they_go_on(case, whole, tmp_path):
     path = tmp_path / "map.h5"
     first = _StopAfter(4)

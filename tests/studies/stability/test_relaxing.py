@@ -92,6 +92,7 @@ class _StopAfter(Observer):
             raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 def test_a_map_over_loss_factors_resumes_to_the_same_numbers(lossy_case, tmp_path):
     case = lossy_case.replace({"map.x": "pressure=2000:20000:3", "map.y": "loss_factor=0.3:3:4:log"})
     whole, path = Valve(case, "valve").map(), tmp_path / "map.h5"

@@ -137,6 +137,7 @@ def test_a_resume_that_dies_at_once_leaves_the_file_as_it_was(tmp_path, valve, m
     assert dbvfiv.resume(path).complete
 
 
+@pytest.mark.slow
 def test_restart_points_take_little_of_the_file(tmp_path, valve, monkeypatch):
     changes = {"transient.duration": 0.3, "transient.restart_every": 7, "transient.step": 5e-4}
     transient(valve(changes), output=tmp_path / "run.h5")
