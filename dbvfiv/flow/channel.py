@@ -23,7 +23,7 @@ from . import derivatives
 from .heads import outward_head, reversible_head
 from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
 from .reversed import ReversibleFluid
-from .term import VISCOSITY, FlowTerm, Stream
+from .term import VISCOSITY, FlowTerm, Stream, upstream_integral
 
 
 class Channel(FlowLaw):
@@ -147,7 +147,7 @@ class Channel(FlowLaw):
     def speeds(self, area, area_rate, velocity, storage):
         """Speeds (m,) at the stations; traceable."""
         open_, opening = jax.jvp(lambda a: above_floor(a, self.floor), (area,), (area_rate,))
-        discharge = open_[-1] * velocity - storage * _upstream(self.step, opening)
+        discharge = open_[-1] * velocity - storage * upstream_integral(self.step, opening)
         return discharge / open_
 
     def heads(self, area, area_rate, inner, parameters):
@@ -163,7 +163,7 @@ class Channel(FlowLaw):
         inlet, and what the terms add; traceable.
         """
         speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
-        psi = _upstream(self.step, speed)
+        psi = upstream_integral(self.step, speed)
         if self.terms:
             psi = psi + self.term_momenta(self.stream(area, area_rate, speed, inner), parameters)
         return psi
@@ -239,9 +239,3 @@ def _trial(count: int, size: float) -> Stream:
     area = np.linspace(2.0, 5.0, count)
     speed = size / area
     return Stream(area, size * np.linspace(0.1, 0.3, count), speed, speed[-1:], area)
-
-
-def _upstream(step, values):
-    """Trapezoidal integral of values (m,) from the inlet (last) to each station."""
-    pieces = 0.5 * step * (values[1:] + values[:-1])
-    return jnp.concatenate([jnp.cumsum(pieces[::-1])[::-1], jnp.zeros(1)])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, NamedTuple
 
+import jax.numpy as jnp
+
 from .law import FlowParameter, Traceable
 
 #: Name of the parameter that a viscous term has, Pa s.
@@ -70,3 +72,9 @@ class FlowTerm(Traceable):
     def momentum(self, stream: Stream, parameters):
         """Momentum per density and area of the fluid before each station, m2/s, that the term adds."""
         return 0.0
+
+
+def upstream_integral(step, values):
+    """Trapezoidal integral of values (m,) from the inlet (last) to each station, `step` (m-1,) apart; traceable."""
+    pieces = 0.5 * step * (values[1:] + values[:-1])
+    return jnp.concatenate([jnp.cumsum(pieces[::-1])[::-1], jnp.zeros(1)])

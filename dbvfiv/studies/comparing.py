@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from ..drawing.style import style
@@ -33,6 +34,16 @@ def labels(results: Sequence[StudyResult], quiet: Sequence[str] = ()) -> list[st
         if len(set(found)) == len(found):
             break
     return found
+
+
+def plain(values: np.ndarray) -> list[float | None]:
+    """Numbers for JSON; None where a run has nothing."""
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def cell(value: float, width: int, form: str) -> str:
+    """A number of a table for people; a dash where a run has nothing."""
+    return (f"{value:{form}}" if np.isfinite(value) else "-").rjust(width)
 
 
 def save_figure(draw: Callable[[], Figure], path: Path) -> Path:

@@ -13,10 +13,8 @@ Equation (T.22) of docs/theory.md.
 
 from __future__ import annotations
 
-import jax.numpy as jnp
-
 from ..law import FlowParameter
-from ..term import VISCOSITY, FlowTerm
+from ..term import VISCOSITY, FlowTerm, upstream_integral
 
 #: Darcy's factor times Re between parallel faces, and Dean's factor times Re^(1/4), by the hydraulic diameter.
 LAMINAR, TURBULENT = 96.0, 4 * 0.073 * 2**0.25
@@ -53,8 +51,7 @@ class GapFriction(FlowTerm):
     def head(self, stream, parameters):
         diameter = 4.0 * stream.open_area / stream.perimeter
         lost = self.gradient(stream.speed, diameter, parameters[VISCOSITY] / parameters["density"])
-        pieces = 0.5 * stream.step * (lost[1:] + lost[:-1])
-        return jnp.concatenate([jnp.cumsum(pieces[::-1])[::-1], jnp.zeros(1)])
+        return upstream_integral(stream.step, lost)
 
 
 def from_case(case) -> GapFriction | None:

@@ -71,8 +71,8 @@ class Comparison:
         """One entry for each pressure, SI; None where a run has nothing."""
         rows = []
         for k, pressure in enumerate(self.pressure):
-            found = {name: _plain(values[:, k]) for name, values in self.values.items()}
-            found |= {f"{name}_difference": _plain(self.difference(name)[:, k]) for name in self.values}
+            found = {name: comparing.plain(values[:, k]) for name, values in self.values.items()}
+            found |= {f"{name}_difference": comparing.plain(self.difference(name)[:, k]) for name in self.values}
             rows.append({"pressure": float(pressure)} | found)
         return rows
 
@@ -86,7 +86,8 @@ class Comparison:
             less = self.difference(name)
             for k, pressure in enumerate(self.pressure):
                 cells = "".join(
-                    _cell(factor * self.values[name][i, k]) + (_cell(factor * less[i, k], "+") if i else "")
+                    comparing.cell(factor * self.values[name][i, k], 12, ".5g")
+                    + (comparing.cell(factor * less[i, k], 12, "+.5g") if i else "")
                     for i in runs
                 )
                 lines.append(f"{pressure / 1e3:10.6g}{cells}")
@@ -95,14 +96,6 @@ class Comparison:
             buckles = "no buckling on its path" if critical is None else f"buckles at {critical / 1e3:.6g} kPa"
             lines.append(f"{i}: {buckles}{'' if factor is None else f', safety factor {factor:.3g}'}.")
         return lines + self.measured
-
-
-def _cell(value: float, sign: str = "") -> str:
-    return f"{value:{sign}12.5g}" if np.isfinite(value) else f"{'-':>12}"
-
-
-def _plain(values: np.ndarray) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
 
 
 def compare(results: Sequence[ClosureResult]) -> Comparison:

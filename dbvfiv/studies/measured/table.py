@@ -7,6 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
+from .. import comparing
+
 
 class Compared(Protocol):
     """Measured data of one kind beside computed ones: a title, and a number for each point."""
@@ -29,9 +31,8 @@ def told(runs: Sequence[Iterable[Compared]]) -> list[str]:
         names = list(dict.fromkeys(name for column in columns for name in column))
         width = max(len(name) for name in names) + 2
         lines += ["", title, " " * width + "".join(f"{number:>10}" for number in range(1, len(runs) + 1))]
-        lines += [f"{name:<{width}}" + "".join(_cell(column.get(name, np.nan)) for column in columns) for name in names]
+        lines += [
+            f"{name:<{width}}" + "".join(comparing.cell(column.get(name, np.nan), 10, ".4g") for column in columns)
+            for name in names
+        ]
     return lines
-
-
-def _cell(value: float) -> str:
-    return f"{value:10.4g}" if np.isfinite(value) else f"{'-':>10}"

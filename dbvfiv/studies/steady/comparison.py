@@ -58,7 +58,7 @@ class Comparison:
         """One entry for each pressure; None where a run has nothing."""
         rows = zip(self.pressure, self.mass_flow.T, self.volume_flow.T, self.difference.T)
         names = ("mass_flow", "volume_flow", "difference")
-        return [{"pressure": float(p)} | {n: _plain(v) for n, v in zip(names, values)} for p, *values in rows]
+        return [{"pressure": float(p)} | {n: comparing.plain(v) for n, v in zip(names, values)} for p, *values in rows]
 
     def lines(self) -> list[str]:
         """Table for people: flow of each run and what it differs by from the first."""
@@ -70,8 +70,7 @@ class Comparison:
             cells = ""
             for i in runs:
                 flow, off = 1e3 * self.volume_flow[i, k], 100 * self.difference[i, k]
-                cells += f"{flow:12.5g}" if np.isfinite(flow) else f"{'-':>12}"
-                cells += (f"{off:+9.3f}" if np.isfinite(off) else f"{'-':>9}") if i else ""
+                cells += comparing.cell(flow, 12, ".5g") + (comparing.cell(off, 9, "+.3f") if i else "")
             rows.append(f"{pressure / 1e3:10.6g}{cells}")
         return [*numbered, head, *rows, *([self.remark] if self.remark else []), *self.measured]
 
@@ -100,10 +99,6 @@ def compare(results: Sequence[SteadyResult]) -> Comparison:
 
 def _at(result: SteadyResult, pressure: np.ndarray, name: str) -> np.ndarray:
     return flow_at(result.states, pressure, result.case.rest_pressure, name)
-
-
-def _plain(values: np.ndarray) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
 
 
 def draw(results: Sequence[SteadyResult], names: Sequence[str] | None = None) -> Figure:

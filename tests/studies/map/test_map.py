@@ -29,23 +29,7 @@ from eigen import SingularShiftError
 from eigen.phase_count import PhaseCounts
 from tests.small_valves import FORMER
 
-AXES = {
-    "map.x": "pressure=1000:12000:6",
-    "map.y": "density=1:1000:10:log",
-    "map.curve": False,
-    "map.refine": 1,
-    "map.checks": 3,
-}
-
-
-@pytest.fixture(scope="module")
-def case(coarse_case):
-    return coarse_case.replace(AXES)
-
-
-@pytest.fixture(scope="module")
-def whole(case):
-    return run_map(case)
+from .axes import AXES
 
 
 def test_every_cell_is_certified_and_checks_agree(whole):

@@ -8,24 +8,6 @@ from dbvfiv.studies.map.curves import linked
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.stability.walk import StabilityWalk
 
-AXES = {
-    "map.x": "pressure=1000:12000:6",
-    "map.y": "density=1:1000:10:log",
-    "map.curve": False,
-    "map.refine": 1,
-    "map.checks": 3,
-}
-
-
-@pytest.fixture(scope="module")
-def case(coarse_case):
-    return coarse_case.replace(AXES)
-
-
-@pytest.fixture(scope="module")
-def whole(case):
-    return run_map(case)
-
 
 def test_linked_curves_go_through_all_onsets(whole):
     curves = linked(whole.plan, whole.columns)
