@@ -8,6 +8,8 @@ JOBS ?= 2
 setup:
 	@tools/setup
 
+# each program that JAX compiles runs a few times only: less is spent on making it fast
+test: export XLA_FLAGS ?= --xla_backend_optimization_level=0
 test: setup
 	@$(PYTHON) -m pytest -n $(JOBS) --dist loadscope -m "not slow"
 

@@ -140,7 +140,12 @@ def test_files_that_are_no_results(command_line, one_sentence, tmp_path, command
 
 
 @pytest.mark.parametrize(
-    "kill, status", [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -signal.SIGKILL)]
+    "kill, status",
+    [
+        (signal.SIGINT, 130),
+        pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow),
+        pytest.param(signal.SIGKILL, -signal.SIGKILL, marks=pytest.mark.slow),
+    ],
 )
 def test_stopped_from_outside(tmp_path, one_sentence, kill, status):
     path = tmp_path / "r.h5"

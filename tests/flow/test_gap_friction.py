@@ -135,6 +135,7 @@ def test_viscosities(given, value):
 COARSE = {"mesh.around": 8, "mesh.along": 14}
 
 
+@pytest.mark.slow
 def test_wide_openings_lose_little_and_gaps_nearly_all():
     """Friction takes a hundredth of the flow at 18 kPa, and most of it at 100 Pa, through gaps of some hundredths of a
     millimetre; a vanishing viscosity takes nothing.

@@ -54,6 +54,7 @@ def test_moduli_are_the_derivatives_of_the_energy(law):
             assert moduli[2 + k, 2 + k] == pytest.approx((tau[i] - tau[j]) / (ln[i] - ln[j]), abs=1e-11 * scale)
 
 
+@pytest.mark.slow
 def test_rotating_axes_are_covered():
     """d2W/ds2 along F = exp(s D) F0, D a unit shear between two principal axes.
 

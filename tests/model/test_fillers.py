@@ -26,6 +26,7 @@ def random_state(model: ValveModel) -> np.ndarray:
     return 2e-4 * np.random.default_rng(3).standard_normal(model.size)
 
 
+@pytest.mark.slow
 def test_a_filler_everywhere_is_a_layer():
     """Zones change nothing where each has all layers: forces, tangents, mass and their higher derivatives."""
     whole = model_of(RUBBER, PLY, RUBBER)

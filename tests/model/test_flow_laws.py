@@ -38,7 +38,9 @@ def with_law(make_model, name: str):
     return model
 
 
-@pytest.fixture(scope="module", params=LAWS)
+@pytest.fixture(
+    scope="module", params=[law if law == "terms" else pytest.param(law, marks=pytest.mark.slow) for law in LAWS]
+)
 def settled(request, make_model):
     """Model and equilibrium, as exact as rounding allows."""
     model = with_law(make_model, request.param)

@@ -66,7 +66,9 @@ def steps_of(motion, state, pressure, count: int, h: float, rule=scheme("general
 
 @pytest.mark.parametrize("rule", [("generalised-alpha", 0.0), ("generalised-alpha", 0.2), ("hht", 0.1)], ids=str)
 @pytest.mark.parametrize("beta", [0.0, 5e-4])
-@pytest.mark.parametrize("series", [ONE, THREE], ids=["one branch", "three branches"])
+@pytest.mark.parametrize(
+    "series", [pytest.param(ONE, marks=pytest.mark.slow), THREE], ids=["one branch", "three branches"]
+)
 def test_free_decay(series, beta, rule):
     bar, size, end = Bar(series, beta=beta), 1e-7, 8e-3
     exact = expm(end * first_order(bar, series, beta)) @ np.concatenate([[1.0], np.zeros(1 + len(series.times))])

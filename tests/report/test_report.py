@@ -97,6 +97,7 @@ def test_a_second_report_computes_nothing(made, command_line):
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_run_that_gives_nothing_is_said_and_the_rest_is_there(command_line, one_sentence, tmp_path):
     page = tmp_path / "page.html"
     without = [word for name in ("modes", "classes", "map", "closure") for word in ("--without", name)]

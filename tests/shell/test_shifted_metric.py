@@ -78,6 +78,7 @@ def test_a_ring_that_swells():
     assert abs(energies["first-order"] / wanted - 1.0) > 0.03
 
 
+@pytest.mark.slow
 def test_one_material_changes_little():
     """To second order in thickness over radius both treatments are one."""
     differences = []
@@ -101,6 +102,7 @@ def test_rigid_motions_and_derivatives(cylinder_mesh, one_layer):
     assert np.linalg.norm(shell.dofs.matrix(data) @ v - slope) < 1e-6 * np.linalg.norm(slope)
 
 
+@pytest.mark.slow
 def test_a_wall_that_folds_stays_sound():
     """Where the true metric is refused lengths stay positive, and so does the stiffness."""
     shell = bar("shifted", 12, height=0.25)

@@ -91,6 +91,7 @@ def test_a_valve_at_the_pressure_it_sees_is_that_of_a_free_discharge():
     assert free.mass_flow == pytest.approx(state.mass_flow, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_onset_with_a_pipe_behind_is_where_modes_cross():
     valve = load(LIGHT, PIPE, {"onset.coarse_mesh": 0, "onset.normal_form": False})
     (point,) = valve.onset("density=10:300:3:log", pressure="6 kPa").points
@@ -99,7 +100,9 @@ def test_onset_with_a_pipe_behind_is_where_modes_cross():
     assert min(abs(mode.growth_rate) for mode in modes) < 1e-4
 
 
-@pytest.mark.parametrize("law, pressure, density", [(QUASI, 2e3, 10.0), (STORAGE, 6e3, 1.2)])
+@pytest.mark.parametrize(
+    "law, pressure, density", [pytest.param(QUASI, 2e3, 10.0, marks=pytest.mark.slow), (STORAGE, 6e3, 1.2)]
+)
 def test_three_routes_with_a_pipe_behind(law, pressure, density):
     """Eigenvalue, its reduction and a small kick in time."""
     check_three_routes(three_routes(law, pressure, density, further=PIPE), law)

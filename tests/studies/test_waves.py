@@ -33,6 +33,7 @@ def test_modes_along_a_parameter_are_those_of_each_value(over):
     assert growth == pytest.approx(leading({name[over.split("=")[0]]: float(found.values[1])}), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_maps_keep_the_wave_speed_over_the_density():
     """In every cell the compressibility is that of its own density."""
     found = load({"map.x": "pressure=3 kPa:6 kPa:2", "map.y": "density=2:50:4:log"}).map()

@@ -28,7 +28,7 @@ def ask():
 
 
 #: Kinds of which many moments are tried only with the slow tests; each kind's file is written by the same code.
-DEAR = ("sweep", "sensitivity", "levels", "closure", "modes", "cycle")
+DEAR = ("steady", "sweep", "sensitivity", "levels", "closure", "modes", "cycle")
 
 
 @pytest.mark.parametrize("kind", [pytest.param(k, marks=pytest.mark.slow) if k in DEAR else k for k in KINDS])

@@ -19,6 +19,7 @@ COARSE = ("--set", "mesh.around=4", "--set", "mesh.along=6", "--set", "fluid.den
 LONG = ("steady", *COARSE, "-p", "1 kPa:30 kPa:4000")
 
 
+@pytest.mark.slow
 def test_a_second_writer_is_refused_before_anything_is_computed(tmp_path, monkeypatch, command_line, one_sentence):
     path = tmp_path / "same.h5"
     first = start(*LONG, "-o", path)
@@ -69,6 +70,7 @@ def test_a_file_that_only_holds_the_name_of_a_run(tmp_path, command_line):
     assert dbvfiv.load_result(path).complete
 
 
+@pytest.mark.slow
 def test_sigterm_twice_and_in_time(tmp_path):
     """As `timeout` and job systems send it; the file says that it is not complete and what there is."""
     path = tmp_path / "t.h5"
@@ -88,7 +90,7 @@ def test_sigterm_twice_and_in_time(tmp_path):
 @pytest.mark.parametrize(
     "number, status",
     [
-        (signal.SIGTERM, 143),
+        pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow),
         pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow),
         pytest.param(signal.SIGKILL, -9, marks=pytest.mark.slow),
     ],

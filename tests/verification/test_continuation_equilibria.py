@@ -50,6 +50,7 @@ def test_brusselator_hopf_curve():
         assert np.isclose(curve.values("l1")[-1], l1, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_brusselator_in_one_dimension():
     """l_k = 0.513020 k, omega = 2.139509 (A = 2, B = 5.45, D = 0.008, 0.004)."""
     lengths = {}

@@ -29,7 +29,7 @@ WAVES = LINE | {"upstream.wave_speed": 300.0}
 @pytest.mark.parametrize(
     "law, pressure, density, further",
     [
-        (QUASI, 2e3, 10.0, WAVES),
+        pytest.param(QUASI, 2e3, 10.0, WAVES, marks=pytest.mark.slow),
         pytest.param(
             STORAGE, 6e3, 100.0, WAVES | {"upstream.wave_speed": 400.0, "drive.at": "line"}, marks=pytest.mark.slow
         ),

@@ -45,6 +45,7 @@ def look_at(number: int, seed: int) -> list[str]:
     return missed
 
 
+@pytest.mark.slow
 def test_counts_of_some_agree():
     assert not look_at(6, 21)
 

@@ -128,7 +128,7 @@ def against_all_that_relaxes(result: Examined) -> None:
     assert result.certified.unstable_count_independent == np.where(there.imag > 0, 2, 1).sum(), str(result.state)
 
 
-@pytest.mark.parametrize("number", [60, pytest.param(300, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [30, pytest.param(300, marks=pytest.mark.slow)])
 def test_random_states(number):
     judge(examined(8, 14, number, seed=0, pressures=20 if number > 60 else 5), exact_every=50)
 

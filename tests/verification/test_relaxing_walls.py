@@ -130,6 +130,7 @@ def test_a_sandwich_with_thin_skins_is_that_of_ross_kerwin_and_ungar():
     compare(sandwich(skin, thin, core, 1e-9), determinant, 3, 0.02)
 
 
+@pytest.mark.slow
 def test_a_sandwich_with_thick_skins_is_the_beam_with_one_rotation_for_all_layers():
     """Where skins are thick the shell cannot slide them; the reference is the independent solution of the same theory:
     a Timoshenko beam with complex section constants.

@@ -104,7 +104,9 @@ def oscillator_start(motion, q: float, v: float):
     return consistent_state(motion, 0.0, np.array([q]), np.array([v]), 0.0, 0.0)
 
 
-@pytest.mark.parametrize("mu, period, amplitude", [(0.5, 6.380676, 2.002488), (1.0, 6.663287, 2.008620)])
+@pytest.mark.parametrize(
+    "mu, period, amplitude", [(0.5, 6.380676, 2.002488), pytest.param(1.0, 6.663287, 2.008620, marks=pytest.mark.slow)]
+)
 def test_van_der_pol(mu, period, amplitude):
     """x'' - mu (1 - x^2) x' + x = 0: period and amplitude of its cycle (reference numbers), by two steps."""
     motion = PointMotion(lambda q: q, np.ones_like, lambda q: -mu * (1 - q**2), lambda q: 2 * mu * q)

@@ -73,6 +73,7 @@ def test_both_laws_and_pairs_without_the_load(coarse_case):
     assert result.grid("certified").all() and all(check.agrees for check in result.checks)
 
 
+@pytest.mark.slow
 def test_two_structural_axes(coarse_case):
     result = run_map(
         coarse_case.replace(
@@ -216,6 +217,7 @@ def test_workers_find_the_same_digits_also_when_they_go_on(case, whole, tmp_path
     same(result, whole)
 
 
+@pytest.mark.slow
 def test_a_map_interrupted_in_its_curves_ends_with_the_same_curves(coarse_case, tmp_path):
     """Columns that a round of the curves had found do not change what that round asks for."""
     axes = {"map.x": "pressure=500:30000:4", "map.y": "density=1:1000:10:log", "map.checks": 1}

@@ -69,6 +69,7 @@ class _Stopper(Observer):
             raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 def test_interrupted_and_resumed(found, tmp_path):
     part = session_of(cycle__exponents=0).perform("map", tmp_path / "part.h5", _Stopper())
     assert part.interrupted and np.isnan(part.cycle_grid("amplitude")[0, :, 1]).all()

@@ -109,6 +109,7 @@ def test_a_band_that_is_asked_for_is_kept(coarse_case):
     assert np.nanmax(result.frequencies) <= 60.0
 
 
+@pytest.mark.slow
 def test_each_onset_over_alpha_is_listed_once_and_shown_by_its_sides(coarse_case):
     options = OnsetOptions("alpha", tuple(np.linspace(0, 100, 6)), normal_form=False, coarse_mesh=0)
     case = coarse_case.replace({"damping.beta": 0, "fluid.density": 4, "mesh.along": 14})

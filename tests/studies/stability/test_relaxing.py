@@ -15,7 +15,7 @@ from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import certified_spectrum
 from tests.small_valves import FORMER
 
-LAWS = pytest.mark.parametrize("continuity", ["quasi-steady", "storage"])
+LAWS = pytest.mark.parametrize("continuity", [pytest.param("quasi-steady", marks=pytest.mark.slow), "storage"])
 
 
 @pytest.fixture(scope="module")

@@ -92,7 +92,7 @@ def test_storage_law_lets_the_wall_displace_fluid(valve):
     assert stored[-1] - stored[0] == pytest.approx(gained, rel=0.01)
 
 
-@pytest.mark.parametrize("kpa", [18, 36])
+@pytest.mark.parametrize("kpa", [18, pytest.param(36, marks=pytest.mark.slow)])
 def test_storage_law_draws_water_in_through_shut_lips_and_opens(valve, kpa):
     """The saddle grows while the lips are shut; the valve opens all the same and rests where load steps lead."""
     run = run_transient(valve({"fluid.continuity": "storage", "drive.pressure": 1e3 * kpa, "transient.duration": 0.5}))
