@@ -15,7 +15,7 @@ test: setup
 
 verify: setup
 	@$(PYTHON) -m pytest -s tests/verification
-	@DBVFIV_FINE=1 $(PYTHON) -m pytest -s -m slow tests/verification/test_shipped_cases.py
+	@DBVFIV_FINE=1 $(PYTHON) -m pytest -s -m slow tests/verification/test_shipped_cases.py tests/verification/test_cycles_in_time.py
 	@$(PYTHON) -m pytest -m slow --ignore=tests/verification
 
 # flow and wall in three dimensions, end to end; installs Debian's OpenFOAM where there is none

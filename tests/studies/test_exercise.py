@@ -26,7 +26,7 @@ def test_a_study_is_a_folder_and_a_word(tmp_path):
     for name, code in blocks:
         (room / name).write_text(code)
     kinds = tmp_path / "dbvfiv/studies/__init__.py"
-    kinds.write_text(kinds.read_text().replace('"steady", ', '"steady", "compliance", ', 1))
+    kinds.write_text(kinds.read_text().replace('"steady",', '"steady", "compliance",', 1))
 
     def call(*arguments):
         done = subprocess.run(

@@ -87,6 +87,7 @@ def test_closure_to_the_rated_back_pressure(name):
     rated = valve.case.closure.rated_pressure or max(valve.case.closure.pressures)
     assert max(state.pressure for state in found.states) >= rated
     assert all(state.closed for state in found.states) and not found.failures
+    assert found.safety.factor >= 1.0
     last = max(found.states, key=lambda state: state.pressure)
     print(
         f"\n{name}: at {last.pressure / 1e3:g} kPa sealed {1e3 * last.lip_seal:.1f}+{1e3 * last.joint_seal:.1f} mm, "
