@@ -17,6 +17,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.resuming import resume
 from dbvfiv.studies.session import load_result
+from tests.small_valves import FORMER
 
 COARSE = {
     "mesh.around": 6,
@@ -135,7 +136,9 @@ def test_supports_to_compare_with_and_the_turn_in_time_are_taken_up_too(tmp_path
 @pytest.mark.slow
 def test_a_walk_that_is_stopped_beyond_a_limit_meets_it_again(tmp_path):
     path = tmp_path / "run.h5"
-    thin = {"mesh.around": 8, "mesh.along": 14, "valve.thickness_factor": 0.4, "closure.max_step": "0.5 kPa"}
+    thin = {"mesh.around": 8, "mesh.along": 14, "valve.thickness_factor": 0.4, "closure.max_step": "0.5 kPa"} | dict(
+        FORMER
+    )
     complete = load(None, thin).closure([3e3, 8e3])
     first = load(None, thin).closure([3e3, 8e3], output=path, observer=StopAt("arclength point", 4))
     assert not first.complete and len(first.states) == 1

@@ -11,6 +11,7 @@ import dbvfiv
 from dbvfiv.studies.case import Case
 from dbvfiv.studies.closure.safety import find_safety
 from dbvfiv.studies.session import load_result
+from tests.small_valves import FORMER
 
 
 def result(pressures, sealed, overlap=None, buckling=(), supports="contact", failure=None, **changes):
@@ -72,7 +73,7 @@ THIN = {
     "valve.thickness_factor": 0.4,
     "closure.max_step": "0.5 kPa",
     "closure.rated_pressure": "2.5 kPa",
-}
+} | dict(FORMER)  # on graded rows this coarse the wall goes to 8 kPa without a limit
 
 
 @pytest.mark.slow
