@@ -7,6 +7,7 @@ how its eigenvalue is read off the lip.
 from __future__ import annotations
 
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.transient.run import Runner
+from tests.small_valves import FORMER
 
 from .test_transient_modes import PUSH, QUASI, STORAGE, errors, ringing
 
@@ -24,10 +26,10 @@ STATES = [(QUASI, 6e3, 50.0), (QUASI, 12e3, 1000.0), (STORAGE, 6e3, 10.0), (STOR
 
 
 def two_routes(
-    law: str, pressure: float, density: float, mesh=(6, 8), steps=(50, 100)
+    law: str, pressure: float, density: float, mesh=(6, 8), steps=(50, 100), further=MappingProxyType({})
 ) -> tuple[complex, list[complex]]:
     """Eigenvalue of the leading oscillating mode, and from its ringing by steps per period."""
-    changes = {
+    changes = dict(further) | {
         "mesh.around": mesh[0],
         "mesh.along": mesh[1],
         "fluid.continuity": law,
@@ -69,7 +71,8 @@ def test_a_small_push_grows_at_the_eigenvalues_rate(law, pressure, density):
     assert off[1] < 0.3 * off[0]
 
 
-#: Continuity law, pressure (Pa), bracket of densities (kg/m3) around the onset at which stability is lost or regained.
+#: Continuity law, pressure (Pa), bracket of densities (kg/m3) around the onset at which stability is lost or regained;
+#: on even rows.
 ONSETS = [
     (QUASI, 6e3, (800.0, 1200.0)),
     (QUASI, 12e3, (1.2, 2.6)),
@@ -84,7 +87,7 @@ def test_the_onset_lies_where_the_sign_changes_in_time(law, pressure, bracket):
     """A little below and above the onset a push decays on one side and grows on the other, at rates that vanish where
     the eigenvalue's does.
     """
-    changes = {
+    changes = dict(FORMER) | {
         "mesh.around": 6,
         "mesh.along": 8,
         "fluid.continuity": law,
@@ -98,7 +101,7 @@ def test_the_onset_lies_where_the_sign_changes_in_time(law, pressure, bracket):
     onset, limits = found[0]["value"], []
     densities = onset * np.array([0.98, 1.02])
     for density in densities:
-        value, rings = two_routes(law, pressure, float(density))
+        value, rings = two_routes(law, pressure, float(density), further=FORMER)
         assert abs(value.imag) / (2 * np.pi) == pytest.approx(found[0]["frequency"], rel=0.02)
         limits.append((rings[1] + (rings[1] - rings[0]) / 3.0).real)
     crossing = densities[0] - limits[0] * (densities[1] - densities[0]) / (limits[1] - limits[0])
