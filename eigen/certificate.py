@@ -11,6 +11,7 @@ from .agreement import Certificate
 from .condensation import Workspace, condensed_matrix
 from .distant import distant_pairs, joined
 from .factorization import StructureMatrices, SuperluFactorization
+from .negative_stiffness import negative_motions
 from .options import SearchOptions
 from .pencil import CoupledPencil, real_apply
 from .response import Determinant
@@ -21,6 +22,8 @@ from .winding import Count, unstable_count
 
 #: Largest accepted error of log det of the reduced basis behind a count.
 TRUSTED = 0.1
+#: Points of a count over all frequencies where one up to the end of a band can stand in for it.
+POINTS_BEYOND = 1000
 #: Finer bases tried at most where the first one leaves a count open.
 FINER = 3
 #: Size below which directions of exact responses are left out of a finer basis, relative to the largest.
@@ -119,7 +122,7 @@ def certified_spectrum(
     workspace = workspace or Workspace()
     spectrum = leading_modes(pencil, count, options, workspace=workspace)
     if pencil.n > Determinant.dense_below:
-        basis = basis or TransferBasis(pencil)
+        basis = _with_own(basis or TransferBasis(pencil), pencil)
     else:
         basis = None
     asked = pencil, options, workspace, exact, check_points
@@ -136,6 +139,12 @@ def certified_spectrum(
             break
         found, basis = _judged(*asked, found.spectrum, basis, finer)
     return found
+
+
+def _with_own(basis: TransferBasis, pencil: CoupledPencil) -> TransferBasis:
+    """The basis, and what of the structure may run away by itself and is foreign to low modes."""
+    motions = negative_motions(pencil)
+    return basis.enlarged(motions) if motions.shape[1] else basis
 
 
 def _finer(pencil, basis, found, finer, number) -> TransferBasis:
@@ -161,7 +170,9 @@ def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, fi
             model = reduced
 
     def counted(band=None):
-        return unstable_count(model, scale=scale, hints=[*hints, *spectrum.eigenvalues], band=band)
+        # a structure that loses stability by itself has very many modes beyond a band that hardly decay
+        most = POINTS_BEYOND if band is None and np.isfinite(spectrum.band) and model is not pencil else None
+        return unstable_count(model, scale=scale, hints=[*hints, *spectrum.eigenvalues], band=band, max_points=most)
 
     winding = counted(within)
     if (
@@ -172,13 +183,15 @@ def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, fi
     ):
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
-    asked = None if options is None else options.max_frequency
-    if model is not pencil and asked is None and winding.number > listed_unstable(spectrum, winding):
-        distant = distant_pairs(pencil, spectrum, model, basis, winding.line, options or SearchOptions())
+    if (model is not pencil or basis is None) and winding.number > listed_unstable(spectrum, winding):
+        space = basis or _with_own(TransferBasis(pencil), pencil)  # a small pencil is counted as it is
+        reduced = space.reduced(pencil)
+        distant = distant_pairs(pencil, spectrum, reduced, space, winding.line, options or SearchOptions())
         if distant is not None:
             spectrum = joined(spectrum, distant, winding.line)
-            basis = basis.enlarged(distant.q)
-            model = basis.reduced(pencil)
+            if basis is not None:
+                basis = basis.enlarged(distant.q)
+                model = basis.reduced(pencil)
             winding = counted()
     if winding.number != listed_unstable(spectrum, winding) and np.isfinite(spectrum.band):
         # the spectrum, and the basis, speak for a band only; count in the same

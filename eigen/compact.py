@@ -33,6 +33,8 @@ FIRST, EVERY = 30, 10
 CONVERGED = 1e-10
 #: Share of |theta| below which an imaginary part is rounding.
 REAL = 1e-9
+#: Distance over the shift beyond which a search does not wait for what lies right of the creep.
+FAR = 10.0
 
 
 class _Operator:
@@ -238,7 +240,7 @@ def oscillating_pairs(
 
 
 def _settled(shift, theta, error, edge, band, tolerance):
-    """Which pairs have converged, the reach, and whether all that lie right of the creep are among them."""
+    """Which pairs have converged, the reach, and whether all right of the creep, if not far off, are among them."""
     size = np.abs(theta)
     good = (error <= tolerance) & (size > 1e-12 * size.max(initial=0.0))
     if isinstance(shift, complex):
@@ -253,7 +255,8 @@ def _settled(shift, theta, error, edge, band, tolerance):
     oscillating = good & (height > bound)
     chosen = np.flatnonzero(oscillating | (good & right))
     lowest = height[oscillating].min(initial=np.inf)
-    settled = bool((good | ~right | (np.abs(values.imag) > band)).all())
+    waited = right & (np.abs(values.imag) <= band) & (size * FAR * shift >= 1.0)
+    settled = bool((good | ~waited).all())
     return chosen, 0.5 / lowest if np.isfinite(lowest) else 0.0, settled
 
 

@@ -1,4 +1,6 @@
-"""Unstable pairs beyond the band of a search, where an independent count says that there are some."""
+"""Unstable pairs that a search has passed by, where an independent count says that there are some: beyond its band, or
+on the real axis far from its shifts.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +17,12 @@ from .residual import acceptable, newton
 from .spectrum import Spectrum
 from .transfer import TransferBasis
 
-#: Pairs looked for at most.
-MOST = 4
+#: Pairs beyond the band that are looked for at most, and real ones.
+MOST, MOST_REAL = 4, 60
 #: Relative distance that a pair may move from the reduced pencil to the full one.
 MOVED = 0.05
+#: Newton steps: motions of single elements are known roughly.
+STEPS = 8
 
 
 def distant_pairs(
@@ -29,7 +33,8 @@ def distant_pairs(
     line: float,
     options: SearchOptions,
 ) -> Found | None:
-    """Unstable pairs of the full pencil near those that the reduced pencil has beyond the band of a spectrum.
+    """Unstable pairs of the full pencil near those that the reduced pencil has beyond the band of a spectrum, if that
+    was not asked for, and on the real axis, which every band holds.
 
     Each is brought to the full pencil by Newton steps and has to pass the residual test like any other; the fastest
     growing ones are tried.
@@ -42,15 +47,20 @@ def distant_pairs(
     Returns
     -------
     Found or None
-        None if there is no band, left vectors are wanted as well, or none was found.
+        None if left vectors are wanted as well, or none was found.
     """
-    if not np.isfinite(spectrum.band) or spectrum.left_q is not None:
+    if spectrum.left_q is not None:
         return None
     values, q, u, _, _ = all_pairs(reduced, left=False)
-    beyond = np.flatnonzero((values.real > line) & (values.imag > 2 * np.pi * spectrum.band))
+    unstable = np.flatnonzero(values.real > line)
+    unstable = unstable[np.argsort(-values.real[unstable])]
+    chosen = list(unstable[values.imag[unstable] == 0][:MOST_REAL])
+    if options.max_frequency is None:
+        chosen += list(unstable[values.imag[unstable] > 2 * np.pi * spectrum.band][:MOST])
     workspace, pairs = Workspace(), []
-    for i in beyond[np.argsort(-values.real[beyond])][:MOST]:
-        pair = newton(pencil, values[i], basis.lift(q[:, i]), u[:, i], workspace=workspace, tolerance=options.tolerance)
+    for i in chosen:
+        start = values[i], basis.lift(q[:, i]), u[:, i]
+        pair = newton(pencil, *start, workspace=workspace, tolerance=options.tolerance, steps=STEPS)
         value, _, _, residual, backward = pair
         near = abs(value - values[i]) <= MOVED * abs(values[i])
         known = [abs(value - x) <= SAME * abs(x) for x in (*spectrum.eigenvalues, *(other[0] for other in pairs))]
@@ -74,14 +84,23 @@ def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
     parts = {name: np.concatenate([getattr(spectrum, name), part], axis=-1) for name, part in new.items()}
     order = np.lexsort((parts["eigenvalues"].imag, -parts["eigenvalues"].real))
     order = order[: max(spectrum.asked, int(np.sum(parts["eigenvalues"].real > line)))]
-    frequencies = ", ".join(f"{value.imag / (2 * np.pi):.4g}" for value in found.values)
-    note = (
-        f"Unstable modes at {frequencies} Hz lie beyond the band up to {spectrum.band:.4g} Hz in which the list is "
-        f"complete; the independent count pointed to them."
-    )
+    real = found.values.imag == 0
+    notes = []
+    if real.any():
+        rates = ", ".join(f"{value.real:.4g}" for value in found.values[real])
+        notes.append(
+            f"Motions that grow by {rates} 1/s without oscillating lie far from where modes are searched for; the "
+            f"independent count pointed to them."
+        )
+    if not real.all():
+        frequencies = ", ".join(f"{value.imag / (2 * np.pi):.4g}" for value in found.values[~real])
+        notes.append(
+            f"Unstable modes at {frequencies} Hz lie beyond the band up to {spectrum.band:.4g} Hz in which the list is "
+            f"complete; the independent count pointed to them."
+        )
     return replace(
         spectrum,
         **{name: part[..., order] for name, part in parts.items()},
         refined=spectrum.refined + found.values.size,
-        notes=(*spectrum.notes, note),
+        notes=(*spectrum.notes, *notes),
     )

@@ -308,24 +308,52 @@ def superlu(matrix: sp.csc_matrix) -> ScaledLU:
     return ScaledLU(sp.csc_matrix(matrix))
 
 
+class SymmetricLU:
+    """SuperLU of a symmetric matrix with pivots from the diagonal only: their signs are its inertia (Sylvester).
+
+    Raises
+    ------
+    SingularShiftError
+        If a pivot is zero, or had to be taken from elsewhere.
+    """
+
+    def __init__(self, matrix: sp.spmatrix):
+        matrix = sp.csc_matrix(matrix)
+        size = np.abs(matrix.diagonal())
+        self._scale = 1.0 / np.sqrt(np.where(size > 0, size, 1.0))
+        scale = sp.diags(self._scale)
+        try:
+            self._lu = spla.splu(
+                (scale @ matrix @ scale).tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise SingularShiftError(f"SuperLU could not factor the matrix ({error}).") from error
+        if not np.array_equal(self._lu.perm_r, self._lu.perm_c):
+            raise SingularShiftError("A pivot of the symmetric matrix is zero.")
+        #: Pivots of the matrix scaled to a diagonal of ones.
+        self.pivots = self._lu.U.diagonal()
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues."""
+        return int(np.sum(self.pivots < 0))
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solution for one right-hand side, shape (n,)."""
+        return self._scale * self._lu.solve(self._scale * b)
+
+
 def is_positive_definite(matrix: sp.spmatrix) -> bool:
     """Whether a symmetric sparse matrix is positive definite, by its pivots."""
-    matrix = sp.csc_matrix(matrix)
-    diagonal = matrix.diagonal()
-    if (diagonal <= 0).any():
+    if (matrix.diagonal() <= 0).any():
         return False
-    scale = sp.diags(1 / np.sqrt(diagonal))
     try:
-        lu = spla.splu(
-            (scale @ matrix @ scale).tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:
+        return bool((SymmetricLU(matrix).pivots > 1e-13).all())
+    except SingularShiftError:
         return False
-    # with pivots from the diagonal only, their signs are the inertia (Sylvester)
-    return bool(np.array_equal(lu.perm_r, lu.perm_c) and (lu.U.diagonal() > 1e-13).all())
 
 
 def petsc_is_complex() -> bool:

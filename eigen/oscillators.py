@@ -34,12 +34,13 @@ class Oscillators(NamedTuple):
         fast = np.tensordot(relaxation.strengths.sum(axis=1), relaxing, 1)
         squares, X = la.eigh(K + fast, M)
         damping, slow = (np.einsum("ik,ij,jk->k", X, part, X, optimize=True) for part in (C, K))
-        return cls(squares, damping, slow, np.einsum("ik,gij,jk->gk", X, relaxing, X, optimize=True))
+        relaxing = np.einsum("ik,gij,jk->gk", X, relaxing, X, optimize=True)
+        return cls(squares, damping, slow, np.maximum(relaxing, 0.0))  # but for rounding they are
 
-    def values(self, relaxation: Relaxation, omega: np.ndarray) -> np.ndarray:
-        """The left sides at s = i omega, (len(omega), k)."""
-        w = np.asarray(omega, float)[:, None]
-        return self.slow - w**2 + 1j * w * self.damping + relaxation.factors(1j * w[:, 0]).T @ self.relaxing
+    def values(self, relaxation: Relaxation, places: np.ndarray) -> np.ndarray:
+        """The left sides at places s, (len(places), k)."""
+        s = np.asarray(places, complex)[:, None]
+        return self.slow + s * (s + self.damping) + relaxation.factors(s[:, 0]).T @ self.relaxing
 
     def zeros(self, relaxation: Relaxation, steps: int = 12) -> np.ndarray:
         """Estimates of the oscillating zeros."""

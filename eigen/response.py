@@ -2,10 +2,11 @@
 
 det T(s) / det D_ref(s) with D_ref = s^2 M + s C_ref + K_ref, where M, C_ref, K_ref are
 symmetric and positive definite, so that D_ref has no zero on or right of the line (Kelvin,
-Tait, Chetaev). What relaxes of the stiffness is part of D_ref, with a multiple of M added where its
-matrices are not symmetric and not negative: springs and dashpots take energy out, and their poles
-lie left of the line. The ratio has no pole there and tends to a known power of s at infinity; its
-zeros right of the line are the eigenvalues counted, the structure's own among them.
+Tait, Chetaev). What relaxes of the stiffness is part of D_ref, as far as it is not negative: springs and
+dashpots take energy out, and their poles lie left of the line. A dense pencil that relaxes is taken
+relative to the oscillators that its modes are one by one, which are as stable and cost nothing. The ratio
+has no pole right of the line and tends to a known power of s at infinity; its zeros there are the
+eigenvalues counted, the structure's own among them.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ _STACK = 1_000_000
 _MODAL_BELOW = 160
 #: Condition of those eigenvectors beyond which it is not.
 _LARGEST_CONDITION = 1e6
+#: Damping over angular frequency of reference oscillators that may have no other.
+_LIGHT = 0.02
 
 
 class Determinant:
@@ -80,9 +83,14 @@ class Determinant:
             slow, self._relaxation = p.relaxation.beside(g)
             stiffness = (stiffness + sum(x * m for x, m in zip(slow, p.relaxing))).tocsr()
         symmetric = [((x + x.T) * 0.5).tocsr() for x in (damping, stiffness)]
+        passive = [] if self._relaxation is None else _passive(p.relaxing, p.M, self._dense)
+        changed = any(a is not b for a, b in zip(passive, p.relaxing))
         unit = abs(p.M).max()
         shifts = []
         for part in symmetric:
+            if part is symmetric[0] and not part.nnz and not changed and _dissipates(self._relaxation):
+                shifts.append(0.0)
+                continue
             size = max(abs(part).max() / unit, 1e-300) if part.nnz else 1.0
             candidates = np.concatenate([[0.0], size * 10.0 ** np.arange(-8, 5)])
             for shift in candidates:
@@ -93,17 +101,21 @@ class Determinant:
                 raise ValueError("No stable reference structure was found for the count.")
         self._reference = tuple((part + shift * p.M).tocsr() for part, shift in zip(symmetric, shifts))
         difference = max(_gap(damping, self._reference[0]), _gap(stiffness, self._reference[1]))
-        if self._relaxation is not None:
-            passive = [_passive(matrix, p.M) for matrix in p.relaxing]
-            if any(a is not b for a, b in zip(passive, p.relaxing)):
-                difference = np.inf
-                self._relaxation = Relaxation(passive, self._relaxation.strengths, self._relaxation.times)
+        if changed:
+            difference = np.inf
+            self._relaxation = Relaxation(passive, self._relaxation.strengths, self._relaxation.times)
         self.structure_is_reference = difference < 1e-14
         if self._dense:
             self._parts = [x.toarray() for x in (p.M, p.C, p.K, *self._reference)]
             self._relaxing = _stacked(p.relaxing, p.n)
-            reference = () if self._relaxation is None else self._relaxation.matrices
-            self._reference_relaxing = self._relaxing if self.structure_is_reference else _stacked(reference, p.n)
+            self._oscillators = None
+            if self._relaxation is not None:
+                parts = self._relaxing if not changed else _stacked(passive, p.n)
+                mass, damping, stiffness = (self._parts[i] for i in (0, 3, 4))
+                modes = Oscillators.of(mass, damping, stiffness, parts, self._relaxation)
+                if changed:  # what was negative no longer damps
+                    modes = modes._replace(damping=modes.damping + _LIGHT * np.sqrt(np.maximum(modes.squares, 0.0)))
+                self._oscillators = modes
             self._G, self._J = p.G.toarray(), p.J.toarray()
             modal = p.n <= _MODAL_BELOW and p.relaxation is None
             self._modes = _StructureModes.of(*self._parts[:3], self._G, self._J) if modal else None
@@ -151,10 +163,8 @@ class Determinant:
         """
         if not self._dense:
             return np.zeros(0, complex)
-        if self._relaxation is not None:
-            mass, damping, stiffness = (self._parts[i] for i in (0, 3, 4))
-            modes = Oscillators.of(mass, damping, stiffness, self._reference_relaxing, self._relaxation)
-            return modes.zeros(self._relaxation)
+        if self._oscillators is not None:
+            return self._oscillators.zeros(self._relaxation)
         values = self._every_reference_zero
         return values[values.imag > 0]
 
@@ -198,12 +208,14 @@ class Determinant:
         s = (self.line + z)[:, None, None]
         M, C, K, Cr, Kr = self._parts
         D = s * s * M + s * C + K + _relaxed(self.pencil.relaxation, self._relaxing, self.line + z)
-        H = self._J @ np.linalg.solve(D, self._G[None].astype(complex))
+        response, total = _solved_with_determinants(D, self._G)
+        H = self._J @ response
         if self.structure_is_reference:
             return H, np.zeros(z.size)
-        reference = _relaxed(self._relaxation, self._reference_relaxing, z)
+        if self._oscillators is not None:
+            return H, total - np.log(self._oscillators.values(self._relaxation, z)).sum(axis=1)
         z = z[:, None, None]
-        return H, _log_determinant(D) - _log_determinant(z * z * M + z * Cr + Kr + reference)
+        return H, total - _log_determinant(z * z * M + z * Cr + Kr)
 
     def _sparse_structure_at(self, z):
         p, s = self.pencil, self.line + z
@@ -252,11 +264,16 @@ def _first_order(M, C, K):
     return np.block([[np.zeros((n, n)), np.eye(n)], [-la.solve(M, K, assume_a="pos"), -la.solve(M, C, assume_a="pos")]])
 
 
-def _passive(matrix, mass):
-    """A relaxing stiffness, or where it is not symmetric or gives energy away one near it that does neither.
+def _passive(matrices, mass, dense: bool):
+    """Relaxing stiffnesses, or where one is not symmetric or gives energy away one near it that does neither.
 
-    Without it the reference of a wall that has no other damping would have its zeros on the line.
+    Without it the reference of a wall that has no other damping would have its zeros on the line. Dense ones lose their
+    negative part alone; sparse ones get a multiple of the mass on top.
     """
+    return [_passive_part(matrix, mass, dense) for matrix in matrices]
+
+
+def _passive_part(matrix, mass, dense):
     size = abs(matrix).max() / abs(mass).max() if matrix.nnz else 0.0
     if not size:
         return matrix
@@ -264,10 +281,44 @@ def _passive(matrix, mass):
     if symmetric and is_positive_definite(matrix + 1e-9 * size * mass):
         return matrix
     other = matrix if symmetric else ((matrix + matrix.T) * 0.5).tocsr()
+    if dense:
+        weight, turn = la.eigh(other.toarray(), mass.toarray())
+        turn = mass @ turn
+        return sp.csr_matrix((turn * np.maximum(weight, 0.0)) @ turn.T)
     for shift in size * 10.0 ** np.arange(-8, 5):
         if is_positive_definite(other + shift * mass):
             return (other + shift * mass).tocsr()
     raise ValueError("No stable reference structure was found for the count.")
+
+
+def _dissipates(relaxation: Relaxation | None) -> bool:
+    """Whether every motion loses energy in what relaxes, whose parts are not negative."""
+    if relaxation is None:
+        return False
+    weight = (relaxation.strengths * relaxation.times).sum(axis=1)
+    return is_positive_definite(sum(x * part for x, part in zip(weight, relaxation.matrices)))
+
+
+def _solved_with_determinants(matrices: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Solutions of complex systems (k, n, n) and logarithms of their determinants, from one factorisation each.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If a matrix is singular.
+    """
+    right = np.asarray(right, complex)
+    factor, solve = la.get_lapack_funcs(("getrf", "getrs"), (matrices, right))
+    solved, logarithms = np.empty((len(matrices), *right.shape), complex), np.empty(len(matrices), complex)
+    for i, matrix in enumerate(matrices):
+        # of the transpose, whose columns lie in memory as the rows of the matrix
+        lu, pivots, singular = factor(matrix.T, overwrite_a=True)
+        if singular > 0:
+            raise np.linalg.LinAlgError("A matrix is singular.")
+        solved[i] = solve(lu, pivots, right, trans=1)[0]
+        swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
+        logarithms[i] = np.log(lu.diagonal()).sum() + 1j * np.pi * swaps
+    return solved, logarithms
 
 
 def _stacked(matrices, n):

@@ -139,7 +139,7 @@ class RelaxingResponse:
         if new.size:
             solved, own = _solved_with_signs(self._at(new), self._in)
             h = self._out @ solved
-            passive = np.angle(self._oscillators.values(self._relaxation, new)).sum(axis=1)
+            passive = np.angle(self._oscillators.values(self._relaxation, 1j * new)).sum(axis=1)
             phase = np.angle(np.linalg.slogdet(h)[0] * own * np.exp(-1j * passive))
             self._known.update(zip(new, zip(np.linalg.inv(h), phase)))
         inverses, phases = zip(*(self._known[w] for w in omega))
