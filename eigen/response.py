@@ -27,6 +27,8 @@ from .relaxation import Relaxation
 _STACK = 1_000_000
 #: Order up to which a structure is represented by its eigenvectors.
 _MODAL_BELOW = 160
+#: Number of places after which a larger one that does not relax is too.
+_MODAL_AFTER = 300
 #: Condition of those eigenvectors beyond which it is not.
 _LARGEST_CONDITION = 1e6
 #: Damping over angular frequency of reference oscillators that may have no other.
@@ -107,18 +109,21 @@ class Determinant:
         self.structure_is_reference = difference < 1e-14
         if self._dense:
             self._parts = [x.toarray() for x in (p.M, p.C, p.K, *self._reference)]
-            self._relaxing = _stacked(p.relaxing, p.n)
+            own = [self._parts[2], self._parts[1], self._parts[0], *(x.toarray() for x in p.relaxing)]
+            self._flat = np.stack(own).reshape(len(own), -1)
             self._oscillators = None
-            if self._relaxation is not None:
-                parts = self._relaxing if not changed else _stacked(passive, p.n)
+            if self._relaxation is not None or p.n > _MODAL_BELOW:
+                parts = np.array([x.toarray() for x in passive]).reshape(-1, p.n, p.n)
                 mass, damping, stiffness = (self._parts[i] for i in (0, 3, 4))
                 modes = Oscillators.of(mass, damping, stiffness, parts, self._relaxation)
                 if changed:  # what was negative no longer damps
                     modes = modes._replace(damping=modes.damping + _LIGHT * np.sqrt(np.maximum(modes.squares, 0.0)))
                 self._oscillators = modes
             self._G, self._J = p.G.toarray(), p.J.toarray()
-            modal = p.n <= _MODAL_BELOW and p.relaxation is None
-            self._modes = _StructureModes.of(*self._parts[:3], self._G, self._J) if modal else None
+            self._mass_log = np.linalg.slogdet(self._parts[0])[1]
+            self._modes, self._modal = None, p.relaxation is None
+            if p.n <= _MODAL_BELOW:
+                self._take_modes()
             return
         self._structure = StructureMatrices(p)
         self._factor = SuperluFactorization(self._structure)
@@ -126,6 +131,11 @@ class Determinant:
             twin = CoupledPencil(M=p.M, C=self._reference[0], K=self._reference[1], relaxation=self._relaxation)
             self._twin = StructureMatrices(twin)
             self._twin_factor = SuperluFactorization(self._twin)
+
+    def _take_modes(self):
+        """Represent the structure by its eigenvectors, if they can stand for it."""
+        if self._modal:
+            self._modes, self._modal = _StructureModes.of(*self._parts[:3], self._G, self._J), False
 
     def _at_infinity(self):
         p = self.pencil
@@ -200,22 +210,30 @@ class Determinant:
 
     def _structure_at(self, z):
         """H at a stack of places, shape (k, m, m), and log det D - log det D_ref there."""
+        if self.evaluations > _MODAL_AFTER:
+            self._take_modes()
         if self._modes is not None:
             H, total = self._modes.response(self.line + z)
-            if self.structure_is_reference:
-                return H, np.zeros(z.size)
-            return H, total - np.log(z[:, None] - self._every_reference_zero).sum(axis=1)
-        s = (self.line + z)[:, None, None]
-        M, C, K, Cr, Kr = self._parts
-        D = s * s * M + s * C + K + _relaxed(self.pencil.relaxation, self._relaxing, self.line + z)
-        response, total = _solved_with_determinants(D, self._G)
-        H = self._J @ response
+        else:
+            response, total = _solved_with_determinants(self._dynamic_stiffness(self.line + z), self._G)
+            H, total = self._J @ response, total - self._mass_log
         if self.structure_is_reference:
             return H, np.zeros(z.size)
         if self._oscillators is not None:
             return H, total - np.log(self._oscillators.values(self._relaxation, z)).sum(axis=1)
-        z = z[:, None, None]
-        return H, total - _log_determinant(z * z * M + z * Cr + Kr)
+        return H, total - np.log(z[:, None] - self._every_reference_zero).sum(axis=1)
+
+    def _dynamic_stiffness(self, s):
+        """s^2 M + s C + K and what relaxes at a stack of places, shape (k, n, n)."""
+        weights = [np.ones_like(s), s, s * s]
+        if self.pencil.relaxation is not None:
+            weights += list(self.pencil.relaxation.factors(s))
+        # one product of real matrices, whose rows are real and imaginary parts in turn
+        both = np.ascontiguousarray(np.stack(weights, axis=1)).view(float).reshape(s.size, -1, 2)
+        flat = np.moveaxis(both, 2, 1).reshape(2 * s.size, -1) @ self._flat
+        out = np.empty((s.size, self._flat.shape[1]), complex)
+        out.real, out.imag = flat[0::2], flat[1::2]
+        return out.reshape(s.size, self.pencil.n, -1)
 
     def _sparse_structure_at(self, z):
         p, s = self.pencil, self.line + z
@@ -319,15 +337,6 @@ def _solved_with_determinants(matrices: np.ndarray, right: np.ndarray) -> tuple[
         swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
         logarithms[i] = np.log(lu.diagonal()).sum() + 1j * np.pi * swaps
     return solved, logarithms
-
-
-def _stacked(matrices, n):
-    return np.array([x.toarray() for x in matrices]).reshape(-1, n, n)
-
-
-def _relaxed(relaxation, matrices, s):
-    """sum phi_g K_g at a stack of places, shape (k, n, n); zero where nothing relaxes."""
-    return 0.0 if relaxation is None else np.tensordot(relaxation.factors(s).T, matrices, 1)
 
 
 def _log_determinant(stack) -> np.ndarray:
