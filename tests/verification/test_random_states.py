@@ -168,14 +168,14 @@ def test_random_states_that_relax(number):
 
 @pytest.mark.slow
 def test_walls_that_lose_stability_are_told():
-    """Of a hundred walls on the graded mesh four grow in up to twelve ways that do not oscillate. The search finds half
-    of these, the count all of them, and the states are left open.
+    """Of a hundred walls on the graded mesh some grow in up to a dozen ways that do not oscillate. All of these are
+    listed, and the count agrees.
     """
     results = examined_relaxing(8, 14, 100, seed=0, pressures=12, mesh={})
-    open_ends = [r for r in results if not r.certified.agrees]
-    for r in open_ends:
-        assert r.certified.unstable_count_independent > r.certified.unstable_count > 0
-    assert len(open_ends) <= 5
+    assert all(r.certified.agrees for r in results)
+    running_away = [r.certified.spectrum.eigenvalues for r in results]
+    running_away = [values[(values.real > 100.0) & (values.imag == 0)].size for values in running_away]
+    assert sum(n > 1 for n in running_away) >= 2
 
 
 @pytest.mark.slow
