@@ -103,11 +103,30 @@ class Case(Section):
                 f"{self.upstream.first_wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
                 "give it with the unsteady law alone",
             )
+        self._check_compression()
         inlet = 2 * (self.valve.inlet_radius - self.valve.flange_wall_deduction)
         self.upstream.check_pipes(inlet)
         self.downstream.check_pipe(inlet)
         self.outside.check_pipe(self.valve.outer_diameter)
         return self
+
+    def _check_compression(self) -> None:
+        """Refuse a fluid that is compressed where nothing can store its mass, or beside waves in a line."""
+        if not self.is_compressed:
+            return
+        given = f"{self.fluid.sound_speed:g} m/s with"
+        if self.fluid.continuity != "storage":
+            raise BrokenRule(
+                "fluid.sound_speed",
+                f"{given} fluid.continuity = {self.fluid.continuity!r}",
+                "a fluid that is compressed stores mass, so it must be 'storage' then",
+            )
+        if self.upstream.is_elastic:
+            raise BrokenRule(
+                "fluid.sound_speed",
+                f"{given} an elastic line (upstream.wave_speed)",
+                "the fluid is compressed in the valve or in the line, so leave one of them out",
+            )
 
     def _check_fillers(self) -> None:
         """Refuse layers of limited extent beside the valve, and places with too few points through the wall."""
@@ -134,6 +153,11 @@ class Case(Section):
     def has_line(self) -> bool:
         """Whether fluid comes through a pipe in front of the valve."""
         return self.drive.kind == "flow" and self.upstream.whole_length > 0
+
+    @property
+    def is_compressed(self) -> bool:
+        """Whether the fluid in the valve is compressible."""
+        return self.drive.kind == "flow" and self.fluid.sound_speed is not None
 
     @property
     def has_tail(self) -> bool:

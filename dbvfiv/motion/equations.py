@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..flow.gas_stepping import GasState
 from ..flow.line_stepping import LineFluid, LineInstant, LineState, LineStep, LineWaves
 from ..model import ValveModel
 from ..model.dynamics import Conditions
@@ -312,6 +313,20 @@ class ValveMotion:
         psi_rate = known + by_rate @ rows.second(self._position(nodal), model.nodal(a)) + by_speed * speed_rate
         line = self._line_moving(line, inlet, speed_rate)
         return a, self.load(q, v, q, v, self._instant(speed, psi_rate, inlet, line), speed)
+
+    def gas_on_mode(self, q, moved, v, speed: float, inlet: float, flow: np.ndarray) -> GasState | None:
+        """State of a fluid that is compressed where a steady valve is pushed along a mode; None without one.
+
+        Parameters
+        ----------
+        q, moved, v : (n,) arrays
+            The steady positions, those that it is pushed to, and its velocities there.
+        speed, inlet : float
+            Steady inlet velocity, m/s, and inlet pressure, Pa.
+        flow : (l,) array
+            Change of the fluid's own unknowns.
+        """
+        return None
 
     def line_at(self, speed: float, inlet: float) -> LineState | None:
         """An elastic line with a steady flow, or at rest without pressure where nothing flows; None without one."""

@@ -1,0 +1,245 @@
+"""A channel whose fluid is compressed: isentropic flow of a gas along one streamline (Shapiro 1953).
+
+    d(rho A)/dt + d(rho A U)/ds = 0,      dU/dt + d(U^2/2 + w)/ds = 0,      dw = dp/rho
+    p = rho_0 c_0^2/gamma [(rho/rho_0)^gamma - 1]
+
+p is the pressure over that around the jet, rho_0 and c_0 density and speed of sound there: a perfect gas of the
+absolute pressure rho_0 c_0^2/gamma, or a liquid whose compression follows Tait's equation. With sigma = c_0 ln(rho/rho_0)
+
+    p = rho_0 c_0^2/gamma [exp(gamma sigma/c_0) - 1],      w = c_0^2/(gamma - 1) [exp((gamma - 1) sigma/c_0) - 1]
+
+so that a density is never negative, and p = rho_0 c_0 sigma where c_0 is large. Both balances are taken over the cells
+between stations with the trapezoidal rule (the box scheme): as c_0 grows, what is left is the law of `Channel` with
+storage, station by station. Losses and inertances are those of the channel's terms, as enthalpies.
+
+The jet leaves at the pressure around it until it is as fast as sound; from there on the speed at the outlet stays that
+of sound and the pressure rises. A throat inside that is narrower than the outlet must not choke: there is no steady
+flow then. What is drawn in comes in with the density outside.
+
+Equations (T.23) and (T.24) of docs/theory.md.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from . import derivatives
+from .channel import Channel
+from .gas_stepping import GasFluid
+from .heads import outward_head, reversible_head
+from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
+
+#: Relative error of the frequency of waves that counts as resolved; the box scheme's is (k h)^2/12.
+_RESOLVED = 0.01
+
+
+def grown(x, rate):
+    """(exp(rate x) - 1)/rate; traceable."""
+    return jnp.expm1(rate * x) / rate
+
+
+class GasChannel(FlowLaw):
+    """Isentropic flow through m stations.
+
+    Its 2 m - 1 unknowns, all in m/s, are the inlet velocity, the velocities at the stations from the outlet on, and
+    sigma at those but the outlet. Its equations, all in Pa, are momentum and mass of each cell between stations, and
+    the pressure at the flange.
+
+    Parameters
+    ----------
+    channel : Channel
+        The same without compression.
+    sound_speed : float, m/s
+        c_0.
+    ratio : float
+        gamma, of the heat capacities; greater than 1.
+    """
+
+    DATA = ("channel", "floor")
+    inner_names: ClassVar[tuple[str, ...]] = ("inlet velocity", "velocities", "logarithms of the density")
+
+    def __init__(self, channel: Channel, sound_speed: float, ratio: float = 1.4):
+        self.channel, self.sound_speed, self.ratio = channel, float(sound_speed), float(ratio)
+        self.floor, self.density = channel.floor, channel.density
+
+    @property
+    def count(self) -> int:
+        return self.channel.count
+
+    @property
+    def inner(self) -> int:
+        return 2 * self.count - 1
+
+    @property
+    def terms(self):
+        """Those of the channel."""
+        return self.channel.terms
+
+    @property
+    def back(self) -> float:
+        """That of the channel."""
+        return self.channel.back
+
+    @property
+    def level(self) -> float:
+        """That of the channel."""
+        return self.channel.level
+
+    @property
+    def static(self):
+        """That of the channel."""
+        return self.channel.static
+
+    @property
+    def storage(self) -> float:
+        """Blend of the continuity laws."""
+        return self.channel.storage
+
+    @property
+    def unsteady(self) -> bool:
+        """That of the channel."""
+        return self.channel.unsteady
+
+    @property
+    def parameters(self) -> tuple[FlowParameter, ...]:
+        return (
+            *self.channel.parameters,
+            FlowParameter("sound_speed", "m/s", "in the fluid around the jet", self.sound_speed),
+            FlowParameter("heat_capacity_ratio", "1", "of the fluid", self.ratio),
+        )
+
+    def at_unit_density(self) -> dict[str, float]:
+        return self.channel.at_unit_density() | {"sound_speed": self.sound_speed * np.sqrt(self.density)}
+
+    def resolved(self, given) -> float:
+        """Frequency up to which waves in the passage are 1 % too high at most, Hz."""
+        speed = self.values({"inlet": 0.0, "density": 1.0} | dict(given))["sound_speed"]
+        return float(np.sqrt(12.0 * _RESOLVED) * speed / (2.0 * np.pi * np.max(self.channel.step)))
+
+    # -- the fluid
+    # ----
+
+    def pressure(self, sigma, parameters):
+        """Pressures over that around the jet, Pa; traceable."""
+        c = parameters["sound_speed"]
+        return parameters["density"] * c * grown(sigma, parameters["heat_capacity_ratio"] / c)
+
+    def enthalpy(self, sigma, parameters):
+        """Integrals of dp/rho from the pressure around the jet, m2/s2; traceable."""
+        c = parameters["sound_speed"]
+        return c * grown(sigma, (parameters["heat_capacity_ratio"] - 1.0) / c)
+
+    def compression(self, pressure, parameters):
+        """sigma, m/s, of pressures over that around the jet, Pa; traceable."""
+        c, ratio = parameters["sound_speed"], parameters["heat_capacity_ratio"]
+        return c / ratio * jnp.log1p(ratio * pressure / (parameters["density"] * c * c))
+
+    def outlet(self, speed, parameters):
+        """sigma, m/s, at the outlet with a speed, m/s: zero up to that of sound, beyond such that it is that."""
+        c = parameters["sound_speed"]
+        over = jnp.log(jnp.maximum(speed / c, 1.0))
+        return 2.0 * c / (parameters["heat_capacity_ratio"] - 1.0) * over
+
+    def split(self, inner, parameters):
+        """Velocities (m,), m/s, and sigma (m,), m/s, at the stations from the law's unknowns; traceable."""
+        speed = jnp.concatenate([inner[1 : self.count], inner[:1]])
+        return speed, jnp.concatenate([self.outlet(speed[0], parameters)[None], inner[self.count :]])
+
+    # -- the definition
+    # ----
+
+    def stored(self, area, area_rate, inner, parameters):
+        """What the balances hold (2 m - 1,): velocities integrated over the cells and the terms' momentum at the flange,
+        m2/s; mass per density outside of the cells, m3; traceable.
+        """
+        channel = self.channel
+        speed, sigma = self.split(inner, parameters)
+        open_ = above_floor(area, self.floor)
+        volume = parameters["storage"] * open_ * jnp.exp(sigma / parameters["sound_speed"])
+        added = jnp.zeros_like(area)
+        if channel.terms:
+            added = added + channel.term_momenta(channel.stream(area, area_rate, speed, inner), parameters)
+        psi = _cells(channel.step, speed) + added[:-1] - added[1:]
+        return jnp.concatenate([psi, added[-1:], _cells(channel.step, volume)])
+
+    def sources(self, area, area_rate, inner, parameters):
+        """By what their rates are balanced (2 m - 1,), m2/s2 and m3/s; traceable."""
+        channel = self.channel
+        speed, sigma = self.split(inner, parameters)
+        open_ = above_floor(area, self.floor)
+        head = (reversible_head if channel.reversible else outward_head)(speed, inner[0])
+        if channel.terms:
+            head = head + channel.term_heads(channel.stream(area, area_rate, speed, inner), parameters)
+        drive = self.enthalpy(self.compression(parameters["inlet"] - channel.back, parameters), parameters)
+        total = head + self.enthalpy(sigma, parameters)
+        flow = open_ * speed * jnp.exp(sigma / parameters["sound_speed"])
+        return jnp.concatenate([total[:-1] - total[1:], total[-1:] - drive, flow[:-1] - flow[1:]])
+
+    def scales(self, area, parameters):
+        """What turns the balances (2 m - 1,) into Pa; traceable."""
+        density = parameters["density"]
+        momentum = jnp.full(self.count, density)
+        mass = jnp.full(self.count - 1, density * parameters["sound_speed"]) / above_floor(area[-1], self.floor)
+        return jnp.concatenate([momentum, mass])
+
+    def equations(self, motion: FlowMotion, parameters):
+        area, rate, acceleration, inner, inner_rate = motion
+        balance = self.sources(area, rate, inner, parameters)
+        if self.unsteady:
+            held = lambda a, r, u: self.stored(a, r, u, parameters)  # noqa: E731
+            _, change = jax.jvp(held, (area, rate, inner), (rate, acceleration, inner_rate))
+            balance = balance + change
+        return self.pressures(inner, parameters), self.scales(area, parameters) * balance
+
+    def pressures(self, inner, parameters):
+        """Pressures (m,) on the wall, Pa; traceable."""
+        _, sigma = self.split(inner, parameters)
+        return self.pressure(sigma, parameters) + self.channel.static
+
+    # -- the steady flow
+    # ----
+
+    def steady_start(self, area, parameters):
+        """The flow without compression, and the densities that its pressures make."""
+        pressure, velocity = self.channel.steady(area, parameters)
+        open_ = above_floor(area, self.floor)
+        speed = velocity[0] * open_[-1] / open_
+        least = -0.5 * parameters["density"] * parameters["sound_speed"] ** 2 / parameters["heat_capacity_ratio"]
+        sigma = self.compression(jnp.maximum(pressure - self.channel.static, least), parameters)
+        return jnp.concatenate([velocity, speed[:-1], sigma[1:]])
+
+    def steady(self, area, parameters):
+        """Searched for; nothing flows where no pressure drives it."""
+        own, still = self._without_drives(), parameters["inlet"] == self.channel.back
+        driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
+        pressure, inner = derivatives.solve_steady(own, area, driven)
+        rest = jnp.zeros_like(pressure) + self.channel.static
+        return jnp.where(still, rest, pressure), jnp.where(still, 0.0, inner)
+
+    def _without_drives(self) -> GasChannel:
+        """The same law with the terms that steady flow sees."""
+        leaves, kept = self._flatten()
+        leaves[self.DATA.index("channel")] = self.channel.without_drives()
+        return self._unflatten(kept, leaves)
+
+    def steady_velocities(self, area, inlet, density):
+        """Of a fluid of another density than the own one, that which is compressed alike by a pressure."""
+        inner = self.steady_inner(area, self._driven(inlet))
+        return np.append(inner[1 : self.count], inner[0]) * np.sqrt(self.density / density)
+
+    def inlet_density(self, area, inlet, density):
+        """Likewise."""
+        inner = self.steady_inner(area, self._driven(inlet))
+        return density * float(np.exp(inner[-1] / self.sound_speed))
+
+    def stepping(self, density: float) -> GasFluid:
+        return GasFluid(self, density)
+
+
+def _cells(step, values):
+    """Integrals (m - 1,) of values (m,) over the cells between stations."""
+    return 0.5 * step * (values[1:] + values[:-1])
