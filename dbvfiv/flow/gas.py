@@ -13,8 +13,9 @@ between stations with the trapezoidal rule (the box scheme): as c_0 grows, what 
 storage, station by station. Losses and inertances are those of the channel's terms, as enthalpies.
 
 The jet leaves at the pressure around it until it is as fast as sound; from there on the speed at the outlet stays that
-of sound and the pressure rises. A throat inside that is narrower than the outlet must not choke: there is no steady
-flow then. What is drawn in comes in with the density outside.
+of sound and the pressure rises. What is drawn in comes from rest outside, and is no denser than it is there at the
+speed of sound. At a throat inside, speed over that of sound is lost downstream of it, as in a shock that stands there:
+the head CHOKED (U - c)^2. It is lost at that density; that a shock heats the gas is left out.
 
 Equations (T.23) and (T.24) of docs/theory.md.
 """
@@ -35,6 +36,8 @@ from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
 
 #: Relative error of the frequency of waves that counts as resolved; the box scheme's is (k h)^2/12.
 _RESOLVED = 0.01
+#: What a flow faster than sound loses, of the square of the difference.
+CHOKED = 50.0
 
 
 def grown(x, rate):
@@ -176,8 +179,26 @@ class GasChannel(FlowLaw):
             head = head + channel.term_heads(channel.stream(area, area_rate, speed, inner), parameters)
         drive = self.enthalpy(self.compression(parameters["inlet"] - channel.back, parameters), parameters)
         total = head + self.enthalpy(sigma, parameters)
-        flow = open_ * speed * jnp.exp(sigma / parameters["sound_speed"])
-        return jnp.concatenate([total[:-1] - total[1:], total[-1:] - drive, flow[:-1] - flow[1:]])
+        thick = sigma + jnp.zeros_like(sigma).at[0].set(self.drawn(speed[0], parameters))
+        flow = open_ * speed * jnp.exp(thick / parameters["sound_speed"])
+        momentum = total[:-1] - total[1:] + self.shocks(speed, thick, parameters)
+        return jnp.concatenate([momentum, total[-1:] - drive, flow[:-1] - flow[1:]])
+
+    def drawn(self, speed, parameters):
+        """sigma, m/s, of what is drawn in through the outlet with a speed, m/s; 0 where it flows out; traceable."""
+        c, ratio = parameters["sound_speed"], parameters["heat_capacity_ratio"]
+        lost = jnp.minimum(0.5 * jnp.minimum(speed, 0.0) ** 2, c * c / (ratio + 1.0))
+        return c / (ratio - 1.0) * jnp.log1p(-(ratio - 1.0) / c**2 * lost)
+
+    def shocks(self, speed, sigma, parameters):
+        """Heads (m - 1,) that the cells take where the fluid enters them faster than sound, m2/s2; traceable."""
+        over = jnp.maximum(jnp.abs(speed) - self.local_sound_speed(sigma, parameters), 0.0) ** 2
+        return CHOKED * (jnp.where(speed[1:] > 0.0, over[1:], 0.0) - jnp.where(speed[:-1] < 0.0, over[:-1], 0.0))
+
+    def local_sound_speed(self, sigma, parameters):
+        """Speed of sound, m/s, where the density is that of sigma, m/s; traceable."""
+        c = parameters["sound_speed"]
+        return c * jnp.exp(0.5 * (parameters["heat_capacity_ratio"] - 1.0) * sigma / c)
 
     def scales(self, area, parameters):
         """What turns the balances (2 m - 1,) into Pa; traceable."""
