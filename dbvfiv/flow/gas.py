@@ -38,6 +38,8 @@ from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
 _RESOLVED = 0.01
 #: What a flow faster than sound loses, of the square of the difference.
 CHOKED = 50.0
+#: Steps within which a steady flow must be found, and the relative size of the last one.
+_SETTLING, _SETTLED = 200, 1e-12
 
 
 def grown(x, rate):
@@ -225,19 +227,19 @@ class GasChannel(FlowLaw):
     # ----
 
     def steady_start(self, area, parameters):
-        """The flow without compression, and the densities that its pressures make."""
+        """The flow without compression, no faster than sound, and the densities that its pressures make."""
         pressure, velocity = self.channel.steady(area, parameters)
         open_ = above_floor(area, self.floor)
-        speed = velocity[0] * open_[-1] / open_
+        speed = jnp.minimum(velocity[0] * open_[-1] / open_, 0.8 * parameters["sound_speed"])
         least = -0.5 * parameters["density"] * parameters["sound_speed"] ** 2 / parameters["heat_capacity_ratio"]
         sigma = self.compression(jnp.maximum(pressure - self.channel.static, least), parameters)
-        return jnp.concatenate([velocity, speed[:-1], sigma[1:]])
+        return jnp.concatenate([speed[-1:], speed[:-1], sigma[1:]])
 
     def steady(self, area, parameters):
         """Searched for; nothing flows where no pressure drives it."""
         own, still = self._without_drives(), parameters["inlet"] == self.channel.back
         driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
-        pressure, inner = derivatives.solve_steady(own, area, driven)
+        pressure, inner = derivatives.solve_steady(own, area, driven, _settled)
         rest = jnp.zeros_like(pressure) + self.channel.static
         return jnp.where(still, rest, pressure), jnp.where(still, 0.0, inner)
 
@@ -259,6 +261,36 @@ class GasChannel(FlowLaw):
 
     def stepping(self, density: float) -> GasFluid:
         return GasFluid(self, density)
+
+
+def _settled(law: GasChannel, area, parameters):
+    """Unknowns (l,) of the steady flow: that which a flow settles in, by implicit steps of time whose length grows as
+    what is left falls (Mulder and van Leer 1985), Newton's method in the end; not numbers where it does not settle.
+    """
+    still, c = jnp.zeros_like(area), parameters["sound_speed"]
+    scales = law.scales(area, parameters)
+    held = lambda x: scales * law.stored(area, still, x, {**parameters, "storage": 1.0})  # noqa: E731
+    source = lambda x: scales * law.sources(area, still, x, parameters)  # noqa: E731
+    passing = jnp.sum(law.channel.step) / c  # time that a wave takes
+    usual = 0.02 * parameters["density"] * c * c
+
+    def step_at(inner):
+        left = source(inner)
+        rate = jnp.linalg.norm(left) / (usual * passing)
+        return -jnp.linalg.solve(jax.jacfwd(source)(inner) + rate * jax.jacfwd(held)(inner), left)
+
+    def advance(carried):
+        inner, step, count = carried
+        inner = inner + jnp.minimum(1.0, 0.3 * c / jnp.max(jnp.abs(step))) * step
+        return inner, step_at(inner), count + 1
+
+    def goes_on(carried):
+        inner, step, count = carried
+        return (count < _SETTLING) & (jnp.linalg.norm(step) > _SETTLED * jnp.linalg.norm(inner))
+
+    start = law.steady_start(area, parameters)
+    inner, step, _ = jax.lax.while_loop(goes_on, advance, (start, step_at(start), 0))
+    return jnp.where(jnp.linalg.norm(step) <= _SETTLED * jnp.linalg.norm(inner), inner, jnp.nan)
 
 
 def _cells(step, values):
