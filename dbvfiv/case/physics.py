@@ -81,7 +81,7 @@ class Fluid(Section):
         None,
         "Speed of sound in the fluid in the valve at the pressure around the jet, for a gas, or a liquid, that is "
         "compressed: 343 m/s in air at 20 degC. Where not given the fluid is incompressible (the thesis). Needs "
-        "continuity = \"storage\".",
+        'continuity = "storage".',
         ge=10,
         le=1e5,
     )

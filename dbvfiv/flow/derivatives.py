@@ -67,16 +67,16 @@ def steady_form(law, area, parameters, directions):
     return along(lambda x: law.steady(x, parameters)[0], *directions)(area)
 
 
-def solve_steady(law, area, parameters, search=None):
+def solve_steady(law, area, parameters):
     """Pressures (m,) and inner unknowns (l,) at which the law's equations are met in a passage at rest; traceable.
 
-    Newton's method finds the unknowns, or a `search` from law, area and parameters. Two more steps, through which derivatives are traced, leave them where they are
+    Newton's method finds the unknowns. Two more steps, through which derivatives are traced, leave them where they are
     and make their derivatives by areas and parameters exact up to the third: each step doubles the order, as it does
     the digits. Not numbers where the search fails.
     """
     inner = jnp.zeros(0)
     if law.inner:
-        inner = (_root if search is None else search)(*jax.lax.stop_gradient((law, area, parameters)))
+        inner = _root(*jax.lax.stop_gradient((law, area, parameters)))
         for _ in range(2):
             inner = inner + _newton_step(law, area, parameters, inner)
     return law.at_rest(area, inner, parameters)[0], inner

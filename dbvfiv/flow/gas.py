@@ -28,7 +28,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from . import derivatives
 from .channel import Channel
 from .gas_stepping import GasFluid
 from .heads import outward_head, reversible_head
@@ -40,6 +39,8 @@ _RESOLVED = 0.01
 CHOKED = 50.0
 #: Steps within which a steady flow must be found, and the relative size of the last one.
 _SETTLING, _SETTLED = 200, 1e-12
+#: What is left, over rho c^2, where such a step is as long as a wave takes through the passage.
+_USUAL = 0.02
 
 
 def grown(x, rate):
@@ -239,7 +240,10 @@ class GasChannel(FlowLaw):
         """Searched for; nothing flows where no pressure drives it."""
         own, still = self._without_drives(), parameters["inlet"] == self.channel.back
         driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
-        pressure, inner = derivatives.solve_steady(own, area, driven, _settled)
+        inner = _settled(*jax.lax.stop_gradient((own, area, driven)))
+        for _ in range(2):  # which make derivatives exact up to the third, as in `derivatives.solve_steady`
+            inner = inner + _newton_step(own, area, driven, inner)
+        pressure = self.pressures(inner, parameters)
         rest = jnp.zeros_like(pressure) + self.channel.static
         return jnp.where(still, rest, pressure), jnp.where(still, 0.0, inner)
 
@@ -249,10 +253,13 @@ class GasChannel(FlowLaw):
         leaves[self.DATA.index("channel")] = self.channel.without_drives()
         return self._unflatten(kept, leaves)
 
+    def own_velocities(self, inner):
+        return np.append(inner[1 : self.count], inner[0])
+
     def steady_velocities(self, area, inlet, density):
         """Of a fluid of another density than the own one, that which is compressed alike by a pressure."""
-        inner = self.steady_inner(area, self._driven(inlet))
-        return np.append(inner[1 : self.count], inner[0]) * np.sqrt(self.density / density)
+        own = self.own_velocities(self.steady_inner(area, self._driven(inlet)))
+        return own * np.sqrt(self.density / density)
 
     def inlet_density(self, area, inlet, density):
         """Likewise."""
@@ -263,34 +270,46 @@ class GasChannel(FlowLaw):
         return GasFluid(self, density)
 
 
+@jax.jit
+def _left(law: GasChannel, area, parameters, inner):
+    """What the equations leave (l,), Pa, in a passage at rest."""
+    return law.scales(area, parameters) * law.sources(area, jnp.zeros_like(area), inner, parameters)
+
+
+@jax.jit
+def _newton_step(law: GasChannel, area, parameters, inner):
+    return -jnp.linalg.solve(jax.jacfwd(_left, 3)(law, area, parameters, inner), _left(law, area, parameters, inner))
+
+
+@jax.jit
+def _settling_step(law: GasChannel, area, parameters, inner):
+    """Change (l,) of the unknowns in an implicit step of time, the longer the less is left."""
+    c, still = parameters["sound_speed"], jnp.zeros_like(area)
+    left = _left(law, area, parameters, inner)
+    passing = jnp.sum(law.channel.step) / c  # time that a wave takes
+    rate = jnp.linalg.norm(left) / (_USUAL * parameters["density"] * c * c * passing)
+    held = jax.jacfwd(law.stored, 2)(area, still, inner, {**parameters, "storage": 1.0})
+    slope = jax.jacfwd(_left, 3)(law, area, parameters, inner)
+    return -jnp.linalg.solve(slope + rate * law.scales(area, parameters)[:, None] * held, left)
+
+
 def _settled(law: GasChannel, area, parameters):
     """Unknowns (l,) of the steady flow: that which a flow settles in, by implicit steps of time whose length grows as
     what is left falls (Mulder and van Leer 1985), Newton's method in the end; not numbers where it does not settle.
     """
-    still, c = jnp.zeros_like(area), parameters["sound_speed"]
-    scales = law.scales(area, parameters)
-    held = lambda x: scales * law.stored(area, still, x, {**parameters, "storage": 1.0})  # noqa: E731
-    source = lambda x: scales * law.sources(area, still, x, parameters)  # noqa: E731
-    passing = jnp.sum(law.channel.step) / c  # time that a wave takes
-    usual = 0.02 * parameters["density"] * c * c
-
-    def step_at(inner):
-        left = source(inner)
-        rate = jnp.linalg.norm(left) / (usual * passing)
-        return -jnp.linalg.solve(jax.jacfwd(source)(inner) + rate * jax.jacfwd(held)(inner), left)
+    longest = 0.3 * parameters["sound_speed"]
 
     def advance(carried):
-        inner, step, count = carried
-        inner = inner + jnp.minimum(1.0, 0.3 * c / jnp.max(jnp.abs(step))) * step
-        return inner, step_at(inner), count + 1
+        inner, _, count = carried
+        step = _settling_step(law, area, parameters, inner)
+        inner = inner + jnp.minimum(1.0, longest / jnp.max(jnp.abs(step))) * step
+        return inner, jnp.linalg.norm(step) / jnp.linalg.norm(inner), count + 1
 
     def goes_on(carried):
-        inner, step, count = carried
-        return (count < _SETTLING) & (jnp.linalg.norm(step) > _SETTLED * jnp.linalg.norm(inner))
+        return (carried[2] < _SETTLING) & (carried[1] > _SETTLED)
 
-    start = law.steady_start(area, parameters)
-    inner, step, _ = jax.lax.while_loop(goes_on, advance, (start, step_at(start), 0))
-    return jnp.where(jnp.linalg.norm(step) <= _SETTLED * jnp.linalg.norm(inner), inner, jnp.nan)
+    inner, last, _ = jax.lax.while_loop(goes_on, advance, (law.steady_start(area, parameters), 1.0, 0))
+    return jnp.where(last <= _SETTLED, inner, jnp.nan)
 
 
 def _cells(step, values):

@@ -35,6 +35,11 @@ SECOND_ORDER = 1.0, 1.5
 BOOKS = ("supply", "outflow", "work", "loss")
 
 
+def packed_size(inner: int) -> int:
+    """Length of `GasState.packed` for a number of unknowns."""
+    return 3 * inner + 2 * len(BOOKS)
+
+
 @dataclass(frozen=True)
 class GasState:
     """A compressed fluid at one instant.
@@ -83,8 +88,7 @@ class GasFlow:
     def __init__(self, step: GasStep | GasInstant, area, area_rate, inner, stored, pressure):
         self._step, self.stored = step, stored
         self.area, self.area_rate, self.inner = area, area_rate, inner
-        count = len(area)
-        self.pressure, self.speed = pressure, np.append(inner[1:count], inner[0])
+        self.pressure, self.speed = pressure, step.fluid.law.own_velocities(inner)
         cells = 0.5 * step.fluid.law.channel.step * (self.speed[1:] + self.speed[:-1])
         self.psi = np.append(np.cumsum(cells[::-1])[::-1], 0.0)
 
@@ -189,13 +193,9 @@ class GasFluid:
         energy, power = _powers(self.law, self.parameters(0.0), area, area_rate, inner)
         return float(energy), np.asarray(power)
 
-    def fastest(self, inner: np.ndarray) -> float:
-        """Largest Mach number at the stations."""
-        count, c = self.law.count, self.law.sound_speed
-        speed = np.append(inner[1:count], inner[0])
-        outlet = float(self.law.outlet(speed[0], self.parameters(0.0)))
-        sigma = np.append(outlet, inner[count:])
-        return float(np.max(np.abs(speed) / c * np.exp(-0.5 * (self.law.ratio - 1.0) * sigma / c)))
+    def readings(self, area, inner) -> tuple[float, float, float]:
+        """Mass flows at outlet and inlet, kg/s of a quarter, and the largest Mach number."""
+        return tuple(float(x) for x in _readings(self.law, self.parameters(0.0), area, inner))
 
 
 # -- compiled
@@ -270,6 +270,15 @@ def _instant(law, parameters, area, area_rate, inner):
     by_inner = jax.jacfwd(lambda x: law.stored(area, area_rate, x, parameters))(inner)
     sources = law.sources(area, area_rate, inner, parameters)
     return law.stored(area, area_rate, inner, parameters), sources, jnp.any(by_inner != 0.0, axis=1)
+
+
+@jax.jit
+def _readings(law, parameters, area, inner):
+    """Mass flows, kg/s of a quarter, at outlet and inlet, and the largest Mach number."""
+    speed, sigma = law.split(inner, parameters)
+    sigma = sigma.at[0].add(law.drawn(speed[0], parameters))
+    flow = parameters["density"] * jnp.exp(sigma / parameters["sound_speed"]) * above_floor(area, law.floor) * speed
+    return flow[0], flow[-1], jnp.max(jnp.abs(speed) / law.local_sound_speed(sigma, parameters))
 
 
 @jax.jit

@@ -290,6 +290,12 @@ class FlowLaw(Traceable, ABC):
         """Density of the fluid at the inlet in steady flow, kg/m3; `density` is that around the jet."""
         return density
 
+    def own_velocities(self, inner: np.ndarray) -> np.ndarray | None:
+        """Velocities (m,) at all stations, m/s, where they are among the law's own unknowns (l,); None where they
+        follow from the passage.
+        """
+        return None
+
     def velocities(self, area: np.ndarray, velocity: float) -> np.ndarray:
         """Steady velocities (m,) of a fluid of constant density at all stations from the inlet velocity; zero without a
         fluid.

@@ -36,8 +36,7 @@ class GasMotion(ValveMotion):
         return Load(force, 0.0, flow.pressure, *moved, gas=flow)
 
     def speeds(self, state) -> np.ndarray:
-        inner, count = state.gas.inner, self.stations
-        return np.append(inner[1:count], inner[0])
+        return self.model.flow.own_velocities(state.gas.inner)
 
     def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None, step=None) -> None:
         model = self.model
