@@ -112,6 +112,7 @@ class Case(Section):
 
     def _check_compression(self) -> None:
         """Refuse a fluid that is compressed where nothing can store its mass, or beside waves in a line."""
+        self._check_boiling()
         if not self.is_compressed:
             return
         given = f"{self.fluid.sound_speed:g} m/s with"
@@ -126,6 +127,25 @@ class Case(Section):
                 "fluid.sound_speed",
                 f"{given} an elastic line (upstream.wave_speed)",
                 "the fluid is compressed in the valve or in the line, so leave one of them out",
+            )
+
+    def _check_boiling(self) -> None:
+        """Refuse a vapour pressure without waves, or one at which the fluid boils everywhere."""
+        boils, around = self.fluid.vapour_pressure, self.fluid.ambient_pressure + self.downstream.pressure
+        if self.drive.kind != "flow" or boils is None:
+            return
+        if not self.is_compressed:
+            raise BrokenRule(
+                "fluid.vapour_pressure",
+                f"{boils:g} Pa without fluid.sound_speed",
+                "how a liquid fills a cavity depends on its waves, so give both or neither",
+            )
+        if boils >= around:
+            raise BrokenRule(
+                "fluid.vapour_pressure",
+                f"{boils:g} Pa in surroundings of {around:g} Pa",
+                "it must be below the absolute pressure around the jet, fluid.ambient_pressure and downstream.pressure "
+                "together, or the liquid boils everywhere",
             )
 
     def _check_fillers(self) -> None:
@@ -158,6 +178,13 @@ class Case(Section):
     def is_compressed(self) -> bool:
         """Whether the fluid in the valve is compressible."""
         return self.drive.kind == "flow" and self.fluid.sound_speed is not None
+
+    @property
+    def boiling_pressure(self) -> float | None:
+        """Pressure at which the fluid in the valve boils, Pa, over that around the jet; None where it does not."""
+        if self.fluid.vapour_pressure is None:
+            return None
+        return self.fluid.vapour_pressure - self.fluid.ambient_pressure - self.downstream.pressure
 
     @property
     def has_tail(self) -> bool:

@@ -4,7 +4,8 @@
     p = rho_0 c_0^2/gamma [(rho/rho_0)^gamma - 1]
 
 p is the pressure over that around the jet, rho_0 and c_0 density and speed of sound there: a perfect gas of the
-absolute pressure rho_0 c_0^2/gamma, or a liquid whose compression follows Tait's equation. With sigma = c_0 ln(rho/rho_0)
+absolute pressure rho_0 c_0^2/gamma, or a liquid whose compression follows Tait's equation. With sigma, m/s, defined as
+c_0 ln(rho/rho_0)
 
     p = rho_0 c_0^2/gamma [exp(gamma sigma/c_0) - 1],      w = c_0^2/(gamma - 1) [exp((gamma - 1) sigma/c_0) - 1]
 
@@ -17,7 +18,11 @@ of sound and the pressure rises. What is drawn in comes from rest outside, and i
 speed of sound. At a throat inside, speed over that of sound is lost downstream of it, as in a shock that stands there:
 the head CHOKED (U - c)^2. It is lost at that density; that a shock heats the gas is left out.
 
-Equations (T.23) and (T.24) of docs/theory.md.
+A liquid boils where its pressure would fall below that of its vapour: the pressure stays, but for what waves at
+VAPOUR c_0 need, the density falls on, and mass is kept, so that a cavity fills and empties (column separation,
+Bergant, Simpson and Tijsseling 2006).
+
+Equations (T.23), (T.24) and (T.25) of docs/theory.md.
 """
 
 from __future__ import annotations
@@ -37,6 +42,8 @@ from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
 _RESOLVED = 0.01
 #: What a flow faster than sound loses, of the square of the difference.
 CHOKED = 50.0
+#: Speed of waves in a liquid that boils, over that of sound in the liquid.
+VAPOUR = 1e-3
 #: Steps within which a steady flow must be found, and the relative size of the last one.
 _SETTLING, _SETTLED = 200, 1e-12
 #: What is left, over rho c^2, where such a step is as long as a wave takes through the passage.
@@ -63,14 +70,18 @@ class GasChannel(FlowLaw):
         c_0.
     ratio : float
         gamma, of the heat capacities; greater than 1.
+    vapour : float, Pa, optional
+        Pressure at which the fluid boils, over that around the jet; negative.
     """
 
-    DATA = ("channel", "floor")
+    DATA = ("channel", "floor", "vapour")
+    STATIC = ("boils",)
     inner_names: ClassVar[tuple[str, ...]] = ("inlet velocity", "velocities", "logarithms of the density")
 
-    def __init__(self, channel: Channel, sound_speed: float, ratio: float = 1.4):
+    def __init__(self, channel: Channel, sound_speed: float, ratio: float = 1.4, vapour: float | None = None):
         self.channel, self.sound_speed, self.ratio = channel, float(sound_speed), float(ratio)
         self.floor, self.density = channel.floor, channel.density
+        self.boils, self.vapour = vapour is not None, 0.0 if vapour is None else float(vapour)
 
     @property
     def count(self) -> int:
@@ -131,13 +142,26 @@ class GasChannel(FlowLaw):
 
     def pressure(self, sigma, parameters):
         """Pressures over that around the jet, Pa; traceable."""
-        c = parameters["sound_speed"]
-        return parameters["density"] * c * grown(sigma, parameters["heat_capacity_ratio"] / c)
+        c, density = parameters["sound_speed"], parameters["density"]
+        liquid, boiling = self._boiling(sigma, parameters)
+        found = density * c * grown(liquid, parameters["heat_capacity_ratio"] / c)
+        if not self.boils:
+            return found
+        return found + density * c * VAPOUR**2 * jnp.exp(liquid / c) * grown(boiling, 1.0 / c)
 
     def enthalpy(self, sigma, parameters):
         """Integrals of dp/rho from the pressure around the jet, m2/s2; traceable."""
         c = parameters["sound_speed"]
-        return c * grown(sigma, (parameters["heat_capacity_ratio"] - 1.0) / c)
+        liquid, boiling = self._boiling(sigma, parameters)
+        found = c * grown(liquid, (parameters["heat_capacity_ratio"] - 1.0) / c)
+        return found + c * VAPOUR**2 * boiling if self.boils else found
+
+    def _boiling(self, sigma, parameters):
+        """sigma, m/s, down to where the fluid boils, and what is below that; traceable."""
+        if not self.boils:
+            return sigma, jnp.zeros_like(sigma)
+        limit = self.compression(self.vapour, parameters)
+        return jnp.maximum(sigma, limit), jnp.minimum(sigma - limit, 0.0)
 
     def compression(self, pressure, parameters):
         """sigma, m/s, of pressures over that around the jet, Pa; traceable."""
@@ -159,8 +183,8 @@ class GasChannel(FlowLaw):
     # ----
 
     def stored(self, area, area_rate, inner, parameters):
-        """What the balances hold (2 m - 1,): velocities integrated over the cells and the terms' momentum at the flange,
-        m2/s; mass per density outside of the cells, m3; traceable.
+        """What the balances hold (2 m - 1,): velocities integrated over the cells and the terms' momentum at the
+        flange, m2/s; mass per density outside of the cells, m3; traceable.
         """
         channel = self.channel
         speed, sigma = self.split(inner, parameters)
@@ -199,9 +223,10 @@ class GasChannel(FlowLaw):
         return CHOKED * (jnp.where(speed[1:] > 0.0, over[1:], 0.0) - jnp.where(speed[:-1] < 0.0, over[:-1], 0.0))
 
     def local_sound_speed(self, sigma, parameters):
-        """Speed of sound, m/s, where the density is that of sigma, m/s; traceable."""
+        """Speed of sound, m/s, where the density is that of sigma, m/s; of the liquid where it boils; traceable."""
         c = parameters["sound_speed"]
-        return c * jnp.exp(0.5 * (parameters["heat_capacity_ratio"] - 1.0) * sigma / c)
+        liquid, _ = self._boiling(sigma, parameters)
+        return c * jnp.exp(0.5 * (parameters["heat_capacity_ratio"] - 1.0) * liquid / c)
 
     def scales(self, area, parameters):
         """What turns the balances (2 m - 1,) into Pa; traceable."""

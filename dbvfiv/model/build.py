@@ -86,7 +86,7 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
     rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, **given)
     if case.is_compressed:
         channel = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, reversible=True, **given)
-        return GasChannel(channel, case.fluid.sound_speed, case.fluid.heat_capacity_ratio)
+        return GasChannel(channel, case.fluid.sound_speed, case.fluid.heat_capacity_ratio, case.boiling_pressure)
     if not case.has_waves:
         return rigid
     line = next(term for term in terms if isinstance(term, (Line, PiecedLine)))
