@@ -27,8 +27,9 @@ from .law import above_floor
 if TYPE_CHECKING:
     from .gas import GasChannel
 
-#: Newton steps within which the flow of a step must be found, and the size of the last one, relative and m/s.
-_STEPS, _TOLERANCE, _SMALLEST = 40, 1e-11, 1e-12
+#: Newton steps within which the flow of a step must be found, and the size of the last one, relative and m/s; what
+#: rounding may leave of it, where steps no longer fall.
+_STEPS, _TOLERANCE, _SMALLEST, _ROUNDING = 40, 1e-11, 1e-12, 1e-9
 #: Share of a step at which its equations are met, and r, for the difference of second order.
 SECOND_ORDER = 1.0, 1.5
 #: Names of the books of a `GasState`.
@@ -230,21 +231,22 @@ def _advanced(law, parameters, area, area_rate, start, weight, known):
         there = inner + 0.5 * fraction * step
         return 0.5 * fraction, inner, step, there, step_at(there)
 
-    def left(inner, step):
-        return jnp.linalg.norm(step) - _TOLERANCE * jnp.linalg.norm(inner) - _SMALLEST
+    def small(inner, step, share):
+        return jnp.linalg.norm(step) <= share * jnp.linalg.norm(inner) + _SMALLEST
 
     def advance(carried):
-        inner, step, count = carried
+        inner, step, count, _ = carried
         there = inner + step
         tried = jax.lax.while_loop(longer, halved, (jnp.ones(()), inner, step, there, step_at(there)))
-        return tried[3], tried[4], count + 1
+        stays = small(there, step, _ROUNDING) & ~(jnp.linalg.norm(tried[4]) <= 0.5 * jnp.linalg.norm(step))
+        return tried[3], tried[4], count + 1, stays
 
     def goes_on(carried):
-        inner, step, count = carried
-        return (count < _STEPS) & (left(inner, step) > 0.0)
+        inner, step, count, stays = carried
+        return (count < _STEPS) & ~stays & ~small(inner, step, _TOLERANCE)
 
-    inner, step, _ = jax.lax.while_loop(goes_on, advance, (start, step_at(start), 0))
-    inner = jnp.where(left(inner, step) <= 0.0, inner + step, jnp.nan)
+    inner, step, _, stays = jax.lax.while_loop(goes_on, advance, (start, step_at(start), 0, False))
+    inner = jnp.where(stays | small(inner, step, _TOLERANCE), inner + step, jnp.nan)
     return inner, law.stored(area, area_rate, inner, parameters), law.pressures(inner, parameters)
 
 
