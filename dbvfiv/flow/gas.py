@@ -189,12 +189,19 @@ class GasChannel(FlowLaw):
         channel = self.channel
         speed, sigma = self.split(inner, parameters)
         open_ = above_floor(area, self.floor)
-        volume = parameters["storage"] * open_ * jnp.exp(sigma / parameters["sound_speed"])
+        volume = parameters["storage"] * open_ * jnp.exp(self.inside(sigma) / parameters["sound_speed"])
         added = jnp.zeros_like(area)
         if channel.terms:
             added = added + channel.term_momenta(channel.stream(area, area_rate, speed, inner), parameters)
         psi = _cells(channel.step, speed) + added[:-1] - added[1:]
         return jnp.concatenate([psi, added[-1:], _cells(channel.step, volume)])
+
+    @staticmethod
+    def inside(sigma):
+        """sigma (m,), m/s, that mass is stored with: at the outlet that of its neighbour, since what is outside there
+        says nothing of how much is in the cell; traceable.
+        """
+        return sigma.at[0].set(sigma[1])
 
     def sources(self, area, area_rate, inner, parameters):
         """By what their rates are balanced (2 m - 1,), m2/s2 and m3/s; traceable."""

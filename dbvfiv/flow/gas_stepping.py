@@ -120,6 +120,7 @@ class GasStep:
 
     def __init__(self, fluid: GasFluid, old: GasState, h: float, rate: float, inlet: float):
         self.fluid, self.old, self.h, self.weight = fluid, old, h, rate / h
+        self._ahead = 1.0 if rate == 1.0 else 0.5  # of a step's power that at its end, as its difference has it
         self._known = (1.0 - rate) * old.rate - self.weight * old.stored
         self.parameters = fluid.parameters(inlet)
         self._start = old.inner
@@ -140,7 +141,8 @@ class GasStep:
         old, h = self.old, self.h
         power = self.fluid.powers(flow.area, flow.area_rate, flow.inner)[1]
         rate = (flow.stored - old.stored) / h
-        return GasState(flow.inner, flow.stored, rate, power, old.books + 0.5 * h * (old.power + power))
+        work = h * (old.power + self._ahead * (power - old.power))
+        return GasState(flow.inner, flow.stored, rate, power, old.books + work)
 
 
 class GasInstant:
@@ -289,13 +291,16 @@ def _powers(law, parameters, area, area_rate, inner):
     channel, density = law.channel, parameters["density"]
     speed, sigma = law.split(inner, parameters)
     open_, opening = jax.jvp(lambda a: above_floor(a, law.floor), (area,), (area_rate,))
-    thick = jnp.exp(sigma / parameters["sound_speed"])
-    pressure, enthalpy = law.pressure(sigma, parameters), law.enthalpy(sigma, parameters)
-    whole = enthalpy + 0.5 * speed**2
-    flow = density * thick * open_ * speed
+    entering = sigma.at[0].add(law.drawn(speed[0], parameters))
+    whole = law.enthalpy(sigma, parameters) + 0.5 * speed**2
+    flow = density * jnp.exp(entering / parameters["sound_speed"]) * open_ * speed
     head = law.sources(area, area_rate, inner, parameters)[: law.count - 1]
     lost = head - (whole[:-1] - whole[1:])  # what the cells take besides Bernoulli's heads
-    content = open_ * (density * thick * whole - pressure)
+    held = law.inside(sigma)
+    kept = density * jnp.exp(held / parameters["sound_speed"]) * (law.enthalpy(held, parameters) + 0.5 * speed**2)
+    content = open_ * (kept - law.pressure(held, parameters))
     integral = lambda x: jnp.sum(0.5 * channel.step * (x[1:] + x[:-1]))  # noqa: E731
     loss = jnp.sum(0.5 * (flow[1:] + flow[:-1]) * lost)
-    return integral(content), jnp.array([flow[-1] * whole[-1], flow[0] * whole[0], integral(pressure * opening), loss])
+    return integral(content), jnp.array(
+        [flow[-1] * whole[-1], flow[0] * whole[0], integral(law.pressure(sigma, parameters) * opening), loss]
+    )
