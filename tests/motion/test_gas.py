@@ -47,10 +47,10 @@ def swung(model, inlet, step, duration, opening=1e-5):
 
 
 def test_compression_moves_the_spectrum_by_little(valve):
-    """Air at 2 kPa: growth of the leading mode 142.97 -> 143.13 1/s, frequency 27.11 -> 27.18 Hz on this mesh."""
+    """Air at 2 kPa: growth of the leading mode +0.03 1/s of 143, frequency +0.05 Hz of 27.1 on this mesh."""
     plain, gas = (leading(valve(AIR | more), 2e3)[1] for more in ({}, SOUND))
-    assert gas.real - plain.real == pytest.approx(0.156, abs=0.02)
-    assert gas.imag - plain.imag == pytest.approx(0.455, abs=0.05)
+    assert gas.real - plain.real == pytest.approx(0.028, abs=0.01)
+    assert gas.imag - plain.imag == pytest.approx(0.307, abs=0.05)
 
 
 def test_a_kick_grows_as_the_eigenvalue_says(valve):
