@@ -38,37 +38,18 @@ class GasMotion(ValveMotion):
     def speeds(self, state) -> np.ndarray:
         return self.model.flow.own_velocities(state.gas.inner)
 
-    def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None, step=None) -> None:
-        model = self.model
-        nodal = model.nodal(q_new)
-        _, structure = model.structure(q_new, step)
-        values = weights.force * structure + weights.inertia * model.mass(q)
-        values = model.follower_stiffness(nodal, weights.load * load.pressure, values)
+    @property
+    def eliminated(self) -> bool:
+        return True
+
+    def _pressure_slope(self, area, load, weights):
         by_area, by_rate = load.gas.slopes()
-        forces = weights.load * model.station_forces(nodal).data
-        slope = by_area + weights.velocity * by_rate
-        self._solver(0).refactor(values, forces, model.rows.jacobian(nodal).data, slope)
-        self._add_outside(weights.outside)
+        return by_area + weights.velocity * by_rate
 
-    def solve(self, force, outlet):
-        solve = self._factor.solve_with_inner if self._correction is None else self._correction.solve
-        return solve(force, np.zeros(0))[0], 0.0
-
-    def accelerations(self, q, v, speed, inlet, memory=None, line=None, gas: GasState | None = None):
-        """As the base class; `gas` is the fluid's state, a steady flow by default, or rest where there is none."""
-        model, alpha, beta = self.model, self.conditions.alpha, self.conditions.beta
-        nodal = model.nodal(q)
-        wall = None if memory is None else self.wall.held(memory)
-        if self.outside is not None:
-            self.outside.begin_step(q, v)
+    def _first_instant(self, q, v, speed, inlet, gas):
+        """That of a given state of the fluid, or of a steady flow, at rest where there is no speed."""
         gas = self._gas(q, v, self._steady(q, speed, inlet), inlet) if gas is None else gas
-        load = self.load(q, v, q, v, self._of_gas(gas, np.zeros(self.stations), inlet))
-        forces = self.internal_force(q, wall) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
-        none = np.zeros((self.stations, self.stations))
-        mass, jacobian = model.mass(q), model.rows.jacobian(nodal).data
-        self._solver(0).refactor(mass, model.station_forces(nodal).data, jacobian, none)
-        self._add_outside(1.0)
-        return self.solve(load.force - forces, 0.0)[0], load
+        return self._of_gas(gas, np.zeros(self.stations), inlet)
 
     def gas_on_mode(self, q, moved, v, speed, inlet, flow):
         return self._gas(moved, v, self._steady(q, speed, inlet) + flow, inlet)
