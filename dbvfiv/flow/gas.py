@@ -22,7 +22,7 @@ A liquid boils where its pressure would fall below that of its vapour: the press
 VAPOUR c_0 need, the density falls on, and mass is kept, so that a cavity fills and empties (column separation,
 Bergant, Simpson and Tijsseling 2006).
 
-Equations (T.25), (T.26) and (T.27) of docs/theory.md.
+Equations (T.23), (T.24) and (T.25) of docs/theory.md.
 """
 
 from __future__ import annotations

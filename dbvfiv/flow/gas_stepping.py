@@ -10,6 +10,8 @@ not resolve, and gas that leaves through lips that shut, die out within it inste
 differenced, not density, so none is lost where a section shrinks to a fraction of itself within a step.
 
 The unknowns x are eliminated in each evaluation: the wall sees pressures and their derivatives by areas.
+
+Equations (T.23) and (T.24) of docs/theory.md.
 """
 
 from __future__ import annotations
