@@ -103,11 +103,50 @@ class Case(Section):
                 f"{self.upstream.first_wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
                 "give it with the unsteady law alone",
             )
+        self._check_compression()
         inlet = 2 * (self.valve.inlet_radius - self.valve.flange_wall_deduction)
         self.upstream.check_pipes(inlet)
         self.downstream.check_pipe(inlet)
         self.outside.check_pipe(self.valve.outer_diameter)
         return self
+
+    def _check_compression(self) -> None:
+        """Refuse a fluid that is compressed where nothing can store its mass, or beside waves in a line."""
+        self._check_boiling()
+        if not self.is_compressed:
+            return
+        given = f"{self.fluid.sound_speed:g} m/s with"
+        if self.fluid.continuity != "storage":
+            raise BrokenRule(
+                "fluid.sound_speed",
+                f"{given} fluid.continuity = {self.fluid.continuity!r}",
+                "a fluid that is compressed stores mass, so it must be 'storage' then",
+            )
+        if self.upstream.is_elastic:
+            raise BrokenRule(
+                "fluid.sound_speed",
+                f"{given} an elastic line (upstream.wave_speed)",
+                "the fluid is compressed in the valve or in the line, so leave one of them out",
+            )
+
+    def _check_boiling(self) -> None:
+        """Refuse a vapour pressure without waves, or one at which the fluid boils everywhere."""
+        boils, around = self.fluid.vapour_pressure, self.fluid.ambient_pressure + self.downstream.pressure
+        if self.drive.kind != "flow" or boils is None:
+            return
+        if not self.is_compressed:
+            raise BrokenRule(
+                "fluid.vapour_pressure",
+                f"{boils:g} Pa without fluid.sound_speed",
+                "how a liquid fills a cavity depends on its waves, so give both or neither",
+            )
+        if boils >= around:
+            raise BrokenRule(
+                "fluid.vapour_pressure",
+                f"{boils:g} Pa in surroundings of {around:g} Pa",
+                "it must be below the absolute pressure around the jet, fluid.ambient_pressure and downstream.pressure "
+                "together, or the liquid boils everywhere",
+            )
 
     def _check_fillers(self) -> None:
         """Refuse layers of limited extent beside the valve, and places with too few points through the wall."""
@@ -134,6 +173,18 @@ class Case(Section):
     def has_line(self) -> bool:
         """Whether fluid comes through a pipe in front of the valve."""
         return self.drive.kind == "flow" and self.upstream.whole_length > 0
+
+    @property
+    def is_compressed(self) -> bool:
+        """Whether the fluid in the valve is compressible."""
+        return self.drive.kind == "flow" and self.fluid.sound_speed is not None
+
+    @property
+    def boiling_pressure(self) -> float | None:
+        """Pressure at which the fluid in the valve boils, Pa, over that around the jet; None where it does not."""
+        if self.fluid.vapour_pressure is None:
+            return None
+        return self.fluid.vapour_pressure - self.fluid.ambient_pressure - self.downstream.pressure
 
     @property
     def has_tail(self) -> bool:

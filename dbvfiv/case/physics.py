@@ -77,6 +77,35 @@ class Fluid(Section):
         "turbulent in wide ones: none (the thesis), water (1.0016 mPa s) or air (0.01813 mPa s), both at 20 degC, or "
         "a number.",
     )
+    sound_speed: Annotated[float, Quantity("m/s", "m/s")] | None = key(
+        None,
+        "Speed of sound in the fluid in the valve at the pressure around the jet, for a gas, or a liquid, that is "
+        "compressed: 343 m/s in air, 1480 m/s in water at 20 degC. Where not given the fluid is incompressible (the "
+        'thesis). Needs continuity = "storage".',
+        ge=10,
+        le=1e5,
+    )
+    heat_capacity_ratio: Number = key(
+        1.4,
+        "Ratio of the specific heats of a gas with a sound_speed, which is compressed isentropically: 1.4 for air, 1.3 "
+        "for natural gas and steam. Its absolute pressure around the jet is density sound_speed^2 over it. For liquids "
+        "the exponent of Tait's equation, 7.15 for water, which says nothing at the pressures of a valve.",
+        ge=1.01,
+        le=10,
+    )
+    vapour_pressure: Annotated[float, Quantity("Pa", "kPa")] | None = key(
+        None,
+        "Absolute pressure at which a liquid with a sound_speed boils: 2339 Pa for water at 20 degC. Pressures in the "
+        "valve end there and cavities fill and empty. Where not given the liquid bears any tension.",
+        ge=0,
+        le=PARAMETERS["pressure"].high,
+    )
+    ambient_pressure: Annotated[float, Quantity("Pa", "kPa")] = key(
+        101325.0,
+        "Absolute pressure of the surroundings, which vapour_pressure is compared with.",
+        gt=0,
+        le=PARAMETERS["pressure"].high,
+    )
     area_floor: Number = key(
         0.05, "Smallest flow area, as a fraction of the lip gap area at rest; keeps a shut passage finite.", gt=0, lt=1
     )

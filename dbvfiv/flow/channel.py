@@ -209,7 +209,7 @@ class Channel(FlowLaw):
         An inlet velocity that no pressure holds back is infinite.
         """
         if self.viscous:
-            return derivatives.solve_steady(self._without_drives(), area, parameters)
+            return derivatives.solve_steady(self.without_drives(), area, parameters)
         open_ = above_floor(area, self.floor)
         total = open_**-2.0
         still = jnp.zeros_like(area)
@@ -223,7 +223,7 @@ class Channel(FlowLaw):
         speed = jnp.sqrt(2.0 * inlet / (parameters["density"] * jnp.where(ratio > 0, ratio, 1.0)))
         return pressure, jnp.where(ratio > 0, speed, jnp.inf)[None]
 
-    def _without_drives(self) -> Channel:
+    def without_drives(self) -> Channel:
         """The same channel with the terms that steady flow sees."""
         leaves, kept = self._flatten()
         leaves[self.DATA.index("terms")] = self.losses

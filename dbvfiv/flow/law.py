@@ -282,8 +282,24 @@ class FlowLaw(Traceable, ABC):
         """Steady inlet velocity, m/s: the first inner unknown of every law with a fluid."""
         return float(self.steady_inner(area, {"inlet": inlet, "density": density})[0]) if self.has_fluid else 0.0
 
+    def steady_velocities(self, area: np.ndarray, inlet: float, density: float) -> np.ndarray:
+        """Steady velocities (m,) at all stations, m/s; zero without a fluid."""
+        return self.velocities(area, self.inlet_velocity(area, inlet, density))
+
+    def inlet_density(self, area: np.ndarray, inlet: float, density: float) -> float:
+        """Density of the fluid at the inlet in steady flow, kg/m3; `density` is that around the jet."""
+        return density
+
+    def own_velocities(self, inner: np.ndarray) -> np.ndarray | None:
+        """Velocities (m,) at all stations, m/s, where they are among the law's own unknowns (l,); None where they
+        follow from the passage.
+        """
+        return None
+
     def velocities(self, area: np.ndarray, velocity: float) -> np.ndarray:
-        """Steady velocities (m,) at all stations from the inlet velocity; zero without a fluid."""
+        """Steady velocities (m,) of a fluid of constant density at all stations from the inlet velocity; zero without a
+        fluid.
+        """
         if not self.has_fluid:
             return np.zeros(self.count)
         open_ = self.open_area(area)

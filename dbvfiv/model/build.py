@@ -7,6 +7,7 @@ import numpy as np
 from ..case.model import Case
 from ..flow import Channel, FlowLaw, UniformLoad
 from ..flow.elastic_line import ElasticLine, LineChannel
+from ..flow.gas import GasChannel
 from ..flow.terms import terms_of
 from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
@@ -83,6 +84,9 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
     given = {"back": case.downstream.pressure, "perimeter": mesh.perimeter, "density": case.fluid.density}
     given |= _levels(case, mesh)
     rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, **given)
+    if case.is_compressed:
+        channel = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, reversible=True, **given)
+        return GasChannel(channel, case.fluid.sound_speed, case.fluid.heat_capacity_ratio, case.boiling_pressure)
     if not case.has_waves:
         return rigid
     line = next(term for term in terms if isinstance(term, (Line, PiecedLine)))

@@ -50,8 +50,8 @@ class LinearisedClass(LinearisedState):
         flow = self.model.flow
         if self.symmetry.sway_axis is None or not flow.has_fluid:
             return {}
-        velocity = flow.inlet_velocity(self.area, self.inlet, density)
-        passage = np.asarray(flow.open_area(self.area)), np.asarray(flow.velocities(self.area, velocity))
+        speeds = flow.steady_velocities(self.area, self.inlet, density)
+        passage = np.asarray(flow.open_area(self.area)), np.asarray(speeds)
         return plug_parts(self.model.mesh.z, *passage, density, flow.unsteady)
 
     def steady_parts(self) -> dict[str, np.ndarray]:

@@ -27,7 +27,7 @@ class BandOrigin(Enum):
     NONE = "none"  #: no band: stiffness damping orders the modes
     ASKED = "asked"  #: named by who asks
     STRUCTURE = "structure"  #: holds as many structural frequencies as modes are wanted
-    LINE = "line"  #: what the elements of an elastic line resolve
+    LINE = "line"  #: what the elements of an elastic line resolve, or the rows of the mesh in a compressed fluid
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,9 @@ class LeadingSearch:
         """What a reader of the result has to know about the band, in a sentence."""
         if self.origin is BandOrigin.LINE:
             return (
-                f"The elements of the line resolve waves up to {self.band:.4g} Hz, so the search covers the band up to "
-                "there; upstream.elements moves its end."
+                f"The elements of the line, or the rows of the mesh in a fluid that is compressed, resolve waves up to "
+                f"{self.band:.4g} Hz, so the search covers the band up to there; upstream.elements or mesh.along moves "
+                "its end."
             )
         if self.origin is not BandOrigin.STRUCTURE:
             return None

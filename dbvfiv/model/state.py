@@ -133,7 +133,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     velocity = model.flow.inlet_velocity(area, pressure, density)
     if not np.isfinite(velocity):
         raise SolveError(_boundless(model, area, pressure))
-    speeds = model.flow.velocities(area, velocity)
+    speeds = model.flow.steady_velocities(area, pressure, density)
     displacement = np.linalg.norm(nodal[:, :3], axis=1)
     where = int(np.argmax(displacement))
     lip = LipCentre(model.mesh, model.shell)

@@ -270,6 +270,7 @@ class ValveModel:
         """Steady mass flow of the whole valve, kg/s."""
         density = self.case.fluid.density if density is None else density
         velocity = self.flow.inlet_velocity(area, pressure, density)
+        density = self.flow.inlet_density(area, pressure, density)
         return QUARTERS * density * velocity * float(self.mesh.rest_area[-1] - self.mesh.wall_deduction[-1])
 
 

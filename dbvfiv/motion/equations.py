@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..flow.gas_stepping import GasState
 from ..flow.line_stepping import LineFluid, LineInstant, LineState, LineStep, LineWaves
 from ..model import ValveModel
 from ..model.dynamics import Conditions
@@ -218,9 +219,8 @@ class ValveMotion:
         forces = weights.load * model.station_forces(nodal).data
         slope = model.rows.jacobian(nodal).data
         mid = self._passage(nodal, v_load)
-        if not self.moving_fluid:
-            _, gradient = model.flow.steady_operator(mid[0], load.inlet)
-            self._solver(0).refactor(values, forces, slope, weights.theta * gradient)
+        if self.eliminated:
+            self._solver(0).refactor(values, forces, slope, self._pressure_slope(mid[0], load, weights))
             self._add_outside(weights.outside)
             return
         new = self._passage(model.nodal(q_new), v_new)
@@ -230,6 +230,15 @@ class ValveMotion:
         by_area, by_speed = found
         self._refactor_moving(values, forces, slope, by_area, by_speed + weights.theta * load.flange_slope)
         self._add_outside(weights.outside)
+
+    @property
+    def eliminated(self) -> bool:
+        """Whether pressures follow from the wall's motion alone, so that a step has no unknown of the fluid."""
+        return not self.moving_fluid
+
+    def _pressure_slope(self, area: np.ndarray, load: Load, weights: Weights) -> np.ndarray:
+        """Derivative (m, m) of pressures that follow from the wall's motion alone by the new areas."""
+        return weights.theta * self.model.flow.steady_operator(area, load.inlet)[1]
 
     def _add_outside(self, weight: float) -> None:
         """Take a multiple of the added mass, if there is one, into the solves with the factors just made."""
@@ -246,8 +255,8 @@ class ValveMotion:
     def solve(self, force: np.ndarray, outlet: float) -> tuple[np.ndarray, float]:
         """Changes of q (n,) and U that the last factored matrix gives for a force (n,) and an outlet pressure."""
         solve = self._factor.solve_with_inner if self._correction is None else self._correction.solve
-        dq, du = solve(force, np.array([outlet]) if self.moving_fluid else np.zeros(0))
-        return dq, float(du[0]) if self.moving_fluid else 0.0
+        dq, du = solve(force, np.zeros(0) if self.eliminated else np.array([outlet]))
+        return dq, 0.0 if self.eliminated else float(du[0])
 
     def begin_step(self, state, h: float, inlet: float) -> None:
         """A step starts from a state, whose shape says whether the added mass still holds."""
@@ -272,10 +281,18 @@ class ValveMotion:
         return self._factor
 
     def accelerations(
-        self, q, v, speed: float, inlet: float, memory: Memory | None = None, line: LineState | None = None
+        self,
+        q,
+        v,
+        speed: float,
+        inlet: float,
+        memory: Memory | None = None,
+        line: LineState | None = None,
+        gas: GasState | None = None,
     ) -> tuple[np.ndarray, Load]:
         """Accelerations (n,) that the equations ask for at positions, velocities and inlet velocity, and the fluid with
-        them; `memory` of a wall that has not relaxed, `line` of an elastic one that does not flow steadily.
+        them; `memory` of a wall that has not relaxed, `line` of an elastic one that does not flow steadily, `gas` of a
+        fluid that is compressed and does not.
 
         The equations are linear in the accelerations and the rate of the inlet velocity: one solve.
         """
@@ -286,8 +303,8 @@ class ValveMotion:
             self.outside.begin_step(q, v)
         forces = self.internal_force(q, wall) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
         mass = model.mass(q)
-        if not self.moving_fluid:
-            load = self.load(q, v, q, v, self._instant(speed, np.zeros(self.stations), inlet))
+        if self.eliminated:
+            load = self.load(q, v, q, v, self._first_instant(q, v, speed, inlet, gas))
             none = np.zeros((self.stations, self.stations))
             self._solver(0).refactor(mass, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
             self._add_outside(1.0)
@@ -313,6 +330,12 @@ class ValveMotion:
         line = self._line_moving(line, inlet, speed_rate)
         return a, self.load(q, v, q, v, self._instant(speed, psi_rate, inlet, line), speed)
 
+    def gas_on_mode(self, q, moved, v, speed: float, inlet: float, flow: np.ndarray) -> GasState | None:
+        """A compressed fluid, steady at positions q, on a mode that moves its unknowns by `flow` (l,) and the wall to
+        positions `moved` with velocities v; None where it is not compressed.
+        """
+        return None
+
     def line_at(self, speed: float, inlet: float) -> LineState | None:
         """An elastic line with a steady flow, or at rest without pressure where nothing flows; None without one."""
         if self.waves is None:
@@ -321,6 +344,10 @@ class ValveMotion:
 
     def _line_moving(self, line: LineState | None, inlet: float, speed_rate: float) -> LineState | None:
         return None if line is None else self.waves.moving(line, inlet, speed_rate)
+
+    def _first_instant(self, q, v, speed: float, inlet: float, gas: GasState | None) -> Step:
+        """A step of no length at positions and velocities whose fluid is eliminated."""
+        return self._instant(speed, np.zeros(self.stations), inlet)
 
     def instant(self, state, inlet: float) -> Step:
         """A step of no length at a state."""

@@ -50,7 +50,7 @@ class StaggeredMotion(ValveMotion):
         self._solver(0).refactor(values, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
         self._add_outside(weights.outside)
 
-    def accelerations(self, q, v, speed, inlet, memory=None, line=None):
+    def accelerations(self, q, v, speed, inlet, memory=None, line=None, gas=None):
         self._frozen, self.moving_fluid = None, self.coupled_fluid
         try:
             return super().accelerations(q, v, speed, inlet, memory, line)

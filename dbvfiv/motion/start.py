@@ -163,12 +163,14 @@ def on_mode(
         The mode, of the size it has at this instant.
     eigenvalue : complex, 1/s
     flow : (l,) array
-        Change of the fluid's own unknowns with it, the inlet velocity, m/s, before those of an elastic line.
+        Change of the fluid's own unknowns with it, the inlet velocity, m/s, before all others.
     """
     moved = q + shape.real
     memory = None if motion.wall is None else motion.wall.on_mode(q, shape, eigenvalue, moved)
     line = None if motion.waves is None else motion.waves.steady(speed, inlet).changed(flow)
-    return consistent_state(motion, 0.0, moved, (eigenvalue * shape).real, speed + flow[0], inlet, memory, line)
+    v = (eigenvalue * shape).real
+    gas = motion.gas_on_mode(q, moved, v, speed, inlet, flow)
+    return consistent_state(motion, 0.0, moved, v, speed + flow[0], inlet, memory, line, gas)
 
 
 def _find_mode(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..flow.gas_stepping import GasState
 from ..flow.line_stepping import LineState
 from ..shell import Memory
 
@@ -31,6 +32,8 @@ class MotionState:
         What a wall that relaxes remembers.
     line : LineState or None
         Waves in an elastic line.
+    gas : GasState or None
+        A fluid that is compressed.
     """
 
     time: float
@@ -45,6 +48,7 @@ class MotionState:
     psi_rate: np.ndarray
     memory: Memory | None = None
     line: LineState | None = None
+    gas: GasState | None = None
 
 
 def consistent_state(
@@ -56,17 +60,18 @@ def consistent_state(
     inlet: float,
     memory: Memory | None = None,
     line: LineState | None = None,
+    gas: GasState | None = None,
 ) -> MotionState:
     """State at given positions, velocities and inlet velocity with the accelerations that the equations of motion ask
-    for; a wall that relaxes has done so unless its memory is given, and an elastic line flows steadily unless its state
-    is.
+    for; a wall that relaxes has done so unless its memory is given, and an elastic line and a fluid that is compressed
+    flow steadily unless their states are.
     """
     q, v = np.asarray(q, float), np.asarray(v, float)
     held = None
     if motion.wall is not None:
         memory = motion.wall.at(q) if memory is None else memory
         held = motion.wall.held(memory)
-    waves = {} if line is None else {"line": line}
+    waves = {name: given for name, given in (("line", line), ("gas", gas)) if given is not None}
     a, load = motion.accelerations(q, v, speed, inlet, memory, **waves)
     return MotionState(
         float(time),
@@ -81,4 +86,5 @@ def consistent_state(
         load.psi_rate,
         memory,
         load.line,
+        None if load.gas is None else load.gas.state(),
     )

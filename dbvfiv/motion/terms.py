@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..flow.gas_stepping import GasFlow, GasInstant, GasStep
 from ..flow.line_stepping import LineInstant, LineState, LineStep
 
 
@@ -57,6 +58,8 @@ class Step:
         Inlet pressure where the equations are met, Pa.
     line : LineStep or LineInstant, optional
         The waves in an elastic line, at whose far end `inlet` is then.
+    gas : GasStep or GasInstant, optional
+        A fluid that is compressed.
     """
 
     theta: float
@@ -65,6 +68,7 @@ class Step:
     psi_known: np.ndarray
     inlet: float
     line: LineStep | LineInstant | None = None
+    gas: GasStep | GasInstant | None = None
 
 
 @dataclass
@@ -91,6 +95,8 @@ class Load:
         Waves in an elastic line at the end of the step.
     flange_slope : float
         Derivative of the pressure at the flange by the inlet velocity, both where the equations are met, Pa s/m.
+    gas : GasFlow, optional
+        A fluid that is compressed, at the end of the step.
     """
 
     force: np.ndarray
@@ -104,3 +110,4 @@ class Load:
     mid_speed: float
     line: LineState | None = None
     flange_slope: float = 0.0
+    gas: GasFlow | None = None

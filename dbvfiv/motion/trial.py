@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..flow.gas_stepping import SECOND_ORDER
 from .scheme import Scheme
 from .state import MotionState
 from .terms import Step, Weights
@@ -26,24 +27,26 @@ class Trial:
         self.motion, self.scheme, self.old, self.h = motion, scheme, old, h
         s, now = scheme, scheme.now
         self.wall = None if motion.wall is None else motion.wall.step(old.memory, h)
-        theta, rate = (1.0, 1.0) if robust else (now, s.rate)
+        theta, rate = (1.0, 1.0) if robust else (now, s.rate) if old.gas is None else SECOND_ORDER
         self.kind = (h, robust, s.gamma)
         self.weights = Weights(
             theta=theta,
-            load=now if robust else 1.0,
+            load=now if theta == 1.0 else 1.0,
             inertia=(1.0 - s.alpha_m) / (s.beta * h * h) + motion.conditions.alpha * now * s.gamma / (s.beta * h),
             force=now + motion.conditions.beta * s.rate / h,
             velocity=s.gamma / (s.beta * h),
             psi=rate / h,
             outside=(1.0 - s.alpha_m) / (s.beta * h * h),
         )
+        inlet = pressure(old.time + theta * h)
         self.fluid = Step(
             theta,
             old.speed,
             rate / h,
             (1.0 - rate) * old.psi_rate - (rate / h) * old.psi,
-            pressure(old.time + theta * h),
-            None if old.line is None else motion.line_step(old.line, h, theta, rate, pressure(old.time + theta * h)),
+            inlet,
+            None if old.line is None else motion.line_step(old.line, h, theta, rate, inlet),
+            None if old.gas is None else motion.fluid_step(old.gas, h, rate, inlet),
         )
 
         # stiffness damping is by the slow law, and its force is known apart only where there is some
@@ -115,4 +118,5 @@ class Trial:
             rate,
             None if self.wall is None else self.motion.wall.advance(old.memory, self.q, self.h, self.scheme.now),
             load.line,
+            None if load.gas is None else load.gas.state(),
         )

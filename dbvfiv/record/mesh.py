@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from ..flow.elastic_line import LineChannel
+from ..flow.gas import GasChannel
 from .layout import TEXT, Column, read_array, write_array
 
 if TYPE_CHECKING:
@@ -38,6 +39,8 @@ _RELAXING = (
 _LINE = (
     Column("line_places", "", "Where the velocities in an elastic line are, from its far end (0) to the flange (1)"),
 )
+#: There where the fluid in the valve is compressed.
+_GAS = (Column("gas_unknowns", "", "Number of unknowns of a fluid that is compressed", "i4"),)
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,8 @@ class MeshData:
         Maxwell branches: group, relaxation time (s), and modulus over that of the slow law.
     line_places : (k + 1,) array
         Where the velocities in an elastic line are; empty without one.
+    gas_unknowns : (1,) int array
+        Number of unknowns of a fluid that is compressed; empty without one.
     """
 
     nodes: np.ndarray
@@ -83,6 +88,7 @@ class MeshData:
     branch_time: np.ndarray = field(default_factory=lambda: np.zeros(0))
     branch_strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
     line_places: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    gas_unknowns: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
 
     @classmethod
     def of(cls, model: ValveModel) -> MeshData:
@@ -107,6 +113,7 @@ class MeshData:
             branch_time=branches.times[time],
             branch_strength=branches.strengths[group, time],
             line_places=model.flow.line.places[0] if isinstance(model.flow, LineChannel) else np.zeros(0),
+            gas_unknowns=np.array([model.flow.inner] if isinstance(model.flow, GasChannel) else [], np.int32),
         )
 
     @property
@@ -134,13 +141,13 @@ class MeshData:
 def write_mesh(file: h5py.File, mesh: MeshData) -> None:
     """Write a mesh into a result file."""
     group = file.create_group("mesh")
-    lines = _LINE if len(mesh.line_places) else ()
-    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *lines):
+    fluid = (*(_LINE if len(mesh.line_places) else ()), *(_GAS if len(mesh.gas_unknowns) else ()))
+    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *fluid):
         write_array(group, column, getattr(mesh, column.name))
 
 
 def read_mesh(file: h5py.File) -> MeshData:
     """Read the mesh of a result file."""
     group = file["mesh"]
-    columns = (*_COLUMNS, *(column for column in (*_RELAXING, *_LINE) if column.name in group))
+    columns = (*_COLUMNS, *(column for column in (*_RELAXING, *_LINE, *_GAS) if column.name in group))
     return MeshData(**{column.name: read_array(group, column) for column in columns})

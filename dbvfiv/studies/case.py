@@ -43,6 +43,12 @@ class _CaseOfStudies(PhysicsCase):
                 "'staggered' with an elastic line (upstream.wave_speed)",
                 "it must be 'monolithic' there, or the column rigid",
             )
+        if self.is_compressed and self.transient.coupling == "staggered":
+            raise BrokenRule(
+                "transient.coupling",
+                "'staggered' with a fluid that is compressed (fluid.sound_speed)",
+                "it must be 'monolithic' there",
+            )
         given = "pressures" if self.has_pump and self.transient.drive_table is not None else ""
         if given or (self.has_pump and self.transient.ramp > 0):
             raise BrokenRule(

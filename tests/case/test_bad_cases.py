@@ -190,6 +190,29 @@ BAD = {
     ),
     "gain in place of a loss": ("[upstream]\nlength = 20\nloss = -1", r"upstream\.loss.*at least 0"),
     "loss that is a length": ("[upstream]\nlength = 20\nloss = '3 m'", r"upstream\.loss.*not a plain number"),
+    "sound faster than a fluid has it": ("[fluid]\nsound_speed = 1e6", r"fluid\.sound_speed.*at most 100000"),
+    "sound without a unit": ("[fluid]\nsound_speed = '343'", r"fluid\.sound_speed.*no unit"),
+    "gas that no section can store": (
+        "[fluid]\nsound_speed = 343",
+        r"fluid\.sound_speed is 343 m/s with fluid\.continuity = 'quasi-steady'.*must be 'storage'",
+    ),
+    "gas behind waves in a line": (
+        "[fluid]\nsound_speed = 343\ncontinuity = 'storage'\n[upstream]\nlength = 20\nwave_speed = 343",
+        r"fluid\.sound_speed is 343 m/s with an elastic line.*leave one of them out",
+    ),
+    "gas by the thesis's coupling": (
+        "[fluid]\nsound_speed = 343\ncontinuity = 'storage'\n[transient]\ncoupling = 'staggered'",
+        r"transient\.coupling is 'staggered' with a fluid that is compressed",
+    ),
+    "gas of equal heat capacities": ("[fluid]\nheat_capacity_ratio = 1", r"fluid\.heat_capacity_ratio.*at least 1\.01"),
+    "vapour without waves": (
+        "[fluid]\nvapour_pressure = 2339",
+        r"fluid\.vapour_pressure is 2339 Pa without fluid\.sound_speed.*give both",
+    ),
+    "liquid that boils everywhere": (
+        "[fluid]\nsound_speed = 1480\ncontinuity = 'storage'\nvapour_pressure = '2 bar'",
+        r"fluid\.vapour_pressure is 200000 Pa in surroundings of 101325 Pa.*below the absolute pressure",
+    ),
     "wave speed below zero": ("[upstream]\nlength = 20\nwave_speed = -1000", r"upstream\.wave_speed.*at least 1"),
     "wave speed of nothing": ("[upstream]\nlength = 20\nwave_speed = 0", r"upstream\.wave_speed.*at least 1"),
     "wave speed that is a length": ("[upstream]\nlength = 20\nwave_speed = '1 km'", r"upstream\.wave_speed.*velocity"),

@@ -158,6 +158,7 @@ class ClosingResult:
 def closing_valve(case: Case) -> ContactValve:
     """The valve that follows the turn of its drive."""
     changes = {"drive.kind": "flow", "drive.side": "inside", "fluid.continuity": case.closure.reversal_continuity}
+    changes["fluid.sound_speed"] = None  # the fluid of these runs is incompressible
     return ContactValve(case.replace(changes | {"fluid.unsteady": True}))
 
 

@@ -115,8 +115,8 @@ def _last_period(model: ValveModel, case: Case, place: Place, result) -> Periodi
         )
     if model.flow.inner != 1:
         raise CaseError(
-            "A branch of a valve with an elastic line does not start from a run in time, whose states do not hold the "
-            "waves; start it from an onset, or from a cycle.",
+            "A branch of a valve with an elastic line, or a compressed fluid, does not start from a run in time, whose "
+            "states do not hold the waves; start it from an onset, or from a cycle.",
             key="cycle.start_file",
         )
     state, inlet, period = result.states[-1], place.pressure, 1.0 / verdict["frequency"]

@@ -83,7 +83,8 @@ _SERIES = (
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     """Tables of a cycle result on a mesh."""
     waves = len(mesh.line_places)
-    series = {"q": (int(mesh.free.sum()),), "inner": (2 * waves - 1 if waves else 1,)}
+    inner = int(mesh.gas_unknowns[0]) if len(mesh.gas_unknowns) else 2 * waves - 1 if waves else 1
+    series = {"q": (int(mesh.free.sum()),), "inner": (inner,)}
     wide = dict.fromkeys(("growth_rates", "angular_frequencies", "errors"), (KEPT,))
     return TableSpec(CYCLES, COLUMNS, wide), TableSpec(SERIES, _SERIES, series)
 

@@ -88,7 +88,9 @@ class Orbit:
         n = model.size
         area = np.stack([model.rows.areas(model.nodal(x)) for x in samples[:, :n]])
         opening, inlet = rates.apply(1, area), samples[:, n]
-        if not model.flow.unsteady:
+        if model.flow.own_velocities(samples[0, n:]) is not None:
+            speeds = np.stack([model.flow.own_velocities(x) for x in samples[:, n:]])
+        elif not model.flow.unsteady:
             speeds = np.stack([model.flow.velocities(a, u) for a, u in zip(area, inlet)])
         else:
             fluid = model.flow.stepping(density)

@@ -148,7 +148,7 @@ def is_surrounding(case: Case, name: str) -> bool:
 
 def why_it_moves(case: Case, name: str) -> str:
     """Why a parameter that leaves steady states alone as a rule moves them in a case, as a clause; empty where it does
-    not: the length of a line does where it has no friction, and the density without gravity and viscosity.
+    not: the length of a line does where it has friction, and the density with gravity, viscosity or compression.
     """
     if name == "pipe_length" and case.has_line and not case.upstream.pieces and case.upstream.has_friction:
         return "friction in the line moves the steady state with it"
@@ -156,6 +156,8 @@ def why_it_moves(case: Case, name: str) -> str:
         return "the weight of the fluid moves the steady state with it"
     if name == "density" and case.fluid.dynamic_viscosity:
         return "the friction of the fluid in the passage moves the steady state with it"
+    if name == "density" and case.is_compressed:
+        return "by how much the fluid is compressed moves the steady state with it"
     return ""
 
 

@@ -107,11 +107,19 @@ def assess(
 
 
 def beyond_model(history: Columns) -> str | None:
-    """Sentence on pressures that no fluid could have, None without any.
+    """Sentence on speeds and pressures beyond what the equations are for, None without any.
 
     An ideal incompressible fluid pays any price for passing a gap that shuts; a real one separates, cavitates or is
     compressed. What follows such an instant is the solution of the equations and no prediction.
     """
+    fastest = np.asarray(history["mach"]) if "mach" in history else np.zeros(1)
+    if fastest.max() > 1.0:
+        where = int(np.argmax(fastest > 1.0))
+        return (
+            f"The fluid is faster than sound in the valve from {history['time'][where]:.4g} s on, in "
+            f"{100 * np.mean(fastest > 1.0):.2g} % of the steps and up to Mach {fastest.max():.3g}: what shocks take "
+            "is a loss of head here, and the air that lips draw in then is a rough estimate."
+        )
     lowest = np.min(history["station_pressure"], axis=1)
     beyond = np.flatnonzero(lowest < -ATMOSPHERE)
     if not len(beyond):

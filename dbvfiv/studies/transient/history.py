@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...flow.gas_stepping import GasState
 from ...flow.line_stepping import LineState
 from ...geometry import QUARTERS
 from ...model.lip import LipCentre
@@ -62,11 +63,15 @@ class Reader:
             by_group = {"branch_energy": QUARTERS * memory.stored, "branch_loss": QUARTERS * memory.loss}
         if state.line is not None:
             by_group |= self._of_line(state.line)
+        entered = density * load.speed[-1] * self._inlet_area
+        if state.gas is not None:
+            out, entered, fastest = motion.fluid.readings(area, state.gas.inner)
+            by_group |= self._of_gas(load, state.gas) | {"mach": fastest}
         return by_group | {
             "time": state.time,
             "inlet_pressure": load.inlet,
             "mass_flow": QUARTERS * out,
-            "inlet_mass_flow": QUARTERS * density * load.speed[-1] * self._inlet_area,
+            "inlet_mass_flow": QUARTERS * entered,
             "outlet_area": QUARTERS * area[0],
             "smallest_area": QUARTERS * area[throat],
             "throat": float(model.mesh.z[throat]),
@@ -91,6 +96,12 @@ class Reader:
             "station_area": area,
             "centre_line": np.where(self._moves, state.q[self._centre], 0.0),
         }
+
+    def _of_gas(self, load, gas: GasState) -> dict[str, float]:
+        energy, _ = self.motion.fluid.powers(load.area, load.gas.area_rate, gas.inner)
+        supply, outflow, work, loss = (float(x) for x in QUARTERS * gas.books)
+        kept = {"gas_supply": supply, "gas_outflow": outflow, "gas_work": work, "gas_loss": loss}
+        return kept | {"gas_energy": QUARTERS * energy}
 
     def _of_line(self, line: LineState) -> dict[str, Any]:
         kinetic, elastic = self.motion.waves.energies(line)

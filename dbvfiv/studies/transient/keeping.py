@@ -48,6 +48,10 @@ class Keeper:
         """Rows of the history, those held back included."""
         return self._kept[HISTORY] + len(self._pending["time"])
 
+    def __contains__(self, name: str) -> bool:
+        """Whether there is such a column of the history."""
+        return name in self._pending
+
     def __getitem__(self, name: str) -> np.ndarray:
         """A column of the history."""
         self.flush()

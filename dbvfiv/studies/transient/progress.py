@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...flow.gas_stepping import GasState
 from ...flow.line_stepping import LineState
 from ...motion.state import MotionState
 from ...record.record import Record
@@ -57,9 +58,9 @@ class Progress:
         """A row of the table of restart points."""
         values = {c.name: getattr(self, c.name) for c in (*COUNTS, *BOOKS)}
         values["eigenvalue"] = [self.eigenvalue.real, self.eigenvalue.imag]
-        values |= {f.name: getattr(self.state, f.name) for f in fields(MotionState) if f.name not in ("memory", "line")}
-        if self.state.line is not None:
-            values["line"] = self.state.line.packed
+        apart = ("memory", "line", "gas")
+        values |= {f.name: getattr(self.state, f.name) for f in fields(MotionState) if f.name not in apart}
+        values |= {name: part.packed for name in apart[1:] if (part := getattr(self.state, name)) is not None}
         return values if self.state.memory is None else values | memory_row(self.state.memory)
 
     @classmethod
@@ -74,8 +75,10 @@ class Progress:
         if wall is not None:
             kept = [record.value(RESTART, c.name, at) for c in MEMORY_COLUMNS]
             state = replace(state, memory=wall.at(state.q, *kept))
-        if any(c.name == "line" for c in record.tables[RESTART].columns):
-            state = replace(state, line=LineState.unpacked(record.value(RESTART, "line", at)))
+        names = {column.name for column in record.tables[RESTART].columns}
+        for name, kind in (("line", LineState), ("gas", GasState)):
+            if name in names:
+                state = replace(state, **{name: kind.unpacked(record.value(RESTART, name, at))})
         return cls(
             state,
             int(values["steps"]),

@@ -21,7 +21,7 @@ from ..result import StudyResult
 from . import figures
 from .animation import animate
 from .assess import assess
-from .tables import HISTORY, LINE, PROFILES, RELAXING, SCALARS, STATE_COLUMNS, STATES
+from .tables import GAS, HISTORY, LINE, PROFILES, RELAXING, SCALARS, STATE_COLUMNS, STATES
 
 _NO_VERDICT = {
     "verdict": "undecided",
@@ -83,7 +83,8 @@ class TransientResult(StudyResult):
     ----------
     history : dict of str to array
         Columns of `dbvfiv.studies.transient.tables.SCALARS` and `PROFILES`, and of `RELAXING` where the wall relaxes,
-        for the groups of layers in `mesh.relaxing`, and of `LINE` behind an elastic line; one row for each step.
+        for the groups of layers in `mesh.relaxing`, of `LINE` behind an elastic line, and of `GAS` where the fluid is
+        compressed; one row for each step.
     states : sequence of TransientState
         Full states, `transient.save_every` apart, and the last one.
     verdict : dict
@@ -99,7 +100,7 @@ class TransientResult(StudyResult):
 
     @cached_property
     def history(self) -> dict[str, np.ndarray]:
-        lines = LINE if len(self.mesh.line_places) else ()
+        lines = (*(LINE if len(self.mesh.line_places) else ()), *(GAS if len(self.mesh.gas_unknowns) else ()))
         columns = (*SCALARS, *PROFILES, *(RELAXING if self.mesh.relaxing else ()), *lines)
         return {c.name: self.record.column(HISTORY, c.name) for c in columns}
 

@@ -12,11 +12,10 @@ from ...errors import SolveError
 from ...geometry import QUARTERS
 from ...model import ValveModel
 from ...model.equilibria import model_warnings
+from ...motion.choice import motion_of
 from ...motion.control import step_control
 from ...motion.drive import Drive
-from ...motion.equations import ValveMotion
 from ...motion.options import RunOptions
-from ...motion.staggered import StaggeredMotion
 from ...motion.start import first_state
 from ...motion.state import MotionState
 from ...motion.stepper import StepFailure, Stepper
@@ -91,7 +90,7 @@ class Runner:
         self.record = _in_memory(model, case) if record is None else record
         self.options = RunOptions.of(case) if options is None else options
         self.drive = Drive.of(case)
-        self.motion = StaggeredMotion(model) if case.transient.coupling == "staggered" else ValveMotion(model)
+        self.motion = motion_of(model, staggered=case.transient.coupling == "staggered")
         self.stepper = Stepper(self.motion, self.options.scheme, self.drive, self.options.step)
         self.control = step_control(self.stepper, self.options.control)
         self.gap = QUARTERS * float(model.mesh.rest_area[0] - model.mesh.wall_deduction[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...flow.gas_stepping import packed_size
 from ...record.layout import Column
 from ...record.mesh import MeshData
 from ...record.table import TableSpec
@@ -73,6 +74,15 @@ LINE = (
     Column("line_dissipation", "J", "Energy lost to friction and losses in the line since the start"),
     Column("line_work", "J", "Energy that left it at the flange since the start, by pressure and velocity head"),
 )
+#: Of a fluid that is compressed, of the whole valve, there where the case has one.
+GAS = (
+    Column("gas_energy", "J", "Kinetic energy and energy of compression of the fluid in the valve"),
+    Column("gas_supply", "J", "Energy that it took in at the flange since the start, by enthalpy and velocity head"),
+    Column("gas_outflow", "J", "Energy that left it at the lips since the start, likewise"),
+    Column("gas_work", "J", "Work that it did on the wall since the start"),
+    Column("gas_loss", "J", "Energy that it lost in the valve since the start: by friction, jets inside, and shocks"),
+    Column("mach", "", "Largest Mach number in the valve"),
+)
 #: Full states.
 STATE_COLUMNS = (
     Column("time", "s", "Time"),
@@ -105,6 +115,10 @@ MEMORY_COLUMNS = (
 )
 #: Waves in an elastic line, as `dbvfiv.flow.line_stepping.LineState` packs them.
 LINE_COLUMNS = (Column("line", "m/s, m/s^2, J", "Velocities, scaled pressures, their rates and books of energy"),)
+#: A fluid that is compressed, as `dbvfiv.flow.gas_stepping.GasState` packs it.
+GAS_COLUMNS = (
+    Column("gas", "m/s, m^2/s, m^3, W, J", "Unknowns, what balances hold and its rates, powers and books of energy"),
+)
 #: How far a run has come.
 COUNTS = (
     Column("steps", "", "Steps made", "i8"),
@@ -135,8 +149,13 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     waves = len(mesh.line_places)
     if waves:
         motion["line"] = (4 * waves + 1,)
+    compressed = len(mesh.gas_unknowns) > 0
+    if compressed:
+        motion["gas"] = (packed_size(int(mesh.gas_unknowns[0])),)
     history = (*SCALARS, *PROFILES, *(RELAXING if groups else ()), *(LINE if waves else ()))
+    history += GAS if compressed else ()
     restart = (*COUNTS, *BOOKS, *MOTION_COLUMNS, *(MEMORY_COLUMNS if groups else ()), *(LINE_COLUMNS if waves else ()))
+    restart += GAS_COLUMNS if compressed else ()
     return (
         TableSpec(HISTORY, history, by_row | by_group | {"centre_line": (stations,)}, chunk=512),
         TableSpec(STATES, STATE_COLUMNS, by_row | {"nodal": (nodes, 5), "nodal_rate": (nodes, 5)}),

@@ -1,0 +1,349 @@
+"""A channel whose fluid is compressed: isentropic flow of a gas along one streamline (Shapiro 1953).
+
+    d(rho A)/dt + d(rho A U)/ds = 0,      dU/dt + d(U^2/2 + w)/ds = 0,      dw = dp/rho
+    p = rho_0 c_0^2/gamma [(rho/rho_0)^gamma - 1]
+
+p is the pressure over that around the jet, rho_0 and c_0 density and speed of sound there: a perfect gas of the
+absolute pressure rho_0 c_0^2/gamma, or a liquid whose compression follows Tait's equation. With sigma, m/s, defined as
+c_0 ln(rho/rho_0)
+
+    p = rho_0 c_0^2/gamma [exp(gamma sigma/c_0) - 1],      w = c_0^2/(gamma - 1) [exp((gamma - 1) sigma/c_0) - 1]
+
+so that a density is never negative, and p = rho_0 c_0 sigma where c_0 is large. Both balances are taken over the cells
+between stations with the trapezoidal rule (the box scheme): as c_0 grows, what is left is the law of `Channel` with
+storage, station by station. Losses and inertances are those of the channel's terms, as enthalpies.
+
+The jet leaves at the pressure around it until it is as fast as sound; from there on the speed at the outlet stays that
+of sound and the pressure rises. What is drawn in comes from rest outside, and is no denser than it is there at the
+speed of sound. At a throat inside, speed over that of sound is lost downstream of it, as in a shock that stands there:
+the head CHOKED (U - c)^2. It is lost at that density; that a shock heats the gas is left out.
+
+A liquid boils where its pressure would fall below that of its vapour: the pressure stays, but for what waves at
+VAPOUR c_0 need, the density falls on, and mass is kept, so that a cavity fills and empties (column separation,
+Bergant, Simpson and Tijsseling 2006).
+
+Equations (T.23), (T.24) and (T.25) of docs/theory.md.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .channel import Channel
+from .gas_stepping import GasFluid
+from .heads import outward_head, reversible_head
+from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
+
+#: Relative error of the frequency of waves that counts as resolved; the box scheme's is (k h)^2/12.
+_RESOLVED = 0.01
+#: What a flow faster than sound loses, of the square of the difference.
+CHOKED = 50.0
+#: Speed of waves in a liquid that boils, over that of sound in the liquid.
+VAPOUR = 1e-3
+#: Steps within which a steady flow must be found, and the relative size of the last one.
+_SETTLING, _SETTLED = 200, 1e-12
+#: What is left, over rho c^2, where such a step is as long as a wave takes through the passage.
+_USUAL = 0.02
+
+
+def grown(x, rate):
+    """(exp(rate x) - 1)/rate; traceable."""
+    return jnp.expm1(rate * x) / rate
+
+
+class GasChannel(FlowLaw):
+    """Isentropic flow through m stations.
+
+    Its 2 m - 1 unknowns, all in m/s, are the inlet velocity, the velocities at the stations from the outlet on, and
+    sigma at those but the outlet. Its equations, all in Pa, are momentum and mass of each cell between stations, and
+    the pressure at the flange.
+
+    Parameters
+    ----------
+    channel : Channel
+        The same without compression.
+    sound_speed : float, m/s
+        c_0.
+    ratio : float
+        gamma, of the heat capacities; greater than 1.
+    vapour : float, Pa, optional
+        Pressure at which the fluid boils, over that around the jet; negative.
+    """
+
+    DATA = ("channel", "floor", "vapour")
+    STATIC = ("boils",)
+    inner_names: ClassVar[tuple[str, ...]] = ("inlet velocity", "velocities", "logarithms of the density")
+
+    def __init__(self, channel: Channel, sound_speed: float, ratio: float = 1.4, vapour: float | None = None):
+        self.channel, self.sound_speed, self.ratio = channel, float(sound_speed), float(ratio)
+        self.floor, self.density = channel.floor, channel.density
+        self.boils, self.vapour = vapour is not None, 0.0 if vapour is None else float(vapour)
+
+    @property
+    def count(self) -> int:
+        return self.channel.count
+
+    @property
+    def inner(self) -> int:
+        return 2 * self.count - 1
+
+    @property
+    def terms(self):
+        """Those of the channel."""
+        return self.channel.terms
+
+    @property
+    def back(self) -> float:
+        """That of the channel."""
+        return self.channel.back
+
+    @property
+    def level(self) -> float:
+        """That of the channel."""
+        return self.channel.level
+
+    @property
+    def static(self):
+        """That of the channel."""
+        return self.channel.static
+
+    @property
+    def storage(self) -> float:
+        """Blend of the continuity laws."""
+        return self.channel.storage
+
+    @property
+    def unsteady(self) -> bool:
+        """That of the channel."""
+        return self.channel.unsteady
+
+    @property
+    def parameters(self) -> tuple[FlowParameter, ...]:
+        return (
+            *self.channel.parameters,
+            FlowParameter("sound_speed", "m/s", "in the fluid around the jet", self.sound_speed),
+            FlowParameter("heat_capacity_ratio", "1", "of the fluid", self.ratio),
+        )
+
+    def at_unit_density(self) -> dict[str, float]:
+        return self.channel.at_unit_density() | {"sound_speed": self.sound_speed * np.sqrt(self.density)}
+
+    def resolved(self, given) -> float:
+        """Frequency up to which waves in the passage are 1 % too high at most, Hz."""
+        speed = self.values({"inlet": 0.0, "density": 1.0} | dict(given))["sound_speed"]
+        return float(np.sqrt(12.0 * _RESOLVED) * speed / (2.0 * np.pi * np.max(self.channel.step)))
+
+    # -- the fluid
+    # ----
+
+    def pressure(self, sigma, parameters):
+        """Pressures over that around the jet, Pa; traceable."""
+        c, density = parameters["sound_speed"], parameters["density"]
+        liquid, boiling = self._boiling(sigma, parameters)
+        found = density * c * grown(liquid, parameters["heat_capacity_ratio"] / c)
+        if not self.boils:
+            return found
+        return found + density * c * VAPOUR**2 * jnp.exp(liquid / c) * grown(boiling, 1.0 / c)
+
+    def enthalpy(self, sigma, parameters):
+        """Integrals of dp/rho from the pressure around the jet, m2/s2; traceable."""
+        c = parameters["sound_speed"]
+        liquid, boiling = self._boiling(sigma, parameters)
+        found = c * grown(liquid, (parameters["heat_capacity_ratio"] - 1.0) / c)
+        return found + c * VAPOUR**2 * boiling if self.boils else found
+
+    def _boiling(self, sigma, parameters):
+        """sigma, m/s, down to where the fluid boils, and what is below that; traceable."""
+        if not self.boils:
+            return sigma, jnp.zeros_like(sigma)
+        limit = self.compression(self.vapour, parameters)
+        return jnp.maximum(sigma, limit), jnp.minimum(sigma - limit, 0.0)
+
+    def compression(self, pressure, parameters):
+        """sigma, m/s, of pressures over that around the jet, Pa; traceable."""
+        c, ratio = parameters["sound_speed"], parameters["heat_capacity_ratio"]
+        return c / ratio * jnp.log1p(ratio * pressure / (parameters["density"] * c * c))
+
+    def outlet(self, speed, parameters):
+        """sigma, m/s, at the outlet with a speed, m/s: zero up to that of sound, beyond such that it is that."""
+        c = parameters["sound_speed"]
+        over = jnp.log(jnp.maximum(speed / c, 1.0))
+        return 2.0 * c / (parameters["heat_capacity_ratio"] - 1.0) * over
+
+    def split(self, inner, parameters):
+        """Velocities (m,), m/s, and sigma (m,), m/s, at the stations from the law's unknowns; traceable."""
+        speed = jnp.concatenate([inner[1 : self.count], inner[:1]])
+        return speed, jnp.concatenate([self.outlet(speed[0], parameters)[None], inner[self.count :]])
+
+    # -- the definition
+    # ----
+
+    def stored(self, area, area_rate, inner, parameters):
+        """What the balances hold (2 m - 1,): velocities integrated over the cells and the terms' momentum at the
+        flange, m2/s; mass per density outside of the cells, m3; traceable.
+        """
+        channel = self.channel
+        speed, sigma = self.split(inner, parameters)
+        open_ = above_floor(area, self.floor)
+        volume = parameters["storage"] * open_ * jnp.exp(self.inside(sigma) / parameters["sound_speed"])
+        added = jnp.zeros_like(area)
+        if channel.terms:
+            added = added + channel.term_momenta(channel.stream(area, area_rate, speed, inner), parameters)
+        psi = _cells(channel.step, speed) + added[:-1] - added[1:]
+        return jnp.concatenate([psi, added[-1:], _cells(channel.step, volume)])
+
+    @staticmethod
+    def inside(sigma):
+        """sigma (m,), m/s, that mass is stored with: at the outlet that of its neighbour, since what is outside there
+        says nothing of how much is in the cell; traceable.
+        """
+        return sigma.at[0].set(sigma[1])
+
+    def sources(self, area, area_rate, inner, parameters):
+        """By what their rates are balanced (2 m - 1,), m2/s2 and m3/s; traceable."""
+        channel = self.channel
+        speed, sigma = self.split(inner, parameters)
+        open_ = above_floor(area, self.floor)
+        head = (reversible_head if channel.reversible else outward_head)(speed, inner[0])
+        if channel.terms:
+            head = head + channel.term_heads(channel.stream(area, area_rate, speed, inner), parameters)
+        drive = self.enthalpy(self.compression(parameters["inlet"] - channel.back, parameters), parameters)
+        total = head + self.enthalpy(sigma, parameters)
+        thick = sigma + jnp.zeros_like(sigma).at[0].set(self.drawn(speed[0], parameters))
+        flow = open_ * speed * jnp.exp(thick / parameters["sound_speed"])
+        momentum = total[:-1] - total[1:] + self.shocks(speed, thick, parameters)
+        return jnp.concatenate([momentum, total[-1:] - drive, flow[:-1] - flow[1:]])
+
+    def drawn(self, speed, parameters):
+        """sigma, m/s, of what is drawn in through the outlet with a speed, m/s; 0 where it flows out; traceable."""
+        c, ratio = parameters["sound_speed"], parameters["heat_capacity_ratio"]
+        lost = jnp.minimum(0.5 * jnp.minimum(speed, 0.0) ** 2, c * c / (ratio + 1.0))
+        return c / (ratio - 1.0) * jnp.log1p(-(ratio - 1.0) / c**2 * lost)
+
+    def shocks(self, speed, sigma, parameters):
+        """Heads (m - 1,) that the cells take where the fluid enters them faster than sound, m2/s2; traceable."""
+        over = jnp.maximum(jnp.abs(speed) - self.local_sound_speed(sigma, parameters), 0.0) ** 2
+        return CHOKED * (jnp.where(speed[1:] > 0.0, over[1:], 0.0) - jnp.where(speed[:-1] < 0.0, over[:-1], 0.0))
+
+    def local_sound_speed(self, sigma, parameters):
+        """Speed of sound, m/s, where the density is that of sigma, m/s; of the liquid where it boils; traceable."""
+        c = parameters["sound_speed"]
+        liquid, _ = self._boiling(sigma, parameters)
+        return c * jnp.exp(0.5 * (parameters["heat_capacity_ratio"] - 1.0) * liquid / c)
+
+    def scales(self, area, parameters):
+        """What turns the balances (2 m - 1,) into Pa; traceable."""
+        density = parameters["density"]
+        momentum = jnp.full(self.count, density)
+        mass = jnp.full(self.count - 1, density * parameters["sound_speed"]) / above_floor(area[-1], self.floor)
+        return jnp.concatenate([momentum, mass])
+
+    def equations(self, motion: FlowMotion, parameters):
+        area, rate, acceleration, inner, inner_rate = motion
+        balance = self.sources(area, rate, inner, parameters)
+        if self.unsteady:
+            held = lambda a, r, u: self.stored(a, r, u, parameters)  # noqa: E731
+            _, change = jax.jvp(held, (area, rate, inner), (rate, acceleration, inner_rate))
+            balance = balance + change
+        return self.pressures(inner, parameters), self.scales(area, parameters) * balance
+
+    def pressures(self, inner, parameters):
+        """Pressures (m,) on the wall, Pa; traceable."""
+        _, sigma = self.split(inner, parameters)
+        return self.pressure(sigma, parameters) + self.channel.static
+
+    # -- the steady flow
+    # ----
+
+    def steady_start(self, area, parameters):
+        """The flow without compression, no faster than sound, and the densities that its pressures make."""
+        pressure, velocity = self.channel.steady(area, parameters)
+        open_ = above_floor(area, self.floor)
+        speed = jnp.minimum(velocity[0] * open_[-1] / open_, 0.8 * parameters["sound_speed"])
+        least = -0.5 * parameters["density"] * parameters["sound_speed"] ** 2 / parameters["heat_capacity_ratio"]
+        sigma = self.compression(jnp.maximum(pressure - self.channel.static, least), parameters)
+        return jnp.concatenate([speed[-1:], speed[:-1], sigma[1:]])
+
+    def steady(self, area, parameters):
+        """Searched for; nothing flows where no pressure drives it."""
+        own, still = self._without_drives(), parameters["inlet"] == self.channel.back
+        driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
+        inner = _settled(*jax.lax.stop_gradient((own, area, driven)))
+        for _ in range(2):  # which make derivatives exact up to the third, as in `derivatives.solve_steady`
+            inner = inner + _newton_step(own, area, driven, inner)
+        pressure = self.pressures(inner, parameters)
+        rest = jnp.zeros_like(pressure) + self.channel.static
+        return jnp.where(still, rest, pressure), jnp.where(still, 0.0, inner)
+
+    def _without_drives(self) -> GasChannel:
+        """The same law with the terms that steady flow sees."""
+        leaves, kept = self._flatten()
+        leaves[self.DATA.index("channel")] = self.channel.without_drives()
+        return self._unflatten(kept, leaves)
+
+    def own_velocities(self, inner):
+        return np.append(inner[1 : self.count], inner[0])
+
+    def steady_velocities(self, area, inlet, density):
+        """Of a fluid of another density than the own one, that which is compressed alike by a pressure."""
+        own = self.own_velocities(self.steady_inner(area, self._driven(inlet)))
+        return own * np.sqrt(self.density / density)
+
+    def inlet_density(self, area, inlet, density):
+        """Likewise."""
+        inner = self.steady_inner(area, self._driven(inlet))
+        return density * float(np.exp(inner[-1] / self.sound_speed))
+
+    def stepping(self, density: float) -> GasFluid:
+        return GasFluid(self, density)
+
+
+@jax.jit
+def _left(law: GasChannel, area, parameters, inner):
+    """What the equations leave (l,), Pa, in a passage at rest."""
+    return law.scales(area, parameters) * law.sources(area, jnp.zeros_like(area), inner, parameters)
+
+
+@jax.jit
+def _newton_step(law: GasChannel, area, parameters, inner):
+    return -jnp.linalg.solve(jax.jacfwd(_left, 3)(law, area, parameters, inner), _left(law, area, parameters, inner))
+
+
+@jax.jit
+def _settling_step(law: GasChannel, area, parameters, inner):
+    """Change (l,) of the unknowns in an implicit step of time, the longer the less is left."""
+    c, still = parameters["sound_speed"], jnp.zeros_like(area)
+    left = _left(law, area, parameters, inner)
+    passing = jnp.sum(law.channel.step) / c  # time that a wave takes
+    rate = jnp.linalg.norm(left) / (_USUAL * parameters["density"] * c * c * passing)
+    held = jax.jacfwd(law.stored, 2)(area, still, inner, {**parameters, "storage": 1.0})
+    slope = jax.jacfwd(_left, 3)(law, area, parameters, inner)
+    return -jnp.linalg.solve(slope + rate * law.scales(area, parameters)[:, None] * held, left)
+
+
+def _settled(law: GasChannel, area, parameters):
+    """Unknowns (l,) of the steady flow: that which a flow settles in, by implicit steps of time whose length grows as
+    what is left falls (Mulder and van Leer 1985), Newton's method in the end; not numbers where it does not settle.
+    """
+    longest = 0.3 * parameters["sound_speed"]
+
+    def advance(carried):
+        inner, _, count = carried
+        step = _settling_step(law, area, parameters, inner)
+        inner = inner + jnp.minimum(1.0, longest / jnp.max(jnp.abs(step))) * step
+        return inner, jnp.linalg.norm(step) / jnp.linalg.norm(inner), count + 1
+
+    def goes_on(carried):
+        return (carried[2] < _SETTLING) & (carried[1] > _SETTLED)
+
+    inner, last, _ = jax.lax.while_loop(goes_on, advance, (law.steady_start(area, parameters), 1.0, 0))
+    return jnp.where(last <= _SETTLED, inner, jnp.nan)
+
+
+def _cells(step, values):
+    """Integrals (m - 1,) of values (m,) over the cells between stations."""
+    return 0.5 * step * (values[1:] + values[:-1])

@@ -1,0 +1,308 @@
+"""A compressed fluid as a time step sees it: its state at the end of a step, found from the law's own definition.
+
+With Q what the balances of `dbvfiv.flow.gas.GasChannel` hold and f what their rates are balanced by, a step of length h
+ends where
+
+    r Q'_{n+1} + (1 - r) Q'_n + f(A_{n+1}, A'_{n+1}, x_{n+1}) = 0,      Q'_{n+1} = (Q_{n+1} - Q_n)/h
+
+r = 1 is the backward difference of first order, r = 3/2 that of second order. Both are L-stable: waves that a step does
+not resolve, and gas that leaves through lips that shut, die out within it instead of alternating in sign. Mass is
+differenced, not density, so none is lost where a section shrinks to a fraction of itself within a step.
+
+The unknowns x are eliminated in each evaluation: the wall sees pressures and their derivatives by areas.
+
+Equations (T.23) and (T.24) of docs/theory.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .law import above_floor
+
+if TYPE_CHECKING:
+    from .gas import GasChannel
+
+#: Newton steps within which the flow of a step must be found, and the size of the last one, relative and m/s; what
+#: rounding may leave of it, where steps no longer fall.
+_STEPS, _TOLERANCE, _SMALLEST, _ROUNDING = 40, 1e-11, 1e-12, 1e-9
+#: Share of a step at which its equations are met, and r, for the difference of second order.
+SECOND_ORDER = 1.0, 1.5
+#: Names of the books of a `GasState`.
+BOOKS = ("supply", "outflow", "work", "loss")
+
+
+def packed_size(inner: int) -> int:
+    """Length of `GasState.packed` for a number of unknowns."""
+    return 3 * inner + 2 * len(BOOKS)
+
+
+@dataclass(frozen=True)
+class GasState:
+    """A compressed fluid at one instant.
+
+    Attributes
+    ----------
+    inner : (l,) array
+        The law's unknowns, m/s.
+    stored, rate : (l,) arrays
+        What the balances hold and the scheme's value of its rate.
+    power, books : (4,) arrays
+        W and J of a quarter: taken in at the flange, left through the lips, done on the wall, lost in the passage; the
+        books are since the start.
+    """
+
+    inner: np.ndarray
+    stored: np.ndarray
+    rate: np.ndarray
+    power: np.ndarray
+    books: np.ndarray
+
+    @property
+    def packed(self) -> np.ndarray:
+        """All numbers in one array."""
+        return np.concatenate([self.inner, self.stored, self.rate, self.power, self.books])
+
+    @classmethod
+    def unpacked(cls, numbers: np.ndarray) -> GasState:
+        """Undo `packed`."""
+        count, books = (len(numbers) - 2 * len(BOOKS)) // 3, len(BOOKS)
+        cuts = np.cumsum([count, count, count, books])
+        return cls(*np.split(np.asarray(numbers, float), cuts))
+
+
+class GasFlow:
+    """The flow in a passage at one instant.
+
+    Attributes
+    ----------
+    pressure : (m,) array, Pa
+        On the wall.
+    speed, psi : (m,) arrays, m/s, m2/s
+        At the stations, and its integral from the inlet.
+    """
+
+    def __init__(self, step: GasStep | GasInstant, area, area_rate, inner, stored, pressure):
+        self._step, self.stored = step, stored
+        self.area, self.area_rate, self.inner = area, area_rate, inner
+        self.pressure, self.speed = pressure, step.fluid.law.own_velocities(inner)
+        cells = 0.5 * step.fluid.law.channel.step * (self.speed[1:] + self.speed[:-1])
+        self.psi = np.append(np.cumsum(cells[::-1])[::-1], 0.0)
+
+    def slopes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives (m, m) of the pressures by areas, Pa/m2, and by their rates, Pa s/m2."""
+        step = self._step
+        found = _slopes(step.fluid.law, step.parameters, self.area, self.area_rate, self.inner, step.weight)
+        return tuple(np.asarray(part) for part in found)
+
+    def state(self) -> GasState:
+        """The fluid's state."""
+        return self._step.end(self)
+
+
+class GasStep:
+    """A step of a compressed fluid.
+
+    Parameters
+    ----------
+    fluid : GasFluid
+    old : GasState
+    h : float, s
+    rate : float
+        r, the weight of the new rate.
+    inlet : float
+        Inlet pressure at the end, Pa.
+    """
+
+    def __init__(self, fluid: GasFluid, old: GasState, h: float, rate: float, inlet: float):
+        self.fluid, self.old, self.h, self.weight = fluid, old, h, rate / h
+        self._ahead = 1.0 if rate == 1.0 else 0.5  # of a step's power that at its end, as its difference has it
+        self._known = (1.0 - rate) * old.rate - self.weight * old.stored
+        self.parameters = fluid.parameters(inlet)
+        self._start = old.inner
+
+    def at(self, area: np.ndarray, area_rate: np.ndarray) -> GasFlow:
+        """Flow at the end of the step in a passage of areas and rates (m,); not numbers where there is none."""
+        given = self.fluid.law, self.parameters, area, area_rate
+        found = _advanced(*given, self._start, self.weight, self._known)
+        if not np.isfinite(found[0][0]):
+            found = _advanced(*given, self.old.inner, self.weight, self._known)
+        inner, stored, pressure = (np.array(part) for part in found)
+        if np.isfinite(inner[0]):
+            self._start = inner
+        return GasFlow(self, area, area_rate, inner, stored, pressure)
+
+    def end(self, flow: GasFlow) -> GasState:
+        """The state that the step ends with."""
+        old, h = self.old, self.h
+        power = self.fluid.powers(flow.area, flow.area_rate, flow.inner)[1]
+        rate = (flow.stored - old.stored) / h
+        work = h * (old.power + self._ahead * (power - old.power))
+        return GasState(flow.inner, flow.stored, rate, power, old.books + work)
+
+
+class GasInstant:
+    """A compressed fluid at one instant, its state known."""
+
+    def __init__(self, fluid: GasFluid, state: GasState, inlet: float):
+        self.fluid, self.state, self.parameters = fluid, state, fluid.parameters(inlet)
+
+    def at(self, area: np.ndarray, area_rate: np.ndarray) -> GasFlow:
+        """The flow; areas and rates are those of the state."""
+        inner = self.state.inner
+        pressure = np.array(_pressures(self.fluid.law, self.parameters, inner))
+        return GasFlow(self, area, area_rate, inner, self.state.stored, pressure)
+
+    def end(self, flow: GasFlow) -> GasState:
+        """The state."""
+        return self.state
+
+
+class GasFluid:
+    """Evaluators for time steps.
+
+    Parameters
+    ----------
+    law : GasChannel
+    density : float, kg/m3
+    """
+
+    def __init__(self, law: GasChannel, density: float):
+        self.law, self.density = law, float(density)
+
+    def parameters(self, inlet: float) -> dict[str, float]:
+        """Parameters of the law under an inlet pressure, Pa."""
+        return self.law.values({"inlet": inlet, "density": self.density})
+
+    def steady_inner(self, area: np.ndarray, inlet: float) -> np.ndarray:
+        """Unknowns (l,) of a steady flow; those of a fluid at rest without pressure where there is none."""
+        found = self.law.steady_inner(area, self.parameters(inlet))
+        return found if np.isfinite(found).all() else np.zeros(self.law.inner)
+
+    def moving(self, area, area_rate, inner, inlet: float) -> GasState:
+        """State with given unknowns (l,) and the rates that the equations ask for."""
+        inner = np.asarray(inner, float)
+        parts = _instant(self.law, self.parameters(inlet), area, area_rate, inner)
+        stored, sources, moves = (np.asarray(part) for part in parts)
+        power = self.powers(area, area_rate, inner)[1]
+        return GasState(inner, stored, np.where(moves, -sources, 0.0), power, np.zeros(len(BOOKS)))
+
+    def powers(self, area, area_rate, inner) -> tuple[float, np.ndarray]:
+        """Energy of the fluid, J of a quarter, and the powers (4,) of `GasState`."""
+        energy, power = _powers(self.law, self.parameters(0.0), area, area_rate, inner)
+        return float(energy), np.asarray(power)
+
+    def readings(self, area, inner) -> tuple[float, float, float]:
+        """Mass flows at outlet and inlet, kg/s of a quarter, and the largest Mach number."""
+        return tuple(float(x) for x in _readings(self.law, self.parameters(0.0), area, inner))
+
+
+# -- compiled
+# ----
+
+
+def _balance(law, parameters, area, area_rate, weight, inner):
+    """Balances (l,) but for what is known of the rates, m2/s2 and m3/s."""
+    held = law.stored(area, area_rate, inner, parameters)
+    return weight * held + law.sources(area, area_rate, inner, parameters)
+
+
+@jax.jit
+def _advanced(law, parameters, area, area_rate, start, weight, known):
+    """Unknowns (l,), what is stored (l,) and pressures (m,); not numbers where none are found.
+
+    Newton's method, a step halved as long as the next one by it is longer.
+    """
+    balance = partial(_balance, law, parameters, area, area_rate, weight)
+    scales = law.scales(area, parameters)  # rows of one size make the pivots of the factors good ones
+
+    def step_at(inner):
+        slope, value = jax.jacfwd(balance)(inner), balance(inner) + known
+        return -jnp.linalg.solve(scales[:, None] * slope, scales * value)
+
+    def longer(tried):
+        fraction, inner, step, _, after = tried
+        return (fraction > 1e-3) & ~(jnp.linalg.norm(after) <= jnp.linalg.norm(step))
+
+    def halved(tried):
+        fraction, inner, step, _, _ = tried
+        there = inner + 0.5 * fraction * step
+        return 0.5 * fraction, inner, step, there, step_at(there)
+
+    def small(inner, step, share):
+        return jnp.linalg.norm(step) <= share * jnp.linalg.norm(inner) + _SMALLEST
+
+    def advance(carried):
+        inner, step, count, _ = carried
+        there = inner + step
+        tried = jax.lax.while_loop(longer, halved, (jnp.ones(()), inner, step, there, step_at(there)))
+        stays = small(there, step, _ROUNDING) & ~(jnp.linalg.norm(tried[4]) <= 0.5 * jnp.linalg.norm(step))
+        return tried[3], tried[4], count + 1, stays
+
+    def goes_on(carried):
+        inner, step, count, stays = carried
+        return (count < _STEPS) & ~stays & ~small(inner, step, _TOLERANCE)
+
+    inner, step, _, stays = jax.lax.while_loop(goes_on, advance, (start, step_at(start), 0, False))
+    inner = jnp.where(stays | small(inner, step, _TOLERANCE), inner + step, jnp.nan)
+    return inner, law.stored(area, area_rate, inner, parameters), law.pressures(inner, parameters)
+
+
+@jax.jit
+def _slopes(law, parameters, area, area_rate, inner, weight):
+    """Total derivatives (m, m) of the pressures by areas and rates."""
+    balance = lambda a, r, x: _balance(law, parameters, a, r, weight, x)  # noqa: E731
+    scales = law.scales(area, parameters)[:, None]
+    by_area, by_rate, own = (scales * part for part in jax.jacfwd(balance, (0, 1, 2))(area, area_rate, inner))
+    pressure = jax.jacfwd(law.pressures)(inner, parameters)
+    both = -pressure @ jnp.linalg.solve(own, jnp.concatenate([by_area, by_rate], axis=1))
+    return both[:, : len(area)], both[:, len(area) :]
+
+
+@jax.jit
+def _pressures(law, parameters, inner):
+    return law.pressures(inner, parameters)
+
+
+@jax.jit
+def _instant(law, parameters, area, area_rate, inner):
+    """What is stored (l,), its sources (l,), and which of it can change with the unknowns."""
+    by_inner = jax.jacfwd(lambda x: law.stored(area, area_rate, x, parameters))(inner)
+    sources = law.sources(area, area_rate, inner, parameters)
+    return law.stored(area, area_rate, inner, parameters), sources, jnp.any(by_inner != 0.0, axis=1)
+
+
+@jax.jit
+def _readings(law, parameters, area, inner):
+    """Mass flows, kg/s of a quarter, at outlet and inlet, and the largest Mach number."""
+    speed, sigma = law.split(inner, parameters)
+    sigma = sigma.at[0].add(law.drawn(speed[0], parameters))
+    flow = parameters["density"] * jnp.exp(sigma / parameters["sound_speed"]) * above_floor(area, law.floor) * speed
+    return flow[0], flow[-1], jnp.max(jnp.abs(speed) / law.local_sound_speed(sigma, parameters))
+
+
+@jax.jit
+def _powers(law, parameters, area, area_rate, inner):
+    """Energy, J, and powers (4,), W, as `GasState` has them."""
+    channel, density = law.channel, parameters["density"]
+    speed, sigma = law.split(inner, parameters)
+    open_, opening = jax.jvp(lambda a: above_floor(a, law.floor), (area,), (area_rate,))
+    entering = sigma.at[0].add(law.drawn(speed[0], parameters))
+    whole = law.enthalpy(sigma, parameters) + 0.5 * speed**2
+    flow = density * jnp.exp(entering / parameters["sound_speed"]) * open_ * speed
+    head = law.sources(area, area_rate, inner, parameters)[: law.count - 1]
+    lost = head - (whole[:-1] - whole[1:])  # what the cells take besides Bernoulli's heads
+    held = law.inside(sigma)
+    kept = density * jnp.exp(held / parameters["sound_speed"]) * (law.enthalpy(held, parameters) + 0.5 * speed**2)
+    content = open_ * (kept - law.pressure(held, parameters))
+    integral = lambda x: jnp.sum(0.5 * channel.step * (x[1:] + x[:-1]))  # noqa: E731
+    loss = jnp.sum(0.5 * (flow[1:] + flow[:-1]) * lost)
+    return integral(content), jnp.array(
+        [flow[-1] * whole[-1], flow[0] * whole[0], integral(law.pressure(sigma, parameters) * opening), loss]
+    )

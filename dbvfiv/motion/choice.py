@@ -1,0 +1,24 @@
+"""Which equations a valve moves by."""
+
+from __future__ import annotations
+
+from ..flow.gas import GasChannel
+from ..model import ValveModel
+from ..model.dynamics import Conditions
+from .equations import ValveMotion
+from .gas import GasMotion
+from .staggered import StaggeredMotion
+
+
+def motion_of(model: ValveModel, conditions: Conditions | None = None, staggered: bool = False) -> ValveMotion:
+    """The equations of a model under conditions, those of its case by default.
+
+    Parameters
+    ----------
+    staggered : bool
+        The thesis's coupling, fluid first.
+    """
+    if staggered:
+        return StaggeredMotion(model, conditions)
+    compressed = isinstance(model.flow, GasChannel) and model.flow.unsteady
+    return (GasMotion if compressed else ValveMotion)(model, conditions)
