@@ -38,6 +38,8 @@ _RELAXING = (
 _LINE = (
     Column("line_places", "", "Where the velocities in an elastic line are, from its far end (0) to the flange (1)"),
 )
+#: There where inner faces touch.
+_FACES = (Column("face_nodes", "", "Nodes whose inner face may touch the closing plane", "i4"),)
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ class MeshData:
         Maxwell branches: group, relaxation time (s), and modulus over that of the slow law.
     line_places : (k + 1,) array
         Where the velocities in an elastic line are; empty without one.
+    face_nodes : (k,) int array
+        Nodes whose inner face may touch the closing plane; none where the lips have stops.
     """
 
     nodes: np.ndarray
@@ -83,6 +87,7 @@ class MeshData:
     branch_time: np.ndarray = field(default_factory=lambda: np.zeros(0))
     branch_strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
     line_places: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    face_nodes: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
 
     @classmethod
     def of(cls, model: ValveModel) -> MeshData:
@@ -107,6 +112,7 @@ class MeshData:
             branch_time=branches.times[time],
             branch_strength=branches.strengths[group, time],
             line_places=model.flow.line.places[0] if isinstance(model.flow, LineChannel) else np.zeros(0),
+            face_nodes=np.zeros(0, np.int32) if model.contact is None else model.contact.plane.nodes.astype(np.int32),
         )
 
     @property
@@ -135,12 +141,13 @@ def write_mesh(file: h5py.File, mesh: MeshData) -> None:
     """Write a mesh into a result file."""
     group = file.create_group("mesh")
     lines = _LINE if len(mesh.line_places) else ()
-    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *lines):
+    faces = _FACES if len(mesh.face_nodes) else ()
+    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *lines, *faces):
         write_array(group, column, getattr(mesh, column.name))
 
 
 def read_mesh(file: h5py.File) -> MeshData:
     """Read the mesh of a result file."""
     group = file["mesh"]
-    columns = (*_COLUMNS, *(column for column in (*_RELAXING, *_LINE) if column.name in group))
+    columns = (*_COLUMNS, *(column for column in (*_RELAXING, *_LINE, *_FACES) if column.name in group))
     return MeshData(**{column.name: read_array(group, column) for column in columns})

@@ -30,7 +30,7 @@ class Progress:
     steps : int
     saved : int
         Full states kept so far.
-    work, dissipation, energy, renewed : float
+    work, dissipation, energy, renewed, contact_loss : float
         The books of energy, J of a quarter.
     control : tuple of float
         Of the step control.
@@ -47,6 +47,7 @@ class Progress:
     renewed: float = 0.0
     control: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
     eigenvalue: complex = complex(np.nan, np.nan)
+    contact_loss: float = 0.0
 
     @property
     def rows(self) -> int:
@@ -58,6 +59,7 @@ class Progress:
         values = {c.name: getattr(self, c.name) for c in (*COUNTS, *BOOKS)}
         values["eigenvalue"] = [self.eigenvalue.real, self.eigenvalue.imag]
         values |= {f.name: getattr(self.state, f.name) for f in fields(MotionState) if f.name not in ("memory", "line")}
+        values["contact_loss"] = self.contact_loss
         if self.state.line is not None:
             values["line"] = self.state.line.packed
         return values if self.state.memory is None else values | memory_row(self.state.memory)
@@ -74,7 +76,7 @@ class Progress:
         if wall is not None:
             kept = [record.value(RESTART, c.name, at) for c in MEMORY_COLUMNS]
             state = replace(state, memory=wall.at(state.q, *kept))
-        if any(c.name == "line" for c in record.tables[RESTART].columns):
+        if _has(record, "line"):
             state = replace(state, line=LineState.unpacked(record.value(RESTART, "line", at)))
         return cls(
             state,
@@ -83,4 +85,10 @@ class Progress:
             *(float(values[name]) for name in ("work", "dissipation", "energy", "renewed")),
             tuple(float(value) for value in values["control"]),
             complex(*values["eigenvalue"]),
+            float(record.value(RESTART, "contact_loss", at)) if _has(record, "contact_loss") else 0.0,
         )
+
+
+def _has(record: Record, name: str) -> bool:
+    """Whether restart points of a record have a column."""
+    return any(c.name == name for c in record.tables[RESTART].columns)
