@@ -51,7 +51,7 @@ class Case(Section):
     downstream: Downstream = key(Downstream(), "What the valve discharges into.")
     outside: Outside = key(Outside(), "The fluid outside the wall.")
     gravity: Gravity = key(Gravity(), "The weight of wall and fluid.")
-    supports: physics.Supports = key(physics.Supports(), "One-sided stops of the lips.")
+    supports: physics.Supports = key(physics.Supports(), "What keeps the lips from crossing.")
 
     @model_validator(mode="before")
     @classmethod

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, StrictBool, ValidationInfo, field_v
 
 from .described import Described
 from .parameters import PARAMETERS
-from .quantity import GRAVITY, Density, Number, Pressure, Quantity, Stiffness
+from .quantity import GRAVITY, Density, FaceStiffness, Number, Pressure, Quantity, Stiffness
 from .section import BrokenRule, Section, key
 
 #: Viscosities by name, Pa s, at 20 degC: water at 0.1 MPa (IAPWS R12-08), dry air at 0.1 MPa (Lemmon & Jacobsen 2004).
@@ -184,8 +184,25 @@ class Drive(Section):
 
 
 class Supports(Section):
-    """One-sided stops of the lips."""
+    """What keeps the lips from crossing: one-sided stops, or contact of the inner faces."""
 
+    contact: Literal["stops", "faces"] = key(
+        "stops",
+        "What keeps the walls from crossing the closing plane y = 0: springs on the displacement of duckbill nodes "
+        "(stops, App. A, said by the keys lip_stop...), which let the outer half of the lips cross, or contact of the "
+        "inner faces of the whole wall (faces), for which these keys say nothing.",
+    )
+    contact_stiffness: FaceStiffness = key(
+        1e10, 'Pressure over depth with which faces that meet resist, for contact = "faces".', gt=0, le=1e15
+    )
+    rebound: Number = key(
+        0.5,
+        'Rebound resilience of the wall, for contact = "faces": the share of the energy stored in the contact that '
+        "faces get back when they part in a run in time. Some 0.4 to 0.6 for the rubbers of valves (ISO 4662); 1 loses "
+        "nothing, 0 is a dead blow.",
+        ge=0,
+        le=1,
+    )
     lip_stop: StrictBool = key(True, "Keep the duckbill from crossing the closing plane y = 0.")
     lip_stop_stiffness: Stiffness = key(1e8, "Stiffness of each one-sided spring.", gt=0, le=1e15)
     lip_stop_columns: Literal["inner-half", "all"] = key(

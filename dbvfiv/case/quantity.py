@@ -34,6 +34,7 @@ DIMENSION = {
     "1/s": "rate",
     "Hz": "frequency",
     "N/m": "stiffness",
+    "Pa/m": "stiffness per area",
     "m/s": "velocity",
     "m^2": "area",
     "m^3/s": "volume flow",
@@ -206,6 +207,7 @@ Time = Annotated[float, Quantity("s", "s")]
 Rate = Annotated[float, Quantity("1/s", "1/s")]
 Frequency = Annotated[float, Quantity("Hz", "Hz")]
 Stiffness = Annotated[float, Quantity("N/m", "N/m")]
+FaceStiffness = Annotated[float, Quantity("Pa/m", "MPa/mm")]
 Angle = Annotated[float, Quantity("deg", "deg")]
 Number = Annotated[float, Quantity("")]
 Percent = Annotated[float, Quantity("", "%")]

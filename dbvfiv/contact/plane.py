@@ -122,20 +122,28 @@ class PlaneContact:
         `first` (nn, 2, 3) are the derivatives of the directors.
         """
         _, pressure, _ = self.law.respond(self.gap(nodal, directors), multiplier)
-        _add(force, self._unknowns, -(self.area * pressure)[:, None] * self._slope(first))
+        self.add_pressure_force(force, pressure, first)
+
+    def add_pressure_force(self, force, pressure, first) -> None:
+        """Add the internal force of contact pressures (k,), Pa, to force (n,)."""
+        _add(force, self._unknowns, -(self.area * pressure)[:, None] * self.slope(first))
 
     def add_multiplier_derivative(self, force, nodal, directors, first, multiplier, change) -> None:
         """Add the derivative of the internal force along a change (k,) of the multipliers to force (n,)."""
         _, _, stiffness = self.law.respond(self.gap(nodal, directors), multiplier)
-        pressure = stiffness / self.law.penalty * change
-        _add(force, self._unknowns, -(self.area * pressure)[:, None] * self._slope(first))
+        self.add_pressure_force(force, stiffness / self.law.penalty * change, first)
 
     def add_force_and_tangent(self, force, data, nodal, directors, first, second, multiplier) -> None:
         """Add force and symmetric tangent values on the shell's pattern; `second` (nn, 3, 3) as `Shell.directors`
         returns.
         """
         self.add_force(force, nodal, directors, first, multiplier)
-        block = self.tangent_blocks(nodal, directors, first, second, multiplier)
+        self.add_blocks(data, self.tangent_blocks(nodal, directors, first, second, multiplier))
+
+    def add_blocks(self, data, block) -> None:
+        """Add blocks (k, 3, 3) of each contact node in its displacement across the plane and its rotations to matrix
+        values on the shell's pattern.
+        """
         slots = self._slots
         keep = slots >= 0
         data[slots[keep]] += block[keep]
@@ -143,9 +151,14 @@ class PlaneContact:
     def tangent_blocks(self, nodal, directors, first, second, multiplier) -> np.ndarray:
         """Tangent (k, 3, 3) of each contact node in its displacement across the plane and its rotations."""
         _, pressure, stiffness = self.law.respond(self.gap(nodal, directors), multiplier)
-        slope = self._slope(first)
+        slope = self.slope(first)
         block = (self.area * stiffness)[:, None, None] * slope[:, :, None] * slope[:, None, :]
-        # The gap bends with the rotations: -pressure * d2 gap, d2 gap = -depth * d2 director.
+        return block + self.bending_blocks(pressure, second)
+
+    def bending_blocks(self, pressure, second) -> np.ndarray:
+        """Tangent (k, 3, 3) of pressures (k,) that stay: gaps bend with the rotations."""
+        # -pressure * d2 gap, d2 gap = -depth * d2 director
+        block = np.zeros((self.count, 3, 3))
         bend = (self.area * pressure * self.depth)[:, None] * second[self.nodes][:, :, self.axis]
         block[:, 1, 1] += bend[:, 0]
         block[:, 2, 2] += bend[:, 1]
@@ -153,7 +166,7 @@ class PlaneContact:
         block[:, 2, 1] += bend[:, 2]
         return block
 
-    def _slope(self, first: np.ndarray) -> np.ndarray:
+    def slope(self, first: np.ndarray) -> np.ndarray:
         """(k, 3) derivative of the gaps with respect to displacement and rotations."""
         slope = np.empty((self.count, 3))
         slope[:, 0] = 1.0

@@ -1,4 +1,4 @@
-"""Second derivative of the contact force, by automatic differentiation of the contact's potential."""
+"""Higher derivatives of the contact force, by automatic differentiation of the contact's potential."""
 
 from __future__ import annotations
 
@@ -14,6 +14,16 @@ def contact_second(
     contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, a: np.ndarray, b: np.ndarray
 ) -> np.ndarray:
     """Second directional derivative (nn, 5) of the contact force at nodal unknowns (nn, 5) along a and b (nn, 5)."""
+    return contact_form(contact, nodal, multiplier, a, b)
+
+
+def contact_form(
+    contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, *directions: np.ndarray
+) -> np.ndarray:
+    """Derivative (nn, 5) of the contact force at nodal unknowns (nn, 5) along any number of directions (nn, 5).
+
+    The law is made of pieces; at their joints the derivatives are those of one side.
+    """
     n, axis, mesh = contact.nodes, contact.axis, contact.shell.mesh
     columns = [axis, 3, 4]
     data = (
@@ -25,9 +35,9 @@ def contact_second(
         mesh.frames[n],
     )
     law = (contact.law.penalty, contact.law.rounding)
-    values = _second(axis, law, nodal[n][:, columns], a[n][:, columns], b[n][:, columns], data)
+    along = tuple(field[n][:, columns] for field in directions)
     out = np.zeros_like(nodal)
-    out[n[:, None], columns] = np.asarray(values)
+    out[n[:, None], columns] = np.asarray(_form(axis, law, nodal[n][:, columns], along, data))
     return out
 
 
@@ -43,13 +53,18 @@ def _potential(axis, law, v, data):
     return area * penalty * jnp.where(x >= width, 0.5 * x**2 + width**2 / 6, jnp.where(x > -width, rounded, 0.0))
 
 
-def _second(axis, law, v, a, b, data):
-    def one(v, a, b, data):
-        force = jax.grad(lambda w: _potential(axis, law, w, data))
-        first = lambda w: jax.jvp(force, (w,), (a,))[1]  # noqa: E731
-        return jax.jvp(first, (v,), (b,))[1]
+def _form(axis, law, v, along, data):
+    def one(v, along, data):
+        found = jax.grad(lambda w: _potential(axis, law, w, data))
+        for direction in along:
+            found = _derivative(found, direction)
+        return found(v)
 
-    return jax.vmap(one)(v, a, b, data)
+    return jax.vmap(one)(v, along, data)
 
 
-_second = jax.jit(_second, static_argnums=(0, 1))
+def _derivative(function, direction):
+    return lambda w: jax.jvp(function, (w,), (direction,))[1]
+
+
+_form = jax.jit(_form, static_argnums=(0, 1))

@@ -15,7 +15,9 @@ without friction.
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 
+from ..shell import Shell
 from .plane import PlaneContact
 
 
@@ -36,3 +38,32 @@ def together_blocks(contact: PlaneContact, nodal, directors, first, multiplier) 
     block[:, :2, 2:] = -force[:, None, None] * turn
     block[:, 2:, :2] = block[:, :2, 2:].transpose(0, 2, 1)
     return block, [*along, 3, 4]
+
+
+def class_stiffness(
+    contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, shell: Shell, apart: bool
+) -> sp.csr_matrix:
+    """Tangent (n, n) of a contact in a class of motion.
+
+    Parameters
+    ----------
+    contact : PlaneContact
+    nodal : (nn, 5) array
+        Nodal unknowns of the state.
+    multiplier : (k,) array, Pa
+    shell : Shell
+        With the n unknowns of the class.
+    apart : bool
+        Whether the two walls move against each other, so that contact resists; where they move together it only turns.
+    """
+    directors, first, second = contact.shell.directors(nodal)
+    if apart:
+        block = contact.tangent_blocks(nodal, directors, first, second, multiplier)
+        columns = [contact.axis, 3, 4]
+    else:
+        block, columns = together_blocks(contact, nodal, directors, first, multiplier)
+    unknowns, width = shell.dofs.index[contact.nodes][:, columns], len(columns)
+    rows = np.repeat(unknowns[:, :, None], width, axis=2)
+    across = np.repeat(unknowns[:, None, :], width, axis=1)
+    keep = (rows >= 0) & (across >= 0) & (block != 0)
+    return sp.csr_matrix((block[keep], (rows[keep], across[keep])), shape=(shell.size, shell.size))

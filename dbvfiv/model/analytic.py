@@ -35,7 +35,7 @@ class AnalyticResidual:
     The residual is a vector (n + l,): forces, then the flow's own equations. A motion is a tuple (q, v, a, inner,
     inner_rate) with the flow's unknowns (l,), one number where there is one; parameters a dict with the keys of
     `parameters`. Second and third derivatives are taken about motions with v = 0. Lip stops are piecewise linear and
-    have none.
+    have none; contact of inner faces has those of the pieces of its law.
 
     Attributes
     ----------
@@ -80,6 +80,7 @@ class AnalyticResidual:
         motion, parameters = self._shaped(motion), self._given(parameters)
         out = np.array(_value(motion, parameters, self._arrays))
         force, structure = self.model.structure(motion[0])
+        force += self.model.contact_force(motion[0])
         out[self._forces] += force + parameters["beta"] * (self.model.shell.dofs.matrix(structure) @ motion[1])
         if self.model.outside is not None and np.any(motion[2]):
             density = self.model.case.outside.density(parameters["density"])
@@ -126,6 +127,8 @@ class AnalyticResidual:
     def _remainder_form(self, motion, parameters, *directions) -> np.ndarray:
         """The same of what has its shape; with what a fluid outside adds."""
         out = np.array(_form_of_remainder(motion, parameters, directions, self._arrays))
+        if self.model.contact is not None:
+            out[self._forces] += self.model.contact.form(motion[0], *(direction[0] for direction in directions))
         if self.model.outside is not None:
             if self._outside is None or not np.array_equal(self._outside.q, motion[0]):
                 self._outside = OutsideForms(self.model, motion[0])

@@ -80,6 +80,9 @@ def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Sy
     pressure_stiffness(surface.quads, surface.nodes, nodal, pressure, model.loaded, dofs.slots, -1.0, stiffness)
     slope = sway_of_sections(model, nodal, symmetry, dofs)
     matrices = [dofs.matrix(values) for values in (shell.mass(still), structure, stiffness)]
+    if model.contact is not None:
+        touching = model.contact.stiffness_of_class(q, shell, symmetry.moves_lips_apart)
+        matrices[2] = (matrices[2] + touching).tocsr()
     added = None if model.outside is None else model.outside.added_mass(q, matrices[1], symmetry.name, shell)
     coupled = slope.T.tocsr(), slope, area, added
     return LinearisedClass(model, q, inlet, *matrices, *coupled, symmetry=symmetry, shell=shell)

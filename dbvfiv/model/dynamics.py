@@ -3,10 +3,11 @@ state.
 
     M(q) a + h(q, v) + alpha M v + beta K_s(q) v + f(q) - G(q) p = 0,     e = 0
 
-with h the inertia quadratic in the velocities (turning directors), K_s the structure's own tangent, p the station
-pressures of the unsteady flow through the areas A(q) with rates A' = J v and A'' = J a + d2A[v, v]. The unknowns are q
-and those of the flow law, the inlet velocity U for one. Small motions see K_s and, of layers with Maxwell branches,
-sum_g phi_g(lambda) K_g, with K_g the material part of the tangent of layers that relax alike.
+with h the inertia quadratic in the velocities (turning directors), K_s the structure's own tangent, which has no part
+of the contact of inner faces in f, p the station pressures of the unsteady flow through the areas A(q) with rates A' =
+J v and A'' = J a + d2A[v, v]. The unknowns are q and those of the flow law, the inlet velocity U for one. Small motions
+see K_s and, of layers with Maxwell branches, sum_g phi_g(lambda) K_g, with K_g the material part of the tangent of
+layers that relax alike.
 
 Equations (T.15) and (T.16) of docs/theory.md.
 """
@@ -94,6 +95,7 @@ def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q,
     matrix = model.shell.dofs.matrix
     nodal, nodal_rate = model.nodal(q), model.nodal(v)
     force, structure = model.structure(q)
+    force += model.contact_force(q)
     mass = matrix(model.mass(q))
     force += (
         mass @ (a + conditions.alpha * v)
@@ -118,7 +120,8 @@ class LinearisedState:
     inlet : float
         Inlet pressure, Pa.
     mass, structure, stiffness : (n, n) sparse matrices
-        M, the structure's own tangent K_s, and K = K_s less the follower stiffness of the pressures.
+        M, the structure's own tangent K_s, and K = K_s, with contact of inner faces, less the follower stiffness of
+        the pressures.
     forces : (n, m) sparse matrix G
     slope : (m, n) sparse matrix J
     area : (m,) array, m2

@@ -59,7 +59,7 @@ class SteadyState:
     station_area, station_velocity, station_pressure : (m,) arrays, m2 (a quarter), m/s, Pa
         Pressures as the wall sees them, over `outlet_pressure`.
     stops : int
-        Lip stops in contact.
+        Lip stops in contact, or nodes whose inner face is.
     converged : bool
     iterations : int
         Newton iterations over all load steps that led here.
@@ -165,7 +165,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
         station_area=area,
         station_velocity=speeds,
         station_pressure=station_pressure,
-        stops=model.stops.touching(q),
+        stops=model.touching(q),
         **solution,
     )
 

@@ -57,8 +57,8 @@ class LipStops:
 
 
 def lip_stops(mesh: ValveMesh, index: np.ndarray, supports: Supports, joint: float) -> LipStops:
-    """Stops on the duckbill nodes of the inner half of the columns, or of all."""
-    if not supports.lip_stop:
+    """Stops on the duckbill nodes of the inner half of the columns, or of all; none where faces touch instead."""
+    if not supports.lip_stop or supports.contact != "stops":
         return LipStops(np.zeros(0, int), supports.lip_stop_stiffness)
     limit = 0.5 if supports.lip_stop_columns == "inner-half" else 1.0 + 1e-9
     rows = mesh.z <= joint * (1 + 1e-9)

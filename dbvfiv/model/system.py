@@ -257,7 +257,9 @@ def pencil_at(model: ValveModel, q, inner, mu) -> CoupledPencil:
     still = FlowMotion.still(area, np.asarray(inner, float))
     p, _ = model.flow.evaluate(still, mu)
     _, structure = model.structure(q)
-    stiffness = matrix(model.follower_stiffness(nodal, p, structure))
+    values = model.follower_stiffness(nodal, p, structure)
+    model.add_contact(q, values)
+    stiffness = matrix(values)
     mass, own = matrix(model.mass(q)), matrix(structure)
     damping = mu["alpha"] * mass + mu["beta"] * own
     parts = model.flow.linearise(still, mu).parts()

@@ -3,10 +3,11 @@
 State q (n,): free displacements (m) and rotations (rad) of the quarter model. Row areas and station pressures are
 functions of it, so the equilibrium is
 
-    r(q; P) = f_shell(q) + f_stops(q) - G(q) p(A(q); P) = 0
+    r(q; P) = f_shell(q) + f_stops(q) + f_contact(q) - G(q) p(A(q); P) = 0
 
-with the columns of G the forces of unit station pressures. The tangent is K - G D J: K holds shell, stops and the
-follower stiffness of the present pressures, J the derivative of the areas, D that of the pressures.
+with the columns of G the forces of unit station pressures. The tangent is K - G D J: K holds shell, stops or contact of
+the inner faces, and the follower stiffness of the present pressures, J the derivative of the areas, D that of the
+pressures.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from ..geometry import QUARTERS, ValveMesh
 from ..shell import Section, StepWall, Weight
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_flow, build_shell, build_weight
+from .faces import FaceContact, face_contact
 from .linear import CoupledFactor
 from .outside import OutsideFluid
 from .relaxing import WallRelaxation
@@ -40,7 +42,7 @@ class Tangent:
     ----------
     residual : (n,) N, N m
     structure : (nnz,) values of the structure's own tangent: material, geometric, stops; symmetric
-    stiffness : (nnz,) values of K: structure less follower stiffness of the pressures
+    stiffness : (nnz,) values of K: structure and contact of faces less follower stiffness of the pressures
     forces : (nnz of G,) values of G
     areas_slope : (nnz of J,) values of J
     pressure_slope : (m, m) D, Pa/m2
@@ -78,6 +80,7 @@ class ValveModel:
         dofs = self.shell.dofs
         self.rows = RowAreas(self.mesh, dofs.index)
         self.stops = lip_stops(self.mesh, dofs.index, case.supports, case.valve.duckbill_length)
+        self.contact: FaceContact | None = face_contact(case, self.mesh, self.shell)
         self.station_of_node = np.empty(len(self.mesh.nodes), np.int64)
         self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
         self.loaded = loaded_share(self.mesh, case)
@@ -132,7 +135,7 @@ class ValveModel:
         """Unbalanced force (n,) at an inlet pressure, Pa; `share` of what loads the wall, its weight included."""
         nodal = self.nodal(q)
         p = share * self.flow.steady_pressure(self.rows.areas(nodal), pressure)
-        return self.internal_force(q, share=share) - self.pressure_force(nodal, p)
+        return self.internal_force(q, share=share) + self.contact_force(q) - self.pressure_force(nodal, p)
 
     def tangent(self, q: np.ndarray, pressure: float, share: float = 1.0) -> Tangent:
         """Residual and linearisation at an inlet pressure, Pa; `share` as `residual` has it."""
@@ -140,11 +143,13 @@ class ValveModel:
         area = self.rows.areas(nodal)
         p, slope = (share * part for part in self.flow.steady_operator(area, pressure))
         force, structure = self.structure(q, share=share)
-        force -= self.pressure_force(nodal, p)
+        force += self.contact_force(q) - self.pressure_force(nodal, p)
+        stiffness = self.follower_stiffness(nodal, p, structure)
+        self.add_contact(q, stiffness)
         return Tangent(
             residual=force,
             structure=structure,
-            stiffness=self.follower_stiffness(nodal, p, structure),
+            stiffness=stiffness,
             forces=self.station_forces(nodal).data,
             areas_slope=self.rows.jacobian(nodal).data,
             pressure_slope=slope,
@@ -171,6 +176,23 @@ class ValveModel:
             force += share * self.weight.force(self.shell, q)
             self.weight.add_tangent(self.shell, q, data, share)
         return force, data
+
+    def contact_force(self, q: np.ndarray) -> np.ndarray | float:
+        """Force (n,) of the contact of inner faces, which is no part of `internal_force`; 0 without."""
+        return 0.0 if self.contact is None else self.contact.force(q)
+
+    def add_contact(self, q: np.ndarray, data: np.ndarray) -> None:
+        """Add its tangent to values (nnz,)."""
+        if self.contact is not None:
+            self.contact.add_tangent(q, data)
+
+    def touching(self, q: np.ndarray) -> int:
+        """Number of stops, or of nodes with their inner face, in contact."""
+        return self.stops.touching(q) if self.contact is None else self.contact.touching(q)
+
+    def support_energy(self, q: np.ndarray) -> float:
+        """Energy of stops or contact, J of a quarter."""
+        return self.stops.energy(q) if self.contact is None else self.contact.energy(q)
 
     def relaxing_stiffness(self, q: np.ndarray) -> tuple[sp.csr_matrix, ...]:
         """K_g (n, n): material part of the tangent of each group of `relaxation`."""

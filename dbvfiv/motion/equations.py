@@ -1,10 +1,10 @@
 """The coupled equations of motion as a time step sees them.
 
-    M(q) a + h(q, v) + alpha M v + beta w + F - G(q) p = 0,     p_outlet = 0
+    M(q) a + h(q, v) + alpha M v + beta w + F + f_c - G(q) p = 0,     p_outlet = 0
 
 F is the internal force of shell and stops and w its rate. F and the flow's psi (see `dbvfiv.flow.stepping`) are kept in
 the state as quantities of first order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent with the
-tangent without an evaluation of it.
+tangent without an evaluation of it. f_c is the contact of inner faces, see `dbvfiv.motion.contact`.
 
 Equation (T.15) of docs/theory.md.
 """
@@ -19,6 +19,7 @@ from ..model import ValveModel
 from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
 from ..shell import Memory, StepWall, WallMemory
+from .contact import FaceStep, MassSolver
 from .kernels import inertia_force, kinetic_energy, row_motion, strain_energy
 from .outside import MovingOutside, OutsideCorrection
 from .terms import Load, Step, Weights
@@ -41,10 +42,12 @@ class ValveMotion:
         What the wall remembers; None where it is elastic.
     waves : LineWaves or None
         Of an elastic line.
+    contact : FaceContact or None
+        Of the inner faces; None where the valve has stops.
     """
 
     def __init__(self, model: ValveModel, conditions: Conditions | None = None):
-        self.model = model
+        self.model, self.contact = model, model.contact
         self.conditions = Conditions.of(model.case) if conditions is None else conditions
         branches = model.relaxation.branches(self.conditions.loss_factor)
         self.wall = WallMemory(model.shell, branches.strengths, branches.times) if branches else None
@@ -59,6 +62,7 @@ class ValveMotion:
         self._integrals = shell._integrals
         self._factor: CoupledFactor | None = None
         self._correction: OutsideCorrection | None = None
+        self._masses: MassSolver | None = None
         free = shell.dofs.free
         scale = np.ones(free.shape)
         scale[:, 3:] = 0.5 * float(np.mean(shell.geometry.thickness))
@@ -190,7 +194,17 @@ class ValveMotion:
     # ----
 
     def linearise(
-        self, q_new, v_new, q, v, load: Load, weights: Weights, q_load=None, v_load=None, step: StepWall | None = None
+        self,
+        q_new,
+        v_new,
+        q,
+        v,
+        load: Load,
+        weights: Weights,
+        q_load=None,
+        v_load=None,
+        step: StepWall | None = None,
+        contact: tuple[FaceStep, float] | None = None,
     ) -> None:
         """Factor the iteration matrix.
 
@@ -204,6 +218,8 @@ class ValveMotion:
             Those that the fluid's equations are met at, if others.
         step : StepWall, optional
             The wall at the end of the step, if it relaxes.
+        contact : (FaceStep, float), optional
+            Contact of faces in the step, and its weight.
 
         Raises
         ------
@@ -215,6 +231,8 @@ class ValveMotion:
         _, structure = model.structure(q_new, step)
         values = weights.force * structure
         values += weights.inertia * model.mass(q)
+        if contact is not None:
+            contact[0].add_tangent(q_new, values, contact[1])
         values = model.follower_stiffness(nodal, weights.load * weights.theta * load.pressure, values)
         forces = weights.load * model.station_forces(nodal).data
         slope = model.rows.jacobian(nodal).data
@@ -258,6 +276,15 @@ class ValveMotion:
         dq, du = solve(force, np.zeros(0) if self.eliminated else np.array([outlet]))
         return dq, 0.0 if self.eliminated else float(du[0])
 
+    def contact_step(self, q: np.ndarray, h: float) -> FaceStep:
+        """Contact of the faces in a step of length h, s, from positions (n,)."""
+        return FaceStep(self.contact, q, h, self.model.case.supports.rebound)
+
+    def accelerated(self, q: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) by a force (n,) against the inertia of the wall and of the fluid outside."""
+        self._masses = self._masses or MassSolver(self.model)
+        return self._masses.solve(q, force, self.outside)
+
     def begin_step(self, state, h: float, inlet: float) -> None:
         """A step starts from a state, whose shape says whether the added mass still holds."""
         if self.outside is not None:
@@ -265,7 +292,7 @@ class ValveMotion:
 
     def drop_factors(self) -> None:
         """Forget the factorisation with its analysis, so that later numbers do not depend on matrices seen before."""
-        self._factor = self._correction = None
+        self._factor = self._correction = self._masses = None
 
     @property
     def factored(self) -> bool:
@@ -302,6 +329,7 @@ class ValveMotion:
         if self.outside is not None:
             self.outside.begin_step(q, v)
         forces = self.internal_force(q, wall) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
+        forces += model.contact_force(q)
         mass = model.mass(q)
         if self.eliminated:
             load = self.load(q, v, q, v, self._first_instant(q, v, speed, inlet, gas))
@@ -361,7 +389,9 @@ class ValveMotion:
     # ----
 
     def energies(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float, float]:
-        """Kinetic, strain and stop energy of the quarter model, J; the fluid outside is `outside_energy`."""
+        """Kinetic energy, strain energy and that of stops or contact, J of a quarter; the fluid outside is
+        `outside_energy`.
+        """
         shell = self.model.shell
         nodal = self.model.nodal(q)
         d, d1, _ = shell.directors(nodal)
@@ -371,7 +401,7 @@ class ValveMotion:
             strain = sum(strain_energy(p.quads, shell.mesh.nodes, nodal, d, p.reference, wall) for p, wall in parts)
         else:
             strain = shell.energy(q)
-        return float(kinetic), float(strain), self.model.stops.energy(q)
+        return float(kinetic), float(strain), self.model.support_energy(q)
 
     def weight_energy(self, q: np.ndarray) -> float:
         """Potential of the wall's weight over that at rest, J of a quarter; zero without gravity."""

@@ -106,6 +106,8 @@ class PeriodicValve:
         held = None if memory is None else memory.held(q, rates)
         slow = np.stack([model.internal_force(x) for x in q])
         out = slow + mu["beta"] * rates.apply(1, slow)
+        if model.contact is not None:
+            out += np.stack([model.contact.force(x) for x in q])
         for i in range(len(q)):
             nodal = model.nodal(q[i])
             if held is not None:
@@ -141,6 +143,7 @@ class PeriodicValve:
             moving = (nodal, model.nodal(v[i]), model.nodal(a[i] + alpha * v[i]))
             by_position, by_rate = inertia_slopes(model.shell, *moving)
             rest[i] = model.follower_stiffness(nodal, p[i], by_position)
+            model.add_contact(q[i], rest[i])
             if held is not None:
                 rest[i] += memory.geometric(q[i], held[i])
             damping[i] = by_rate + alpha * mass[i]

@@ -40,11 +40,13 @@ class StaggeredMotion(ValveMotion):
             kept, force=self.model.pressure_force(self.model.nodal(q), kept.pressure), outlet=0.0, inlet=step.inlet
         )
 
-    def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None, step=None) -> None:
+    def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None, step=None, contact=None) -> None:
         model = self.model
         nodal = model.nodal(q if q_load is None else q_load)
         _, structure = model.structure(q_new, step)
         values = weights.force * structure + weights.inertia * model.mass(q)
+        if contact is not None:
+            contact[0].add_tangent(q_new, values, contact[1])
         values = model.follower_stiffness(nodal, weights.load * weights.theta * load.pressure, values)
         none = np.zeros((self.stations, self.stations))
         self._solver(0).refactor(values, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)

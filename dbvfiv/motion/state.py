@@ -21,7 +21,8 @@ class MotionState:
     speed : float
         Inlet velocity, m/s.
     q, v, a : (n,) arrays
-        Unknowns (m, rad), velocities and accelerations.
+        Unknowns (m, rad), velocities and accelerations; the latter without the part of touching faces, whose impulses
+        belong to single steps.
     force, force_rate : (n,) arrays
         Internal force F and the scheme's value of its rate; of a wall that relaxes the rate by its slow law.
     load : (n,) array
@@ -73,6 +74,8 @@ def consistent_state(
         held = motion.wall.held(memory)
     waves = {name: given for name, given in (("line", line), ("gas", gas)) if given is not None}
     a, load = motion.accelerations(q, v, speed, inlet, memory, **waves)
+    if motion.contact is not None and motion.contact.touching(q):
+        a = a + motion.accelerated(q, motion.contact.force(q))
     return MotionState(
         float(time),
         float(load.speed[-1]),

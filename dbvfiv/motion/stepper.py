@@ -81,6 +81,8 @@ class StepResult:
         Work done.
     error : float
         Estimated local error of the displacements, m.
+    contact_loss : float
+        Energy that touching faces took and did not store, J.
     """
 
     state: MotionState
@@ -91,6 +93,7 @@ class StepResult:
     solves: int
     factorisations: int
     error: float
+    contact_loss: float = 0.0
 
 
 class StepFailure(ArithmeticError):
@@ -158,7 +161,8 @@ class Stepper:
         self._past.add(*here)
         work = [now - then for now, then in zip((self.residuals, self.solves, self.factorisations), before)]
         jump = 0.0 if past is None else self.motion.length(here[1] - past[1]) * h / (here[0] - past[0])
-        return StepResult(new, trial.load, *self._works(trial), *work, scheme.error_constant * h * h * jump)
+        error = scheme.error_constant * h * h * jump
+        return StepResult(new, trial.load, *self._works(trial), *work, error, trial.contact_loss)
 
     @staticmethod
     def _smooth(state: MotionState, h: float) -> bool:

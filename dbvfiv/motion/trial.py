@@ -19,6 +19,10 @@ class Trial:
     but momentum that is lost within a step, when lips slam, does not come back with the opposite sign. Its force is
     then the weighted mean of this and the last one, as spikes that change their sign from step to step would otherwise
     do work on stops that ring.
+
+    Contact of faces acts as the impulse of its own step (nonsmooth generalised-alpha; Bruls, Acary & Cardona 2014): it
+    moves the wall by half the step and changes velocities at once, and what the scheme carries on to later steps as
+    accelerations has no part of it. Impacts then keep or lose what the contact's law says for any member of the family.
     """
 
     def __init__(
@@ -38,6 +42,8 @@ class Trial:
             psi=rate / h,
             outside=(1.0 - s.alpha_m) / (s.beta * h * h),
         )
+        self.contact = motion.contact_step(old.q, h) if motion.contact is not None else None
+        self._impulse_weight = (1.0 - s.alpha_m) / (2.0 * s.beta)
         inlet = pressure(old.time + theta * h)
         self.fluid = Step(
             theta,
@@ -89,11 +95,15 @@ class Trial:
         share = self.weights.load
         self.push = self.load.force if share == 1.0 else old.load + share * (self.load.force - old.load)
         self.residual = inertia + self.damping + elastic - self.push
+        if self.contact is not None:
+            self.touch = self.contact.force(self.q)
+            self.residual += self._impulse_weight * self.touch
         return float(np.linalg.norm(self.residual))
 
     def linearise(self) -> None:
         moving = (self.q, self.v, self.q_mid, self.v_mid)
-        self.motion.linearise(*moving, self.load, self.weights, *self.at_load, self.wall)
+        touching = {} if self.contact is None else {"contact": (self.contact, self._impulse_weight)}
+        self.motion.linearise(*moving, self.load, self.weights, *self.at_load, self.wall, **touching)
 
     def allowed(self, tolerance: float, floor: float) -> float:
         """Largest correction that may be left, m; see `dbvfiv.motion.stepper.StepOptions`."""
@@ -105,12 +115,13 @@ class Trial:
     def state(self) -> MotionState:
         old, load = self.old, self.load
         rate = (load.psi - old.psi) / self.h if self.motion.moving_fluid else load.psi_rate
+        v, a = self._after_contact()
         return MotionState(
             old.time + self.h,
             float(load.speed[-1]),
             self.q,
-            self.v,
-            self.a,
+            v,
+            a,
             self.force,
             self.force_rate,
             load.force,
@@ -120,3 +131,17 @@ class Trial:
             load.line,
             None if load.gas is None else load.gas.state(),
         )
+
+    def _after_contact(self) -> tuple[np.ndarray, np.ndarray]:
+        """Velocities with the whole impulse of the step's contact, accelerations with none of it."""
+        if self.contact is None or not np.any(self.touch):
+            return self.v, self.a
+        s, pushed = self.scheme, -self.motion.accelerated(self.q_mid, self.touch)
+        return self.v + self.h * (1.0 - 0.5 * s.gamma / s.beta) * pushed, self.a - pushed / (2.0 * s.beta)
+
+    @property
+    def contact_loss(self) -> float:
+        """Energy that contact took from the wall in the step and did not store, J."""
+        if self.contact is None:
+            return 0.0
+        return float(self.touch @ (self.q - self.old.q)) - self.contact.stored(self.q)

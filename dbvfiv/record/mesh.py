@@ -41,6 +41,8 @@ _LINE = (
 )
 #: There where the fluid in the valve is compressed.
 _GAS = (Column("gas_unknowns", "", "Number of unknowns of a fluid that is compressed", "i4"),)
+#: There where inner faces touch.
+_FACES = (Column("face_nodes", "", "Nodes whose inner face may touch the closing plane", "i4"),)
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,8 @@ class MeshData:
         Where the velocities in an elastic line are; empty without one.
     gas_unknowns : (1,) int array
         Number of unknowns of a fluid that is compressed; empty without one.
+    face_nodes : (k,) int array
+        Nodes whose inner face may touch the closing plane; none where the lips have stops.
     """
 
     nodes: np.ndarray
@@ -89,6 +93,7 @@ class MeshData:
     branch_strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
     line_places: np.ndarray = field(default_factory=lambda: np.zeros(0))
     gas_unknowns: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+    face_nodes: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
 
     @classmethod
     def of(cls, model: ValveModel) -> MeshData:
@@ -114,6 +119,7 @@ class MeshData:
             branch_strength=branches.strengths[group, time],
             line_places=model.flow.line.places[0] if isinstance(model.flow, LineChannel) else np.zeros(0),
             gas_unknowns=np.array([model.flow.inner] if isinstance(model.flow, GasChannel) else [], np.int32),
+            face_nodes=np.zeros(0, np.int32) if model.contact is None else model.contact.plane.nodes.astype(np.int32),
         )
 
     @property
@@ -142,12 +148,14 @@ def write_mesh(file: h5py.File, mesh: MeshData) -> None:
     """Write a mesh into a result file."""
     group = file.create_group("mesh")
     fluid = (*(_LINE if len(mesh.line_places) else ()), *(_GAS if len(mesh.gas_unknowns) else ()))
-    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *fluid):
+    faces = _FACES if len(mesh.face_nodes) else ()
+    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *fluid, *faces):
         write_array(group, column, getattr(mesh, column.name))
 
 
 def read_mesh(file: h5py.File) -> MeshData:
     """Read the mesh of a result file."""
     group = file["mesh"]
-    columns = (*_COLUMNS, *(column for column in (*_RELAXING, *_LINE, *_GAS) if column.name in group))
+    further = (*_RELAXING, *_LINE, *_GAS, *_FACES)
+    columns = (*_COLUMNS, *(column for column in further if column.name in group))
     return MeshData(**{column.name: read_array(group, column) for column in columns})

@@ -76,7 +76,7 @@ SUMMARY = (
     ),
     Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
     Column("max_displacement_position", "m", "Where it occurs, position at rest"),
-    Column("stops", "", "Lip stops in contact", "i8"),
+    Column("stops", "", "Lip stops, or nodes with their inner face, in contact", "i8"),
     Column("converged", "", "Whether the residual fell below the tolerance", "bool"),
     Column(
         "iterations",

@@ -68,6 +68,33 @@ def test_linearisation_is_the_derivative_of_the_residual(name):
         assert error < 2e-5 * np.linalg.norm(difference[:, part])
 
 
+def test_faces_that_touch_in_a_part_of_the_cycle():
+    """Their force is in the residual, and its derivative in the linearisation, with no part of stiffness damping."""
+    changes = {"supports.contact": "faces", "supports.contact_stiffness": 1e7, "valve.initial_gap": 1e-3}
+    model, free = make_valve(changes), make_valve(changes | {"supports.contact": "stops", "supports.lip_stop": False})
+    mu = dict(MU)
+    system, bare = (PeriodicValve(lambda _, m=m: m, mu) for m in (model, free))
+    motion = motion_of(model, mu, size=8e-2)
+    coefficients = motion.coefficients.copy()
+    coefficients[0, : model.size] = 0.0  # about lips at rest
+    motion = PeriodicMotion(motion.harmonics, coefficients, motion.omega)
+    touching = [model.touching(x[: model.size]) for x in motion.samples]
+    assert max(touching) > 3 and min(touching) == 0
+    forces = np.array([model.contact.force(x[: model.size]) for x in motion.samples])
+    more = system.residual(motion, mu) - bare.residual(motion, mu)
+    assert more[:, : model.size] == pytest.approx(forces, abs=1e-9 * np.abs(forces).max())
+    change = motion_of(model, mu, seed=1).coefficients - motion.coefficients
+    change[0] = 1e-3 * motion.coefficients[0]
+    found = system.linearise(motion, mu).apply(change) - bare.linearise(motion, mu).apply(change)
+
+    def contact(sign):
+        moved = PeriodicMotion(motion.harmonics, motion.coefficients + sign * 1e-6 * change, motion.omega)
+        return moved.harmonics.project(np.array([model.contact.force(x[: model.size]) for x in moved.samples]))
+
+    difference = (contact(1) - contact(-1)) / 2e-6
+    assert np.linalg.norm(found[:, : model.size] - difference) < 1e-4 * np.linalg.norm(difference)
+
+
 def test_residual_is_that_of_the_equations_of_motion():
     """At every sample, with rates of stiffness damping taken by its tangent."""
     model, mu, system = valve_of("storage")

@@ -23,6 +23,7 @@ class Motion:
     moving_fluid = False
     outside = None
     wall = None
+    contact = None
     resolution = 0.0
 
     def __init__(self, size: int, alpha: float = 0.0, beta: float = 0.0):

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 
-from ...contact import together_blocks
+from ...contact import class_stiffness
 from ...model.classes import shell_of_class
 from ...model.load_steps import LoadStepOptions
 from ...model.pressed_shell import PressedShell
@@ -65,20 +65,10 @@ class ClassStiffness:
         return spectrum_of(*self.matrices(q, pressure), pressure, count)
 
     def _contact(self, nodal: np.ndarray, shell: Shell) -> sp.csr_matrix:
-        contact, size = self.pressed.contact, shell.size
+        contact = self.pressed.contact
         if contact is None:
-            return sp.csr_matrix((size, size))
-        directors, first, second = shell.directors(nodal)
-        multiplier, columns = self.pressed.multiplier, [contact.axis, 3, 4]
-        if self.closing:
-            block = contact.tangent_blocks(nodal, directors, first, second, multiplier)
-        else:
-            block, columns = together_blocks(contact, nodal, directors, first, multiplier)
-        unknowns, width = shell.dofs.index[contact.nodes][:, columns], len(columns)
-        rows = np.repeat(unknowns[:, :, None], width, axis=2)
-        across = np.repeat(unknowns[:, None, :], width, axis=1)
-        keep = (rows >= 0) & (across >= 0) & (block != 0)
-        return sp.csr_matrix((block[keep], (rows[keep], across[keep])), shape=(size, size))
+            return sp.csr_matrix((shell.size, shell.size))
+        return class_stiffness(contact, nodal, self.pressed.multiplier, shell, self.closing)
 
 
 @dataclass

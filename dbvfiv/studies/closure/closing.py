@@ -164,7 +164,7 @@ def closing_valve(case: Case) -> ContactValve:
 
 def shut_below(model: ContactValve) -> float:
     """Passage of the whole valve, m2, that counts as shut."""
-    rest = measure(model.mesh, model.shell, model.contact, np.zeros((len(model.mesh.nodes), 5)))
+    rest = measure(model.mesh, model.shell, model.face, np.zeros((len(model.mesh.nodes), 5)))
     return QUARTERS * model.case.closure.shut_fraction * rest.reference
 
 
@@ -228,7 +228,7 @@ def _sample(model: ContactValve, motion: ClosingMotion, state, load) -> ClosingS
     nodal, contact = model.nodal(state.q), model.contact_state(state.q)
     if not (np.isfinite(state.q).all() and np.isfinite(load.pressure).all()):
         raise SolveError(f"The state at {state.time:.6g} s is not finite.")
-    passage = measure(model.mesh, model.shell, model.contact, nodal)
+    passage = measure(model.mesh, model.shell, model.face, nodal)
     open_area = motion.fluid.open_area(load.area)
     lip = LipCentre(model.mesh, model.shell)
     return ClosingSample(

@@ -21,12 +21,13 @@ class ContactValve(ValveModel):
 
     def __init__(self, case: Case):
         pump = {"upstream.pump": None} if case.has_pump else {}  # what reverses the pressure takes its place
-        super().__init__(case.replace({"supports.lip_stop": False, "gravity.direction": "none"} | pump))
+        alone = {"supports.contact": "stops", "supports.lip_stop": False, "gravity.direction": "none"}
+        super().__init__(case.replace(alone | pump))
         closure, nodes = case.closure, np.arange(len(self.mesh.nodes))
         law = ContactLaw(
             max(*closure.pressures, closure.open_pressure) / closure.contact_depth, ROUNDING * closure.contact_depth
         )
-        self.contact = PlaneContact(
+        self.face = PlaneContact(
             self.shell,
             nodes,
             0.5 * nodal_thickness(self.shell),
@@ -37,30 +38,30 @@ class ContactValve(ValveModel):
 
     @cached_property
     def _free(self) -> np.ndarray:
-        return np.zeros(self.contact.count)
+        return np.zeros(self.face.count)
 
-    def contact_force(self, q: np.ndarray) -> np.ndarray:
+    def face_force(self, q: np.ndarray) -> np.ndarray:
         """Internal force (n,) of the contact alone."""
         force, nodal = np.zeros(self.size), self.nodal(q)
         d, d1, _ = self.shell.directors(nodal)
-        self.contact.add_force(force, nodal, d, d1, self._free)
+        self.face.add_force(force, nodal, d, d1, self._free)
         return force
 
     def contact_state(self, q: np.ndarray):
         nodal = self.nodal(q)
-        return self.contact.state(nodal, self.shell.directors(nodal)[0], self._free)
+        return self.face.state(nodal, self.shell.directors(nodal)[0], self._free)
 
     def contact_energy(self, q: np.ndarray) -> float:
         nodal = self.nodal(q)
-        return self.contact.energy(nodal, self.shell.directors(nodal)[0], self._free)
+        return self.face.energy(nodal, self.shell.directors(nodal)[0], self._free)
 
     def internal_force(self, q, step=None, share=1.0):
-        return super().internal_force(q, step, share) + self.contact_force(q)
+        return super().internal_force(q, step, share) + self.face_force(q)
 
     def structure(self, q, step=None, share=1.0):
         force, data = super().structure(q, step, share)
         nodal = self.nodal(q)
-        self.contact.add_force_and_tangent(force, data, nodal, *self.shell.directors(nodal), self._free)
+        self.face.add_force_and_tangent(force, data, nodal, *self.shell.directors(nodal), self._free)
         return force, data
 
 

@@ -79,7 +79,7 @@ def energies(result: TransientResult) -> Figure:
     t = h["time"]
     for axes, curves in ((upper, _STORED), (lower, _EXCHANGED)):
         for name, label, look in curves:
-            if np.any(h[name]):
+            if np.any(h.get(name, 0.0)):
                 axes.plot(t, h[name], lw=1.2, label=label, **look)
         if result.mesh.relaxing:
             _draw_branches(axes, result, "branch_energy" if axes is upper else "branch_loss")
@@ -118,12 +118,13 @@ _STORED = (
     ("kinetic_energy", "kinetic", {"color": ACCENT}),
     ("outside_energy", "fluid\noutside", {"color": ACCENT, "ls": "--"}),
     ("strain_energy", "strain", {"color": COMPUTED}),
-    ("stop_energy", "lip stops", {"color": "0.45", "ls": ":"}),
+    ("stop_energy", "stops or\ncontact", {"color": "0.45", "ls": ":"}),
     ("weight_energy", "weight of\nthe wall", {"color": COMPUTED, "ls": ":"}),
 )
 _EXCHANGED = (
     ("pressure_work", "work of the\npressure", {"color": COMPUTED}),
     ("dissipation", "lost to\ndamping", {"color": ACCENT}),
+    ("contact_loss", "lost in\ncontact", {"color": "0.45", "ls": "--"}),
     ("outside_renewed", "renewals of the\nadded mass", {"color": "0.45", "ls": ":"}),
 )
 

@@ -13,6 +13,9 @@ from ...model.lip import LipCentre
 from ...motion.equations import ValveMotion
 from ...motion.stepper import StepResult
 
+#: Quarters whose faces press on the closing plane from one side.
+_FACES = 2
+
 
 class Reader:
     """Makes rows of the history of one run and keeps the books of energy.
@@ -22,10 +25,20 @@ class Reader:
     motion : ValveMotion
     energy : float
         Energy at the start, J of a quarter.
+    work, dissipation, contact_loss : float
+        What went in and out since, J of a quarter.
     """
 
-    def __init__(self, motion: ValveMotion, energy: float, work: float = 0.0, dissipation: float = 0.0):
+    def __init__(
+        self,
+        motion: ValveMotion,
+        energy: float,
+        work: float = 0.0,
+        dissipation: float = 0.0,
+        contact_loss: float = 0.0,
+    ):
         self.motion, self.energy, self.work, self.dissipation = motion, energy, work, dissipation
+        self.contact_loss = contact_loss
         model = motion.model
         index = model.shell.dofs.index
         self._lip = LipCentre(model.mesh, model.shell)
@@ -43,6 +56,7 @@ class Reader:
         """Row of a step."""
         self.work += result.work
         self.dissipation += result.dissipation
+        self.contact_loss += result.contact_loss
         return self._row(result.state, result.load, h, result.residuals)
 
     def _row(self, state, load, h: float, evaluations: int) -> dict[str, Any]:
@@ -56,7 +70,7 @@ class Reader:
         weight = motion.weight_energy(state.q)
         renewed = 0.0 if motion.outside is None else motion.outside.renewed
         stored = kinetic + outside + strain + stop + weight
-        balance = stored - self.energy - self.work + self.dissipation - renewed
+        balance = stored - self.energy - self.work + self.dissipation + self.contact_loss - renewed
         memory, by_group = state.memory, {}
         if memory is not None:
             balance += memory.work.sum()
@@ -67,6 +81,8 @@ class Reader:
         if state.gas is not None:
             out, entered, fastest = motion.fluid.readings(area, state.gas.inner)
             by_group |= self._of_gas(load, state.gas) | {"mach": fastest}
+        if model.contact is not None:
+            by_group |= self._of_faces(state.q)
         return by_group | {
             "time": state.time,
             "inlet_pressure": load.inlet,
@@ -80,7 +96,7 @@ class Reader:
             "lip_opening": self._lip.opening(state.q),
             "lip_displacement": self._lip.displacement(state.q),
             "lip_velocity": self._lip.displacement(state.v),
-            "stops": model.stops.touching(state.q),
+            "stops": model.touching(state.q),
             "kinetic_energy": QUARTERS * kinetic,
             "outside_energy": QUARTERS * outside,
             "outside_renewed": QUARTERS * renewed,
@@ -102,6 +118,14 @@ class Reader:
         supply, outflow, work, loss = (float(x) for x in QUARTERS * gas.books)
         kept = {"gas_supply": supply, "gas_outflow": outflow, "gas_work": work, "gas_loss": loss}
         return kept | {"gas_energy": QUARTERS * energy}
+
+    def _of_faces(self, q: np.ndarray) -> dict[str, Any]:
+        contact = self.motion.model.contact.state(q)
+        return {
+            "contact_loss": QUARTERS * self.contact_loss,
+            "contact_force": _FACES * contact.total,
+            "penetration": contact.penetration,
+        }
 
     def _of_line(self, line: LineState) -> dict[str, Any]:
         kinetic, elastic = self.motion.waves.energies(line)

@@ -31,7 +31,7 @@ class Progress:
     steps : int
     saved : int
         Full states kept so far.
-    work, dissipation, energy, renewed : float
+    work, dissipation, energy, renewed, contact_loss : float
         The books of energy, J of a quarter.
     control : tuple of float
         Of the step control.
@@ -48,6 +48,7 @@ class Progress:
     renewed: float = 0.0
     control: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
     eigenvalue: complex = complex(np.nan, np.nan)
+    contact_loss: float = 0.0
 
     @property
     def rows(self) -> int:
@@ -61,6 +62,7 @@ class Progress:
         apart = ("memory", "line", "gas")
         values |= {f.name: getattr(self.state, f.name) for f in fields(MotionState) if f.name not in apart}
         values |= {name: part.packed for name in apart[1:] if (part := getattr(self.state, name)) is not None}
+        values["contact_loss"] = self.contact_loss
         return values if self.state.memory is None else values | memory_row(self.state.memory)
 
     @classmethod
@@ -75,9 +77,8 @@ class Progress:
         if wall is not None:
             kept = [record.value(RESTART, c.name, at) for c in MEMORY_COLUMNS]
             state = replace(state, memory=wall.at(state.q, *kept))
-        names = {column.name for column in record.tables[RESTART].columns}
         for name, kind in (("line", LineState), ("gas", GasState)):
-            if name in names:
+            if _has(record, name):
                 state = replace(state, **{name: kind.unpacked(record.value(RESTART, name, at))})
         return cls(
             state,
@@ -86,4 +87,10 @@ class Progress:
             *(float(values[name]) for name in ("work", "dissipation", "energy", "renewed")),
             tuple(float(value) for value in values["control"]),
             complex(*values["eigenvalue"]),
+            float(record.value(RESTART, "contact_loss", at)) if _has(record, "contact_loss") else 0.0,
         )
+
+
+def _has(record: Record, name: str) -> bool:
+    """Whether restart points of a record have a column."""
+    return any(c.name == name for c in record.tables[RESTART].columns)

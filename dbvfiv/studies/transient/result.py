@@ -21,7 +21,7 @@ from ..result import StudyResult
 from . import figures
 from .animation import animate
 from .assess import assess
-from .tables import GAS, HISTORY, LINE, PROFILES, RELAXING, SCALARS, STATE_COLUMNS, STATES
+from .tables import HISTORY, PROFILES, SCALARS, STATE_COLUMNS, STATES, added_columns
 
 _NO_VERDICT = {
     "verdict": "undecided",
@@ -83,8 +83,8 @@ class TransientResult(StudyResult):
     ----------
     history : dict of str to array
         Columns of `dbvfiv.studies.transient.tables.SCALARS` and `PROFILES`, and of `RELAXING` where the wall relaxes,
-        for the groups of layers in `mesh.relaxing`, of `LINE` behind an elastic line, and of `GAS` where the fluid is
-        compressed; one row for each step.
+        for the groups of layers in `mesh.relaxing`, of `LINE` behind an elastic line, of `GAS` where the fluid is
+        compressed, and of `FACES` where inner faces touch; one row for each step.
     states : sequence of TransientState
         Full states, `transient.save_every` apart, and the last one.
     verdict : dict
@@ -100,18 +100,18 @@ class TransientResult(StudyResult):
 
     @cached_property
     def history(self) -> dict[str, np.ndarray]:
-        lines = (*(LINE if len(self.mesh.line_places) else ()), *(GAS if len(self.mesh.gas_unknowns) else ()))
-        columns = (*SCALARS, *PROFILES, *(RELAXING if self.mesh.relaxing else ()), *lines)
+        columns = (*SCALARS, *PROFILES, *added_columns(self.mesh))
         return {c.name: self.record.column(HISTORY, c.name) for c in columns}
 
     def dissipated(self) -> dict[str, float]:
-        """Energy lost since the start, J: to Rayleigh damping and, where there are any, in groups of layers that relax
-        and in an elastic line.
+        """Energy lost since the start, J: to Rayleigh damping and, where there are any, in groups of layers that relax,
+        in an elastic line and in faces that touch.
         """
         h = self.history
         lost = zip(self.mesh.relaxing, h["branch_loss"][-1]) if self.mesh.relaxing else ()
         losses = {"Rayleigh damping": float(h["dissipation"][-1])} | {name: float(value) for name, value in lost}
-        return losses | ({"line": float(h["line_dissipation"][-1])} if "line_dissipation" in h else {})
+        named = {"line": "line_dissipation", "contact of the faces": "contact_loss"}
+        return losses | {name: float(h[column][-1]) for name, column in named.items() if column in h}
 
     @cached_property
     def states(self) -> StateList:

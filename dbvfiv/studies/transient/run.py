@@ -124,7 +124,8 @@ class Runner:
         progress = Progress.read(self.record, wall=self.motion.wall)
         self._begin(progress.steps)
         self.control.unpack(progress.control)
-        self._reader = Reader(self.motion, progress.energy, progress.work, progress.dissipation)
+        books = progress.energy, progress.work, progress.dissipation, progress.contact_loss
+        self._reader = Reader(self.motion, *books)
         self.stepper.forget()
         if self.motion.outside is not None:
             self.motion.outside.start_afresh(progress.state.q, progress.state.v)
@@ -199,6 +200,7 @@ class Runner:
         self.keeper.append(row)
         progress.steps += 1
         progress.work, progress.dissipation = self._reader.work, self._reader.dissipation
+        progress.contact_loss = self._reader.contact_loss
         if (
             options.save_every
             and result.state.time >= (progress.saved * options.save_every) - 1e-9 * options.control.step

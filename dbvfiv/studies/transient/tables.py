@@ -25,7 +25,7 @@ SCALARS = (
     Column("lip_opening", "m", "Full clear opening between the inner faces of both lips at x = z = 0"),
     Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
     Column("lip_velocity", "m/s", "Rate of the lip displacement"),
-    Column("stops", "", "Lip stops in contact, of a quarter"),
+    Column("stops", "", "Lip stops, or nodes with their inner face, in contact, of a quarter"),
     Column("kinetic_energy", "J", "Kinetic energy of the wall"),
     Column("outside_energy", "J", "Kinetic energy of the fluid outside the wall"),
     Column(
@@ -34,15 +34,15 @@ SCALARS = (
         "Energy that renewals of the added mass of that fluid have put in since the start, as the shape moved on",
     ),
     Column("strain_energy", "J", "Strain energy of the wall"),
-    Column("stop_energy", "J", "Energy of the lip stops"),
+    Column("stop_energy", "J", "Energy stored in the lip stops, or in the contact of the inner faces"),
     Column("weight_energy", "J", "Potential of the wall's weight over that at rest"),
     Column("pressure_work", "J", "Work of the pressure on the wall since the start"),
     Column("dissipation", "J", "Energy lost to Rayleigh damping since the start"),
     Column(
         "balance",
         "J",
-        "Energy gained since the start, by Maxwell branches and the fluid outside too, less work plus dissipation, and "
-        "less what renewals put in: what the scheme itself adds or takes",
+        "Energy gained since the start, by Maxwell branches and the fluid outside too, less work plus dissipation and "
+        "what faces that part lost, and less what renewals put in: what the scheme itself adds or takes",
     ),
     Column("step", "s", "Length of the step"),
     Column("evaluations", "", "Residuals evaluated in the step"),
@@ -82,6 +82,12 @@ GAS = (
     Column("gas_work", "J", "Work that it did on the wall since the start"),
     Column("gas_loss", "J", "Energy that it lost in the valve since the start: by friction, jets inside, and shocks"),
     Column("mach", "", "Largest Mach number in the valve"),
+)
+#: Contact of the inner faces, there where the case has it.
+FACES = (
+    Column("contact_loss", "J", "Energy that touching faces took and did not give back since the start, whole valve"),
+    Column("contact_force", "N", "Force with which the two walls press on each other"),
+    Column("penetration", "m", "Depth to which faces are pressed into the closing plane"),
 )
 #: Full states.
 STATE_COLUMNS = (
@@ -133,6 +139,8 @@ BOOKS = (
     Column("control", "", "Numbers of the step control"),
     Column("eigenvalue", "1/s", "Real and imaginary part of that of the mode of a kick"),
 )
+#: Books of contact of the inner faces, there where the case has it.
+FACE_BOOKS = (Column("contact_loss", "J", "Energy of a quarter that touching faces took and did not give back"),)
 
 
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
@@ -152,15 +160,21 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     compressed = len(mesh.gas_unknowns) > 0
     if compressed:
         motion["gas"] = (packed_size(int(mesh.gas_unknowns[0])),)
-    history = (*SCALARS, *PROFILES, *(RELAXING if groups else ()), *(LINE if waves else ()))
-    history += GAS if compressed else ()
+    history = (*SCALARS, *PROFILES, *added_columns(mesh))
     restart = (*COUNTS, *BOOKS, *MOTION_COLUMNS, *(MEMORY_COLUMNS if groups else ()), *(LINE_COLUMNS if waves else ()))
     restart += GAS_COLUMNS if compressed else ()
+    restart += FACE_BOOKS if len(mesh.face_nodes) else ()
     return (
         TableSpec(HISTORY, history, by_row | by_group | {"centre_line": (stations,)}, chunk=512),
         TableSpec(STATES, STATE_COLUMNS, by_row | {"nodal": (nodes, 5), "nodal_rate": (nodes, 5)}),
         TableSpec(RESTART, restart, motion | by_group),
     )
+
+
+def added_columns(mesh: MeshData) -> tuple[Column, ...]:
+    """Columns of the history that a run has besides `SCALARS` and `PROFILES`."""
+    fluid = (*(LINE if len(mesh.line_places) else ()), *(GAS if len(mesh.gas_unknowns) else ()))
+    return (*(RELAXING if mesh.relaxing else ()), *fluid, *(FACES if len(mesh.face_nodes) else ()))
 
 
 def row_bytes(table: TableSpec) -> int:
