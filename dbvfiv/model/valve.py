@@ -190,6 +190,10 @@ class ValveModel:
         """Number of stops, or of nodes with their inner face, in contact."""
         return self.stops.touching(q) if self.contact is None else self.contact.touching(q)
 
+    def weight_energy(self, q: np.ndarray) -> float:
+        """Potential of the wall's weight over that at rest, J of a quarter; zero without gravity."""
+        return 0.0 if self.weight is None else self.weight.energy(self.shell, q)
+
     def support_energy(self, q: np.ndarray) -> float:
         """Energy of stops or contact, J of a quarter."""
         return self.stops.energy(q) if self.contact is None else self.contact.energy(q)

@@ -20,7 +20,8 @@ from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
 from ..shell import Memory, StepWall, WallMemory
 from .contact import FaceStep, MassSolver
-from .kernels import inertia_force, kinetic_energy, row_motion, strain_energy
+from .energies import wall_energies
+from .kernels import inertia_force, row_motion
 from .outside import MovingOutside, OutsideCorrection
 from .terms import Load, Step, Weights
 
@@ -392,21 +393,7 @@ class ValveMotion:
         """Kinetic energy, strain energy and that of stops or contact, J of a quarter; the fluid outside is
         `outside_energy`.
         """
-        shell = self.model.shell
-        nodal = self.model.nodal(q)
-        d, d1, _ = shell.directors(nodal)
-        kinetic = kinetic_energy(self._quads, self._integrals, d1, self.model.nodal(v))
-        if shell.metric == "first-order":
-            parts = zip(shell.parts, shell.wall)
-            strain = sum(strain_energy(p.quads, shell.mesh.nodes, nodal, d, p.reference, wall) for p, wall in parts)
-        else:
-            strain = shell.energy(q)
-        return float(kinetic), float(strain), self.model.support_energy(q)
-
-    def weight_energy(self, q: np.ndarray) -> float:
-        """Potential of the wall's weight over that at rest, J of a quarter; zero without gravity."""
-        weight = self.model.weight
-        return 0.0 if weight is None else weight.energy(self.model.shell, q)
+        return *wall_energies(self.model, q, v), self.model.support_energy(q)
 
     def outside_energy(self, q: np.ndarray, v: np.ndarray) -> float:
         """Kinetic energy of the fluid outside, J of a quarter; zero where there is none."""

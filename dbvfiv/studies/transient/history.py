@@ -67,7 +67,7 @@ class Reader:
         throat = int(np.argmin(area))
         out = density * load.speed[0] * float(self.motion.model.flow.open_area(area[0]))
         outside = motion.outside_energy(state.q, state.v)
-        weight = motion.weight_energy(state.q)
+        weight = model.weight_energy(state.q)
         renewed = 0.0 if motion.outside is None else motion.outside.renewed
         stored = kinetic + outside + strain + stop + weight
         balance = stored - self.energy - self.work + self.dissipation + self.contact_loss - renewed

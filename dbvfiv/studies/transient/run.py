@@ -108,7 +108,7 @@ class Runner:
         inlet = self.drive(0.0)
         state, kick = (first, None) if first is not None else self._first(inlet)
         energy = sum(self.motion.energies(state.q, state.v)) + self.motion.outside_energy(state.q, state.v)
-        energy += self.motion.weight_energy(state.q)
+        energy += self.motion.model.weight_energy(state.q)
         progress = Progress(state, energy=energy, control=tuple(self.control.pack()))
         if kick is not None:
             progress.eigenvalue = kick.eigenvalue
