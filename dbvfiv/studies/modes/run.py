@@ -15,6 +15,7 @@ from eigen import (
     TransferBasis,
     certified_spectrum,
 )
+from eigen.negative_stiffness import negative_motions
 
 from ...errors import CaseError
 from ...model import ValveModel
@@ -180,13 +181,27 @@ def run_modes(
                 "modes of higher frequency may be unstable: modes.max_frequency moves the end."
             ),
         )
-    notes = (*notes, *certified.spectrum.notes)
+    notes = (*notes, *certified.spectrum.notes, *of_the_wall(certified.spectrum, pencil))
     result = _described(model, state, conditions, without_fluid, certified, pencil, linear, notes, symmetry)
     observer.item(result)
     if result.stable is None:
         observer.warn(certified.statement)
     observer.end(False)
     return result
+
+
+def of_the_wall(spectrum: Spectrum, pencil: CoupledPencil) -> list[str]:
+    """What to make of motions that run away without swinging where rubber has lost stability."""
+    values = spectrum.eigenvalues
+    count = int(np.sum((values.imag == 0) & (values.real > 0)))
+    if not count or not negative_motions(pencil).shape[1]:
+        return []
+    return [
+        f"The unstable eigenvalues without a frequency, {count} here, come with a wall that runs away by itself: loss "
+        "factors make rubber stiffer the faster it is strained, which is no hold where its constants have lost "
+        "stability. They say that the constants do not last to these strains (materials.strain_level, or a fit over a "
+        "wider range), not that the valve flutters."
+    ]
 
 
 def _described(
