@@ -25,8 +25,9 @@ from typing import Any, ClassVar, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
+from .around import AroundChannel
 from .channel import Channel
-from .law import FlowLaw, FlowMotion, FlowParameter, Traceable
+from .law import FlowMotion, FlowParameter, Traceable
 from .line_elements import DEGREE, chain, element
 from .line_stepping import LineFluid
 from .terms.line import Line, PiecedLine
@@ -178,7 +179,7 @@ class ElasticLine(Traceable):
         return (head / (segments.ratio * segments.speed)[:, None]).ravel()
 
 
-class LineChannel(FlowLaw):
+class LineChannel(AroundChannel):
     """A channel behind an elastic line.
 
     Its unknowns are the inlet velocity, the velocities in the line from the far end and the pressures in it, each as
@@ -201,10 +202,6 @@ class LineChannel(FlowLaw):
         self.floor, self.density = channel.floor, channel.density
 
     @property
-    def count(self) -> int:
-        return self.channel.count
-
-    @property
     def inner(self) -> int:
         return 1 + self.line.size
 
@@ -212,26 +209,6 @@ class LineChannel(FlowLaw):
     def terms(self):
         """Those of the rigid column."""
         return self.rigid.terms
-
-    @property
-    def back(self) -> float:
-        """That of the channel."""
-        return self.channel.back
-
-    @property
-    def level(self) -> float:
-        """That of the channel."""
-        return self.channel.level
-
-    @property
-    def static(self):
-        """That of the channel."""
-        return self.channel.static
-
-    @property
-    def storage(self) -> float:
-        """Blend of the continuity laws."""
-        return self.channel.storage
 
     @property
     def parameters(self) -> tuple[FlowParameter, ...]:

@@ -33,10 +33,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .around import AroundChannel
 from .channel import Channel
 from .gas_stepping import GasFluid
 from .heads import outward_head, reversible_head
-from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
+from .law import FlowMotion, FlowParameter, above_floor
 
 #: Relative error of the frequency of waves that counts as resolved; the box scheme's is (k h)^2/12.
 _RESOLVED = 0.01
@@ -55,7 +56,7 @@ def grown(x, rate):
     return jnp.expm1(rate * x) / rate
 
 
-class GasChannel(FlowLaw):
+class GasChannel(AroundChannel):
     """Isentropic flow through m stations.
 
     Its 2 m - 1 unknowns, all in m/s, are the inlet velocity, the velocities at the stations from the outlet on, and
@@ -84,37 +85,8 @@ class GasChannel(FlowLaw):
         self.boils, self.vapour = vapour is not None, 0.0 if vapour is None else float(vapour)
 
     @property
-    def count(self) -> int:
-        return self.channel.count
-
-    @property
     def inner(self) -> int:
         return 2 * self.count - 1
-
-    @property
-    def terms(self):
-        """Those of the channel."""
-        return self.channel.terms
-
-    @property
-    def back(self) -> float:
-        """That of the channel."""
-        return self.channel.back
-
-    @property
-    def level(self) -> float:
-        """That of the channel."""
-        return self.channel.level
-
-    @property
-    def static(self):
-        """That of the channel."""
-        return self.channel.static
-
-    @property
-    def storage(self) -> float:
-        """Blend of the continuity laws."""
-        return self.channel.storage
 
     @property
     def unsteady(self) -> bool:
