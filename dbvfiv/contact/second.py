@@ -10,13 +10,6 @@ from ..shell.rotation import director
 from .plane import PlaneContact
 
 
-def contact_second(
-    contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, a: np.ndarray, b: np.ndarray
-) -> np.ndarray:
-    """Second directional derivative (nn, 5) of the contact force at nodal unknowns (nn, 5) along a and b (nn, 5)."""
-    return contact_form(contact, nodal, multiplier, a, b)
-
-
 def contact_form(
     contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, *directions: np.ndarray
 ) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.contact import ContactLaw, PlaneContact, nodal_thickness, tributary_area
-from dbvfiv.contact.second import contact_second
+from dbvfiv.contact.second import contact_form
 from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.shell import Shell, ShellMesh
 from tests.shell.structures import grid, mixed_section
@@ -115,7 +115,7 @@ def test_second_derivatives_agree_with_differences_of_the_tangent():
         return pressed.shell.dofs.matrix(whole - bare) @ a
 
     change = (contact_only(q + h * b) - contact_only(q - h * b)) / (2 * h)
-    exact = restrict(contact_second(pressed.contact, expand(q), pressed.multiplier, expand(a), expand(b)))
+    exact = restrict(contact_form(pressed.contact, expand(q), pressed.multiplier, expand(a), expand(b)))
     assert exact == pytest.approx(change, rel=1e-4, abs=1e-5 * np.abs(change).max())
     change = (pressed.pressure_force(expand(q + h * b), 1.0) - pressed.pressure_force(expand(q), 1.0)) / h
     linear = pressed.shell.dofs.matrix(pressed.tangent(q, 0.0).stiffness - pressed.tangent(q, 1.0).stiffness) @ b

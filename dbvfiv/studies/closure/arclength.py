@@ -10,7 +10,7 @@ from continuation import ContinuationOptions, MatrixLinearisation, SystemBase, c
 from continuation import NewtonOptions as ContinuationNewton
 from continuation.branch import Branch
 
-from ...contact.second import contact_second
+from ...contact.second import contact_form
 from ...model.pressed_shell import PressedShell
 from ...observer import Observer
 from .stiffness import stiffness_spectrum
@@ -62,7 +62,7 @@ class PressedSystem(SystemBase):
         expand, restrict = pressed.nodal, pressed.shell.dofs.restrict
         second = pressed.shell.second(u, a, b)
         if pressed.contact is not None:
-            second += restrict(contact_second(pressed.contact, expand(u), pressed.multiplier, expand(a), expand(b)))
+            second += restrict(contact_form(pressed.contact, expand(u), pressed.multiplier, expand(a), expand(b)))
         return mu[PARAMETER] * pressed.pressure_force_second(expand(a), expand(b)) - second
 
     def d2_parameter(self, u, mu, name, a):
