@@ -13,15 +13,17 @@ from .condensation import Workspace
 from .factorization import SingularShiftError
 from .family import Condition, PencilFamily
 from .phase_count import phase_counts
-from .reduction import FamilyReduction, ReducedFamily, StaticSolver
+from .reduced import ReducedFamily
+from .reduction import FamilyReduction
 from .search import leading_modes
 from .snapshots import between, spread
+from .static_solver import StaticSolver
 from .winding import unstable_count
 
 #: Estimated relative error of an eigenvalue above which a cell is treated directly.
 TOLERANCE = 1e-6
 #: Directions weaker than this are left out where two spaces are put together.
-JOINT = 1e-3
+JOINT = 3e-3
 #: How a cell was found.
 REDUCED, DIRECT, MISSING = 0, 1, 2
 #: Share of a band up to which eigenvalues are counted, clear of those at its end.
@@ -176,7 +178,7 @@ class ColumnSolver:
         counter = first
         if any(conditions[i].loss for i in counted) and error <= TOLERANCE:
             # static responses alone say little of what relaxes; with the vectors that the list rests on they are enough
-            counter = ReducedFamily(family, np.hstack([first.V, fine.V]), JOINT)
+            counter = ReducedFamily(family, fine.V, JOINT, base=first)
         if len(counted):
             found = count_unstable(counter, [conditions[i] for i in counted], [leading[i] for i in counted])
             counts.enter(counted, found)

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .pencil import fluid_zeros, stable_fluid
-from .reduction import POWERS, ReducedFamily
+from .reduced import POWERS, ReducedFamily
 from .structure_response import NEAR, RelaxingResponse, Response, response
 
 #: Largest accepted step of the phase between neighbours, rad.

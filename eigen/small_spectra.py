@@ -12,7 +12,7 @@ from .structure_response import relative
 
 if TYPE_CHECKING:
     from .family import Condition
-    from .reduction import ReducedFamily
+    from .reduced import ReducedFamily
 
 #: Eigenvalues of a cell that are taken from the surrogate to the rational pencil.
 TAKEN = 6

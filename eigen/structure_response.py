@@ -17,7 +17,7 @@ import scipy.linalg as la
 from .oscillators import Oscillators
 
 if TYPE_CHECKING:
-    from .reduction import ReducedFamily
+    from .reduced import ReducedFamily
 
 #: Patterns of motion and force weaker than this are left out.
 PATTERNS = 1e-5

@@ -7,7 +7,8 @@ import scipy.sparse as sp
 
 from eigen import Certificate, ColumnSolver, Condition, CoupledPencil, PencilFamily, SearchOptions, certified_spectrum
 from eigen.columns import DIRECT, REDUCED, count_unstable
-from eigen.reduction import POWERS, FamilyReduction
+from eigen.reduced import POWERS
+from eigen.reduction import FamilyReduction
 
 SIZE = 60
 

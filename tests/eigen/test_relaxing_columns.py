@@ -7,7 +7,8 @@ import scipy.sparse as sp
 
 from eigen import ColumnSolver, Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions
 from eigen.phase_count import phase_counts
-from eigen.reduction import POWERS, FamilyReduction, ReducedFamily
+from eigen.reduced import POWERS, ReducedFamily
+from eigen.reduction import FamilyReduction
 
 SIZE, GROUPS, TIMES = 12, 2, 3
 

@@ -7,7 +7,8 @@ from dbvfiv.studies.stability.family import ValveFamily
 from dbvfiv.studies.stability.place import Place
 from eigen import ColumnSolver, Condition, FamilyReduction
 from eigen.phase_count import phase_counts
-from eigen.reduction import POWERS, StaticSolver
+from eigen.reduced import POWERS
+from eigen.static_solver import StaticSolver
 
 DENSITIES = np.geomspace(1.0, 1000.0, 13)
 
