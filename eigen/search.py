@@ -94,7 +94,7 @@ def _search(pencil, count, options, workspace, first) -> Found:
         if found.everything or (is_covered(found, aim, options) and not given):
             break
         if not queue and not given and len(found.shifts) < options.max_shifts:
-            if options.max_frequency is not None and fresh == 0 and len(found.shifts) > 1:
+            if options.max_frequency is not None and found.values.size and fresh == 0 and len(found.shifts) > 1:
                 break  # the band holds no more within reach
             queue = [next_shift(pencil, found, aim, options, workspace)]
     return found
@@ -221,7 +221,8 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
             f"list of leading modes goes on from there to the {count} asked for."
         )
     elif order.size < count:
-        where = "" if all_there_are or options.max_frequency is None else _within(found, options, low)
+        searched = options.max_frequency is not None and low < np.inf
+        where = _within(found, options, low) if searched and not all_there_are else ""
         notes.append(
             f"{count} modes were asked for, {order.size} were found{where}"
             + ("; there are no more." if all_there_are or where else ".")

@@ -76,7 +76,10 @@ def next_shift(pencil, found, aim, options, workspace) -> complex:
     if pencil.relaxation is not None:
         return found.shifts[0] * (2.5, 0.4)[len(found.shifts) % 2] ** ((len(found.shifts) + 1) // 2)
     if not found.values.size and all(isinstance(s, float) for s in found.shifts):
-        return min(found.shifts) / 3.0
+        closer = min(found.shifts) / 3.0
+        if options.max_frequency is None:
+            return closer
+        return min(closer, first_shift(pencil, aim, replace(options, max_frequency=None), workspace))
     if options.limit_point is not None:  # a larger disc hugs the line through the limit point
         return 3.0 * max(abs(s) for s in found.shifts)
     if options.max_frequency is not None and len(found.shifts) == 1:

@@ -13,6 +13,7 @@ from dbvfiv.model import Conditions, ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import Case
 from eigen import SearchOptions, TransferBasis, certified_spectrum
+from eigen.dense import all_eigenvalues
 
 MESH = {"mesh.around": 6, "mesh.along": 8}
 #: What a state may be refused with: a discharge that gives back all the head there is, a wall that touches its pipe.
@@ -101,6 +102,40 @@ def look_at(number: int, seed: int, conditions_each: int = 3) -> tuple[list[str]
                 assert not found.stable and found.statement
                 left_open.append(f"{i}: {conditions}, {keys}: {found.statement}")
     return left_open, refused, unstable
+
+
+def test_waves_resolved_far_above_the_modes():
+    """The band ends where the waves are resolved, at thirty times the highest unstable mode of a lightly damped wall:
+    shifts of the band's size converge to nothing, and closer ones are taken.
+    """
+    keys = {
+        "fluid.density": 6.439481599036446,
+        "valve.thickness_factor": 0.7471367031159876,
+        "upstream.pieces": [
+            {"length": 1.3914951978421821, "diameter": 0.4537121899809169},
+            {
+                "length": 0.1920701519938924,
+                "diameter": 0.5060342722202749,
+                "friction": 0.07309567392050009,
+                "wave_speed": 537.8548622781612,
+                "elements": 2,
+            },
+        ],
+        "downstream.pressure": 140.6336416111368,
+        "drive.at": "reservoir",
+        "drive.pressure": 343.6359928351305,
+    }
+    case = Case().replace(MESH | keys)
+    model = ValveModel(case)
+    linear = linearise(model, LoadPath(model).go_to(case.drive.pressure).q, case.drive.pressure)
+    own = Conditions.of(case)
+    pencil = linear.pencil(Conditions(own.density, 5.0, 1.838e-5, 0.0, **own.of_line), storage=1.0)
+    found = certified_spectrum(pencil, 6, SearchOptions(max_frequency=2800.0), whole=False)
+    assert found.agrees and found.unstable_count == 8, found.statement
+    every = all_eigenvalues(pencil)
+    every = every[(every.imag > 0) & (every.imag < 2 * np.pi * 2800.0)]
+    listed = found.spectrum.eigenvalues
+    assert np.allclose(listed, every[np.argsort(-every.real)][: len(listed)], rtol=1e-7)
 
 
 @pytest.mark.slow
