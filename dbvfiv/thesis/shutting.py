@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..report.content import pictures_of
 from .entry import Entry, Number, Outcome
 from .workshop import Workshop
@@ -20,7 +22,8 @@ def back_pressure(workshop: Workshop) -> Outcome:
                     f"largest displacement at {s.pressure / 1e3:g} kPa, {words}", 1e3 * s.max_displacement, None, "mm"
                 )
             )
-        pictures += pictures_of(result, {"side-views": f"Lips {words}."})
+        views = pictures_of(result, {"side-views": f"Lips {words}."})
+        pictures += [replace(view, name=f"{view.name}-{supports}") for view in views]  # figures are numbered by name
         told += [f"Lips {words}: {line}" for line in result.remarks() if not line.startswith("Forces")]
     told.insert(
         0,

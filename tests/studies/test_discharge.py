@@ -12,6 +12,7 @@ from dbvfiv.case import CaseError
 from dbvfiv.case.measured import DISCHARGE, read_measured
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.studies.case import load_case
+from dbvfiv.studies.steady.comparison import draw
 from dbvfiv.studies.steady.measured import against
 from tests.small_valves import make_valve
 
@@ -187,6 +188,13 @@ def test_steady_runs_side_by_side(runs, command_line, tmp_path):
     assert rows[0]["volume_flow"][2] is None and rows[3]["difference"][2] is None
     out = command_line("compare", *runs, "-o", figure).out
     assert "2: pipe_diameter 0.305" in out and "2, L/s" in out and "Wrote" in out
+
+
+def test_axes_hold_the_widest_of_several_runs(runs):
+    read = [dbvfiv.load_result(path) for path in reversed(runs)]  # the pipe behind takes the least
+    axes = draw(read).axes[0]
+    widest = max(line.get_xdata().max() for line in axes.lines)
+    assert axes.get_xlim()[0] == 0 and axes.get_xlim()[1] > widest
 
 
 def test_what_cannot_be_compared(runs, command_line, one_sentence, tmp_path):

@@ -137,12 +137,13 @@ def draw(results: Sequence[ClosureResult]) -> Figure:
             axes.plot(pressure / 1e3, values, color=colour, marker="." if len(pressure) == 1 else None, label=label)
         axes.set_ylabel(f"{title}, {unit}")
         axes.set_xlabel("Back pressure, kPa")
-        axes.set_xlim(left=0)
     for result in results:
         passage = result.measured.passage
         if passage is not None:
             panels[3].plot(passage.pressure / 1e3, 1e6 * passage.measured, color="black", **MEASURED)
     panels[4].axhline(0.0, color=REST, lw=0.9)
+    for axes in panels[: len(COLUMNS)]:
+        axes.set_xlim(left=0)  # after everything: a limit that is set holds
     for axes, section in zip(panels[len(COLUMNS) :], sections):
         draw_section_of_runs(axes, section, shapes, colours)
     for axes in panels:

@@ -127,6 +127,8 @@ def draw(results: Sequence[SteadyResult], names: Sequence[str] | None = None) ->
         draw_section_of_runs(panel, section, shapes, colours)
     for panel in axes:
         panel.set_visible(panel.has_data())
+    axes[0].set_xlim(left=0)  # after all runs: a limit that is set holds
+    axes[0].set_ylim(bottom=0)
     axes[0].set_title("Head and discharge", loc="left", fontweight="bold")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=2 if len(results) > 3 else 1)
     return figure
@@ -146,8 +148,6 @@ def _discharge(axes: Axes, result: SteadyResult, label: str, colour: Any) -> Non
         axes.plot(flow, points.pressure / 1e3, color=colour, label=f"measured, {label}", **MEASURED)
     axes.set_xlabel("Flow, L/s")
     axes.set_ylabel(parameter_label(result.case, "pressure"))
-    axes.set_xlim(left=0)
-    axes.set_ylim(bottom=0)
 
 
 def _areas(axes: Axes, result: SteadyResult, label: str, colour: Any) -> None:
