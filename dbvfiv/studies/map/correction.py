@@ -52,7 +52,11 @@ class OnsetCorrection:
         return value, frequency, float("nan")
 
     def _settled(self, eigenvalue, value: float, near: complex):
-        slope = self._slope(value, near)
+        slope = self._slope(self._small, value, near)
+        if not np.isfinite(slope):
+            slope = self._slope(self._by_solving, value, near)
+        if not np.isfinite(slope) or slope == 0:
+            return None
         for _ in range(CORRECTIONS):
             found = eigenvalue(value, near)
             if found is None or not np.isfinite(found):
@@ -65,24 +69,30 @@ class OnsetCorrection:
             value -= found.real / slope
         return (value, abs(near.imag) / (2 * np.pi), left) if left <= ACCURATE else None
 
-    def _small(self, value: float, near: complex) -> complex:
-        values = self.column.eigenvalues(self.condition(value))
-        return complex(values[int(np.argmin(np.abs(values - near)))])
+    def _small(self, value: float, near: complex) -> complex | None:
+        """Eigenvalue of the small model; None where it has no leading one and all cells needed the full matrices."""
+        return _nearest(self.column.eigenvalues(self.condition(value)), near)
 
-    def _slope(self, value: float, near: complex) -> float:
+    def _slope(self, eigenvalue, value: float, near: complex) -> float:
         step = STEP * (abs(value) or 1.0)
-        up, down = (self._small(v, near).real for v in (value + step, value - step))
-        return (up - down) / (2 * step)
+        up, down = (eigenvalue(v, near) for v in (value + step, value - step))
+        return float("nan") if up is None or down is None else (up.real - down.real) / (2 * step)
 
     def _by_correction(self, value: float, near: complex) -> complex | None:
         found = self._small(value, near)
+        if found is None:
+            return None
         change = self.column.corrected(self.condition(value), found)
         return found + change if abs(change) < SAME * max(abs(found), 1.0) else None
 
     def _by_solving(self, value: float, near: complex) -> complex | None:
         try:
-            values = self.direct(value)
+            nearest = _nearest(self.direct(value), near)
         except SolveError:
             return None
-        nearest = complex(values[int(np.argmin(np.abs(values - near)))])
-        return nearest if abs(nearest - near) < SAME * max(abs(near), 1.0) else None
+        return None if nearest is None or abs(nearest - near) > SAME * max(abs(near), 1.0) else nearest
+
+
+def _nearest(values: np.ndarray, near: complex) -> complex | None:
+    """The eigenvalue next to a place, None if there is none at all."""
+    return complex(values[int(np.argmin(np.abs(values - near)))]) if len(values) else None
