@@ -16,6 +16,7 @@ from .materials import AUTO, DEFAULT_LAYERS, RUBBERS, Layer, Materials
 from .mesh import Mesh
 from .outside import Outside
 from .parameters import PARAMETERS
+from .part import QUARTER, Part
 from .relaxing import SHIPPED_LOSSES
 from .section import BrokenRule, Section, key
 from .upstream import Upstream
@@ -168,6 +169,11 @@ class Case(Section):
                         "every place of the wall needs a layer, and two points through it that mesh.layer_points and "
                         "its layers make",
                     )
+
+    @property
+    def part(self) -> Part:
+        """The part of the valve that is computed."""
+        return QUARTER
 
     @property
     def has_line(self) -> bool:

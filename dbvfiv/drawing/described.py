@@ -50,8 +50,9 @@ def valve_figure(model: ValveModel) -> Figure:
 def _title(model: ValveModel) -> str:
     case, shell = model.case, model.shell
     density = np.atleast_2d(shell.at_rest.inertia)[:, 0]  # of the wall, by element or everywhere
-    weight = 4.0 * float(np.sum(shell.geometry.area.sum(axis=1) * shell.mesh.thickness * density))
-    passage = 4e4 * (model.mesh.rest_area - model.mesh.wall_deduction)
+    copies = model.mesh.part.copies
+    weight = copies * float(np.sum(shell.geometry.area.sum(axis=1) * shell.mesh.thickness * density))
+    passage = 1e4 * copies * (model.mesh.rest_area - model.mesh.wall_deduction)
     lip, inlet = passage[0], passage[-1]
     scaled = f", {case.valve.scale:g} times as given" if case.valve.scale != 1.0 else ""
     return (

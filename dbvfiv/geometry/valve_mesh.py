@@ -9,6 +9,7 @@ import numpy as np
 
 from ..case.extent import Extent
 from ..case.mesh import Mesh
+from ..case.part import QUARTER, Part
 from ..case.valve import Valve
 from ..errors import CaseError
 from .divisions import column_division, grading, inverse_grading, row_division
@@ -45,6 +46,8 @@ class ValveMesh:
         it has the length (L^2 - pi T)^(1/2) (Steiner).
     missed_rows, missed_columns : arrays
         Breaks, in m and in the parameter of the grading, inside elements because there are too few of them.
+    part : Part
+        Of the valve, that is meshed.
     """
 
     nodes: np.ndarray
@@ -60,6 +63,7 @@ class ValveMesh:
     perimeter: np.ndarray
     missed_rows: np.ndarray
     missed_columns: np.ndarray
+    part: Part = QUARTER
 
     @property
     def shape(self) -> tuple[int, int]:

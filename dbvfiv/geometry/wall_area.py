@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..case.part import QUARTER
 from ..case.valve import Valve
 from .surface import Surface
 
-#: Of the whole valve that a section is one of.
-QUARTERS = 4
 #: Pieces of a section over which a wall that varies around it is summed up.
 _FINE = 1000
 
@@ -67,7 +66,7 @@ def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float,
                 f"The key points of the {place} leave no flow area inside a half wall of {half:g} m; it must be less, "
                 f"see valve.{name}_wall_deduction."
             )
-    inside = [1e4 * QUARTERS * (surface.area(z) - taken) for z, taken in ((lip, found[0]), (flange, found[2]))]
+    inside = [1e4 * QUARTER.copies * (surface.area(z) - taken) for z, taken in ((lip, found[0]), (flange, found[2]))]
     if inside[0] >= inside[1]:
         raise ValueError(
             f"The key points leave {inside[0]:.4g} cm2 between the lips at rest; the passage there must be smaller "

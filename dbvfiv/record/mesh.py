@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
+from ..case.part import PARTS, QUARTER, Part
 from ..flow.elastic_line import LineChannel
 from ..flow.gas import GasChannel
 from .layout import TEXT, Column, read_array, write_array
@@ -43,6 +44,8 @@ _LINE = (
 _GAS = (Column("gas_unknowns", "", "Number of unknowns of a fluid that is compressed", "i4"),)
 #: There where inner faces touch.
 _FACES = (Column("face_nodes", "", "Nodes whose inner face may touch the closing plane", "i4"),)
+#: There where more than a quarter is computed.
+_PART = (Column("part_name", "", "Part of the valve that the mesh is", TEXT),)
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,8 @@ class MeshData:
         Number of unknowns of a fluid that is compressed; empty without one.
     face_nodes : (k,) int array
         Nodes whose inner face may touch the closing plane; none where the lips have stops.
+    part_name : (1,) tuple of str
+        Part of the valve that the mesh is.
     """
 
     nodes: np.ndarray
@@ -94,6 +99,7 @@ class MeshData:
     line_places: np.ndarray = field(default_factory=lambda: np.zeros(0))
     gas_unknowns: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
     face_nodes: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+    part_name: tuple[str, ...] = (QUARTER.name,)
 
     @classmethod
     def of(cls, model: ValveModel) -> MeshData:
@@ -120,7 +126,13 @@ class MeshData:
             line_places=model.flow.line.places[0] if isinstance(model.flow, LineChannel) else np.zeros(0),
             gas_unknowns=np.array([model.flow.inner] if isinstance(model.flow, GasChannel) else [], np.int32),
             face_nodes=np.zeros(0, np.int32) if model.contact is None else model.contact.plane.nodes.astype(np.int32),
+            part_name=(model.mesh.part.name,),
         )
+
+    @property
+    def part(self) -> Part:
+        """Part of the valve that the mesh is."""
+        return PARTS[self.part_name[0]]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -149,13 +161,14 @@ def write_mesh(file: h5py.File, mesh: MeshData) -> None:
     group = file.create_group("mesh")
     fluid = (*(_LINE if len(mesh.line_places) else ()), *(_GAS if len(mesh.gas_unknowns) else ()))
     faces = _FACES if len(mesh.face_nodes) else ()
-    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *fluid, *faces):
+    part = () if mesh.part.is_quarter else _PART
+    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *fluid, *faces, *part):
         write_array(group, column, getattr(mesh, column.name))
 
 
 def read_mesh(file: h5py.File) -> MeshData:
     """Read the mesh of a result file."""
     group = file["mesh"]
-    further = (*_RELAXING, *_LINE, *_GAS, *_FACES)
+    further = (*_RELAXING, *_LINE, *_GAS, *_FACES, *_PART)
     columns = (*_COLUMNS, *(column for column in further if column.name in group))
     return MeshData(**{column.name: read_array(group, column) for column in columns})

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry import QUARTERS
 from ...model.lip import LipCentre
 from ...shell.recovery import layer_fields
 from .balance import force_balance
 from .model import ClosureModel
-from .opening import FACES, Opening, opening
+from .opening import Opening, opening
 from .stiffness import StiffnessSpectrum
 
 
@@ -132,7 +131,7 @@ def describe_closure(
     """State of a model from its unknowns; `known` holds how it was found, the energy balance and whether it lies beyond
     a limit point.
     """
-    pressed = model.pressed
+    pressed, part = model.pressed, model.mesh.part
     nodal = pressed.nodal(q)
     state, passage = pressed.contact_state(q), opening(model, q)
     fraction = model.case.closure.shut_fraction
@@ -154,14 +153,14 @@ def describe_closure(
         sealed_length=length,
         lip_seal=lip,
         joint_seal=length - lip,
-        sealed_area=float(FACES * pressed.contact.area[state.touching].sum()),
-        contact_force=FACES * state.total,
+        sealed_area=float(part.walls * pressed.contact.area[state.touching].sum()),
+        contact_force=part.walls * state.total,
         largest_contact_pressure=float(state.pressure.max(initial=0.0)),
         contact_nodes=int(np.count_nonzero(state.touching)),
         contact_front=contact_front(passage, model),
         penetration=state.penetration,
         overlap=face_overlap(model, nodal),
-        least_opening=float(QUARTERS * passage.area.min()),
+        least_opening=float(part.copies * passage.area.min()),
         least_opening_position=float(passage.z[passage.narrowest]),
         lip_opening=centre.opening(q),
         lip_displacement=centre.displacement(q),

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
-from ...geometry import QUARTERS
 from ...model.equilibria import model_warnings, state_warnings
 from ...model.symmetry import SYMMETRIES
 from ...record.record import GrowingRecord
@@ -51,7 +50,8 @@ class ClosureWalk:
         record = self.record
         self._say([*model_warnings(self.model), *start_warnings(self.model)])
         if not record.notes(self.states):
-            reference = QUARTERS * opening(self.model, self.model.pressed.rest()).reference
+            copies = self.model.mesh.part.copies
+            reference = copies * opening(self.model, self.model.pressed.rest()).reference
             record.note(self.states, supports=self.model.supports, reference_opening=reference)
         try:
             over = [note for note in record.notes("walked") if note["table"] == self.states]

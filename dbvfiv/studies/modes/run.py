@@ -75,7 +75,7 @@ class FoundModes:
     shapes : (k, nn, 5) complex
         Displacements and rotations of the nodes, the largest displacement being 1 and real.
     areas, pressures : (k, m) complex
-        Changes of the row areas (m2, a quarter) and station pressures (Pa) for a largest displacement of 1 m; no
+        Changes of the row areas (m2, of the part) and station pressures (Pa) for a largest displacement of 1 m; no
         pressures in vacuo, and none of either to first order but in the class of the equilibria.
     inlet_velocities : (k,) complex, m/s
         Likewise.

@@ -9,7 +9,6 @@ import numpy as np
 
 from continuation.periodic import PeriodicMotion
 
-from ...geometry import QUARTERS
 from ...model import ValveModel
 from ...model.lip import LipCentre
 
@@ -95,7 +94,8 @@ class Orbit:
         else:
             fluid = model.flow.stepping(density)
             speeds = np.stack([fluid.state(a, r, u).speed for a, r, u in zip(area, opening, inlet)])
-        out = QUARTERS * density * speeds[:, 0] * np.array([model.flow.open_area(a) for a in area[:, 0]])
+        open_area = np.array([model.flow.open_area(a) for a in area[:, 0]])
+        out = model.mesh.part.copies * density * speeds[:, 0] * open_area
         return out, speeds.min(axis=1)
 
     def opening(self) -> float:

@@ -85,7 +85,7 @@ def _picture(result: TransientResult, rows: np.ndarray, shown: np.ndarray):
     moving = _moving(h["centre_line"][rows])
     line = mesh.rows[:, 0]
     half = 0.5 * nodal_thickness(mesh)[line]
-    area = 1e4 * 4.0 * h["station_area"]
+    area = 1e4 * mesh.part.copies * h["station_area"]
     figure = new_figure(7.2, 6.0)
     upper, middle, lower = figure.subplots(3, 1, gridspec_kw={"height_ratios": [3, 2, 2]})
 
