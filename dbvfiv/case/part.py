@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    pass
+    from .mesh import Mesh
+    from .valve import Valve
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,15 @@ class Part:
         Mirror signs in x and y of the pieces of the whole valve, the part itself first.
     begin : float
         Parameter at which sections begin: 0, the centre on x = 0, or -1, the other side edge.
+    classes : tuple of str
+        Names of the classes of small motions about a state of its symmetry, that of the equilibria first; see
+        `dbvfiv.model.symmetry`.
     """
 
     name: str
     images: tuple[tuple[int, int], ...]
     begin: float
+    classes: tuple[str, ...]
 
     @property
     def copies(self) -> int:
@@ -44,6 +49,11 @@ class Part:
         return self.copies // 2
 
     @property
+    def quarters(self) -> int:
+        """How many quarters of the valve it is."""
+        return QUARTER.copies // self.copies
+
+    @property
     def turn(self) -> float:
         """Angle by which a section turns from its first end to its last, rad."""
         return 0.5 * math.pi * (1.0 - self.begin)
@@ -52,6 +62,11 @@ class Part:
     def is_quarter(self) -> bool:
         """Whether it begins in the plane x = 0."""
         return self.begin == 0.0
+
+    @property
+    def middle(self) -> str:
+        """Where the middle of the lips and what is behind it lies, in words."""
+        return "x = 0" if self.is_quarter else "the middle of the lips"
 
     @property
     def edges(self) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -63,7 +78,12 @@ class Part:
         return 0 if self.is_quarter else columns // 2
 
 
-QUARTER = Part("quarter", ((1, 1), (-1, 1), (-1, -1), (1, -1)), 0.0)
-HALF = Part("half", ((1, 1), (1, -1)), -1.0)
+QUARTER = Part("quarter", ((1, 1), (-1, 1), (-1, -1), (1, -1)), 0.0, ("SS", "SA", "AS", "AA"))
+HALF = Part("half", ((1, 1), (1, -1)), -1.0, ("S", "A"))
 #: By their names.
 PARTS = {part.name: part for part in (QUARTER, HALF)}
+
+
+def part_of(valve: Valve, mesh: Mesh) -> Part:
+    """The part of a valve that a mesh has: the least that its symmetry allows, unless a half is asked for."""
+    return HALF if mesh.part == HALF.name or not valve.is_double_symmetric else QUARTER

@@ -1,4 +1,4 @@
-"""The quarter valve's mesh as results keep it."""
+"""The mesh of the part of the valve that is computed, as results keep it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 _COLUMNS = (
     Column("nodes", "m", "Mid-surface at rest, x y z of each node"),
     Column("quads", "", "Four nodes of each element, counter-clockwise seen from outside", "i4"),
-    Column("rows", "", "Node numbers: rows from lip to flange, columns from x = 0 to y = 0", "i4"),
+    Column(
+        "rows", "", "Node numbers: rows from lip to flange, columns from x = 0, of a half from y = 0, to y = 0", "i4"
+    ),
     Column("z", "m", "Axial position of the rows (flow stations), from the lip"),
     Column("directors", "", "Unit vectors through the wall at rest"),
     Column("frames", "", "Two unit vectors at each node that the rotation unknowns turn the director towards"),
@@ -50,14 +52,14 @@ _PART = (Column("part_name", "", "Part of the valve that the mesh is", TEXT),)
 
 @dataclass(frozen=True)
 class MeshData:
-    """Mesh of the quarter valve.
+    """Mesh of the part of the valve that is computed.
 
     Attributes
     ----------
     nodes : (nn, 3) m
     quads : (ne, 4) int
     rows : (m, columns) int
-        Node numbers, the lip first; column 0 on x = 0, the last on y = 0.
+        Node numbers, the lip first; column 0 on x = 0, of a half on y = 0, the last on y = 0.
     z : (m,) m
     directors : (nn, 3)
     frames : (nn, 2, 3)
@@ -133,6 +135,16 @@ class MeshData:
     def part(self) -> Part:
         """Part of the valve that the mesh is."""
         return PARTS[self.part_name[0]]
+
+    @property
+    def centre_line(self) -> np.ndarray:
+        """(m,) nodes in the middle of the lips and behind it, from the lip on."""
+        return self.rows[:, self.part.centre(self.rows.shape[1])]
+
+    def extent(self, row: int, axis: int) -> float:
+        """Of the whole valve's mid-surface at rest, m, along x (0) or y (1), at a row."""
+        places = self.nodes[self.rows[row], axis]
+        return float(np.ptp([signs[axis] * places for signs in self.part.images]))
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -198,7 +198,10 @@ def contact_front(passage: Opening, model: ClosureModel) -> float:
     rows.
     """
     # just less than the gap that lifted rows have at rest
-    gap = np.where(model.held, 0.0, passage.gap[:, 0]) - 0.999 * model.case.valve.initial_gap
+    gap = (
+        np.where(model.held, 0.0, passage.gap[:, model.mesh.part.centre(passage.gap.shape[1])])
+        - 0.999 * model.case.valve.initial_gap
+    )
     met = np.flatnonzero(gap <= 0)
     if not len(met):
         return 0.0

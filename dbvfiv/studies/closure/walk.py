@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import SolveError
 from ...model.equilibria import model_warnings, state_warnings
-from ...model.symmetry import SYMMETRIES
+from ...model.symmetry import symmetry_named
 from ...record.record import GrowingRecord
 from ...record.states import LAYERS
 from ...shell.recovery import layer_fields
@@ -111,7 +111,9 @@ class ClosureWalk:
                     pressure=found.pressure,
                     eigenvalue=found.eigenvalue,
                 )
-                self._say([f"The wall buckles at {found.pressure:.6g} Pa in class {name}: {SYMMETRIES[name].words}."])
+                self._say(
+                    [f"The wall buckles at {found.pressure:.6g} Pa in class {name}: {symmetry_named(name).words}."]
+                )
             self._class_buckling_kept[name] = len(watch.found)
 
     def _reached(self, state: ClosureState) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES
+from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...record.layout import Column
 from ..state import State
 from .run import FoundModes
@@ -102,9 +102,9 @@ class ModeShape:
         """Largest displacement, m, at which the mode shows well and the centre line of the duckbill stays open."""
         mesh = state.results.mesh
         largest = _DRAWN * float(np.ptp(mesh.z))
-        if not SYMMETRIES[self.symmetry].moves_lips_apart:
+        if not symmetry_named(self.symmetry).moves_lips_apart:
             return largest
-        line = mesh.rows[:, 0]
+        line = mesh.centre_line
         height = mesh.nodes[line, 1] + state.nodal[line, 1]
         swing = np.abs(self.shape[line, 1])
         moving = swing > 1e-3

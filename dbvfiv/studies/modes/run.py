@@ -234,7 +234,7 @@ def _described(
 
 def _changes(model, pencil: CoupledPencil, linear, spectrum, symmetry, in_vacuo) -> tuple[np.ndarray, np.ndarray]:
     """Changes of areas (m, k) and pressures (m or 0, k) of the eigenvectors."""
-    if symmetry.name != EQUILIBRIA:
+    if not symmetry.of_equilibria:
         return np.zeros((model.stations, len(spectrum)), complex), np.zeros(
             (0 if in_vacuo else model.stations, len(spectrum)), complex
         )

@@ -45,18 +45,18 @@ class Orbit:
     @cached_property
     def lip(self) -> np.ndarray:
         """(k,) displacement in y of the mid-surface of one lip at x = z = 0, m."""
-        return self._of_node(self.model.mesh.rows[0, 0], self.motion.coefficients)
+        return self._of_node(self.model.mesh.centre_line[0], self.motion.coefficients)
 
     @cached_property
     def lip_rate(self) -> np.ndarray:
         """(k,) its rate, m/s."""
         rate = self.motion.omega * self.motion.harmonics.rate(self.motion.coefficients)
-        return self._of_node(self.model.mesh.rows[0, 0], rate)
+        return self._of_node(self.model.mesh.centre_line[0], rate)
 
     @cached_property
     def centre_line(self) -> np.ndarray:
         """(k, m) displacement in y of the line x = 0 at each row, m."""
-        rows = self.model.mesh.rows[:, 0]
+        rows = self.model.mesh.centre_line
         return np.stack([self._of_node(node, self.motion.coefficients) for node in rows], axis=1)
 
     def _of_node(self, node: int, coefficients: np.ndarray) -> np.ndarray:
@@ -73,7 +73,7 @@ class Orbit:
     @property
     def lip_harmonics(self) -> np.ndarray:
         """(H + 1,) amplitudes of the harmonics of the lip's displacement, m; the mean first."""
-        number = self.model.shell.dofs.index[self.model.mesh.rows[0, 0], 1]
+        number = self.model.shell.dofs.index[self.model.mesh.centre_line[0], 1]
         parts = np.abs(self.motion.harmonics.complex(self.motion.coefficients[:, number]))
         return parts * np.append(1.0, np.full(len(parts) - 1, 2.0))
 

@@ -39,7 +39,7 @@ class Reader:
         index = model.shell.dofs.index
         self._copies = model.mesh.part.copies
         self._lip = LipCentre(model.mesh, model.shell)
-        centre = index[model.mesh.rows[:, 0], 1]
+        centre = index[model.mesh.centre_line, 1]
         self._centre, self._moves = np.maximum(centre, 0), centre >= 0
         self._inlet_area = float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
 

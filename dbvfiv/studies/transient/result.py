@@ -43,7 +43,7 @@ class TransientState:
     time : float, s
     nodal, nodal_rate : (nn, 5) arrays
         Displacements (m) and rotations (rad) of the nodes, and their rates.
-    station_pressure, station_area : (m,) arrays, Pa, m2 of a quarter
+    station_pressure, station_area : (m,) arrays, Pa, m2 of the part that is computed
     station_velocity : (m,) array, m/s
         At the flange only; the others are not a number.
     """

@@ -95,7 +95,7 @@ STATE_COLUMNS = (
     Column("nodal", "m, rad", "Displacements ux uy uz and two rotations of each node"),
     Column("nodal_rate", "m/s, rad/s", "Their rates"),
     Column("station_pressure", "Pa", "Pressure at each row"),
-    Column("station_area", "m^2", "Flow area of a quarter at each row"),
+    Column("station_area", "m^2", "Flow area at each row, of the part that is computed"),
     Column("inlet_velocity", "m/s", "Velocity at the flange"),
 )
 #: The state of a motion between two steps, see `dbvfiv.motion.state.MotionState`.
