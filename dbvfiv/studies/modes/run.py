@@ -30,6 +30,10 @@ from ..solving import solving
 
 #: Structural modes in the basis behind the independent count.
 _BASIS = 24
+_NO_PLUG = (
+    "Inner fluid answers to the areas of this half of the valve and does not go along where it sways sideways in x: "
+    "frequencies of such modes are too high in a liquid."
+)
 
 
 @dataclass(frozen=True)
@@ -182,6 +186,8 @@ def run_modes(
             ),
         )
     notes = (*notes, *certified.spectrum.notes, *of_the_wall(certified.spectrum, pencil))
+    if symmetry.of_equilibria and not (model.mesh.part.is_quarter or without_fluid):
+        notes = (*notes, _NO_PLUG)
     result = _described(model, state, conditions, without_fluid, certified, pencil, linear, notes, symmetry)
     observer.item(result)
     if result.stable is None:
