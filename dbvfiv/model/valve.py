@@ -1,7 +1,7 @@
 """The coupled valve: one contract for equilibria, spectra, branches and time histories.
 
-State q (n,): free displacements (m) and rotations (rad) of the quarter model. Row areas and station pressures are
-functions of it, so the equilibrium is
+State q (n,): free displacements (m) and rotations (rad) of the part of the valve that is computed. Row areas and
+station pressures are functions of it, so the equilibrium is
 
     r(q; P) = f_shell(q) + f_stops(q) + f_contact(q) - G(q) p(A(q); P) = 0
 

@@ -118,9 +118,10 @@ def test_it_shuts_under_back_pressure():
 
 @pytest.mark.slow
 def test_the_onset_of_the_half_of_a_symmetric_valve_is_that_of_the_quarter():
-    keys = {"mesh.around": 6, "mesh.along": 8, "onset.normal_form": False, "damping.alpha": 0, "drive.pressure": 6e3}
+    keys = {"mesh.around": 8, "mesh.along": 16, "onset.normal_form": False, "onset.coarse_mesh": 0}
+    keys |= {"damping.alpha": 0, "damping.beta": 0.003, "drive.pressure": 6e3}
     found = [
-        dbvfiv.load(None, keys | {"mesh.part": part}).onset(over="density=5:60:5:log") for part in ("auto", "half")
+        dbvfiv.load(None, keys | {"mesh.part": part}).onset(over="density=10:200:4:log") for part in ("auto", "half")
     ]
     edges = [[point for point in one.summary()["points"] if point["edge"]] for one in found]
     assert len(edges[0]) == 1

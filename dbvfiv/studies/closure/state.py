@@ -16,7 +16,8 @@ from .stiffness import StiffnessSpectrum
 
 @dataclass(frozen=True)
 class ClosureState:
-    """An equilibrium under back pressure. Areas and forces are those of the whole valve, fields those of the quarter.
+    """An equilibrium under back pressure. Areas and forces are those of the whole valve, fields those of the
+    part that is computed.
 
     Attributes
     ----------
@@ -73,7 +74,7 @@ class ClosureState:
     nodal : (nn, 5) array, m and rad
         Displacements and rotations of all nodes.
     opening : (rows,) array, m2
-        Passage of a quarter at each row.
+        Passage of the computed part at each row.
     contact_pressure, gap : (nn,) arrays, Pa, m
     stiffness_eigenvalues : (k,) array, 1/s2
         Real parts, ascending.

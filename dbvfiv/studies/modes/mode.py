@@ -24,7 +24,12 @@ MODE = (
         "Displacements and rotations of the nodes, the largest displacement being 1 and real",
         "c16",
     ),
-    Column("area", "m", "Change of the flow area of a quarter at each row, m2 for 1 m of largest displacement", "c16"),
+    Column(
+        "area",
+        "m",
+        "Change of the flow area of the computed part at each row, m2 for 1 m of largest displacement",
+        "c16",
+    ),
     Column("pressure", "Pa/m", "Change of the pressure at each row for 1 m of largest displacement", "c16"),
     Column("inlet_velocity", "1/s", "Change of the inlet velocity for 1 m of largest displacement", "c16"),
 )
