@@ -18,8 +18,8 @@ _ACROSS = ("x", "+x", "-x", "y", "+y", "-y")
 def _direction(given: Any) -> Any:
     if isinstance(given, str) and given.strip() in _ACROSS:
         raise ValueError(
-            "which is across the axis, and the quarter that is computed is symmetric about x = 0 and y = 0, so it "
-            "carries weight along its axis alone"
+            "which is across the axis, and the part that is computed is symmetric about x = 0 and y = 0, or one of "
+            "them, so it carries weight along its axis alone"
         )
     if not isinstance(given, str) or given.strip() not in _ALONG:
         raise ValueError("which is no direction that is known here")

@@ -28,7 +28,7 @@ class KeyProfile:
     Attributes
     ----------
     points : tuple of (x, y, z), m
-        From the centre, x = 0, to the side edge, y = 0.
+        From the centre, x = 0, or from one side edge, y = 0, to the other side edge.
     joints : tuple of int
         Points inside at which the curvature jumps or the section has a corner.
     smooth : bool
@@ -86,6 +86,20 @@ def key_point_inlet(path: Path) -> float | None:
     except ValueError:
         return None
     return math.fsum(math.hypot(x, y) for x, y, _ in last) / len(last)
+
+
+def has_whole_sections(path: Path) -> bool:
+    """Whether the profiles of a file of key points run from side edge to side edge; not where it cannot be read."""
+    try:
+        return is_whole(read_key_points(path)[0])
+    except ValueError:
+        return False
+
+
+def is_whole(profile: KeyProfile) -> bool:
+    """Whether a profile runs from side edge to side edge, and not from the centre."""
+    size = max(max(abs(x), abs(y)) for x, y, _ in profile.points)
+    return profile.points[0][0] < -_ON_PLANE * size
 
 
 def _bare(numbered: list[tuple[int, str]]) -> list[KeyProfile]:
@@ -167,7 +181,7 @@ def _by(items: list, labels: list) -> list[list]:
 
 
 def _check(profiles: list[KeyProfile]) -> None:
-    """Refuse profiles that make no quarter of a valve."""
+    """Refuse profiles that make neither a quarter of a valve nor a half."""
     if len(profiles) < 2:
         raise ValueError("which holds one profile, and a valve has two or more")
     for i, profile in enumerate(profiles, 1):
@@ -177,12 +191,18 @@ def _check(profiles: list[KeyProfile]) -> None:
             raise ValueError(f"{where} has {len(points)} points, and a profile has three or more")
         size = max(max(abs(x), abs(y)) for x, y, _ in points)
         near = _ON_PLANE * size
-        if min(min(x, y) for x, y, _ in points) < -near:
+        whole = is_whole(profile)
+        if whole != is_whole(profiles[0]):
             raise ValueError(
-                f"{where} leaves the quarter of positive x and y, whose mirror images are the rest of the valve (a "
-                "bill with a flat bottom has no such quarter)"
+                f"{where} does not begin as the first one does: all run from the centre, x = 0, or all from the side "
+                "edge at negative x"
             )
-        if abs(points[0][0]) > near or abs(points[-1][1]) > near:
+        if min(y if whole else min(x, y) for x, y, _ in points) < -near:
+            there = "half of positive y" if whole else "quarter of positive x and y"
+            raise ValueError(f"{where} leaves the {there}, whose mirror images are the rest of the valve")
+        if whole and max(abs(points[0][1]), abs(points[-1][1])) > near:
+            raise ValueError(f"{where} does not run from side edge to side edge, where y = 0")
+        if not whole and (abs(points[0][0]) > near or abs(points[-1][1]) > near):
             raise ValueError(f"{where} does not run from the centre, x = 0, to the side edge, y = 0")
         if min(math.dist(a[:2], b[:2]) for a, b in zip(points, points[1:])) <= 1e-9 * size:
             raise ValueError(f"{where} has the same point twice")

@@ -1,4 +1,4 @@
-"""The mesh of the quarter valve."""
+"""The mesh of the part of the valve that is computed."""
 
 from __future__ import annotations
 
@@ -11,9 +11,14 @@ from .section import BrokenRule, Section, key
 
 
 class Mesh(Section):
-    """The shell mesh of the quarter model."""
+    """The shell mesh of the part that is computed."""
 
     around: StrictInt = key(28, "Elements along the section, from the centre to the side edge.", ge=4, le=1000)
+    part: Literal["auto", "half"] = key(
+        "auto",
+        "Part of the valve that is meshed: the least that its symmetry allows, a quarter (auto), or one lip from side "
+        "edge to side edge, around elements on each side of its middle (half).",
+    )
     along: StrictInt = key(48, "Elements along the axis, from lip to flange, in all.", ge=6, le=2000)
     grading: Number = key(0.5, "Length of the element at the side edge over that at the centre.", ge=0.05, le=2.0)
     layer_points: StrictInt = key(2, "Gauss points through the thickness of each layer.", ge=1, le=10)

@@ -16,6 +16,7 @@ from .materials import AUTO, DEFAULT_LAYERS, RUBBERS, Layer, Materials
 from .mesh import Mesh
 from .outside import Outside
 from .parameters import PARAMETERS
+from .part import Part, part_of
 from .relaxing import SHIPPED_LOSSES
 from .section import BrokenRule, Section, key
 from .upstream import Upstream
@@ -36,7 +37,7 @@ class Case(Section):
     """
 
     valve: Valve = key(Valve(), "Shape and wall of the valve.")
-    mesh: Mesh = key(Mesh(), "Shell mesh of the quarter model.")
+    mesh: Mesh = key(Mesh(), "Shell mesh of the part that is computed.")
     layers: tuple[Layer, ...] = key(
         DEFAULT_LAYERS,
         "Layers of the wall from inside to outside, scaled so that their sum is the local wall thickness.",
@@ -108,6 +109,12 @@ class Case(Section):
         self.upstream.check_pipes(inlet)
         self.downstream.check_pipe(inlet)
         self.outside.check_pipe(self.valve.outer_diameter)
+        if self.outside.is_there and not self.part.is_quarter:
+            raise BrokenRule(
+                "outside.fluid",
+                "one with a half of the valve (valve.offset, mesh.part)",
+                'the fluid outside is known around a quarter and its images alone, so it must be "none"',
+            )
         return self
 
     def _check_compression(self) -> None:
@@ -168,6 +175,11 @@ class Case(Section):
                         "every place of the wall needs a layer, and two points through it that mesh.layer_points and "
                         "its layers make",
                     )
+
+    @property
+    def part(self) -> Part:
+        """The part of the valve that is computed."""
+        return part_of(self.valve, self.mesh)
 
     @property
     def has_line(self) -> bool:

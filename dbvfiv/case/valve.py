@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from pydantic import PrivateAttr, ValidationInfo, field_validator, model_serializer, model_validator
 
-from .key_points import key_point_inlet, read_key_points
+from .key_points import has_whole_sections, key_point_inlet, read_key_points
 from .lip import LipSizes
 from .quantity import Length, Number
 from .section import Section, key
@@ -68,6 +68,14 @@ class Valve(Section):
         ge=0,
         le=10,
     )
+    bill_offset: Number = key(
+        0.0,
+        "By how much the bill stands off the pipe's axis along its slit: 0 in the middle, 1 where its side edge at "
+        "negative x runs straight on from the pipe (a flat bottom), in between in proportion. A half of the valve is "
+        "computed then; not with key_points, which may run from side edge to side edge instead.",
+        ge=0,
+        le=1,
+    )
     lip_radius: Length | None = key(
         None,
         "Mid-surface radius of the side edge of the lip, and height of its straight part above the closing plane (R1); "
@@ -124,7 +132,8 @@ class Valve(Section):
         None,
         "File of mid-surface key points, any number of profiles and points, used instead of lip_half_width, lip_rise, "
         "lip_radius, cuff_radius, flange_radius and saddle: a table of x, y and z with units (profile, x [mm], y [mm], "
-        "z [mm], joint; profiles from lip to flange, each from the centre x = 0 to the side edge y = 0) or bare lines "
+        "z [mm], joint; profiles from lip to flange, each from the centre x = 0 to the side edge y = 0, or of a valve "
+        "that is symmetric about y = 0 alone from side edge to side edge with x increasing) or bare lines "
         "x y z in m; the lengths say where duckbill and saddle end on it; relative to the case file.",
     )
     key_point_skin: Literal["ruled", "smooth"] = key(
@@ -151,6 +160,16 @@ class Valve(Section):
     def as_given(self) -> Valve:
         """The valve with its sizes as the case gives them, before `scale` multiplies them."""
         return self if self._given is None else self._given
+
+    @property
+    def is_double_symmetric(self) -> bool:
+        """Whether it is symmetric about x = 0, the middle of its lips, besides about y = 0, the plane of their slit."""
+        return self.bill_offset == 0.0 and not (self.key_points is not None and has_whole_sections(self.key_points))
+
+    @property
+    def bill_shift(self) -> float:
+        """Distance in x, m, of the middle of the lips from the pipe's axis, of the parametric shape."""
+        return self.bill_offset * (self.lip.widest - self.cuff_radius)
 
     @property
     def length(self) -> float:
@@ -206,7 +225,7 @@ class Valve(Section):
         if self.key_points is not None:
             return flange
         cuff = 2 * self.cuff_radius + self.thickness_at(self.length) if self.cuff_length + self.flare_length > 0 else 0
-        return max(flange, cuff, 2 * self.lip.widest + self.thickness_at(0.0))
+        return max(flange, cuff, 2 * (self.lip.widest + abs(self.bill_shift)) + self.thickness_at(0.0))
 
     @field_validator("key_points", mode="after")
     @classmethod

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .valve import Valve
 
 #: What key points say in place of the case's keys.
-_SHAPE = ("lip_half_width", "lip_rise", "lip_radius", "cuff_radius", "flange_radius", "saddle")
+_SHAPE = ("lip_half_width", "lip_rise", "bill_offset", "lip_radius", "cuff_radius", "flange_radius", "saddle")
 #: Steepest a transition may run from the axis, rad: beyond it the rows of the mesh lie in its surface.
 _STEEPEST = math.radians(80.0)
 #: Least passage between the lips at rest, over that of the flange: below it nothing flows, and rounding says how much.
@@ -24,7 +24,8 @@ def check_key_points(valve: Valve) -> None:
     for name in _SHAPE:
         value = getattr(valve, name)
         if name not in valve.following and value != type(valve).model_fields[name].default:
-            given = f"{value:g} m" if isinstance(value, float) else repr(value)
+            unit = "" if name == "bill_offset" else " m"
+            given = f"{value:g}{unit}" if isinstance(value, float) else repr(value)
             raise BrokenRule(name, f"{given} beside key_points", "the points give the shape, so leave it out")
     try:
         end = read_key_points(valve.key_points)[-1].z
@@ -87,7 +88,8 @@ def _check_transitions(valve: Valve) -> None:
         )
     lip, steepest = valve.lip, math.tan(_STEEPEST)
     wider = lip.widest > valve.cuff_radius
-    across = max(abs(lip.widest - valve.cuff_radius), abs(valve.cuff_radius - lip.height))
+    aside = (1.0 + valve.bill_offset) * abs(lip.widest - valve.cuff_radius)  # of the side edge that moves farther
+    across = max(aside, abs(valve.cuff_radius - lip.height))
     blend = 1.5 if valve.saddle == "smooth" else 1.0
     flare = abs(valve.flange_radius - valve.cuff_radius)
     for name, rise in (("saddle_length", across), ("flare_length", flare)):

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry import QUARTERS
 from .fields import FlowFields
 from .flow_case import FlowCase
 
@@ -141,7 +140,7 @@ class FlowComparison:
         """Plain SI numbers."""
         case, state = self.case, self.case.state
         flange, law = self.flange, self.law_flange
-        area = QUARTERS * float(case.faces.section_areas()[0])
+        area = case.mesh.part.copies * float(case.faces.section_areas()[0])
         jet = state.volume_flow / area
         head = 0.5 * case.density * jet**2
         rows, span = self.rows, np.diff(case.domain.rows)

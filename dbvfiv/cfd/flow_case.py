@@ -70,8 +70,13 @@ class FlowCase:
         Raises
         ------
         CaseError
-            If the valve does not go into the pipe.
+            If the valve does not go into the pipe, or more than a quarter of it is computed.
         """
+        if not self.mesh.part.is_quarter:
+            raise CaseError(
+                "The flow in three dimensions is meshed in a quarter between two planes of symmetry; this state is "
+                f"that of a {self.mesh.part.name} of the valve."
+            )
         widest = float(np.hypot(self.faces.outer[..., 0], self.faces.outer[..., 1]).max())
         if self.pipe is None:
             return Domain(self.faces, ROOM * float(self.faces.outer[-1, 0, 1]), True, self.fineness)

@@ -44,7 +44,7 @@ def command(
         ),
     ] = None,
     quarter: Annotated[
-        bool, typer.Option("--quarter", help="Only the quarter that was computed, not the whole valve.")
+        bool, typer.Option("--quarter", help="Only the part that was computed, not the whole valve.")
     ] = False,
     deformed: Annotated[
         bool, typer.Option("--deformed", help="Move the points; without it use 'Warp By Vector' along displacement.")

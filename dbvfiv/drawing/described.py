@@ -50,8 +50,9 @@ def valve_figure(model: ValveModel) -> Figure:
 def _title(model: ValveModel) -> str:
     case, shell = model.case, model.shell
     density = np.atleast_2d(shell.at_rest.inertia)[:, 0]  # of the wall, by element or everywhere
-    weight = 4.0 * float(np.sum(shell.geometry.area.sum(axis=1) * shell.mesh.thickness * density))
-    passage = 4e4 * (model.mesh.rest_area - model.mesh.wall_deduction)
+    copies = model.mesh.part.copies
+    weight = copies * float(np.sum(shell.geometry.area.sum(axis=1) * shell.mesh.thickness * density))
+    passage = 1e4 * copies * (model.mesh.rest_area - model.mesh.wall_deduction)
     lip, inlet = passage[0], passage[-1]
     scaled = f", {case.valve.scale:g} times as given" if case.valve.scale != 1.0 else ""
     return (
@@ -72,25 +73,26 @@ def _in_space(axes, mesh: MeshData, scale: Normalize) -> None:
 
 
 def _plane(axes: Axes, case: Case, mesh: MeshData, across: int) -> None:
-    """Wall in the plane x = 0 (across 1: y over z) or y = 0 (across 0), mirrored, with the lengths of its pieces."""
-    line = mesh.rows[:, 0 if across else -1]
-    inner, outer = (1e3 * face[line] for face in faces(mesh))
-    for sign in (1.0, -1.0):
-        axes.fill(
-            np.concatenate([inner[:, 2], outer[::-1, 2]]),
-            sign * np.concatenate([inner[:, across], outer[::-1, across]]),
-            color="0.85",
-            lw=0,
-        )
+    """Wall in the middle of the lips (across 1: y over z) or in the plane y = 0 (across 0), on both sides of the axis,
+    with the lengths of its pieces.
+    """
+    line = mesh.centre_line if across else mesh.rows[:, -1]
+    other, mirror = (line, -1.0) if across or mesh.part.is_quarter else (mesh.rows[:, 0], 1.0)
+    found = []
+    for nodes, sign in ((line, 1.0), (other, mirror)):
+        inner, outer, middle = (1e3 * face[nodes][:, [2, across]] * [1.0, sign] for face in (*faces(mesh), mesh.nodes))
+        axes.fill(*np.concatenate([inner, outer[::-1]]).T, color="0.85", lw=0)
         for face, width in ((inner, 1.6), (outer, 0.9)):
-            axes.plot(face[:, 2], sign * face[:, across], color=COMPUTED, lw=width)
-        axes.plot(1e3 * mesh.nodes[line, 2], sign * 1e3 * mesh.nodes[line, across], color=REST, lw=0.6, ls="--")
-    top = max(outer[:, across].max(), inner[:, across].max())
+            axes.plot(*face.T, color=COMPUTED, lw=width)
+        axes.plot(*middle.T, color=REST, lw=0.6, ls="--")
+        found.append((inner, outer))
+    top = max(face[:, 1].max() for face in found[0])
+    bottom = min(face[:, 1].min() for face in found[1])
     for row, side in ((0, "right"), (-1, "left")):
-        place = outer[row]
+        high, low = (outer[row] for _, outer in found)
         axes.annotate(
-            f"{2 * place[across]:.4g} mm",
-            (place[2], -place[across]),
+            f"{high[1] - low[1]:.4g} mm",
+            tuple(low),
             textcoords="offset points",
             xytext=(-6 if side == "right" else 6, 4),
             ha=side,
@@ -98,13 +100,13 @@ def _plane(axes: Axes, case: Case, mesh: MeshData, across: int) -> None:
         )
     if across:
         _measure_pieces(axes, case, 1.18 * top)
-    axes.set_ylim(-1.15 * top, (1.5 if across else 1.15) * top)
+    axes.set_ylim(1.15 * bottom, (1.5 if across else 1.15) * top)
     axes.set_xlim(-0.28e3 * case.valve.length, 1.28e3 * case.valve.length)
     axes.set_aspect("equal")
     axes.set_ylabel("y, mm" if across else "x, mm")
     if not across:
         axes.set_xlabel("Distance from the lip z, mm")
-    name = "Plane x = 0" if across else "Plane y = 0: side edges"
+    name = ("Plane x = 0" if mesh.part.is_quarter else "Middle of the lips") if across else "Plane y = 0: side edges"
     axes.set_title(f"{name}, faces (full) and middle of the wall", loc="left", fontweight="bold")
 
 
@@ -122,14 +124,14 @@ def _measure_pieces(axes: Axes, case: Case, height: float) -> None:
 
 
 def _sections(axes: Axes, case: Case, mesh: MeshData) -> None:
-    """Inner and outer face of the lip and of the inlet, of a quarter."""
+    """Inner and outer face of the lip and of the inlet, of the part that is computed."""
     inner, outer = faces(mesh)
     for row, name, look in ((0, "lip", COMPUTED), (-1, "inlet", "0.45")):
         nodes = mesh.rows[row]
         for face, width, label in ((inner, 1.6, name), (outer, 0.8, None)):
             axes.plot(*(1e3 * face[nodes, :2].T), color=look, lw=width, label=label)
     axes.set_aspect("equal")
-    axes.set_xlim(left=0)
+    axes.set_xlim(left=0 if mesh.part.is_quarter else None)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     axes.set_xlabel("x, mm")
     axes.set_ylabel("y, mm")
@@ -138,12 +140,12 @@ def _sections(axes: Axes, case: Case, mesh: MeshData) -> None:
 
 
 def _wall(figure: Figure, axes: Axes, mesh: MeshData, scale: Normalize) -> None:
-    """Thickness over the unrolled quarter."""
+    """Thickness over the unrolled part."""
     arc, z = unrolled(mesh)
     values = 1e3 * mesh.thickness.reshape(mesh.shape[::-1])
     axes.pcolormesh(1e3 * z, 1e3 * arc, values, cmap=_COLOURS, norm=scale, shading="flat", edgecolor="1", lw=0.1)
     axes.set_xlabel("z, mm")
-    axes.set_ylabel("Arc from x = 0, mm")
+    axes.set_ylabel(f"Arc from {mesh.part.middle}, mm")
     axes.grid(False)
     axes.set_title("Thickness and mesh", loc="left", fontweight="bold")
     colour_bar(figure, ScalarMappable(scale, _COLOURS), axes, "Wall, mm", aspect=18)
@@ -155,7 +157,7 @@ def _layers(axes: Axes, model: ValveModel, mesh: MeshData) -> None:
     if shell.zones is not None:
         zone = int(np.argmax(shell.zones.presence.sum(axis=1)))
     section = shell.section if shell.zones is None else shell.at_rest.sections[zone]
-    element = 0 if shell.zones is None else shell.at_rest.elements[zone][0]
+    element = mesh.part.centre(mesh.rows.shape[1]) if shell.zones is None else shell.at_rest.elements[zone][0]
     wall, place, kinds = 1e3 * mesh.thickness[element], 0.0, []
     for share, title, layer in zip(section.fractions, mesh.layer_titles(), model.case.layers):
         height = wall * share

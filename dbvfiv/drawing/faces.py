@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..case.part import QUARTER, Part
 from ..record.fields import motion
 from ..record.mesh import MeshData
 from ..record.whole_valve import WholeValve
@@ -21,7 +22,7 @@ def nodal_thickness(mesh: MeshData) -> np.ndarray:
 
 
 def faces(mesh: MeshData, nodal: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Inner and outer face of the quarter.
+    """Inner and outer face of the part that is computed.
 
     Parameters
     ----------
@@ -41,10 +42,10 @@ def faces(mesh: MeshData, nodal: np.ndarray | None = None) -> tuple[np.ndarray, 
     return middle - half * moved["director"], middle + half * moved["director"]
 
 
-def closed_section(quarter: np.ndarray) -> np.ndarray:
-    """Closed curve (k, 2) through the four mirror images of a section from (0, y) to (x, 0)."""
-    right = np.concatenate([quarter, quarter[-2::-1] * [1, -1]])
-    return np.concatenate([right, right[-2::-1] * [-1, 1]])
+def closed_section(section: np.ndarray, part: Part = QUARTER) -> np.ndarray:
+    """Closed curve (k, 2) through the mirror images of a section of a part that ends at (x, 0)."""
+    right = np.concatenate([section, section[-2::-1] * [1, -1]])
+    return np.concatenate([right, right[-2::-1] * [-1, 1]]) if part.is_quarter else right
 
 
 def offset_line(z: np.ndarray, y: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -80,7 +81,7 @@ class ValveSkin:
 
     @classmethod
     def of(cls, mesh: MeshData) -> ValveSkin:
-        """Skin of all four quarters."""
+        """Skin of the whole valve."""
         return cls(mesh, WholeValve.of(mesh))
 
     @cached_property
@@ -93,7 +94,7 @@ class ValveSkin:
         return np.concatenate([quads, quads + count, np.hstack([rim, rim[:, ::-1] + count])])
 
     def points(self, nodal: np.ndarray) -> np.ndarray:
-        """(2 np, 3) m, the outer face first, from nodal unknowns (nn, 5) of the quarter."""
+        """(2 np, 3) m, the outer face first, from nodal unknowns (nn, 5) of the part."""
         inner, outer = faces(self.mesh, nodal)
         return np.concatenate([self.valve.vectors(outer), self.valve.vectors(inner)])
 
@@ -103,7 +104,7 @@ class ValveSkin:
 
     def moving_corners(self, steady: np.ndarray, motion: np.ndarray, parity: np.ndarray) -> np.ndarray:
         """(n, 4, 3) m, corners of a motion (nn, 5) about a symmetric state (nn, 5); `parity` (np,) are its factors at
-        the points of mirrored quarters.
+        the points of mirrored images.
         """
         points = self.points(steady + motion)
         if np.any(parity < 0):
@@ -111,6 +112,6 @@ class ValveSkin:
         return points[self.quads]
 
     def means(self, field: np.ndarray) -> np.ndarray:
-        """(n,) mean over each quadrilateral of a field (nn,) of the quarter's nodes."""
+        """(n,) mean over each quadrilateral of a field (nn,) of the part's nodes."""
         both = np.tile(field[self.valve.node], 2)
         return both[self.quads].mean(axis=1)

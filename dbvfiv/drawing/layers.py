@@ -24,8 +24,8 @@ def draw(result: SteadyResult, pressure: float | None = None) -> Iterator[tuple[
 
 
 def layer_stress(state: State) -> Figure:
-    """Von Mises stress of each layer over the quarter, unrolled: arc length from the centre against the axis (compare
-    Fig. 7-12 of the thesis).
+    """Von Mises stress of each layer over the part that is computed, unrolled: arc length from the centre against the
+    axis (compare Fig. 7-12 of the thesis).
     """
     mesh = state.results.mesh
     arc, z = unrolled(mesh)
@@ -38,13 +38,13 @@ def layer_stress(state: State) -> Figure:
         middle = [0.25 * (f[:-1, :-1] + f[1:, :-1] + f[:-1, 1:] + f[1:, 1:]).ravel()[peak] * 1e3 for f in (arc, z)]
         axes.plot(*middle, "+", color=PUBLISHED, ms=9, mew=1.6)
         axes.set_title(axes.get_title(loc="right"), loc="right", fontsize=9, color=PUBLISHED)
-        axes.set_xlim(0, arc.max() * 1e3)
+        axes.set_xlim(arc.min() * 1e3, arc.max() * 1e3)
     headline(figure, f"Von Mises stress in the layers at {kilopascals(state.pressure)} (largest in each element)")
     return figure
 
 
 def layer_panels(mesh, values: np.ndarray, label: str) -> tuple[Figure, list]:
-    """A panel for each layer with its values (layers, elements) over the unrolled quarter, the largest written above.
+    """A panel for each layer with its values (layers, elements) over the unrolled part, the largest written above.
 
     Parameters
     ----------

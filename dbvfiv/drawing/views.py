@@ -70,8 +70,9 @@ def mark_pieces(result: Result, *panels) -> None:
 
 
 def unrolled(mesh: MeshData) -> tuple[np.ndarray, np.ndarray]:
-    """Arc length from x = 0 and axial position of the nodes, both (rows, columns) in m, at rest."""
+    """Arc length from the middle of the lips and axial position of the nodes, both (rows, columns) in m, at rest."""
     points = mesh.nodes[mesh.rows]
     steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
     arc = np.concatenate([np.zeros((len(points), 1)), np.cumsum(steps, axis=1)], axis=1)
-    return arc, points[:, :, 2]
+    middle = mesh.part.centre(arc.shape[1])
+    return arc - arc[:, middle : middle + 1], points[:, :, 2]

@@ -16,10 +16,6 @@ SHAPES = {
     "wall": "the wall, a closed body",
     "fluid": "the fluid from flange to lip, a closed body",
 }
-#: Signs of x and y in the quarters of a whole valve.
-IMAGES = ((1, 1), (-1, 1), (-1, -1), (1, -1))
-
-
 #: Parameter of a direction in which a piece has two points only, a straight line.
 LINE = np.array([0.0, 1.0])
 
@@ -47,7 +43,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Shape:
-    """Pieces of surface of one quarter and whether they are mirrored to the whole valve.
+    """Pieces of surface of the part that is computed, and its images.
 
     Attributes
     ----------
@@ -55,23 +51,25 @@ class Shape:
         Points of two pieces that meet are the same.
     closed : bool
         Whether they bound a body.
-    whole : bool
+    signs : tuple of (int, int)
+        Of x and y in the images: those of the whole valve, or of the part alone.
     """
 
     pieces: tuple[Piece, ...]
     closed: bool
-    whole: bool
+    signs: tuple[tuple[int, int], ...]
 
     def images(self) -> list[Piece]:
         """All pieces, mirrored where the valve is whole."""
-        return [piece.mirrored(*signs) for signs in (IMAGES if self.whole else IMAGES[:1]) for piece in self.pieces]
+        return [piece.mirrored(*signs) for signs in self.signs for piece in self.pieces]
 
 
 def shape_of(faces: WallFaces, name: str, whole: bool = True) -> Shape:
-    """One of `SHAPES`, of the whole valve or the quarter that was computed."""
+    """One of `SHAPES`, of the whole valve or the part that was computed."""
+    signs = faces.part.images if whole else faces.part.images[:1]
     rows, columns = _shares(faces.middle), _shares(faces.middle.swapaxes(0, 1))
     if name in ("inner", "middle", "outer"):
-        return Shape((Piece(getattr(faces, name), (rows, columns)),), False, whole)
+        return Shape((Piece(getattr(faces, name), (rows, columns)),), False, signs)
     low = faces.inner if name == "wall" else faces.base
     high = faces.outer if name == "wall" else faces.inner
     pieces = [
@@ -82,10 +80,11 @@ def shape_of(faces: WallFaces, name: str, whole: bool = True) -> Shape:
     if name == "wall" or not whole:
         pieces.append(Piece(low[::-1], (1.0 - rows[::-1], columns)))
     if not whole:
-        pieces.append(Piece(np.stack([high[:, 0], low[:, 0]]), (LINE, rows)))
-        if name == "wall":
-            pieces.append(Piece(np.stack([low[:, -1], high[:, -1]]), (LINE, rows)))
-    return Shape(tuple(pieces), True, whole)
+        for column, across in faces.part.edges:  # the fluid ends on y = 0 as it is
+            if across == 0 or name == "wall":
+                sides = (high, low) if column == 0 else (low, high)
+                pieces.append(Piece(np.stack([side[:, column] for side in sides]), (LINE, rows)))
+    return Shape(tuple(pieces), True, signs)
 
 
 def _shares(grid: np.ndarray) -> np.ndarray:

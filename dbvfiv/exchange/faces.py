@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..case.part import QUARTER, Part
 from ..drawing.faces import faces
 from ..record.mesh import MeshData
 from .passage import passage_grid
@@ -13,18 +14,22 @@ from .passage import passage_grid
 
 @dataclass(frozen=True)
 class WallFaces:
-    """Grids (rows, columns, 3), m, of a quarter: rows from the lip to the flange, columns from x = 0 to y = 0.
+    """Grids (rows, columns, 3), m, of the part that is computed: rows from the lip to the flange, columns from x = 0,
+    of a half from y = 0, to y = 0.
 
     Attributes
     ----------
     inner : array
         The inner face that fluid meets, see `dbvfiv.exchange.passage`.
     middle, outer : arrays
+    part : Part
+        Of the valve.
     """
 
     inner: np.ndarray
     middle: np.ndarray
     outer: np.ndarray
+    part: Part = QUARTER
 
     @classmethod
     def of(cls, mesh: MeshData, nodal: np.ndarray) -> WallFaces:
@@ -38,17 +43,23 @@ class WallFaces:
         inner, outer = faces(mesh, nodal)
         grids = [inner[mesh.rows], 0.5 * (inner + outer)[mesh.rows], outer[mesh.rows]]
         for grid in grids:  # the planes of symmetry, to the last digit
-            grid[:, 0, 0] = 0.0
-            grid[:, -1, 1] = 0.0
-        grids[0] = passage_grid(grids[0])
-        return cls(*grids)
+            for column, across in mesh.part.edges:
+                grid[:, column, across] = 0.0
+        if mesh.part.is_quarter:
+            grids[0] = passage_grid(grids[0])
+        else:
+            centre = mesh.part.centre(grids[0].shape[1])
+            right, left = grids[0][:, centre:], grids[0][:, centre::-1] * [-1.0, 1.0, 1.0]
+            left = passage_grid(left)[:, :0:-1] * [-1.0, 1.0, 1.0]
+            grids[0] = np.concatenate([left, passage_grid(right)], axis=1)
+        return cls(*grids, mesh.part)
 
     def section_areas(self) -> np.ndarray:
-        """Area (rows,) of a quarter of the passage at each row, m2, as seen along the axis."""
+        """Area (rows,) of the part's passage at each row, m2, as seen along the axis."""
         x, y = self.inner[..., 0], self.inner[..., 1]
         return np.sum(0.5 * (y[:, 1:] + y[:, :-1]) * np.diff(x, axis=1), axis=1)
 
     @property
     def base(self) -> np.ndarray:
-        """Points of the plane y = 0 below those of the inner face: the other side of the fluid in a quarter."""
+        """Points of the plane y = 0 below those of the inner face: the other side of the part's fluid."""
         return self.inner * [1.0, 0.0, 1.0]

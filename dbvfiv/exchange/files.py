@@ -46,7 +46,7 @@ def write_shapes(
     shapes : sequence of str
         Of `dbvfiv.exchange.bodies.SHAPES`; all without it.
     quarter : bool
-        Only the quarter that was computed.
+        Only the part that was computed.
 
     Returns
     -------

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pyvista
 
-from .bodies import IMAGES, Shape
+from .bodies import Shape
 
 #: Points closer than this share of the size of the shape are one.
 SAME = 1e-9
 
 
 def triangulated(shape: Shape) -> pyvista.PolyData:
-    """Triangles of a shape, m: the diagonals of each quarter are mirror images of those of the first.
+    """Triangles of a shape, m: the diagonals of each image are mirror images of those of the part itself.
 
     Raises
     ------
@@ -22,7 +22,7 @@ def triangulated(shape: Shape) -> pyvista.PolyData:
         If a body is not watertight.
     """
     points, triangles, count = [], [], 0
-    for sx, sy in IMAGES if shape.whole else IMAGES[:1]:
+    for sx, sy in shape.signs:
         for piece in shape.pieces:
             number = count + np.arange(piece.points[..., 0].size).reshape(piece.points.shape[:2])
             a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]

@@ -124,7 +124,7 @@ class ElasticLine(Traceable):
         return np.append((start + width * one.nodes[:-1]).ravel(), 1.0), (start + width * one.points).ravel()
 
     def segments(self, inlet_area, parameters) -> Segments:
-        """Elements and nodes for the area of a quarter of the inlet, m2; traceable."""
+        """Elements and nodes for the part's area of the inlet, m2; traceable."""
         stretch = parameters["pipe_length"] / self.line.length
         faster = parameters["wave_speed"] / self.wave_speed
         columns = []

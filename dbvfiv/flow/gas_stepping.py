@@ -54,7 +54,7 @@ class GasState:
     stored, rate : (l,) arrays
         What the balances hold and the scheme's value of its rate.
     power, books : (4,) arrays
-        W and J of a quarter: taken in at the flange, left through the lips, done on the wall, lost in the passage; the
+        W and J of the part: taken in at the flange, left through the lips, done on the wall, lost in the passage; the
         books are since the start.
     """
 
@@ -194,12 +194,12 @@ class GasFluid:
         return GasState(inner, stored, np.where(moves, -sources, 0.0), power, np.zeros(len(BOOKS)))
 
     def powers(self, area, area_rate, inner) -> tuple[float, np.ndarray]:
-        """Energy of the fluid, J of a quarter, and the powers (4,) of `GasState`."""
+        """Energy of the fluid, J of the part, and the powers (4,) of `GasState`."""
         energy, power = _powers(self.law, self.parameters(0.0), area, area_rate, inner)
         return float(energy), np.asarray(power)
 
     def readings(self, area, inner) -> tuple[float, float, float]:
-        """Mass flows at outlet and inlet, kg/s of a quarter, and the largest Mach number."""
+        """Mass flows at outlet and inlet, kg/s of the part, and the largest Mach number."""
         return tuple(float(x) for x in _readings(self.law, self.parameters(0.0), area, inner))
 
 
@@ -280,7 +280,7 @@ def _instant(law, parameters, area, area_rate, inner):
 
 @jax.jit
 def _readings(law, parameters, area, inner):
-    """Mass flows, kg/s of a quarter, at outlet and inlet, and the largest Mach number."""
+    """Mass flows, kg/s of the part, at outlet and inlet, and the largest Mach number."""
     speed, sigma = law.split(inner, parameters)
     sigma = sigma.at[0].add(law.drawn(speed[0], parameters))
     flow = parameters["density"] * jnp.exp(sigma / parameters["sound_speed"]) * above_floor(area, law.floor) * speed

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from ..case.quantity import GRAVITY
-from ..geometry import QUARTERS
 from .line_elements import DEGREE, chain, element
 from .reversed import ReversibleFluid
 
@@ -38,7 +37,7 @@ class LineState:
     pressure, pressure_rate : (k,) arrays
         m/s and m/s2.
     books : (3,) array
-        Energy since the start, J of a quarter: taken in at the far end, lost by friction, handed to the valve.
+        Energy since the start, J of the part: taken in at the far end, lost by friction, handed to the valve.
     """
 
     velocity: np.ndarray
@@ -75,7 +74,7 @@ class LineWaves:
     ----------
     line : ElasticLine
     inlet_area : float
-        Of a quarter, m2.
+        Of the part, m2.
     density : float, kg/m3
     """
 
@@ -140,7 +139,7 @@ class LineWaves:
         head, slope = self._source(velocity, inlet)
         if self.pump is None:
             return head, slope
-        per_velocity = QUARTERS * self.area
+        per_velocity = self.pump.copies * self.area
         lift, falling = self.pump.head_and_slope(per_velocity * velocity)
         return head + GRAVITY * (lift - self.pump.reference), slope + GRAVITY * falling * per_velocity
 
@@ -176,7 +175,7 @@ class LineWaves:
     # ----
 
     def energies(self, state: LineState) -> tuple[float, float]:
-        """Kinetic and elastic energy, J of a quarter."""
+        """Kinetic and elastic energy, J of the part."""
         weight = 0.5 * self.density * self.area
         kinetic = weight * float(state.velocity @ self.inertia(state.velocity))
         squares = self.ratio * self.length * self._weights * state.pressure.reshape(self.count, -1) ** 2
@@ -331,7 +330,7 @@ class LineFluid(ReversibleFluid):
         self.line = line
 
     def waves(self, inlet_area: float) -> LineWaves:
-        """The line's equations for the area of a quarter of the inlet, m2."""
+        """The line's equations for the part's area of the inlet, m2."""
         return LineWaves(self.line, inlet_area, self.density)
 
     def velocity_behind(

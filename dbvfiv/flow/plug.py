@@ -28,7 +28,7 @@ def centroid_slope(points: np.ndarray, axis: int, floor: float = 0.0) -> np.ndar
     Parameters
     ----------
     points : (m, c, 2) array, m
-        Wall of a quarter of each section from x = 0 to y = 0.
+        Wall of the computed part of each section, from x = 0 or y = 0 to y = 0.
     axis : int
         Of the displacement: 0 for x, 1 for y.
     floor : float, m2

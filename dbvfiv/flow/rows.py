@@ -42,7 +42,7 @@ class RowAreas:
         return len(self.rows)
 
     def areas(self, nodal: np.ndarray) -> np.ndarray:
-        """Flow areas (rows,) in m2 of a quarter, from nodal unknowns (nn, 5); may be negative when the lips cross."""
+        """Flow areas (rows,) in m2 of the part, from nodal unknowns (nn, 5); may be negative when the lips cross."""
         return _polygon(self._rest + nodal[self.rows][:, :, :2]) + self.offset
 
     def jacobian(self, nodal: np.ndarray) -> sp.csr_matrix:

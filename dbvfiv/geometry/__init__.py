@@ -4,10 +4,8 @@ from .key_point_table import key_point_table
 from .sections import Profile, flange_section, key_point_sections, lip_section
 from .surface import Surface, surface_of
 from .valve_mesh import ValveMesh, valve_mesh
-from .wall_area import QUARTERS
 
 __all__ = [
-    "QUARTERS",
     "Profile",
     "Surface",
     "ValveMesh",

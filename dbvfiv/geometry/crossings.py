@@ -1,4 +1,4 @@
-"""Sections that no wall can have: curves that cross themselves or leave their quarter between the key points."""
+"""Sections that no wall can have: curves that cross themselves or leave their part between the key points."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..case.part import QUARTER, Part
 from .sections import Profile
 
 #: Pieces in which a section is looked at, and how far beyond a plane of symmetry it may run, over its size.
 _PIECES, _BEYOND = 240, 1e-3
 
 
-def check_profiles(profiles: Sequence[Profile]) -> None:
+def check_profiles(profiles: Sequence[Profile], part: Part = QUARTER) -> None:
     """Refuse sections through key points that cross themselves, or that run beyond a plane of symmetry between them.
 
     Raises
@@ -21,18 +22,20 @@ def check_profiles(profiles: Sequence[Profile]) -> None:
         In one sentence.
     """
     for number, profile in enumerate(profiles, 1):
-        points = profile.points(np.linspace(0.0, 1.0, _PIECES + 1))
+        points = profile.points(np.linspace(part.begin, 1.0, _PIECES * part.quarters + 1))
         where = f"The section through the key points of profile {number} at z = {profile.z:g} m"
-        if points.min() < -_BEYOND * np.abs(points).max():
+        inside = points if part.is_quarter else points[:, 1]
+        if inside.min() < -_BEYOND * np.abs(points).max():
+            there = "quarter of positive x and y" if part.is_quarter else "half of positive y"
             raise ValueError(
-                f"{where} leaves the quarter of positive x and y between its points; give more of them there, or mark "
+                f"{where} leaves the {there} between its points; give more of them there, or mark "
                 "a joint where it has a corner."
             )
         place = crossing(points)
         if place is not None:
             raise ValueError(
                 f"{where} crosses itself at x = {place[0]:.4g} m, y = {place[1]:.4g} m; its points must follow each "
-                "other from the centre to the side edge."
+                f"other from {'the centre' if part.is_quarter else 'side edge'} to {'the ' * part.is_quarter}side edge."
             )
 
 

@@ -75,12 +75,15 @@ def column_division(mesh: Mesh, surface: Surface, breaks) -> Division:
 
 
 def bend_of_lip(surface: Surface) -> float:
-    """Normalised arc length at which the section of the lip has turned by 5 degrees from where it began."""
-    s = np.linspace(0.0, 1.0, 2001)
-    steps = np.diff(surface.section(surface.breaks[0], s)[:, :2], axis=0)
-    turned = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    past = np.abs(turned - turned[0]) > BEND
-    return float(s[int(np.argmax(past))]) if past.any() else 1.0
+    """Normalised arc length from the centre at which the section of the lip has turned by 5 degrees from its direction
+    there; on the side where that is nearer."""
+    s, found = np.linspace(0.0, 1.0, 2001), [1.0]
+    for side in (1.0,) if surface.part.is_quarter else (1.0, -1.0):
+        steps = np.diff(surface.section(surface.breaks[0], side * s)[:, :2], axis=0) * [side, 1.0]
+        turned = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        past = np.abs(turned - turned[0]) > BEND
+        found.append(float(s[int(np.argmax(past))]) if past.any() else 1.0)
+    return min(found)
 
 
 def grading(columns: np.ndarray, ratio: float) -> np.ndarray:
@@ -170,8 +173,7 @@ def _row_law(mesh: Mesh, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
 
 def kinks(surface: Surface) -> np.ndarray:
     """Largest angle, rad, by which the surface turns along the axis at each of its inner joints."""
-    s = np.linspace(0.0, 1.0, 33)
-    found = []
+    s, found = np.linspace(surface.part.begin, 1.0, 32 * surface.part.quarters + 1), []
     for before, joint, after in zip(surface.breaks[:-2], surface.breaks[1:-1], surface.breaks[2:]):
         step = 1e-6 * min(joint - before, after - joint)
         sides = [(surface.section(joint, s) - surface.section(joint - step, s)) / step]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..case.part import HALF, QUARTER
 from ..case.valve import Valve
 from ..errors import CaseError
 from .sections import Profile
@@ -42,21 +43,23 @@ def key_point_table(valve: Valve, points: int = 17, extra: int = 0) -> str:
             "valve.saddle is 'smooth' with a flare, whose blend key points do not have; take a ruled saddle.",
             "valve.saddle",
         )
-    surface = surface_of(valve)
+    surface = surface_of(valve, QUARTER if valve.is_double_symmetric else HALF)
+    begin = surface.part.begin
     lines = [
         f"# Key points of a duckbill valve, {valve.length * 1e3:g} mm long; profiles from lip to flange.",
         "# joint: 1 where the curvature jumps; between joints a profile is a smooth curve through its points.",
         "profile, x [mm], y [mm], z [mm], joint",
     ]
     for number, (profile, joints) in enumerate(_profiles(surface, valve, extra), 1):
-        ends = [0.0, *joints, 1.0]
-        each = points if joints else 2 * points - 1
+        ends = [begin, *joints, 1.0]
+        each = points if joints else 2 * surface.part.quarters * (points - 1) + 1
         shares = [np.linspace(a, b, each) for a, b in zip(ends[:-1], ends[1:])]
         for i, share in enumerate(shares):
             first = 1 if i else 0
             for place in range(first, each):
                 x, y = profile.points(share[place : place + 1])[0] * 1e3
-                x, y = (0.0 if share[place] == edge else value for value, edge in ((x, 0.0), (y, 1.0)))
+                if share[place] in (begin, 1.0):  # on a plane of symmetry, to the last digit
+                    x, y = (0.0, y) if share[place] == 0.0 else (x, 0.0)
                 joint = int(place == each - 1 and i < len(shares) - 1)
                 lines.append(f"{number}, {x:.15g}, {y:.15g}, {profile.z * 1e3:.15g}, {joint}")
     return "\n".join(lines) + "\n"

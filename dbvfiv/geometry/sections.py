@@ -1,14 +1,16 @@
-"""Cross-sections of the mid-surface, each a curve from the centre line (x = 0) to the side edge (y = 0)."""
+"""Cross-sections of the mid-surface, each a curve from the centre line (x = 0), or from one side edge (y = 0), to the
+other side edge.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
-from ..case.key_points import KeyProfile
+from ..case.key_points import KeyProfile, is_whole
 from ..case.lip import LipSizes
 
 #: Places at which the arc length of a key-point curve is kept, and Gauss points between them.
@@ -18,14 +20,15 @@ _GAUSS = np.polynomial.legendre.leggauss(6)
 
 @dataclass(frozen=True)
 class Profile:
-    """A section of the quarter mid-surface.
+    """A section of the mid-surface.
 
     Attributes
     ----------
     z : float
         Axial position, m.
     points : callable
-        Positions (k, 2) in x and y, m, at normalised arc lengths s (k,) in 0 (centre) .. 1 (side edge).
+        Positions (k, 2) in x and y, m, at normalised arc lengths s (k,) in 0 (centre) .. 1 (side edge); from
+        -1, the other side edge, on where the section is that of a whole lip.
     length : float
         Arc length, m.
     joints : tuple of float
@@ -36,6 +39,18 @@ class Profile:
     points: Callable[[np.ndarray], np.ndarray]
     length: float = np.nan
     joints: tuple[float, ...] = ()
+
+
+def both_sides(profile: Profile, middle: float = 0.0) -> Profile:
+    """The section of a whole lip from that of its half at x > 0, with its centre moved to x = `middle`, m."""
+
+    def points(s):
+        s = np.asarray(s, float)
+        sign = np.stack([np.where(s < 0, -1.0, 1.0), np.ones_like(s)], axis=-1)
+        return profile.points(np.abs(s)) * sign + [middle, 0.0]
+
+    joints = (*(-s for s in reversed(profile.joints)), *profile.joints)
+    return Profile(profile.z, points, 2.0 * profile.length, joints)
 
 
 def lip_section(lip: LipSizes) -> Callable[[np.ndarray], np.ndarray]:
@@ -81,12 +96,19 @@ def round_profile(z: float, radius: float) -> Profile:
 
 
 def key_point_sections(profiles: Sequence[KeyProfile], scale: float = 1.0) -> list[Profile]:
-    """Profiles through given key points, multiplied by a scale, each at equal normalised arc length.
+    """Profiles through given key points, multiplied by a scale, each at equal normalised arc length, of a
+    whole lip from the middle of that length.
 
     A profile is a spline through its points over the chord length, cubic as the thesis's program draws its lines (App.
     A). Where a table marks joints it is one between each two of them, of degree five as far as their points allow.
     """
-    return [Profile(scale * profile.z, *_spline_section(profile, scale)) for profile in profiles]
+    found = [Profile(scale * profile.z, *_spline_section(profile, scale)) for profile in profiles]
+    return [_from_edge(of) if is_whole(profile) else of for of, profile in zip(found, profiles)]
+
+
+def _from_edge(profile: Profile) -> Profile:
+    """A section of a whole lip by its parameter from -1 to 1, from one that runs over its length from 0 to 1."""
+    return replace(profile, points=lambda s: profile.points(0.5 * (np.asarray(s, float) + 1.0)))
 
 
 def _spline_section(profile: KeyProfile, scale: float) -> tuple[Callable[[np.ndarray], np.ndarray], float]:

@@ -8,10 +8,11 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..case.key_points import read_key_points
+from ..case.key_points import is_whole, read_key_points
+from ..case.part import HALF, QUARTER, Part
 from ..case.valve import Valve
 from .crossings import check_profiles
-from .sections import Profile, key_point_sections, lip_profile, round_profile
+from .sections import Profile, both_sides, key_point_sections, lip_profile, round_profile
 
 
 @dataclass(frozen=True)
@@ -24,10 +25,13 @@ class Surface:
         From lip to flange.
     smooth : bool
         Blend that leaves and meets the profiles with zero slope instead of straight rulings.
+    part : Part
+        Of the valve, whose sections the profiles are.
     """
 
     profiles: tuple[Profile, ...]
     smooth: bool = False
+    part: Part = QUARTER
 
     @property
     def breaks(self) -> np.ndarray:
@@ -35,7 +39,7 @@ class Surface:
         return np.array([profile.z for profile in self.profiles])
 
     def section(self, z: float, s: np.ndarray) -> np.ndarray:
-        """Points (k, 3) of the section at the axial position z, normalised arc lengths s (k,).
+        """Points (k, 3) of the section at the axial position z, at normalised arc lengths s (k,).
 
         Raises
         ------
@@ -56,15 +60,18 @@ class Surface:
 
     def area(self, z: float) -> float:
         """Area between the section and the symmetry planes, m2."""
-        points = self.section(z, np.linspace(0.0, 1.0, 8001))
+        points = self.section(z, self._fine())
         return float(np.sum(0.5 * (points[1:, 1] + points[:-1, 1]) * np.diff(points[:, 0])))
 
+    def _fine(self) -> np.ndarray:
+        return np.linspace(self.part.begin, 1.0, 8000 * self.part.quarters + 1)
+
     def length(self, z: float) -> float:
-        """Arc length of the section, m: of the profile that lies there, else of the polygon through 8001 points."""
+        """Arc length of the section, m: of the profile that lies there, else of a polygon of many points."""
         near = next((p for p in self.profiles if abs(p.z - z) <= 1e-9 * self.profiles[-1].z), None)
         if near is not None and np.isfinite(near.length):
             return near.length
-        return float(np.linalg.norm(np.diff(self.section(z, np.linspace(0.0, 1.0, 8001)), axis=0), axis=1).sum())
+        return float(np.linalg.norm(np.diff(self.section(z, self._fine()), axis=0), axis=1).sum())
 
 
 @dataclass(frozen=True)
@@ -89,8 +96,9 @@ class SmoothSurface(Surface):
         return PchipInterpolator([profile.z for profile in self.profiles], heights, axis=0)
 
 
-def surface_of(valve: Valve) -> Surface:
-    """Surface of a valve: from its key points if it has any, else lip, saddle, cuff, flare and flange (App. A).
+def surface_of(valve: Valve, part: Part = QUARTER) -> Surface:
+    """Surface of a part of a valve: from its key points if it has any, else lip, saddle, cuff, flare and flange
+    (App. A).
 
     Raises
     ------
@@ -98,9 +106,14 @@ def surface_of(valve: Valve) -> Surface:
         If a section through key points crosses itself.
     """
     if valve.key_points is not None:
-        profiles = tuple(key_point_sections(read_key_points(valve.key_points), valve.scale))
-        check_profiles(profiles)
-        return SmoothSurface(profiles) if valve.key_point_skin == "smooth" else Surface(profiles)
+        given = read_key_points(valve.key_points)
+        own = HALF if is_whole(given[0]) else QUARTER
+        profiles = tuple(key_point_sections(given, valve.scale))
+        check_profiles(profiles, own)
+        if part is not own:
+            profiles = tuple(both_sides(profile) for profile in profiles)
+        skin = SmoothSurface if valve.key_point_skin == "smooth" else Surface
+        return skin(profiles, part=part)
     profiles, end = [lip_profile(0.0, valve.lip)], 0.0
     pieces = (
         (valve.duckbill_length, lip_profile, valve.lip),
@@ -114,4 +127,7 @@ def surface_of(valve: Valve) -> Surface:
         if length > 0:
             profiles.append(profile(end, size))
     profiles[-1] = replace(profiles[-1], z=valve.length)
-    return Surface(tuple(profiles), smooth=valve.saddle == "smooth")
+    if part is HALF:
+        shifts = [valve.bill_shift * (profile.z <= valve.duckbill_length) for profile in profiles]
+        profiles = [both_sides(profile, shift) for profile, shift in zip(profiles, shifts)]
+    return Surface(tuple(profiles), valve.saddle == "smooth", part)

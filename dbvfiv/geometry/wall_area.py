@@ -7,8 +7,6 @@ import numpy as np
 from ..case.valve import Valve
 from .surface import Surface
 
-#: Of the whole valve that a section is one of.
-QUARTERS = 4
 #: Pieces of a section over which a wall that varies around it is summed up.
 _FINE = 1000
 
@@ -30,11 +28,13 @@ def _even_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray
     """That of a wall without patches."""
     place = np.asarray(z, float)
     share = np.clip((place - valve.duckbill_length) / valve.saddle_length, 0.0, 1.0)
+    quarters = surface.part.quarters
     if valve.key_points is not None:
         duckbill, cuff, flange = _key_point_deductions(valve, surface)
     else:
-        duckbill = valve.duckbill_wall_area
-        cuff, flange = (_round_deduction(radius, valve) for radius in (valve.cuff_radius, valve.flange_radius))
+        duckbill = quarters * valve.duckbill_wall_area
+        radii = valve.cuff_radius, valve.flange_radius
+        cuff, flange = (quarters * _round_deduction(radius, valve) for radius in radii)
     taken = duckbill + share * (cuff - duckbill)
     if valve.flare_length > 0:
         begin = valve.duckbill_length + valve.saddle_length + valve.cuff_length
@@ -52,22 +52,25 @@ def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float,
     """Areas taken by the wall at the lip, at the cuff and at the flange that key points give.
 
     A face at the distance h inside a section of length L that turns by a right angle takes h L - pi h^2/4, which is
-    Th. 4.12 and 4.14 for the sections of App. A.
+    Th. 4.12 and 4.14 for the sections of App. A; where it turns by two, h L - pi h^2/2.
     """
     found = []
     lip, flange = surface.breaks[[0, -1]]
     cuff = flange if valve.flare_length == 0 else valve.duckbill_length + valve.saddle_length
     halves = {"duckbill": valve.duckbill_wall_deduction, "flange": valve.flange_wall_deduction}
     for place, name, z in (("lip", "duckbill", lip), ("cuff", "flange", cuff), ("flange", "flange", flange)):
-        half, edge = halves[name], surface.section(z, np.ones(1))[0, 0]
-        gap = valve.initial_gap * max(edge - half, 0.0) if place == "lip" else 0.0
-        found.append(half * surface.length(z) - 0.25 * np.pi * half**2 - gap)
+        half, (other, edge) = halves[name], surface.section(z, np.array([surface.part.begin, 1.0]))[:, 0]
+        width = edge - (0.0 if surface.part.is_quarter else other)
+        gap = valve.initial_gap * max(width - surface.part.quarters * half, 0.0) if place == "lip" else 0.0
+        found.append(half * surface.length(z) - 0.5 * surface.part.turn * half**2 - gap)
         if found[-1] >= surface.area(z):
             raise ValueError(
                 f"The key points of the {place} leave no flow area inside a half wall of {half:g} m; it must be less, "
                 f"see valve.{name}_wall_deduction."
             )
-    inside = [1e4 * QUARTERS * (surface.area(z) - taken) for z, taken in ((lip, found[0]), (flange, found[2]))]
+    inside = [
+        1e4 * surface.part.copies * (surface.area(z) - taken) for z, taken in ((lip, found[0]), (flange, found[2]))
+    ]
     if inside[0] >= inside[1]:
         raise ValueError(
             f"The key points leave {inside[0]:.4g} cm2 between the lips at rest; the passage there must be smaller "
@@ -84,6 +87,8 @@ def _patched(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
     """
     edges = [s for patch in valve.patches for s in patch.section_edges]
     places = np.unique([*np.linspace(0.0, 1.0, _FINE + 1), *edges])
+    if not surface.part.is_quarter:
+        places = np.concatenate([-places[:0:-1], places])
     middle = 0.5 * (places[1:] + places[:-1])
     joint, end = valve.duckbill_length, valve.duckbill_length + valve.saddle_length
     taken = []
@@ -96,7 +101,7 @@ def _patched(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
         turn = between[:-1] - between[1:]
         room = 0.5 * (points[1:, 1] + points[:-1, 1]) * lengths / np.maximum(steps[:, 0], 1e-9 * lengths)
         even = np.interp(level, (joint, end), (valve.duckbill_wall_deduction, valve.flange_wall_deduction))
-        added = 0.5 * (_sides(valve, level, middle) - _sides(valve, level))
+        added = 0.5 * (_sides(valve, level, np.abs(middle)) - _sides(valve, level))
         half = np.minimum(even + added, np.maximum(room, even))
         more = np.sum((half - even) * lengths - 0.5 * (half**2 - even**2) * turn)
         taken.append(float(more))

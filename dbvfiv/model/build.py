@@ -42,7 +42,8 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
         mesh.quads,
         mesh.thickness,
         material_axis=(0.0, 0.0, 1.0),
-        planes=[(mesh.rows[:, 0], 0), (mesh.rows[:, -1], 1)],
+        planes=[(mesh.rows[:, column], across) for column, across in mesh.part.edges],
+        mirrored=mesh.mirrored,
     )
     section = section or build_section(case)
     zones = layer_zones(case, mesh) if fillers else None

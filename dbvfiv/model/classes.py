@@ -1,4 +1,4 @@
-"""Small motions of every class about a steady state: the same quarter with other unknowns.
+"""Small motions of every class about a steady state: the same part of the valve with other unknowns.
 
 Element integrals are those of the model; only their numbering differs (`dbvfiv.model.symmetry`). Stops stand between
 the lips, so they act on motions that are symmetric about y = 0 and not on those in which both lips move together. Areas
@@ -19,7 +19,7 @@ from ..flow.plug import centroid_matrix, centroid_slope, plug_parts
 from ..shell import Shell
 from ..shell.pressure import pressure_stiffness
 from .dynamics import LinearisedState, linearise
-from .symmetry import EQUILIBRIA, ClassDofs, Symmetry
+from .symmetry import ClassDofs, Symmetry
 from .valve import ValveModel
 
 
@@ -63,7 +63,7 @@ class LinearisedClass(LinearisedState):
 
 def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Symmetry) -> LinearisedState:
     """Linearise the motions of a class about a steady state at an inlet pressure, Pa."""
-    if symmetry.name == EQUILIBRIA:
+    if symmetry.of_equilibria:
         return linearise(model, q, inlet)
     nodal = model.nodal(q)
     shell = shell_of_class(model.shell, symmetry.free_unknowns(model.mesh), nodal)

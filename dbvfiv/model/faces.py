@@ -51,7 +51,7 @@ class FaceContact:
         return self.shell.dofs.expand(q)
 
     def state(self, q: np.ndarray) -> ContactState:
-        """Gaps, pressures and forces of a state (n,), of a quarter."""
+        """Gaps, pressures and forces of a state (n,), of the part."""
         nodal = self.nodal(q)
         return self.plane.state(nodal, self.shell.directors(nodal)[0], self._none)
 
@@ -60,7 +60,7 @@ class FaceContact:
         return int(np.count_nonzero(self.state(q).touching))
 
     def energy(self, q: np.ndarray) -> float:
-        """Stored in the contact, J of a quarter."""
+        """Stored in the contact, J of the part."""
         nodal = self.nodal(q)
         return self.plane.energy(nodal, self.shell.directors(nodal)[0], self._none)
 

@@ -9,7 +9,7 @@ from ..shell import Shell
 
 
 class LipCentre:
-    """The node of the lip at x = z = 0.
+    """The node in the middle of the lip.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ class LipCentre:
     """
 
     def __init__(self, mesh: ValveMesh, shell: Shell):
-        node = mesh.rows[0, 0]
+        node = mesh.centre_line[0]
         surface = shell.mesh
         around = np.any(surface.quads == node, axis=1)
         self.half_wall = 0.5 * float(surface.thickness[around].mean())

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..case.quantity import GRAVITY, head_of
 from ..errors import SolveError
-from ..geometry import QUARTERS
 from .hydraulics import Behind, Hydraulics, hydraulics_of
 from .lip import LipCentre
 from .valve import ValveModel
@@ -16,8 +15,8 @@ from .valve import ValveModel
 
 @dataclass(frozen=True)
 class SteadyState:
-    """An equilibrium; flow and areas are those of the whole valve, station data those of a quarter. Pressures are
-    static ones, over that of the surroundings.
+    """An equilibrium; flow and areas are those of the whole valve, station data those of the part that is computed.
+    Pressures are static ones, over that of the surroundings.
 
     Attributes
     ----------
@@ -56,7 +55,7 @@ class SteadyState:
         `dbvfiv.model.lip.LipCentre.opening`.
     lip_displacement : float, m
         Displacement in y of the mid-surface of one lip there.
-    station_area, station_velocity, station_pressure : (m,) arrays, m2 (a quarter), m/s, Pa
+    station_area, station_velocity, station_pressure : (m,) arrays, m2 (of the part), m/s, Pa
         Pressures as the wall sees them, over `outlet_pressure`.
     stops : int
         Lip stops in contact, or nodes whose inner face is.
@@ -156,7 +155,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
         nodal=nodal,
         mass_flow=mass_flow,
         volume_flow=mass_flow / density,
-        outlet_area=float(QUARTERS * area[0]),
+        outlet_area=float(model.mesh.part.copies * area[0]),
         outlet_velocity=float(speeds[0]),
         max_displacement=float(displacement[where]),
         max_displacement_position=tuple(float(value) for value in model.mesh.nodes[where]),
@@ -182,10 +181,11 @@ def _behind(model: ValveModel, area: np.ndarray, velocity: float, jet: float) ->
     downstream = model.flow.back - model.flow.level
     if tail is None:
         return downstream, 0.0, 0.0, 0.0
-    if area[0] > tail.quarter:
+    if area[0] > tail.section:
+        copies = model.mesh.part.copies
         raise SolveError(
-            f"The passage at the lips, {1e4 * QUARTERS * area[0]:.4g} cm2, is wider than the pipe that it stands in, "
-            f"{1e4 * QUARTERS * float(tail.quarter):.4g} cm2: downstream.pipe_diameter must be larger."
+            f"The passage at the lips, {1e4 * copies * area[0]:.4g} cm2, is wider than the pipe that it stands in, "
+            f"{1e4 * copies * float(tail.section):.4g} cm2: downstream.pipe_diameter must be larger."
         )
     speed = float(tail.speed(area[-1], velocity))
     recovered = density * float(tail.gained(model.flow.open_area(area)[0], jet, speed))
@@ -195,7 +195,7 @@ def _behind(model: ValveModel, area: np.ndarray, velocity: float, jet: float) ->
 
 def _boundless(model: ValveModel, area: np.ndarray, pressure: float) -> str:
     """Why no finite flow belongs to a state."""
-    lips, flange = (f"{1e4 * QUARTERS * some:.4g} cm2" for some in (area[0], area[-1]))
+    lips, flange = (f"{1e4 * model.mesh.part.copies * some:.4g} cm2" for some in (area[0], area[-1]))
     begin = f"At {pressure:.6g} Pa no finite steady flow belongs to the equilibrium: "
     if model.tail is not None and area[0] < area[-1]:
         return begin + (

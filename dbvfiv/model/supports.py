@@ -11,17 +11,14 @@ from ..geometry import ValveMesh
 
 
 def free_unknowns(mesh: ValveMesh) -> np.ndarray:
-    """(nn, 5) free displacements and rotations of the quarter valve (App. A).
+    """(nn, 5) free displacements and rotations of the part of the valve that is computed (App. A).
 
     The frames' first vector lies in each symmetry plane, so a plane of symmetry fixes the second rotation.
     """
     free = np.ones((len(mesh.nodes), 5), bool)
-    centre, side, flange = mesh.rows[:, 0], mesh.rows[:, -1], mesh.rows[-1]
-    free[centre, 0] = False
-    free[centre, 4] = False
-    free[side, 1] = False
-    free[side, 4] = False
-    free[flange] = False
+    for column, across in mesh.part.edges:
+        free[np.ix_(mesh.rows[:, column], [across, 4])] = False
+    free[mesh.rows[-1]] = False
     return free
 
 
@@ -34,14 +31,14 @@ class LipStops:
     ----------
     unknowns : (k,) int array
         Numbers of the free unknowns that the stops act on.
-    stiffness : float, N/m
+    stiffness : float or (k,) array, N/m
     """
 
     unknowns: np.ndarray
-    stiffness: float
+    stiffness: float | np.ndarray
 
     def energy(self, q: np.ndarray) -> float:
-        return 0.5 * self.stiffness * float(np.sum(np.minimum(q[self.unknowns], 0.0) ** 2))
+        return 0.5 * float(np.sum(self.stiffness * np.minimum(q[self.unknowns], 0.0) ** 2))
 
     def force(self, q: np.ndarray) -> np.ndarray:
         """Internal force (k,) on the unknowns with a stop."""
@@ -62,6 +59,10 @@ def lip_stops(mesh: ValveMesh, index: np.ndarray, supports: Supports, joint: flo
         return LipStops(np.zeros(0, int), supports.lip_stop_stiffness)
     limit = 0.5 if supports.lip_stop_columns == "inner-half" else 1.0 + 1e-9
     rows = mesh.z <= joint * (1 + 1e-9)
-    nodes = mesh.rows[np.ix_(rows, mesh.columns < limit - 1e-9)].ravel()
+    nodes = mesh.rows[np.ix_(rows, np.abs(mesh.columns) < limit - 1e-9)].ravel()
     unknowns = index[nodes, 1]
-    return LipStops(unknowns[unknowns >= 0].astype(int), supports.lip_stop_stiffness)
+    moving = unknowns >= 0
+    stiffness = supports.lip_stop_stiffness
+    if not mesh.part.is_quarter:  # two quarters meet in the middle of the lips, each with its stop
+        stiffness = np.where(np.isin(nodes, mesh.centre_line), 2.0 * stiffness, stiffness)[moving]
+    return LipStops(unknowns[moving].astype(int), stiffness)

@@ -1,8 +1,9 @@
-"""Classes of small motion about a state that is symmetric about x = 0 and y = 0, and what each fixes on the quarter.
+"""Classes of small motion about a state that is symmetric as the valve is, and what each fixes on the computed part.
 
 A mirror image of a motion is the motion itself or its opposite, so small motions split into four classes that do not
-act on one another: symmetric (S) or antisymmetric (A) about x = 0, the first letter, and about y = 0, the second. Each
-is solved on the quarter, with the same element integrals, by exchanging what is fixed in the planes of symmetry:
+act on one another: symmetric (S) or antisymmetric (A) about x = 0, the first letter, and about y = 0, the second. On a
+half, symmetric about y = 0 alone, there are two, S and A. Each is solved on the part that is computed, with the same
+element integrals, by exchanging what is fixed in the planes of symmetry:
 
     in a plane of symmetry       symmetric motion                  antisymmetric motion
     displacement across it       fixed                             free
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..case.part import HALF, QUARTER, Part
 from ..geometry import ValveMesh
 from ..shell.supports import DofMap
 
@@ -28,16 +30,22 @@ class Symmetry:
     Attributes
     ----------
     name : str
-        "SS", "SA", "AS" or "AA".
+        "SS", "SA", "AS" or "AA"; "S" or "A" on a half.
     words : str
         What the valve does.
     signs : (int, int)
-        +1 where the motion is symmetric about x = 0 and about y = 0, -1 where it is antisymmetric.
+        +1 where the motion is symmetric about x = 0 and about y = 0, -1 where it is antisymmetric; about x = 0, which
+        is no plane of symmetry of a half, +1 there.
     """
 
     name: str
     words: str
     signs: tuple[int, int]
+
+    @property
+    def of_equilibria(self) -> bool:
+        """Whether it is the class in which equilibria lie."""
+        return self.signs == (1, 1)
 
     @property
     def sway_axis(self) -> int | None:
@@ -50,40 +58,69 @@ class Symmetry:
         return self.signs[1] > 0
 
     def parity(self, mirrors: np.ndarray) -> np.ndarray:
-        """Factors (k,) on a motion in images of the quarter with mirror signs (k, 2) in x and y, besides those of the
+        """Factors (k,) on a motion in images of the part with mirror signs (k, 2) in x and y, besides those of the
         vectors themselves.
         """
         return np.prod(np.where(np.asarray(mirrors)[:, :2] < 0, self.signs, 1), axis=1)
 
     def free_unknowns(self, mesh: ValveMesh) -> np.ndarray:
-        """(nn, 5) free displacements and rotations of the quarter valve in this class.
+        """(nn, 5) free displacements and rotations of the part of the valve in this class.
 
         The frames' first vector lies in each symmetry plane.
         """
         free = np.ones((len(mesh.nodes), 5), bool)
-        for column, across, sign in ((0, 0, self.signs[0]), (-1, 1, self.signs[1])):
-            fixed = [across, 4] if sign > 0 else [*{0, 1, 2} - {across}, 3]
+        for column, across in mesh.part.edges:
+            fixed = [across, 4] if self.signs[across] > 0 else [*{0, 1, 2} - {across}, 3]
             free[np.ix_(mesh.rows[:, column], fixed)] = False
         free[mesh.rows[-1]] = False
         return free
 
 
-SYMMETRIES = {
+_CLASSES = {
     symmetry.name: symmetry
     for symmetry in (
         Symmetry("SS", "both lips open and close", (1, 1)),
         Symmetry("SA", "the lips sway together in y", (1, -1)),
         Symmetry("AS", "the valve sways sideways in x", (-1, 1)),
         Symmetry("AA", "the valve twists", (-1, -1)),
+        Symmetry("S", "both lips open and close, or sway sideways in x", (1, 1)),
+        Symmetry("A", "the lips sway together in y, or the valve twists", (1, -1)),
     )
 }
-#: The class in which equilibria lie, and the word for all of them.
+#: The class in which equilibria lie, of a half too where a case asks for it, and the word for all of them.
 EQUILIBRIA, ALL = "SS", "all"
 
 
-def chosen_symmetries(name: str) -> tuple[Symmetry, ...]:
-    """The classes that a name of the case file stands for."""
-    return tuple(SYMMETRIES.values()) if name == ALL else (SYMMETRIES[name],)
+def symmetries_of(part: Part) -> dict[str, Symmetry]:
+    """All classes of a part by name, that of the equilibria first."""
+    return {name: _CLASSES[name] for name in part.classes}
+
+
+#: Of a quarter and of a half.
+SYMMETRIES, HALF_SYMMETRIES = symmetries_of(QUARTER), symmetries_of(HALF)
+
+
+def equilibria_of(part: Part) -> Symmetry:
+    """The class in which the equilibria of a part lie."""
+    return next(iter(symmetries_of(part).values()))
+
+
+def symmetry_named(name: str) -> Symmetry:
+    """The class of a name."""
+    return _CLASSES[name]
+
+
+def asks_for_equilibria(name: str) -> bool:
+    """Whether a name of the case file stands for the class of the equilibria alone."""
+    return name != ALL and symmetry_named(name).of_equilibria
+
+
+def chosen_symmetries(name: str, part: Part) -> tuple[Symmetry, ...]:
+    """The classes of a part that a name of the case file stands for."""
+    known = symmetries_of(part)
+    if name == ALL:
+        return tuple(known.values())
+    return (equilibria_of(part) if name == EQUILIBRIA else known[name],)
 
 
 @dataclass(frozen=True)

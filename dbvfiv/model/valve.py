@@ -1,7 +1,7 @@
 """The coupled valve: one contract for equilibria, spectra, branches and time histories.
 
-State q (n,): free displacements (m) and rotations (rad) of the quarter model. Row areas and station pressures are
-functions of it, so the equilibrium is
+State q (n,): free displacements (m) and rotations (rad) of the part of the valve that is computed. Row areas and
+station pressures are functions of it, so the equilibrium is
 
     r(q; P) = f_shell(q) + f_stops(q) + f_contact(q) - G(q) p(A(q); P) = 0
 
@@ -23,7 +23,7 @@ from ..flow import RowAreas
 from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
 from ..flow.terms.tail import Tail
-from ..geometry import QUARTERS, ValveMesh
+from ..geometry import ValveMesh
 from ..shell import Section, StepWall, Weight
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_flow, build_shell, build_weight
@@ -191,11 +191,11 @@ class ValveModel:
         return self.stops.touching(q) if self.contact is None else self.contact.touching(q)
 
     def weight_energy(self, q: np.ndarray) -> float:
-        """Potential of the wall's weight over that at rest, J of a quarter; zero without gravity."""
+        """Potential of the wall's weight over that at rest, J of the part; zero without gravity."""
         return 0.0 if self.weight is None else self.weight.energy(self.shell, q)
 
     def support_energy(self, q: np.ndarray) -> float:
-        """Energy of stops or contact, J of a quarter."""
+        """Energy of stops or contact, J of the part."""
         return self.stops.energy(q) if self.contact is None else self.contact.energy(q)
 
     def relaxing_stiffness(self, q: np.ndarray) -> tuple[sp.csr_matrix, ...]:
@@ -297,7 +297,8 @@ class ValveModel:
         density = self.case.fluid.density if density is None else density
         velocity = self.flow.inlet_velocity(area, pressure, density)
         density = self.flow.inlet_density(area, pressure, density)
-        return QUARTERS * density * velocity * float(self.mesh.rest_area[-1] - self.mesh.wall_deduction[-1])
+        inlet = float(self.mesh.rest_area[-1] - self.mesh.wall_deduction[-1])
+        return self.mesh.part.copies * density * velocity * inlet
 
 
 def loaded_share(mesh: ValveMesh, case: Case) -> np.ndarray:

@@ -39,7 +39,7 @@ class FaceStep:
         self._step.add_tangent(self._faces.nodal(q), values, weight)
 
     def stored(self, q: np.ndarray) -> float:
-        """Energy gained by the contact up to positions (n,), J of a quarter."""
+        """Energy gained by the contact up to positions (n,), J of the part."""
         return self._step.stored(self._faces.nodal(q))
 
 

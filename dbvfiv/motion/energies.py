@@ -9,7 +9,7 @@ from .kernels import kinetic_energy, strain_energy
 
 
 def wall_energies(model: ValveModel, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
-    """Kinetic energy and strain energy at positions and velocities (n,), J of a quarter."""
+    """Kinetic energy and strain energy at positions and velocities (n,), J of the part."""
     shell = model.shell
     nodal = model.nodal(q)
     d, d1, _ = shell.directors(nodal)

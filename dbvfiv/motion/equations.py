@@ -390,11 +390,11 @@ class ValveMotion:
     # ----
 
     def energies(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float, float]:
-        """Kinetic energy, strain energy and that of stops or contact, J of a quarter; the fluid outside is
+        """Kinetic energy, strain energy and that of stops or contact, J of the part; the fluid outside is
         `outside_energy`.
         """
         return *wall_energies(self.model, q, v), self.model.support_energy(q)
 
     def outside_energy(self, q: np.ndarray, v: np.ndarray) -> float:
-        """Kinetic energy of the fluid outside, J of a quarter; zero where there is none."""
+        """Kinetic energy of the fluid outside, J of the part; zero where there is none."""
         return 0.0 if self.outside is None else self.outside.energy(q, v)

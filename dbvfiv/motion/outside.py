@@ -36,7 +36,7 @@ class MovingOutside:
     Attributes
     ----------
     renewed : float
-        Energy that renewals have added since the start, J of a quarter.
+        Energy that renewals have added since the start, J of the part.
     renewals : int
         How often the added mass changed.
     """
@@ -55,7 +55,7 @@ class MovingOutside:
         return self.density * (w @ (w.T @ a))
 
     def energy(self, q: np.ndarray, v: np.ndarray) -> float:
-        """Kinetic energy of the fluid, J of a quarter."""
+        """Kinetic energy of the fluid, J of the part."""
         return 0.5 * self.density * float(np.sum((self._at(q).columns.T @ v) ** 2))
 
     def _at(self, q: np.ndarray) -> AddedMass:

@@ -132,7 +132,7 @@ def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, push:
         raise SolveError(f"The mode to push along at {inlet:.6g} Pa was not found: {said}.") from error
     mode = found.mode(index)
     nodal = model.nodal(mode.q)
-    lip = nodal[model.mesh.rows[0, 0], 1]
+    lip = nodal[model.mesh.centre_line[0], 1]
     if abs(lip) < 1e-6 * np.abs(nodal[:, :3]).max():
         raise SolveError(f"Mode {push.mode} does not move the middle of the lip, so no push can be measured there.")
     shape = push.opening / lip * mode.q

@@ -74,7 +74,7 @@ class StepResult:
     load : Load
         Fluid at the end of the step.
     work : float
-        Of the pressure on the wall during the step, J of the quarter model.
+        Of the pressure on the wall during the step, J of the part.
     dissipation : float
         By Rayleigh damping, J.
     residuals, solves, factorisations : int

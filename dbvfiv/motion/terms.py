@@ -84,7 +84,7 @@ class Load:
     pressure : (m,) array
         Pa, where the equations are met.
     area, speed, psi : (m,) arrays
-        At the end of the step: m2 of a quarter, m/s, m2/s.
+        At the end of the step: m2 of the part, m/s, m2/s.
     psi_rate : (m,) array
         Where the equations are met, m2/s2.
     inlet : float

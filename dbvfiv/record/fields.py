@@ -32,7 +32,7 @@ def export_result(
     path : path
         Name of the file, or a folder in which it gets the name of the case.
     quarter : bool
-        Only the quarter that was computed.
+        Only the part that was computed.
     deformed : bool
         Points move with the states; otherwise they stay at rest, for ParaView's "Warp By Vector" along
         ``displacement``.

@@ -1,4 +1,4 @@
-"""The quarter valve's mesh as results keep it."""
+"""The mesh of the part of the valve that is computed, as results keep it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
+from ..case.part import PARTS, QUARTER, Part
 from ..flow.elastic_line import LineChannel
 from ..flow.gas import GasChannel
 from .layout import TEXT, Column, read_array, write_array
@@ -18,7 +19,9 @@ if TYPE_CHECKING:
 _COLUMNS = (
     Column("nodes", "m", "Mid-surface at rest, x y z of each node"),
     Column("quads", "", "Four nodes of each element, counter-clockwise seen from outside", "i4"),
-    Column("rows", "", "Node numbers: rows from lip to flange, columns from x = 0 to y = 0", "i4"),
+    Column(
+        "rows", "", "Node numbers: rows from lip to flange, columns from x = 0, of a half from y = 0, to y = 0", "i4"
+    ),
     Column("z", "m", "Axial position of the rows (flow stations), from the lip"),
     Column("directors", "", "Unit vectors through the wall at rest"),
     Column("frames", "", "Two unit vectors at each node that the rotation unknowns turn the director towards"),
@@ -43,18 +46,20 @@ _LINE = (
 _GAS = (Column("gas_unknowns", "", "Number of unknowns of a fluid that is compressed", "i4"),)
 #: There where inner faces touch.
 _FACES = (Column("face_nodes", "", "Nodes whose inner face may touch the closing plane", "i4"),)
+#: There where more than a quarter is computed.
+_PART = (Column("part_name", "", "Part of the valve that the mesh is", TEXT),)
 
 
 @dataclass(frozen=True)
 class MeshData:
-    """Mesh of the quarter valve.
+    """Mesh of the part of the valve that is computed.
 
     Attributes
     ----------
     nodes : (nn, 3) m
     quads : (ne, 4) int
     rows : (m, columns) int
-        Node numbers, the lip first; column 0 on x = 0, the last on y = 0.
+        Node numbers, the lip first; column 0 on x = 0, of a half on y = 0, the last on y = 0.
     z : (m,) m
     directors : (nn, 3)
     frames : (nn, 2, 3)
@@ -74,6 +79,8 @@ class MeshData:
         Number of unknowns of a fluid that is compressed; empty without one.
     face_nodes : (k,) int array
         Nodes whose inner face may touch the closing plane; none where the lips have stops.
+    part_name : (1,) tuple of str
+        Part of the valve that the mesh is.
     """
 
     nodes: np.ndarray
@@ -94,6 +101,7 @@ class MeshData:
     line_places: np.ndarray = field(default_factory=lambda: np.zeros(0))
     gas_unknowns: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
     face_nodes: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+    part_name: tuple[str, ...] = (QUARTER.name,)
 
     @classmethod
     def of(cls, model: ValveModel) -> MeshData:
@@ -120,7 +128,23 @@ class MeshData:
             line_places=model.flow.line.places[0] if isinstance(model.flow, LineChannel) else np.zeros(0),
             gas_unknowns=np.array([model.flow.inner] if isinstance(model.flow, GasChannel) else [], np.int32),
             face_nodes=np.zeros(0, np.int32) if model.contact is None else model.contact.plane.nodes.astype(np.int32),
+            part_name=(model.mesh.part.name,),
         )
+
+    @property
+    def part(self) -> Part:
+        """Part of the valve that the mesh is."""
+        return PARTS[self.part_name[0]]
+
+    @property
+    def centre_line(self) -> np.ndarray:
+        """(m,) nodes in the middle of the lips and behind it, from the lip on."""
+        return self.rows[:, self.part.centre(self.rows.shape[1])]
+
+    def extent(self, row: int, axis: int) -> float:
+        """Of the whole valve's mid-surface at rest, m, along x (0) or y (1), at a row."""
+        places = self.nodes[self.rows[row], axis]
+        return float(np.ptp([signs[axis] * places for signs in self.part.images]))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -149,13 +173,14 @@ def write_mesh(file: h5py.File, mesh: MeshData) -> None:
     group = file.create_group("mesh")
     fluid = (*(_LINE if len(mesh.line_places) else ()), *(_GAS if len(mesh.gas_unknowns) else ()))
     faces = _FACES if len(mesh.face_nodes) else ()
-    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *fluid, *faces):
+    part = () if mesh.part.is_quarter else _PART
+    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *fluid, *faces, *part):
         write_array(group, column, getattr(mesh, column.name))
 
 
 def read_mesh(file: h5py.File) -> MeshData:
     """Read the mesh of a result file."""
     group = file["mesh"]
-    further = (*_RELAXING, *_LINE, *_GAS, *_FACES)
+    further = (*_RELAXING, *_LINE, *_GAS, *_FACES, *_PART)
     columns = (*_COLUMNS, *(column for column in further if column.name in group))
     return MeshData(**{column.name: read_array(group, column) for column in columns})

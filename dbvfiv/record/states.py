@@ -112,7 +112,7 @@ def shown_summary(case: Case) -> tuple[Column, ...]:
 #: Fields of a state.
 FIELDS = (
     Column("nodal", "m, rad", "Displacements ux uy uz and two rotations of each node"),
-    Column("station_area", "m^2", "Flow area of a quarter at each row"),
+    Column("station_area", "m^2", "Flow area at each row, of the part that is computed"),
     Column("station_velocity", "m/s", "Velocity at each row"),
     Column("station_pressure", "Pa", "Static pressure at each row, over that outside the wall"),
 )

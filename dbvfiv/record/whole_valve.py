@@ -1,4 +1,4 @@
-"""From the quarter model to the whole valve: four mirror images joined along the planes of symmetry."""
+"""From the part that is computed to the whole valve: its mirror images joined along the planes of symmetry."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class WholeValve:
     quads : (nq, 4) int
         Counter-clockwise seen from outside.
     node : (np,) int
-        Node of the quarter behind each point.
+        Node of the part behind each point.
     cell : (nq,) int
-        Element of the quarter behind each quadrilateral.
+        Element of the part behind each quadrilateral.
     sign : (np, 3)
         Mirror signs of vectors at each point.
     """
@@ -34,17 +34,17 @@ class WholeValve:
 
     @classmethod
     def of(cls, mesh: MeshData, quarter: bool = False) -> WholeValve:
-        """All four quarters, or the one that was computed."""
-        images = [(1, 1)] if quarter else [(1, 1), (-1, 1), (-1, -1), (1, -1)]
-        on_centre, on_side = np.zeros((2, len(mesh.nodes)), bool)
-        on_centre[mesh.rows[:, 0]] = True
-        on_side[mesh.rows[:, -1]] = True
+        """All images, or with `quarter` the part alone that was computed."""
+        images = mesh.part.images[:1] if quarter else mesh.part.images
+        in_plane = np.zeros((2, len(mesh.nodes)), bool)  # across x, across y
+        for column, across in mesh.part.edges:
+            in_plane[across, mesh.rows[:, column]] = True
         number = {image: np.full(len(mesh.nodes), -1) for image in images}
         nodes, signs, quads, count = [], [], [], 0
         for sx, sy in images:
             own = number[sx, sy]
             # nodes in a plane of symmetry belong to the image that came first
-            for shared, other in ((on_centre, (-sx, sy)), (on_side, (sx, -sy))):
+            for shared, other in zip(in_plane, ((-sx, sy), (sx, -sy))):
                 if other in number:
                     own[shared & (own < 0)] = number[other][shared & (own < 0)]
             new = np.flatnonzero(own < 0)
@@ -64,9 +64,9 @@ class WholeValve:
         )
 
     def vectors(self, field: np.ndarray) -> np.ndarray:
-        """Vectors (np, 3) at the points from vectors (nn, 3) at the quarter's nodes."""
+        """Vectors (np, 3) at the points from vectors (nn, 3) at the part's nodes."""
         return field[self.node] * self.sign
 
     def cells(self, field: np.ndarray) -> np.ndarray:
-        """Element values (nq, ...) from those of the quarter (ne, ...)."""
+        """Element values (nq, ...) from those of the part (ne, ...)."""
         return field[self.cell]

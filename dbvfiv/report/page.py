@@ -97,7 +97,10 @@ def answers(found: Gathered) -> list[tuple[str, tuple[str, ...]]]:
 def setting(found: Gathered) -> str:
     """What the answers are for, in a line."""
     case, mesh = found.case, found.case.mesh
-    words = [describe_fixed(case), f"{mesh.around} x {mesh.along} elements on a quarter of the valve"]
+    words = [
+        describe_fixed(case),
+        f"{mesh.around * case.part.quarters} x {mesh.along} elements on a {case.part.name} of the valve",
+    ]
     return f"At {', '.join(words)}. Made {datetime.now().astimezone():%Y-%m-%d %H:%M}."
 
 

@@ -137,7 +137,9 @@ def _enhancement(x, geometry: ReferenceGeometry, section, compatible: np.ndarray
     normal /= size[:, None]
     first -= np.einsum("ei,ei->e", first, normal)[:, None] * normal
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    axes = np.stack([first, np.cross(normal, first)], axis=1)
+    second = np.cross(normal, first)
+    second *= np.sign(np.einsum("ei,ei->e", second, geometry.axes[:, :, 1].mean(axis=1)))[:, None]
+    axes = np.stack([first, second], axis=1)
     dual = np.linalg.inv(np.einsum("eci,edi->ecd", u, u)) @ u
     turned = strain_map(np.einsum("eai,eci->eac", axes, dual))
     modes = (size[:, None] / geometry.area)[..., None, None] * (turned[:, None] @ _MODES)  # local, (ne, 4, 3, 4)

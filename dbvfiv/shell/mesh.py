@@ -35,6 +35,9 @@ class ShellMesh:
     thickness : (ne,) float array, m
     material_axis : (3,) or (ne, 3) float array
         Direction from which layer angles are measured, projected into each tangent plane.
+    mirrored : (ne,) bool array, optional
+        Elements whose layers lie at mirrored angles: measured to the right of that direction seen from outside, to the
+        left elsewhere. None by default.
     """
 
     nodes: np.ndarray
@@ -43,6 +46,7 @@ class ShellMesh:
     frames: np.ndarray
     thickness: np.ndarray
     material_axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    mirrored: np.ndarray | None = None
 
     def __post_init__(self):
         nn, ne = len(self.nodes), len(self.quads)
@@ -64,7 +68,17 @@ class ShellMesh:
         return len(self.quads)
 
     @classmethod
-    def build(cls, nodes, quads, thickness, material_axis=(0.0, 0.0, 1.0), frame_axis=None, planes=(), directors=None):
+    def build(
+        cls,
+        nodes,
+        quads,
+        thickness,
+        material_axis=(0.0, 0.0, 1.0),
+        frame_axis=None,
+        planes=(),
+        directors=None,
+        mirrored=None,
+    ):
         """Mesh with averaged nodal directors.
 
         Parameters
@@ -76,6 +90,8 @@ class ShellMesh:
             Symmetry planes: the director of these nodes has no component along the axis (0, 1 or 2).
         directors : (nn, 3) array, optional
             Given directors instead of averaged ones.
+        mirrored : (ne,) bool array, optional
+            Elements whose layers lie at mirrored angles.
         """
         nodes = np.asarray(nodes, float)
         quads = np.asarray(quads, np.int32)
@@ -86,9 +102,9 @@ class ShellMesh:
         axis = material_axis if frame_axis is None else np.asarray(frame_axis, float)
         if axis.ndim > 1:
             raise ValueError("A material axis per element needs a frame_axis of shape (3,).")
-        return cls(
-            nodes, quads, np.asarray(directors, float), tangent_frames(directors, axis), thickness, material_axis
-        )
+        directors = np.asarray(directors, float)
+        frames = tangent_frames(directors, axis)
+        return cls(nodes, quads, directors, frames, thickness, material_axis, mirrored)
 
 
 def nodal_directors(nodes: np.ndarray, quads: np.ndarray, planes=()) -> np.ndarray:

@@ -105,7 +105,10 @@ def reference_geometry(mesh: ShellMesh) -> ReferenceGeometry:
     if np.any(length < 1e-6 * np.linalg.norm(axis, axis=-1, keepdims=True)):
         raise ValueError(f"The material axis stands normal to element {int(np.argmin(length.min(axis=(1, 2))))}.")
     first /= length
-    axes = np.stack([first, np.cross(normal, first), normal], axis=2)
+    second = np.cross(normal, first)
+    if mesh.mirrored is not None:  # a left-handed pair, in which an angle is that of the mirror image
+        second[mesh.mirrored] *= -1.0
+    axes = np.stack([first, second, normal], axis=2)
     metric = np.einsum("epci,epdi->epcd", basis, basis)
     dual = np.einsum("epcd,epdi->epci", np.linalg.inv(metric), basis)
     p = np.einsum("epai,epci->epac", axes[:, :, :2], dual)

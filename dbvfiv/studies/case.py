@@ -58,6 +58,19 @@ class _CaseOfStudies(PhysicsCase):
             )
         return self
 
+    @model_validator(mode="after")
+    def _classes_are_those_of_the_part(self) -> Self:
+        known = {"SS", "all", *self.part.classes}
+        for study in ("modes", "sweep"):
+            given = getattr(self, study).symmetry
+            if given not in known:
+                raise BrokenRule(
+                    f"{study}.symmetry",
+                    f"{given!r} where a {self.part.name} of the valve is computed",
+                    f"its classes of motion are {', '.join(self.part.classes)}",
+                )
+        return self
+
     def meets_pump(self, kind: str) -> bool:
         """Whether a study asks for the operating point of valve and pump."""
         listed = kind == "steady" and "pressures" in self.steady.model_fields_set

@@ -157,11 +157,20 @@ BAD = {
     "does not end at the side edge": (changed(6, "40, 3, 560"), "profile 2 at z = 0.56 m does not run from"),
     "backwards": ("\n".join([GOOD[0], *GOOD[3:0:-1], *GOOD[4:]]), "profile 1 at z = 0 m does not run from"),
     "below the plane": (changed(2, "50, -15, 0"), "leaves the quarter"),
-    "flat bottom": (
+    "lower lip flat": (
         "\n".join([GOOD[0], "0, 40, 0", "60, 20, 0", "50, -10, 0", "0, -10, 0", *GOOD[4:]]),
-        "profile 1 at z = 0 m leaves the quarter .* flat bottom has no such quarter",
+        "profile 1 at z = 0 m leaves the quarter of positive x and y",
     ),
     "to the left": (changed(2, "-50, 15, 0"), "leaves the quarter"),
+    "quarter after a half": (changed(1, "-60, 0, 0|0, 20, 0"), "profile 2 at z = 0.56 m does not begin as the first"),
+    "half below the plane": (
+        "\n".join([GOOD[0], "-60, 0, 0", "0, -20, 0", "60, 0, 0", "-40, 0, 560", "0, 40, 560", "40, 0, 560"]),
+        "profile 1 at z = 0 m leaves the half of positive y",
+    ),
+    "half without its edge": (
+        "\n".join([GOOD[0], "-60, 5, 0", "0, 20, 0", "60, 0, 0", "-40, 0, 560", "0, 40, 560", "40, 0, 560"]),
+        "profile 1 at z = 0 m does not run from side edge to side edge",
+    ),
     "same point twice": (changed(2, "50, 15, 0|50, 15, 0"), "has the same point twice"),
     "flange first": ("\n".join([GOOD[0], *GOOD[4:], *GOOD[1:4]]), "do not go from the lip to the flange"),
     "does not begin at the lip": ("\n".join(GOOD).replace(", 0\n", ", 7\n"), "first profile lies at z = 0.007 m"),

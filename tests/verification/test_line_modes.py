@@ -12,9 +12,9 @@ from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
 import dbvfiv
+from dbvfiv.case.part import QUARTER
 from dbvfiv.model import Conditions, ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.model.valve import QUARTERS
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import Case
@@ -122,7 +122,7 @@ def test_balances_of_line_and_valve(law):
     run = Runner(model, replace(RunOptions.of(case), step=StepOptions(tolerance=1e-9, floor=1e-13))).start()
     assert not run.failures
     h = run.history
-    section = QUARTERS * float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
+    section = QUARTER.copies * float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
     pipe = 0.25 * np.pi * 0.3**2
     velocity = h["inlet_velocity"]
     mean = 0.5 * (velocity[1:] + velocity[:-1])  # the step meets its equations halfway
@@ -136,7 +136,7 @@ def test_balances_of_line_and_valve(law):
     entered, left = (CubicSpline(h["time"], h[name]).antiderivative() for name in ("inlet_mass_flow", "mass_flow"))
     gained = entered(h["time"]) - left(h["time"])
     areas = h["station_area"].astype(float)
-    volume = QUARTERS * trapezoid(areas, model.mesh.z, axis=1)
+    volume = QUARTER.copies * trapezoid(areas, model.mesh.z, axis=1)
     held = density * (volume - volume[0]) if law == STORAGE else 0.0
     own = np.abs(h["balance"]).max() / np.abs(np.diff(h["pressure_work"])).sum()
     off = np.abs(missing).max() / moved, np.abs(gained - held).max() / entered(h["time"])[-1]

@@ -14,7 +14,7 @@ import dbvfiv
 from dbvfiv.case.quantity import GRAVITY
 
 CASES = Path(__file__).parents[2] / "cases"
-VALVES = ("dbv12", "dbv12-table-layers", "dbv12-40-percent", "dbv6", "dbv36", "dbv4-wide")
+VALVES = ("dbv12", "dbv12-table-layers", "dbv12-40-percent", "dbv6", "dbv36", "dbv4-wide", "dbv4-flat")
 HEADS = (0.1, 0.5, 2.0, 5.0, 10.0)
 MESH = {} if os.environ.get("DBVFIV_FINE") else {"mesh.around": 8, "mesh.along": 14}
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import jax.numpy as jnp
 
+from ...case.part import QUARTER
 from ..law import FlowParameter
 from ..term import FlowTerm
 
@@ -34,9 +35,11 @@ class Line(FlowTerm):
         Sum of K, of the velocity head in the line.
     reservoir : bool
         Whether the pressure that drives the flow is that of a reservoir; the static one in the line otherwise.
+    copies : int
+        How many of the part that is computed the whole valve is.
     """
 
-    DATA = ("length", "friction", "roughness", "loss", "diameter")
+    DATA = ("length", "friction", "roughness", "loss", "diameter", "copies")
     STATIC = ("reservoir",)
 
     def __init__(
@@ -47,10 +50,11 @@ class Line(FlowTerm):
         roughness: float = 0.0,
         loss: float = 0.0,
         reservoir: bool = True,
+        copies: int = QUARTER.copies,
     ):
         self.length, self.friction, self.roughness, self.loss = map(float, (length, friction, roughness, loss))
         self.diameter = None if diameter is None else float(diameter)
-        self.reservoir = bool(reservoir)
+        self.reservoir, self.copies = bool(reservoir), float(copies)
 
     @property
     def parameters(self) -> tuple[FlowParameter, ...]:
@@ -62,8 +66,8 @@ class Line(FlowTerm):
         return (self,)
 
     def section(self, inlet):
-        """Diameter, m, and area of the inlet over that of the line, from the area of a quarter of the inlet."""
-        own = jnp.sqrt(16.0 * inlet / jnp.pi)
+        """Diameter, m, and area of the inlet over that of the line, from the part's area of the inlet."""
+        own = jnp.sqrt(4.0 * self.copies * inlet / jnp.pi)
         return (own, 1.0) if self.diameter is None else (self.diameter, (own / self.diameter) ** 2)
 
     def lost(self, diameter, length):
@@ -73,7 +77,7 @@ class Line(FlowTerm):
         return (self.friction + factor) * length / diameter + self.loss
 
     def lost_head(self, inlet: float, velocity: float) -> float:
-        """Head lost in the line, m2/s2, from the area of a quarter of the inlet, m2, and its velocity, m/s."""
+        """Head lost in the line, m2/s2, from the part's area of the inlet, m2, and its velocity, m/s."""
         diameter, ratio = self.section(inlet)
         return float(0.5 * self.lost(diameter, self.length) * (ratio * velocity) ** 2)
 
@@ -145,7 +149,7 @@ def from_case(case) -> Line | PiecedLine | None:
         return None
     reservoir = case.drive.at == "reservoir"
     parts = [
-        Line(pipe.length, pipe.diameter, pipe.friction, pipe.roughness, pipe.loss, reservoir)
+        Line(pipe.length, pipe.diameter, pipe.friction, pipe.roughness, pipe.loss, reservoir, case.part.copies)
         for pipe in case.upstream.pipes
     ]
     return PiecedLine(parts) if case.upstream.pieces else parts[0]

@@ -18,8 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from ...case.part import QUARTER
 from ...case.quantity import GRAVITY
-from ...geometry import QUARTERS
 from ..term import FlowTerm
 
 
@@ -35,14 +35,23 @@ class Pump(FlowTerm):
         Of the fluid it pumps, kg/m3.
     pressure : float
         P_0, Pa.
+    copies : int
+        How many of the part that is computed the whole valve is.
     """
 
-    DATA = ("flow", "heads", "series", "density", "reference")
+    DATA = ("flow", "heads", "series", "density", "reference", "copies")
     drives = True
 
-    def __init__(self, flow: Sequence[float], head: Sequence[float], density: float, pressure: float):
+    def __init__(
+        self,
+        flow: Sequence[float],
+        head: Sequence[float],
+        density: float,
+        pressure: float,
+        copies: int = QUARTER.copies,
+    ):
         self.flow, self.heads, self.density = np.asarray(flow, float), np.asarray(head, float), float(density)
-        self.reference = pressure / (density * GRAVITY)
+        self.reference, self.copies = pressure / (density * GRAVITY), float(copies)
         inside = PchipInterpolator(self.flow, self.heads)
         ends = [(float(inside(q)), float(inside(q, 1))) for q in self.flow[[0, -1]]]
         before, after = ([0.0, 0.0, slope, value] for value, slope in ends)
@@ -72,7 +81,7 @@ class Pump(FlowTerm):
         Flow and head of a fluid of another density are those of the same pressures.
         """
         size = self.density / parameters["density"]
-        flow = QUARTERS * inlet_area * velocity / jnp.sqrt(size)
+        flow = self.copies * inlet_area * velocity / jnp.sqrt(size)
         return size * GRAVITY * (self.curve(flow) - self.reference)
 
     def head(self, stream, parameters):
@@ -84,4 +93,4 @@ def from_case(case) -> Pump | None:
     if not case.has_pump:
         return None
     flow, head = zip(*case.upstream.pump, strict=True)
-    return Pump(flow, head, case.fluid.density, case.drive.pressure)
+    return Pump(flow, head, case.fluid.density, case.drive.pressure, case.part.copies)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
+from ...case.part import QUARTER
 from ..law import FlowParameter
 from ..term import FlowTerm
 
@@ -29,14 +30,24 @@ class Tail(FlowTerm):
         Sum of K up to the far end, of the velocity head in the pipe.
     expansion : float, optional
         Loss of the widening jet over its velocity head, the K of Th. 7.2; Borda and Carnot's (1 - r)^2 without it.
+    copies : int
+        How many of the part that is computed the whole valve is.
 
     Flow that runs back comes from fluid at rest at the far end and gets no head from a jet.
     """
 
-    DATA = ("diameter", "length", "loss", "expansion")
+    DATA = ("diameter", "length", "loss", "expansion", "copies")
 
-    def __init__(self, diameter: float, length: float = 0.0, loss: float = 0.0, expansion: float | None = None):
+    def __init__(
+        self,
+        diameter: float,
+        length: float = 0.0,
+        loss: float = 0.0,
+        expansion: float | None = None,
+        copies: int = QUARTER.copies,
+    ):
         self.diameter, self.length, self.loss = map(float, (diameter, length, loss))
+        self.copies = float(copies)
         self.expansion = None if expansion is None else float(expansion)
 
     @property
@@ -44,9 +55,9 @@ class Tail(FlowTerm):
         return (FlowParameter("tail_length", "m", "length of the pipe behind", self.length),)
 
     @property
-    def quarter(self):
-        """A quarter of the pipe's section, m2."""
-        return jnp.pi * self.diameter**2 / 16.0
+    def section(self):
+        """The part's share of the pipe's section, m2."""
+        return jnp.pi * self.diameter**2 / (4.0 * self.copies)
 
     def gained(self, jet_area, jet, speed):
         """Rise of pressure over density from the jet to the pipe, m2/s2.
@@ -54,18 +65,18 @@ class Tail(FlowTerm):
         Parameters
         ----------
         jet_area : float, m2
-            Of a quarter.
+            Of the part.
         jet, speed : float, m/s
             Of the jet and in the pipe; what runs back gains nothing.
         """
         jet, speed = jnp.maximum(jet, 0.0), jnp.maximum(speed, 0.0)
         if self.expansion is None:
-            return jet_area / self.quarter * jet**2 - speed**2
+            return jet_area / self.section * jet**2 - speed**2
         return 0.5 * ((1.0 - self.expansion) * jet**2 - speed**2)
 
     def speed(self, inlet, velocity):
-        """Speed in the pipe, m/s, from the area of a quarter of the inlet, m2, and its velocity."""
-        return inlet * velocity / self.quarter
+        """Speed in the pipe, m/s, from the part's area of the inlet, m2, and its velocity."""
+        return inlet * velocity / self.section
 
     def lost_head(self, speed):
         """Head lost in the pipe, m2/s2, at a speed in it, m/s."""
@@ -84,4 +95,4 @@ def from_case(case) -> Tail | None:
     tail = case.downstream
     if not case.has_tail:
         return None
-    return Tail(tail.pipe_diameter, tail.length, tail.loss, tail.expansion_loss)
+    return Tail(tail.pipe_diameter, tail.length, tail.loss, tail.expansion_loss, case.part.copies)

@@ -18,7 +18,7 @@ def part(found: Gathered) -> Part:
     mesh = next(iter(found.results.values())).mesh if found.results else None
     sentences, tables = [], []
     if mesh is not None:
-        width, height = (2e3 * np.abs(mesh.nodes[mesh.rows[0], axis]).max() for axis in (0, 1))
+        width, height = (1e3 * mesh.extent(0, axis) for axis in (0, 1))
         inlet = 2e3 * np.hypot(mesh.nodes[mesh.rows[-1], 0], mesh.nodes[mesh.rows[-1], 1]).max()
         sentences = [
             f"{1e3 * np.ptp(mesh.z):.0f} mm long; at the lip {width:.0f} mm wide and {height:.1f} mm high over the "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...case.parameters import PARAMETERS
-from ...model.symmetry import SYMMETRIES
+from ...model.symmetry import symmetry_named
 from ...studies.map.result import LAWS
 from .. import live
 from ..content import Part, Table, pictures_of
@@ -25,7 +25,7 @@ def classes(found: Gathered) -> Part:
     result, title = found.classes, "Motions of all classes"
     if result is None or result.certificate is None:
         return not_there(found, "classes", title)
-    words = ", ".join(f"{name}: {SYMMETRIES[name].words}" for name in result.certificates)
+    words = ", ".join(f"{name}: {symmetry_named(name).words}" for name in result.certificates)
     return Part("classes", title, (result.verdict, f"{words}."), (_modes(result),), (), _certified(result))
 
 

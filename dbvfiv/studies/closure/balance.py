@@ -12,7 +12,7 @@ from ...shell import Shell
 
 @dataclass(frozen=True)
 class ForceBalance:
-    """Resultants on the quarter shell, N, each (3,).
+    """Resultants on the shell of the computed part, N, each (3,).
 
     Attributes
     ----------

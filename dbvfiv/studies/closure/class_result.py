@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES
+from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...record.record import Record
 
 #: Kinds of notes: lowest eigenvalues of one equilibrium, and a state that buckles.
@@ -40,7 +40,7 @@ class ClassBuckling:
         softest = min(range(len(self.lowest)), key=self.lowest.__getitem__)
         return {
             "symmetry": self.symmetry,
-            "motion": SYMMETRIES[self.symmetry].words,
+            "motion": symmetry_named(self.symmetry).words,
             "buckling": list(self.buckling),
             "critical_pressure": self.critical_pressure,
             "softest": {"pressure": self.pressures[softest], "lowest_stiffness_eigenvalue": self.lowest[softest]},
@@ -50,7 +50,7 @@ class ClassBuckling:
     @property
     def sentence(self) -> str:
         """The same for people."""
-        motion = f"class {self.symmetry} ({SYMMETRIES[self.symmetry].words})"
+        motion = f"class {self.symmetry} ({symmetry_named(self.symmetry).words})"
         if self.buckling:
             return f"Buckling in {motion} at {self.critical_pressure / 1e3:.6g} kPa."
         softest = min(range(len(self.lowest)), key=self.lowest.__getitem__)
@@ -71,18 +71,21 @@ def read_classes(record: Record, table: str) -> tuple[ClassBuckling, ...]:
         if note["table"] == table
     }
     found = []
-    for name in SYMMETRIES if seen else ():
-        if name != EQUILIBRIA:
-            pressures = sorted(seen)
-            lowest = tuple(seen[p][name] for p in pressures)
-            own = sorted((b for (symmetry, _), b in buckled.items() if symmetry == name), key=lambda b: b["pressure"])
-            found.append(ClassBuckling(name, tuple(pressures), lowest, tuple(own)))
+    for name in next(iter(seen.values()), ()):
+        pressures = sorted(seen)
+        lowest = tuple(seen[p][name] for p in pressures)
+        own = sorted((b for (symmetry, _), b in buckled.items() if symmetry == name), key=lambda b: b["pressure"])
+        found.append(ClassBuckling(name, tuple(pressures), lowest, tuple(own)))
     return tuple(found)
 
 
-def first_buckling(critical: float | None, classes: tuple[ClassBuckling, ...]) -> dict[str, Any] | None:
-    """Lowest pressure at which the wall buckles in any class, Pa, and the class; `critical` is that of the path."""
+def first_buckling(
+    critical: float | None, classes: tuple[ClassBuckling, ...], own: str = EQUILIBRIA
+) -> dict[str, Any] | None:
+    """Lowest pressure at which the wall buckles in any class, Pa, and the class; `critical` is that of the path, whose
+    class is `own`.
+    """
     found = [(c.critical_pressure, c.symmetry) for c in classes if c.critical_pressure is not None]
-    found += [] if critical is None else [(critical, EQUILIBRIA)]
+    found += [] if critical is None else [(critical, own)]
     pressure, name = min(found, default=(None, None))
     return None if pressure is None else {"pressure": pressure, "symmetry": name}

@@ -17,7 +17,7 @@ from ...contact import class_stiffness
 from ...model.classes import shell_of_class
 from ...model.load_steps import LoadStepOptions
 from ...model.pressed_shell import PressedShell
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
+from ...model.symmetry import Symmetry, symmetries_of
 from ...shell import Shell
 from ...shell.pressure import pressure_stiffness
 from .buckling import Buckling, BucklingWatch
@@ -90,8 +90,8 @@ class ClassWatch:
     def of(cls, model: ClosureModel, steps: LoadStepOptions, eigenvalues: int, wanted: bool) -> ClassWatch:
         """Of a model with contact; of no class unless it is wanted."""
         watches = {}
-        for name, symmetry in SYMMETRIES.items() if wanted and model.supports == CONTACT else ():
-            if name != EQUILIBRIA:
+        for name, symmetry in symmetries_of(model.mesh.part).items() if wanted and model.supports == CONTACT else ():
+            if not symmetry.of_equilibria:
                 spectrum = partial(ClassStiffness.of(model, symmetry).spectrum, eigenvalues)
                 watches[name] = BucklingWatch(model.pressed, steps, eigenvalues, spectrum=spectrum)
         return cls(watches, [])

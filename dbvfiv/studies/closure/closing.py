@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
-from ...geometry import QUARTERS
 from ...model.lip import LipCentre
 from ...motion.control import ControlOptions, FixedSteps
 from ...motion.scheme import scheme
@@ -21,7 +20,7 @@ from ...motion.stepper import StepFailure, StepOptions, Stepper
 from ...observer import Observer
 from ..case import Case
 from .closing_motion import ClosingMotion, ContactValve
-from .opening import FACES, measure
+from .opening import measure
 
 #: Rest before the drive turns, over the time it takes to turn.
 LEAD = 0.1
@@ -165,7 +164,7 @@ def closing_valve(case: Case) -> ContactValve:
 def shut_below(model: ContactValve) -> float:
     """Passage of the whole valve, m2, that counts as shut."""
     rest = measure(model.mesh, model.shell, model.face, np.zeros((len(model.mesh.nodes), 5)))
-    return QUARTERS * model.case.closure.shut_fraction * rest.reference
+    return model.mesh.part.copies * model.case.closure.shut_fraction * rest.reference
 
 
 def run_closing(
@@ -230,16 +229,16 @@ def _sample(model: ContactValve, motion: ClosingMotion, state, load) -> ClosingS
         raise SolveError(f"The state at {state.time:.6g} s is not finite.")
     passage = measure(model.mesh, model.shell, model.face, nodal)
     open_area = motion.fluid.open_area(load.area)
-    lip = LipCentre(model.mesh, model.shell)
+    lip, part = LipCentre(model.mesh, model.shell), model.mesh.part
     return ClosingSample(
         time=float(state.time),
         inlet_pressure=float(load.inlet),
         lip_opening=lip.opening(state.q),
         lip_displacement=lip.displacement(state.q),
-        least_opening=float(QUARTERS * passage.area.min()),
-        mass_flow=float(QUARTERS * motion.conditions.density * load.speed[0] * open_area[0]),
+        least_opening=float(part.copies * passage.area.min()),
+        mass_flow=float(part.copies * motion.conditions.density * load.speed[0] * open_area[0]),
         lowest_pressure=float(load.pressure.min()),
         highest_pressure=float(load.pressure.max()),
-        contact_force=float(FACES * contact.total),
+        contact_force=float(part.walls * contact.total),
         penetration=contact.penetration,
     )

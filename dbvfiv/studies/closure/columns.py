@@ -126,7 +126,7 @@ SUMMARY = (
 #: Fields of a state.
 FIELDS = (
     Column("nodal", "m, rad", "Displacements ux uy uz and two rotations of each node"),
-    Column("opening", "m^2", "Passage of a quarter between the inner faces at each row"),
+    Column("opening", "m^2", "Passage of the computed part between the inner faces at each row"),
     Column("contact_pressure", "Pa", "Contact pressure at each node"),
     Column("gap", "m", "Height of the inner face above the closing plane at each node"),
     Column("stiffness_eigenvalues", "1/s^2", "Those nearest to zero, real parts; NaN behind those that were followed"),

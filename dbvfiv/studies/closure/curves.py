@@ -199,11 +199,11 @@ def supports_compared(first: ClosureResult, second: ClosureResult) -> Figure:
         front.plot(p, [point.contact_front * 1e3 for point in result.walk], dash, color=colour, label=name)
         moved.plot(p, [point.max_displacement * 1e3 for point in result.walk], dash, color=colour)
         stiffness.plot(p, [point.lowest_eigenvalue / 1e3 for point in result.walk], dash, color=colour)
-        centre = result.mesh.rows[:, 0]
+        centre = result.mesh.centre_line
         for state, shade in zip(result.states, np.linspace(0.35, 1.0, len(result.states))):
             at = faces(result.mesh, state.nodal)[0][centre] * 1e3
             line.plot(at[:, 2], at[:, 1], dash, color=colour, alpha=shade, lw=1.2)
-    rest = faces(first.mesh)[0][first.mesh.rows[:, 0]] * 1e3
+    rest = faces(first.mesh)[0][first.mesh.centre_line] * 1e3
     line.plot(rest[:, 2], rest[:, 1], color=REST, lw=1.0, label="at rest")
     line.axhline(0.0, color=ACCENT, lw=1.0, label="inner faces meet")
     line.set_xlim(0.25 * rest[-1, 2], 0.9 * rest[-1, 2])

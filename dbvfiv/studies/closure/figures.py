@@ -67,7 +67,7 @@ def _cut(axes, skin: ValveSkin, state: PressedState, scale: Normalize) -> None:
     look = {"facecolors": COLOURS(scale(size[order])), "edgecolors": "0.25", "linewidths": 0.15}
     axes.add_collection(PolyCollection(corners[order][:, :, [2, 1]], **look))
     mesh = state.results.mesh
-    line = mesh.rows[:, 0]
+    line = mesh.centre_line
     low, high = ((face[line] * 1e3)[:, [2, 1]] for face in faces(mesh, state.nodal))
     wall = np.concatenate([low, high[::-1]])
     walls = PolyCollection([wall, wall * [1, -1]], facecolors="#c9b8a8", edgecolors="black", linewidths=0.7)
@@ -90,7 +90,7 @@ def _inset(axes, skin: ValveSkin, state: PressedState, scale: Normalize) -> None
 
 
 def contact_map(result: ClosureResult) -> Figure:
-    """Contact pressure on the unrolled inner face of a quarter at up to four back pressures, up to its maximum."""
+    """Contact pressure on the unrolled inner face of the part at up to four back pressures, up to its maximum."""
     states = some_of(sorted((s for s in result.states if s.contact_nodes), key=lambda s: s.pressure), 4)
     mesh = result.mesh
     arc, z = (1e3 * value for value in unrolled(mesh))
@@ -117,7 +117,7 @@ def contact_map(result: ClosureResult) -> Figure:
         )
         axes.set_xlabel("Arc from the centre, mm")
         axes.grid(False)
-        axes.set_xlim(0, arc[shown].max())
+        axes.set_xlim(arc[shown].min(), arc[shown].max())
         axes.set_ylim(0, z[last].max())
         axes.tick_params(labelleft=True)
     panels[0].set_ylabel("Distance from the lip z, mm")

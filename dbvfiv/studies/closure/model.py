@@ -23,7 +23,7 @@ ROUNDING = 0.3
 
 @dataclass(frozen=True)
 class ClosureModel:
-    """A quarter valve, pressed from outside.
+    """The computed part of a valve, pressed from outside.
 
     Attributes
     ----------

@@ -11,13 +11,10 @@ from ...geometry import ValveMesh
 from ...shell import Shell
 from .model import ClosureModel
 
-#: The quarter model meets the closing plane once; the whole valve's walls meet each other over two such quarters.
-FACES = 2
-
 
 @dataclass(frozen=True)
 class Opening:
-    """Passage between the inner faces of one state, a quarter of it, by mesh row from the lip.
+    """Passage between the inner faces of one state, of the part that is computed, by mesh row from the lip.
 
     Attributes
     ----------

@@ -13,7 +13,6 @@ import numpy as np
 from continuation import NotConverged
 
 from ...errors import SolveError
-from ...geometry import QUARTERS
 from ...model.load_steps import LoadStepOptions, LoadSteps
 from ...model.newton import NewtonOptions
 from ...model.symmetry import ALL
@@ -23,7 +22,7 @@ from .buckling import Buckling, BucklingWatch
 from .classes import ClassWatch
 from .energy import EnergyLedger
 from .model import ClosureModel
-from .opening import FACES, opening
+from .opening import opening
 from .path_point import PathPoint, PathRestart
 from .state import ClosureState, contact_front, describe_closure, face_overlap
 from .stiffness import stiffness_spectrum
@@ -294,8 +293,8 @@ class ClosurePath:
         return PathPoint(
             pressure=float(pressure),
             max_displacement=float(np.linalg.norm(nodal[:, :3], axis=1).max()),
-            contact_force=FACES * contact.total,
-            least_opening=float(QUARTERS * passage.area.min()),
+            contact_force=model.mesh.part.walls * contact.total,
+            least_opening=float(model.mesh.part.copies * passage.area.min()),
             sealed_length=passage.shut_length(model.case.closure.shut_fraction),
             lip_seal=passage.lip_seal(model.case.closure.shut_fraction),
             contact_front=contact_front(passage, model),

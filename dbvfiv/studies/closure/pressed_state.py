@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...geometry import QUARTERS
 from ...record.states import LAYERS
 from ...shell.recovery import LayerFields
 from .columns import STATES, SUMMARY
@@ -48,7 +47,9 @@ class PressedState(ClosureState):
     def sealed_intervals(self) -> list[list[float]]:
         """Intervals along the axis, m, on which the valve is shut."""
         results = self.results
-        passage = Opening(results.mesh.z, self.opening, results.reference_opening / QUARTERS, self.gap, self.gap)
+        passage = Opening(
+            results.mesh.z, self.opening, results.reference_opening / results.mesh.part.copies, self.gap, self.gap
+        )
         return [list(pair) for pair in passage.shut_intervals(results.case.closure.shut_fraction)]
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...drawing import layers
-from ...model.symmetry import EQUILIBRIA
+from ...model.symmetry import equilibria_of
 from ...record.header import Header
 from ...record.layout import Column
 from ...record.record import Record, plain
@@ -202,17 +202,18 @@ class ClosureResult(StudyResult):
     def summary(self) -> dict[str, Any]:
         followed = [point for point in self.walk if np.isfinite(point.lowest_eigenvalue)]
         softest = min(followed, key=lambda point: point.lowest_eigenvalue, default=None)
+        own = equilibria_of(self.case.part).name
         document = {
             "supports": self.supports,
             "points": [state.summary() for state in self.states],
             "before_limit": None if self.before_limit is None else self.before_limit.summary(),
             "closing_pressure": self.closing_pressure,
             "buckling": [
-                {"kind": b.kind, "pressure": b.pressure, "eigenvalue": b.eigenvalue, "symmetry": EQUILIBRIA}
+                {"kind": b.kind, "pressure": b.pressure, "eigenvalue": b.eigenvalue, "symmetry": own}
                 for b in self.buckling
             ],
             "critical_pressure": self.critical_pressure,
-            "first_buckling": first_buckling(self.critical_pressure, self.classes),
+            "first_buckling": first_buckling(self.critical_pressure, self.classes, own),
             "classes": [part.summary() for part in self.classes],
             "safety": None if self.safety is None else self.safety.summary(),
             "softest": {"pressure": softest.pressure, "lowest_stiffness_eigenvalue": softest.lowest_eigenvalue}

@@ -6,18 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry import QUARTERS
 from ...model.lip import LipCentre
 from ...shell.recovery import layer_fields
 from .balance import force_balance
 from .model import ClosureModel
-from .opening import FACES, Opening, opening
+from .opening import Opening, opening
 from .stiffness import StiffnessSpectrum
 
 
 @dataclass(frozen=True)
 class ClosureState:
-    """An equilibrium under back pressure. Areas and forces are those of the whole valve, fields those of the quarter.
+    """An equilibrium under back pressure. Areas and forces are those of the whole valve, fields those of the
+    part that is computed.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class ClosureState:
     nodal : (nn, 5) array, m and rad
         Displacements and rotations of all nodes.
     opening : (rows,) array, m2
-        Passage of a quarter at each row.
+        Passage of the computed part at each row.
     contact_pressure, gap : (nn,) arrays, Pa, m
     stiffness_eigenvalues : (k,) array, 1/s2
         Real parts, ascending.
@@ -132,7 +132,7 @@ def describe_closure(
     """State of a model from its unknowns; `known` holds how it was found, the energy balance and whether it lies beyond
     a limit point.
     """
-    pressed = model.pressed
+    pressed, part = model.pressed, model.mesh.part
     nodal = pressed.nodal(q)
     state, passage = pressed.contact_state(q), opening(model, q)
     fraction = model.case.closure.shut_fraction
@@ -154,14 +154,14 @@ def describe_closure(
         sealed_length=length,
         lip_seal=lip,
         joint_seal=length - lip,
-        sealed_area=float(FACES * pressed.contact.area[state.touching].sum()),
-        contact_force=FACES * state.total,
+        sealed_area=float(part.walls * pressed.contact.area[state.touching].sum()),
+        contact_force=part.walls * state.total,
         largest_contact_pressure=float(state.pressure.max(initial=0.0)),
         contact_nodes=int(np.count_nonzero(state.touching)),
         contact_front=contact_front(passage, model),
         penetration=state.penetration,
         overlap=face_overlap(model, nodal),
-        least_opening=float(QUARTERS * passage.area.min()),
+        least_opening=float(part.copies * passage.area.min()),
         least_opening_position=float(passage.z[passage.narrowest]),
         lip_opening=centre.opening(q),
         lip_displacement=centre.displacement(q),
@@ -199,7 +199,10 @@ def contact_front(passage: Opening, model: ClosureModel) -> float:
     rows.
     """
     # just less than the gap that lifted rows have at rest
-    gap = np.where(model.held, 0.0, passage.gap[:, 0]) - 0.999 * model.case.valve.initial_gap
+    gap = (
+        np.where(model.held, 0.0, passage.gap[:, model.mesh.part.centre(passage.gap.shape[1])])
+        - 0.999 * model.case.valve.initial_gap
+    )
     met = np.flatnonzero(gap <= 0)
     if not len(met):
         return 0.0

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
-from ...geometry import QUARTERS
 from ...model.equilibria import model_warnings, state_warnings
-from ...model.symmetry import SYMMETRIES
+from ...model.symmetry import symmetry_named
 from ...record.record import GrowingRecord
 from ...record.states import LAYERS
 from ...shell.recovery import layer_fields
@@ -51,7 +50,8 @@ class ClosureWalk:
         record = self.record
         self._say([*model_warnings(self.model), *start_warnings(self.model)])
         if not record.notes(self.states):
-            reference = QUARTERS * opening(self.model, self.model.pressed.rest()).reference
+            copies = self.model.mesh.part.copies
+            reference = copies * opening(self.model, self.model.pressed.rest()).reference
             record.note(self.states, supports=self.model.supports, reference_opening=reference)
         try:
             over = [note for note in record.notes("walked") if note["table"] == self.states]
@@ -111,7 +111,9 @@ class ClosureWalk:
                     pressure=found.pressure,
                     eigenvalue=found.eigenvalue,
                 )
-                self._say([f"The wall buckles at {found.pressure:.6g} Pa in class {name}: {SYMMETRIES[name].words}."])
+                self._say(
+                    [f"The wall buckles at {found.pressure:.6g} Pa in class {name}: {symmetry_named(name).words}."]
+                )
             self._class_buckling_kept[name] = len(watch.found)
 
     def _reached(self, state: ClosureState) -> None:

@@ -211,7 +211,7 @@ def spectrum(result: CycleResult) -> Figure:
 
 
 def stress_range(result: CycleResult) -> Figure:
-    """Largest range of a stress over a period of the last cycle, in each layer on the unrolled quarter."""
+    """Largest range of a stress over a period of the last cycle, in each layer on the unrolled part."""
     point = result.nearest()
     figure, _ = layer_panels(result.mesh, point.ranges.stress.T / 1e6, "Range of stress, MPa")
     headline(figure, f"Range of stress over a period, {_at(result, point)}")

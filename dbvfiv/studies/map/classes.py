@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES
+from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...observer import Observer
 from ...record.record import GrowingRecord
 from ..case import Case
@@ -24,7 +24,7 @@ _PLAIN = {"map.curve": False, "map.refine": 0, "map.continuity": "case", "map.wo
 
 def look_at_classes(case: Case, record: GrowingRecord, walk: StabilityWalk) -> None:
     """Cells of the grid in the other classes, where they are asked for and not in the record yet."""
-    for symmetry in classes_to_look_at(record, case.map.symmetry):
+    for symmetry in classes_to_look_at(record, case.map.symmetry, case.part):
         found = run_map(case.replace(_PLAIN), Observer(), walk=walk.in_class(symmetry))
         for sentence in found.warnings:
             record.warn(f"In class {symmetry.name}: {sentence}")
@@ -36,7 +36,7 @@ def look_at_classes(case: Case, record: GrowingRecord, walk: StabilityWalk) -> N
 def note_of_class(found: FoundMap, name: str) -> dict[str, Any]:
     """What a record keeps of a class: tables (y, x)."""
     grids = {grid: found.grid(grid)[0].tolist() for grid in _GRIDS}
-    return {"symmetry": name, "motion": SYMMETRIES[name].words} | grids
+    return {"symmetry": name, "motion": symmetry_named(name).words} | grids
 
 
 def summary_of(note: dict[str, Any]) -> dict[str, Any]:
@@ -52,11 +52,13 @@ def summary_of(note: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def leading_of(growth: np.ndarray, frequency: np.ndarray, notes: list[dict[str, Any]]) -> dict[str, Any]:
+def leading_of(
+    growth: np.ndarray, frequency: np.ndarray, notes: list[dict[str, Any]], own: str = EQUILIBRIA
+) -> dict[str, Any]:
     """Growth rate, frequency and class of the most unstable motion in each cell, from tables (y, x) of the class of the
-    equilibria and the notes of the others; a gap stays one.
+    equilibria, `own`, and the notes of the others; a gap stays one.
     """
-    names = [EQUILIBRIA, *(note["symmetry"] for note in notes)]
+    names = [own, *(note["symmetry"] for note in notes)]
     rates = np.stack([growth, *(np.array(note["growth_rate"], float) for note in notes)])
     frequencies = np.stack([frequency, *(np.array(note["frequency"], float) for note in notes)])
     gap = np.isnan(rates[0])

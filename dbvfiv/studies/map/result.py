@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...model.symmetry import equilibria_of
 from ..result import StudyResult
 from ..stability.classes import NOTE as CLASS_NOTE
 from ..stability.place import describe_fixed, fixed_conditions
@@ -97,7 +98,11 @@ class MapResult(StudyResult):
 
     def _picture(self, law: int) -> dict[str, Any]:
         tables = self.grid("growth_rate")[law], self.grid("frequency")[law]
-        leading = {"leading": classes.leading_of(*tables, self.classes)} if self.classes else {}
+        leading = (
+            {"leading": classes.leading_of(*tables, self.classes, equilibria_of(self.case.part).name)}
+            if self.classes
+            else {}
+        )
         followed = cycles.summary_of(self.record, self.plan, law) if self.case.map.cycles else {}
         mine = [curve for curve in self.curves if curve.law == law]
         return (

@@ -36,10 +36,12 @@ def _wide(shapes: MeasuredShapes) -> list[MeasuredSection]:
 
 
 def _on_centre(shapes: MeasuredShapes) -> dict[tuple[float, str], np.ndarray]:
-    """Points at x = 0 in two sections or more: (k, 2) z and y, m, by pressure and face."""
+    """Points at x = 0, where the middle of the lips is, in two sections or more: (k, 2) z and y, m, by pressure and
+    face; none on a half, whose middle need not be there.
+    """
     found: dict[tuple[float, str], list[tuple[float, float]]] = {}
     for section in shapes.sections:
-        if section.z is None:
+        if section.z is None or not section.part.is_quarter:
             continue
         near = np.abs(section.points[:, 0]) <= 1e-3 * max(1e-2, np.abs(section.points).max())
         for _, y in section.points[near]:
@@ -65,7 +67,7 @@ def sections(shapes: MeasuredShapes) -> Figure:
 def draw_section(axes: Axes, section: MeasuredSection) -> None:
     """One section: the computed curve of the whole valve and the measured points."""
     if section.curve is not None:
-        axes.plot(*closed_section(section.curve).T * 1e3, color=COMPUTED, label="computed")
+        axes.plot(*closed_section(section.curve, section.part).T * 1e3, color=COMPUTED, label="computed")
     axes.plot(*section.points.T * 1e3, color="black", label="measured", **MEASURED)
     distance = 1e3 * section.distance
     told = f"{np.sqrt(np.mean(distance**2)):.3g} mm rms" if np.isfinite(distance).all() else "not computed there"
@@ -82,10 +84,10 @@ def draw_section_of_runs(
     axes: Axes, section: MeasuredSection, shapes: Sequence[MeasuredShapes | None], colours: Sequence[Any]
 ) -> None:
     """The measured points of a section, and what several runs have computed there, in their colours."""
-    for part, colour in zip(shapes, colours):
-        curve = None if part is None else part.walls.curve(section.pressure, section.z, section.face)
+    for run, colour in zip(shapes, colours):
+        curve = None if run is None else run.walls.curve(section.pressure, section.z, section.face)
         if curve is not None:
-            axes.plot(*closed_section(curve).T * 1e3, color=colour, lw=1.2)
+            axes.plot(*closed_section(curve, run.walls.mesh.part).T * 1e3, color=colour, lw=1.2)
     axes.plot(*section.points.T * 1e3, color="black", **MEASURED)
     _label(axes, section.title)
 

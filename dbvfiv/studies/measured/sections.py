@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ...case.part import QUARTER, Part
 from ...drawing.faces import closed_section, faces
 from ...drawing.style import kilopascals
 from ...record.mesh import MeshData
@@ -37,7 +38,7 @@ class WallSections:
     _known: dict[float, dict[str, np.ndarray] | None] = field(default_factory=dict, repr=False)
 
     def places(self, pressure: float) -> dict[str, np.ndarray] | None:
-        """Faces, and the middle between them, as (rows, columns, 3) places of a quarter, m, at a pressure, Pa; None
+        """Faces, and the middle between them, as (rows, columns, 3) places of the part, m, at a pressure, Pa; None
         where there is no state.
         """
         if pressure not in self._known:
@@ -53,16 +54,16 @@ class WallSections:
         return {"inner": inner[rows], "outer": outer[rows], "middle": 0.5 * (inner + outer)[rows]}
 
     def curve(self, pressure: float, z: float | None, face: str) -> np.ndarray | None:
-        """(columns, 2) x and y, m, of a face in the plane of z, m, or at the edge of the lip, from x = 0 to the side
-        edge; None where there is none.
+        """(columns, 2) x and y, m, of a face in the plane of z, m, or at the edge of the lip, along the section of the
+        part; None where there is none.
         """
         places = self.places(pressure)
         return None if places is None else cut(places[face], z)
 
     def centre_line(self, pressure: float, face: str) -> np.ndarray | None:
-        """(rows, 2) z and y, m, of a face in the plane x = 0."""
+        """(rows, 2) z and y, m, of a face in the middle of the lips."""
         places = self.places(pressure)
-        return None if places is None else places[face][:, 0, [2, 1]]
+        return None if places is None else places[face][:, self.mesh.part.centre(self.mesh.rows.shape[1]), [2, 1]]
 
 
 def cut(places: np.ndarray, z: float | None) -> np.ndarray | None:
@@ -84,16 +85,16 @@ def cut(places: np.ndarray, z: float | None) -> np.ndarray | None:
     return found[:, :2]
 
 
-def distances(points: np.ndarray, curve: np.ndarray) -> np.ndarray:
-    """Signed distances (k,), m, of a curve (c, 2) of a quarter from points (k, 2) of any quarter: positive where the
+def distances(points: np.ndarray, curve: np.ndarray, part: Part = QUARTER) -> np.ndarray:
+    """Signed distances (k,), m, of a curve (c, 2) of a part from points (k, 2) of any image of it: positive where the
     curve lies farther out.
     """
-    folded = np.abs(points)
+    folded = np.abs(points) if part.is_quarter else np.column_stack([points[:, 0], np.abs(points[:, 1])])
     begin, way = curve[:-1], np.diff(curve, axis=0)
     size = np.maximum(np.sum(way**2, axis=1), 1e-300)
     share = np.clip(np.einsum("kci,ci->kc", folded[:, None] - begin, way) / size, 0.0, 1.0)
     nearest = np.linalg.norm(begin + share[:, :, None] * way - folded[:, None], axis=2).min(axis=1)
-    return np.where(_inside(folded, closed_section(curve)), nearest, -nearest)
+    return np.where(_inside(folded, closed_section(curve, part)), nearest, -nearest)
 
 
 def _inside(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
@@ -117,7 +118,8 @@ class MeasuredSection:
         "inner", "outer" or "middle".
     points : (k, 2) array, m
     curve : (c, 2) array or None, m
-        The computed section of a quarter; None without a state there or beyond the valve.
+        The computed section of a part; None without a state there or beyond the valve.
+    part : Part
     """
 
     pressure: float
@@ -125,11 +127,14 @@ class MeasuredSection:
     face: str
     points: np.ndarray
     curve: np.ndarray | None
+    part: Part = QUARTER
 
     @property
     def distance(self) -> np.ndarray:
         """(k,) m, from the points to the computed section, positive where that lies farther out; NaN without one."""
-        return np.full(len(self.points), np.nan) if self.curve is None else distances(self.points, self.curve)
+        return (
+            np.full(len(self.points), np.nan) if self.curve is None else distances(self.points, self.curve, self.part)
+        )
 
     @property
     def title(self) -> str:
@@ -166,7 +171,10 @@ class MeasuredShapes:
         groups: dict[tuple[float, float | None, str], list[tuple[float, float]]] = {}
         for pressure, z, face, x, y in zip(*columns):
             groups.setdefault((pressure, z, face), []).append((x, y))
-        return cls(tuple(MeasuredSection(*at, np.array(xy), walls.curve(*at)) for at, xy in groups.items()), walls)
+        return cls(
+            tuple(MeasuredSection(*at, np.array(xy), walls.curve(*at), walls.mesh.part) for at, xy in groups.items()),
+            walls,
+        )
 
     @property
     def distance(self) -> np.ndarray:

@@ -12,7 +12,7 @@ from ...drawing.faces import faces
 from ...drawing.style import COMPUTED, REST, new_figure, phase_looks
 from ...drawing.views import mark_pieces
 from ...drawing.waves import wave_content
-from ...model.symmetry import SYMMETRIES
+from ...model.symmetry import symmetry_named
 from .plane import conditions, mode_title
 from .shapes import drawn_amplitude
 
@@ -30,7 +30,7 @@ def draw(result: ModesResult, mode: int | None = None) -> Iterator[tuple[str, Ca
     about it the line x = 0 does not swing in y.
     """
     chosen = result.modes[:_DRAWN] if mode is None else [result.mode(mode)]
-    for each in (mode for mode in chosen if SYMMETRIES[mode.symmetry].signs[0] > 0):
+    for each in (mode for mode in chosen if symmetry_named(mode.symmetry).signs[0] > 0):
         yield f"centre-line-{each.number}", lambda each=each: centre_line(result, each)
 
 
@@ -38,7 +38,7 @@ def centre_line(result: ModesResult, mode: ModeShape) -> Figure:
     """Inner face at x = 0 over one cycle (compare Fig. 7-16 of the thesis): its place, the swing in y, how the motion
     lags along it, and how much of it travels.
     """
-    line, z = result.mesh.rows[:, 0], result.mesh.z * 1e3
+    line, z = result.mesh.centre_line, result.mesh.z * 1e3
     figure = new_figure(7.4, 8.0)
     place, swing, lag = figure.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": [1.25, 1.1, 0.8]})
     amplitude = drawn_amplitude(result.state, mode)
@@ -68,7 +68,7 @@ def centre_line(result: ModesResult, mode: ModeShape) -> Figure:
 def _draw_cycle(place, swing, result: ModesResult, mode: ModeShape, amplitude: float) -> None:
     """Inner face and swing of the line x = 0 at some phases, about the steady state."""
     mesh, steady = result.mesh, result.state.nodal
-    line, z = mesh.rows[:, 0], mesh.z * 1e3
+    line, z = mesh.centre_line, mesh.z * 1e3
     phases = np.arange(_PHASES) / _PHASES
     for share, look in zip(phases, phase_looks(_PHASES)):
         shape = mode.at_phase(2 * np.pi * share)

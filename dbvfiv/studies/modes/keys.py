@@ -21,9 +21,11 @@ class Keys(Section):
     shift_frequency: Frequency = key(0.0, "Frequency of that shift.", ge=0, le=1e6)
     tolerance: Number = key(1e-8, "Largest accepted relative residual of the full pencil.", gt=0, le=1e-2)
     continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
-    symmetry: Literal["SS", "SA", "AS", "AA", "all"] = key(
+    symmetry: Literal["SS", "SA", "AS", "AA", "S", "A", "all"] = key(
         "SS",
         "Class of motion, symmetric (S) or antisymmetric (A) about x = 0, first letter, and about y = 0, second: SS "
-        "opens and closes the lips, SA sways them together in y, AS sideways in x, AA twists; or all four.",
+        "opens and closes the lips, SA sways them together in y, AS sideways in x, AA twists; or all four. Where a "
+        "half is computed there are two about y = 0 alone: S, which SS stands for too, opens the lips or sways them "
+        "sideways, A sways them together in y or twists.",
     )
     in_vacuo: StrictBool = key(False, "Leave the fluid out: the stressed structure alone.")

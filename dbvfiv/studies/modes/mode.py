@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES
+from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...record.layout import Column
 from ..state import State
 from .run import FoundModes
@@ -24,7 +24,12 @@ MODE = (
         "Displacements and rotations of the nodes, the largest displacement being 1 and real",
         "c16",
     ),
-    Column("area", "m", "Change of the flow area of a quarter at each row, m2 for 1 m of largest displacement", "c16"),
+    Column(
+        "area",
+        "m",
+        "Change of the flow area of the computed part at each row, m2 for 1 m of largest displacement",
+        "c16",
+    ),
     Column("pressure", "Pa/m", "Change of the pressure at each row for 1 m of largest displacement", "c16"),
     Column("inlet_velocity", "1/s", "Change of the inlet velocity for 1 m of largest displacement", "c16"),
 )
@@ -102,9 +107,9 @@ class ModeShape:
         """Largest displacement, m, at which the mode shows well and the centre line of the duckbill stays open."""
         mesh = state.results.mesh
         largest = _DRAWN * float(np.ptp(mesh.z))
-        if not SYMMETRIES[self.symmetry].moves_lips_apart:
+        if not symmetry_named(self.symmetry).moves_lips_apart:
             return largest
-        line = mesh.rows[:, 0]
+        line = mesh.centre_line
         height = mesh.nodes[line, 1] + state.nodal[line, 1]
         swing = np.abs(self.shape[line, 1])
         moving = swing > 1e-3

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...drawing.style import DANGER, STABLE, UNSTABLE, driven, new_figure
-from ...model.symmetry import EQUILIBRIA
+from ...model.symmetry import symmetry_named
 
 if TYPE_CHECKING:
     from .result import ModesResult
@@ -103,7 +103,7 @@ def mode_title(mode) -> str:
 
 def class_of(mode) -> str:
     """Class of motion as it stands behind the number of a mode; nothing for that of the equilibria."""
-    return "" if mode.symmetry == EQUILIBRIA else f" {mode.symmetry}"
+    return "" if symmetry_named(mode.symmetry).of_equilibria else f" {mode.symmetry}"
 
 
 def _rays(axes, left: float, top: float) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from ...errors import CaseError
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES
+from ...model.symmetry import EQUILIBRIA, asks_for_equilibria, symmetry_named
 from ...record.mesh import MeshData
 from ...record.states import state_table
 from ...record.table import TableSpec
@@ -166,7 +166,7 @@ class ModesResult(StudyResult):
     def _class_summary(name: str, found: Certificate) -> dict[str, Any]:
         return {
             "symmetry": name,
-            "motion": SYMMETRIES[name].words,
+            "motion": symmetry_named(name).words,
             "unstable_count": found.unstable_count,
             "unstable_count_independent": found.unstable_count_independent,
             "stable": found.stable,
@@ -181,10 +181,10 @@ class ModesResult(StudyResult):
             for m in self.modes
         ]
         head, notes = HEAD, [f"Note: {note}" for note in self.notes]
-        if self.case.modes.symmetry != EQUILIBRIA:
+        if not asks_for_equilibria(self.case.modes.symmetry):
             head = (f"{HEAD[0]}   class", HEAD[1])
             rows = [f"{row}{mode.symmetry:>8}" for row, mode in zip(rows, self.modes)]
-            words = ", ".join(f"{name}: {SYMMETRIES[name].words}" for name in self.certificates)
+            words = ", ".join(f"{name}: {symmetry_named(name).words}" for name in self.certificates)
             notes = [f"Classes: {words}.", *notes]
         other = self.other_law
         if other is None:

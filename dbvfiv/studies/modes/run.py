@@ -30,6 +30,10 @@ from ..solving import solving
 
 #: Structural modes in the basis behind the independent count.
 _BASIS = 24
+_NO_PLUG = (
+    "Inner fluid answers to the areas of this half of the valve and does not go along where it sways sideways in x: "
+    "frequencies of such modes are too high in a liquid."
+)
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,7 @@ class FoundModes:
     shapes : (k, nn, 5) complex
         Displacements and rotations of the nodes, the largest displacement being 1 and real.
     areas, pressures : (k, m) complex
-        Changes of the row areas (m2, a quarter) and station pressures (Pa) for a largest displacement of 1 m; no
+        Changes of the row areas (m2, of the part) and station pressures (Pa) for a largest displacement of 1 m; no
         pressures in vacuo, and none of either to first order but in the class of the equilibria.
     inlet_velocities : (k,) complex, m/s
         Likewise.
@@ -182,6 +186,8 @@ def run_modes(
             ),
         )
     notes = (*notes, *certified.spectrum.notes, *of_the_wall(certified.spectrum, pencil))
+    if symmetry.of_equilibria and not (model.mesh.part.is_quarter or without_fluid):
+        notes = (*notes, _NO_PLUG)
     result = _described(model, state, conditions, without_fluid, certified, pencil, linear, notes, symmetry)
     observer.item(result)
     if result.stable is None:
@@ -234,7 +240,7 @@ def _described(
 
 def _changes(model, pencil: CoupledPencil, linear, spectrum, symmetry, in_vacuo) -> tuple[np.ndarray, np.ndarray]:
     """Changes of areas (m, k) and pressures (m or 0, k) of the eigenvectors."""
-    if symmetry.name != EQUILIBRIA:
+    if not symmetry.of_equilibria:
         return np.zeros((model.stations, len(spectrum)), complex), np.zeros(
             (0 if in_vacuo else model.stations, len(spectrum)), complex
         )

@@ -15,7 +15,7 @@ from ...drawing.axes import colour_bar, headline
 from ...drawing.faces import ValveSkin, faces
 from ...drawing.style import UNSTABLE, new_figure
 from ...drawing.views import COLOURS, frame, shaded
-from ...model.symmetry import SYMMETRIES
+from ...model.symmetry import symmetry_named
 from .plane import conditions, mode_title
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def draw(result: ModesResult, mode: int | None = None) -> Iterator[tuple[str, Ca
 
 
 def mode_shapes(result: ModesResult, modes) -> Figure:
-    """Modes at the phase of their largest displacement, all quarters, coloured by the amplitude over a cycle."""
+    """Modes at the phase of their largest displacement, the whole valve, coloured by the amplitude over a cycle."""
     columns = min(2, len(modes))
     rows = -(-len(modes) // columns)
     figure = new_figure(8.2, 5.0) if columns == 1 else new_figure(5.2 * columns, 3.2 * rows)
@@ -77,7 +77,7 @@ class ModeSurface:
         self.mode = mode
         self.amplitude = drawn_amplitude(result.state, mode)
         self.steady = result.state.nodal
-        self.parity = SYMMETRIES[mode.symmetry].parity(self.skin.valve.sign)
+        self.parity = symmetry_named(mode.symmetry).parity(self.skin.valve.sign)
         self.colours = COLOURS(self.skin.means(mode.amplitude))
 
     def corners(self, phase: float) -> np.ndarray:
@@ -111,10 +111,11 @@ class ModeSurface:
 def drawn_amplitude(state: State, mode: ModeShape) -> float:
     """Largest displacement, m, at which a mode shows well and the inner faces of the lips do not cross."""
     mesh = state.results.mesh
-    symmetry = SYMMETRIES[mode.symmetry]
+    symmetry = symmetry_named(mode.symmetry)
     if not symmetry.moves_lips_apart:
         return mode.drawn_amplitude(state)
-    line = mesh.rows[:, 0] if symmetry.signs[0] > 0 else mesh.rows.ravel()  # a sideways sway leaves x = 0 in place
+    line = mesh.centre_line  # which a sideways sway leaves in place
+    line = line if symmetry.signs[0] > 0 and mesh.part.is_quarter else mesh.rows.ravel()
     height = faces(mesh, state.nodal)[0][line, 1]
     swing = np.abs(mode.shape[line, 1])
     chosen = (swing > 1e-3) & (height > 0)

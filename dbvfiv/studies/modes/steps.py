@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...model.symmetry import SYMMETRIES
+from ...model.symmetry import symmetry_named
 from ...record.fields import motion
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
@@ -32,7 +32,7 @@ class _ModeSteps(Sequence):
 
     def __getitem__(self, number):
         mode, valve, mesh = self.result.modes[number], self.valve, self.result.mesh
-        shape, parity = mode.shape[:, :3], SYMMETRIES[mode.symmetry].parity(valve.sign)[:, None]
+        shape, parity = mode.shape[:, :3], symmetry_named(mode.symmetry).parity(valve.sign)[:, None]
         points = motion(mesh, valve, self.result.state.nodal) | {
             "mode_real": valve.vectors(shape.real) * parity,
             "mode_imag": valve.vectors(shape.imag) * parity,
@@ -65,7 +65,7 @@ class _CycleSteps(Sequence):
         share = range(self.phases + 1)[number] / self.phases
         mode, state, mesh = self.mode, self.result.state, self.result.mesh
         moved = mode.at_phase(2 * np.pi * share) * mode.drawn_amplitude(state)
-        parity = SYMMETRIES[mode.symmetry].parity(self.valve.sign)[:, None]
+        parity = symmetry_named(mode.symmetry).parity(self.valve.sign)[:, None]
         points = motion(mesh, self.valve, state.nodal + moved)
         if np.any(parity < 0):
             opposite = motion(mesh, self.valve, state.nodal - moved)

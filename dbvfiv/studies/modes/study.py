@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...errors import CaseError
 from ...model.state import SteadyState
-from ...model.symmetry import EQUILIBRIA, Symmetry, chosen_symmetries
+from ...model.symmetry import EQUILIBRIA, Symmetry, asks_for_equilibria, chosen_symmetries
 from ...record.record import GrowingRecord
 from ...record.states import state_row
 from ..case import Case
@@ -26,7 +26,8 @@ def run(session: Session, record: GrowingRecord) -> None:
         require_two_laws(case, "modes", "modes.in_vacuo leaves the fluid out" if case.modes.in_vacuo else "")
         _require_one_class(case)
     done = {note.get("symmetry", EQUILIBRIA) for note in record.notes("certificate")}
-    missing = [symmetry for symmetry in chosen_symmetries(case.modes.symmetry) if symmetry.name not in done]
+    chosen = chosen_symmetries(case.modes.symmetry, case.part)
+    missing = [symmetry for symmetry in chosen if symmetry.name not in done]
     further = both and not record.notes(NOTE)
     if not (missing or further):
         return
@@ -48,7 +49,7 @@ def _require_one_class(case: Case) -> None:
     ------
     CaseError
     """
-    if case.modes.symmetry != EQUILIBRIA:
+    if not asks_for_equilibria(case.modes.symmetry):
         raise CaseError(
             f"modes.continuity is given as 'both' with modes.symmetry = {case.modes.symmetry!r}, but the laws differ "
             f"in class {EQUILIBRIA} alone, since no other motion changes areas; modes.symmetry must be {EQUILIBRIA!r} "

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ...drawing.axes import log_axis
 from ...drawing.style import COMPUTED, STABLE, UNSTABLE, new_figure
-from ...model.symmetry import EQUILIBRIA
+from ...model.symmetry import symmetry_named
 from .plane import conditions
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def draw(result: ModesResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of modes, each with its name."""
     for name, certificate in result.certificates.items():
-        ending = "" if name == EQUILIBRIA else f"-{name}"
+        ending = "" if symmetry_named(name).of_equilibria else f"-{name}"
         yield f"winding{ending}", lambda name=name, certificate=certificate: winding(result, name, certificate)
 
 
@@ -42,7 +42,7 @@ def winding(result: ModesResult, symmetry: str, certificate: Certificate) -> Fig
     log_axis(axes.xaxis, *certificate.frequency[[1, -1]])
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, -0.25), max(high, number + 0.1 * max(1.0, high - low)))
-    which = "" if symmetry == EQUILIBRIA else f" in class {symmetry}"
+    which = "" if symmetry_named(symmetry).of_equilibria else f" in class {symmetry}"
     levels = _mark_modes(axes, result, symmetry, certificate)
     if np.isfinite(certificate.counted_up_to):
         right = axes.get_xlim()[1]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES
+from ...model.symmetry import EQUILIBRIA, symmetry_named
 from .intervals import Interval, uncertain_intervals
 from .other_law import note_of
 from .run import FoundOnsets
@@ -21,11 +21,13 @@ def note_of_class(found: FoundOnsets) -> dict[str, Any]:
     for point in said["points"]:
         point["symmetry"] = name
     uncertain = uncertain_intervals(found.values, found.certified)
-    words = {"symmetry": name, "motion": SYMMETRIES[name].words}
+    words = {"symmetry": name, "motion": symmetry_named(name).words}
     return words | said | {"uncertain": [list(stretch) for stretch in uncertain]}
 
 
-def merge_points(own: Iterable[dict[str, Any]], unstable: Sequence[Interval], classes) -> list[dict[str, Any]]:
+def merge_points(
+    own: Iterable[dict[str, Any]], unstable: Sequence[Interval], classes, name: str = EQUILIBRIA
+) -> list[dict[str, Any]]:
     """Points of all classes in ascending order. Where another class is unstable a crossing is no edge of stability.
 
     Parameters
@@ -34,8 +36,10 @@ def merge_points(own: Iterable[dict[str, Any]], unstable: Sequence[Interval], cl
         Points of the class of the equilibria, with the stretches `unstable` in which that is unstable.
     classes : sequence of dict
         As `note_of_class` gives them.
+    name : str
+        Of the class of the equilibria.
     """
-    parts = {EQUILIBRIA: (list(own), unstable)} | {c["symmetry"]: (c["points"], c["unstable"]) for c in classes}
+    parts = {name: (list(own), unstable)} | {c["symmetry"]: (c["points"], c["unstable"]) for c in classes}
     merged = []
     for name, (points, _) in parts.items():
         elsewhere = [stretch for other, (_, found) in parts.items() if other != name for stretch in found]
@@ -45,7 +49,9 @@ def merge_points(own: Iterable[dict[str, Any]], unstable: Sequence[Interval], cl
     return sorted(merged, key=lambda point: point["value"])
 
 
-def leading_of(values: np.ndarray, growth: np.ndarray, frequency: np.ndarray, certified, classes) -> dict[str, Any]:
+def leading_of(
+    values: np.ndarray, growth: np.ndarray, frequency: np.ndarray, certified, classes, name: str = EQUILIBRIA
+) -> dict[str, Any]:
     """The most unstable class at each value that all were asked at.
 
     Parameters
@@ -54,9 +60,11 @@ def leading_of(values: np.ndarray, growth: np.ndarray, frequency: np.ndarray, ce
         Of the class of the equilibria.
     classes : sequence of dict
         As `note_of_class` gives them.
+    name : str
+        Of the class of the equilibria.
     """
     own = zip(values.tolist(), zip(growth.tolist(), frequency.tolist(), np.asarray(certified).tolist()))
-    scans = {EQUILIBRIA: dict(own)}
+    scans = {name: dict(own)}
     for part in classes:
         scan = part["scan"]
         numbers = zip(scan["growth_rate"], scan["frequency"], scan["certified"])

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
-from ...model.symmetry import EQUILIBRIA
+from ...model.symmetry import equilibria_of
 from ..result import StudyResult
 from ..stability.classes import NOTE as CLASS_NOTE
 from ..stability.crossings import WATCHED
@@ -52,7 +52,7 @@ class OnsetResult(StudyResult):
 
     @cached_property
     def points(self) -> tuple[dict[str, Any], ...]:
-        return tuple(classes.merge_points(self._own_points, self._own_intervals(True), self.classes))
+        return tuple(classes.merge_points(self._own_points, self._own_intervals(True), self.classes, self._own))
 
     @cached_property
     def _own_points(self) -> list[dict[str, Any]]:
@@ -69,7 +69,7 @@ class OnsetResult(StudyResult):
     def leading(self) -> dict[str, Any]:
         """Growth rate, frequency and class of the most unstable motion at the values that all classes were asked at."""
         own = (self.values, self.growth_rates[:, 0], self.frequencies[:, 0], self.certified)
-        return classes.leading_of(*own, self.classes)
+        return classes.leading_of(*own, self.classes, self._own)
 
     @cached_property
     def _scan(self) -> list[OnsetSample]:
@@ -198,6 +198,11 @@ class OnsetResult(StudyResult):
         said = f"No onset: the valve is {'unstable' if growth and growth[0] > 0 else 'stable'} over the range."
         return [fixed, said if sure else "No onset was found, and none is ruled out: some values lack a certificate."]
 
+    @property
+    def _own(self) -> str:
+        """Class of the equilibria."""
+        return equilibria_of(self.case.part).name
+
     def _without_onset(self) -> str:
         row = PARAMETERS[self.parameter]
         low, high = (self.values[[0, -1]] / row.scale) if len(self.values) else (math.nan, math.nan)
@@ -211,7 +216,7 @@ class OnsetResult(StudyResult):
                 "certificate."
             )
         state = "unstable" if self.leading["growth_rate"][0] > 0 else "stable"
-        which = f" in classes {', '.join([EQUILIBRIA, *(c['symmetry'] for c in self.classes)])}" if self.classes else ""
+        which = f" in classes {', '.join([self._own, *(c['symmetry'] for c in self.classes)])}" if self.classes else ""
         return f"No onset: the valve is {state} {scanned}{which}."
 
     def _line(self, point: dict[str, Any]) -> str:

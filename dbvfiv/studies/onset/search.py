@@ -10,7 +10,7 @@ import numpy as np
 from eigen import Certificate
 
 from ...errors import CaseError, SolveError
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES
+from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...observer import Observer
 from ..case import Case
 from ..stability.crossings import WATCHED, Crossing, Sample, Scan, locate
@@ -98,7 +98,7 @@ class OnsetSearch:
     ):
         self.case, self.options, self.mesh = case, options, mesh
         self.observer = observer or Observer()
-        self.walk = walk or StabilityWalk(case, self.observer, symmetry=SYMMETRIES[options.symmetry])
+        self.walk = walk or StabilityWalk(case, self.observer, symmetry=symmetry_named(options.symmetry))
         self.base = place or Place.of(case)
         known = list(known)
         self._samples = {item.value: item for item in known if isinstance(item, OnsetSample) and item.mesh == mesh}

@@ -54,7 +54,7 @@ def _look_at_classes(session: Session, record: GrowingRecord, walk: StabilityWal
     """Onsets in the other classes of motion, where they are asked for. Cycles that leave the symmetry have normal forms
     of their own, which are not looked for.
     """
-    for symmetry in classes_to_look_at(record, session.case.onset.symmetry):
+    for symmetry in classes_to_look_at(record, session.case.onset.symmetry, session.case.part):
         options = replace(OnsetOptions.of(session.case), normal_form=False, symmetry=symmetry.name)
         found = run_onset(session.case, options, walk=walk.in_class(symmetry))
         for sentence in found.failures:

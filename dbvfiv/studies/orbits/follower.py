@@ -65,7 +65,7 @@ class Follower:
         self.name = PARAMETERS[parameter].system_name or parameter
         model = self.system.model(place.mu())
         #: Number of the displacement in y of the lip at x = z = 0 among the unknowns.
-        self.lip = int(model.shell.dofs.index[model.mesh.rows[0, 0], 1])
+        self.lip = int(model.shell.dofs.index[model.mesh.centre_line[0], 1])
 
     def from_onset(self, onset: Onset) -> tuple[Cycle, Cycle, Cycle]:
         """The steady state at an onset, as a cycle at rest, and two small cycles beside it, of the amplitude asked for

@@ -9,7 +9,6 @@ import numpy as np
 
 from continuation.periodic import PeriodicMotion
 
-from ...geometry import QUARTERS
 from ...model import ValveModel
 from ...model.lip import LipCentre
 
@@ -46,18 +45,18 @@ class Orbit:
     @cached_property
     def lip(self) -> np.ndarray:
         """(k,) displacement in y of the mid-surface of one lip at x = z = 0, m."""
-        return self._of_node(self.model.mesh.rows[0, 0], self.motion.coefficients)
+        return self._of_node(self.model.mesh.centre_line[0], self.motion.coefficients)
 
     @cached_property
     def lip_rate(self) -> np.ndarray:
         """(k,) its rate, m/s."""
         rate = self.motion.omega * self.motion.harmonics.rate(self.motion.coefficients)
-        return self._of_node(self.model.mesh.rows[0, 0], rate)
+        return self._of_node(self.model.mesh.centre_line[0], rate)
 
     @cached_property
     def centre_line(self) -> np.ndarray:
         """(k, m) displacement in y of the line x = 0 at each row, m."""
-        rows = self.model.mesh.rows[:, 0]
+        rows = self.model.mesh.centre_line
         return np.stack([self._of_node(node, self.motion.coefficients) for node in rows], axis=1)
 
     def _of_node(self, node: int, coefficients: np.ndarray) -> np.ndarray:
@@ -74,7 +73,7 @@ class Orbit:
     @property
     def lip_harmonics(self) -> np.ndarray:
         """(H + 1,) amplitudes of the harmonics of the lip's displacement, m; the mean first."""
-        number = self.model.shell.dofs.index[self.model.mesh.rows[0, 0], 1]
+        number = self.model.shell.dofs.index[self.model.mesh.centre_line[0], 1]
         parts = np.abs(self.motion.harmonics.complex(self.motion.coefficients[:, number]))
         return parts * np.append(1.0, np.full(len(parts) - 1, 2.0))
 
@@ -95,7 +94,8 @@ class Orbit:
         else:
             fluid = model.flow.stepping(density)
             speeds = np.stack([fluid.state(a, r, u).speed for a, r, u in zip(area, opening, inlet)])
-        out = QUARTERS * density * speeds[:, 0] * np.array([model.flow.open_area(a) for a in area[:, 0]])
+        open_area = np.array([model.flow.open_area(a) for a in area[:, 0]])
+        out = model.mesh.part.copies * density * speeds[:, 0] * open_area
         return out, speeds.min(axis=1)
 
     def opening(self) -> float:

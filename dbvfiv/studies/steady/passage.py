@@ -9,17 +9,17 @@ from matplotlib.figure import Figure
 
 from ...drawing.style import kilopascals, new_figure, pressure_colours, pressure_heading, some_of
 from ...drawing.views import mark_pieces
-from ...geometry import QUARTERS
 from ..measured.figures import MEASURED
 from .discharge import ordered
 
 if TYPE_CHECKING:
     from .result import SteadyResult
 
+#: What each panel shows of a state, in how many copies of the part that is computed.
 _PANELS = (
-    ("Static pressure, kPa", lambda state: (state.station_pressure + state.outlet_pressure) / 1e3),
-    ("Velocity, m/s", lambda state: state.station_velocity),
-    ("Flow area, cm²", lambda state: QUARTERS * state.station_area * 1e4),
+    ("Static pressure, kPa", lambda state, copies: (state.station_pressure + state.outlet_pressure) / 1e3),
+    ("Velocity, m/s", lambda state, copies: state.station_velocity),
+    ("Flow area, cm²", lambda state, copies: copies * state.station_area * 1e4),
 )
 
 
@@ -40,7 +40,7 @@ def passage(result: SteadyResult) -> Figure:
     colours = pressure_colours([*(s.pressure for s in states), *([] if taps is None else taps.pressure)])
     for axes, (label, value) in zip(panels, _PANELS):
         for state, colour in zip(states, colours):
-            axes.plot(z, value(state), color=colour, label=kilopascals(state.pressure))
+            axes.plot(z, value(state, result.mesh.part.copies), color=colour, label=kilopascals(state.pressure))
         axes.set_ylabel(label)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.set_xlim(0, z[-1])

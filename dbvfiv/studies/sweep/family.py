@@ -30,7 +30,7 @@ from ...model.dynamics import Conditions
 from ...model.equilibria import LoadPath, SteadyOptions
 from ...model.leading import LeadingSearch, select_search
 from ...model.state import SteadyState
-from ...model.symmetry import SYMMETRIES
+from ...model.symmetry import symmetry_named
 from ...observer import Observer
 
 #: Static corrections below this share of the largest are left to the eigenvectors of the check points, which gives a
@@ -98,7 +98,7 @@ class FluidFamily:
         self, model: ValveModel, state: SteadyState, axis: Axis, conditions: Conditions, options, observer: Observer
     ):
         self.state, self.axis, self.conditions, self.options, self.observer = state, axis, conditions, options, observer
-        self.linear = linearise_class(model, state.q, state.pressure, SYMMETRIES[options.symmetry])
+        self.linear = linearise_class(model, state.q, state.pressure, symmetry_named(options.symmetry))
         self.pressure = state.pressure
         self.done: tuple[Check, ...] = ()
         self.notes: tuple[str, ...] = ()
@@ -261,7 +261,7 @@ class PressureFamily:
                 if near.pressure != self.path.pressure:
                     self.path.q, self.path.pressure, self.path.slope = near.q, near.pressure, None
             self.known[value] = self.path.go_to(value)
-        symmetry = SYMMETRIES[self.options.symmetry]
+        symmetry = symmetry_named(self.options.symmetry)
         pencil = linearise_class(self.model, self.known[value].q, value, symmetry).pencil(self.conditions)
         if value not in self._bands:
             search, workspace = self.options.search, self.workspace

@@ -24,10 +24,10 @@ class Keys(Section):
         0.6, "A step is halved while the match of a leading mode is less certain than this.", gt=0, lt=1
     )
 
-    symmetry: Literal["SS", "SA", "AS", "AA"] = key(
+    symmetry: Literal["SS", "SA", "AS", "AA", "S", "A"] = key(
         "SS",
         "Class of motion followed: SS opens and closes the lips, SA sways them together in y, AS sideways in x, AA "
-        "twists.",
+        "twists; S or A where a half is computed, see modes.symmetry.",
     )
 
     @property

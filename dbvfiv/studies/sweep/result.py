@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from ...case.axis import Axis
 from ...case.parameters import PARAMETERS
+from ...model.symmetry import chosen_symmetries
 from ...record.layout import Column
 from ...record.mesh import MeshData
 from ...record.states import SUMMARY
@@ -218,7 +219,7 @@ class SweepResult(StudyResult):
     def summary(self) -> dict[str, Any]:
         return {
             "parameter": self.parameter,
-            "symmetry": self.case.sweep.symmetry,
+            "symmetry": chosen_symmetries(self.case.sweep.symmetry, self.case.part)[0].name,
             "values": self.values.tolist(),
             "branches": [branch.summary() for branch in self.branches],
             "unstable_count": self.unstable_count.tolist(),

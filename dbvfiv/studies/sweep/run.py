@@ -18,7 +18,7 @@ from ...model.dynamics import Conditions
 from ...model.equilibria import require_equilibrium
 from ...model.leading import growth_floor
 from ...model.state import SteadyState
-from ...model.symmetry import EQUILIBRIA
+from ...model.symmetry import EQUILIBRIA, chosen_symmetries
 from ...observer import Observer
 from ..solving import solving
 from .family import Check, Family, FluidFamily, PressureFamily
@@ -70,7 +70,7 @@ class SweepOptions:
             tolerance=sweep.tolerance,
             least_confidence=sweep.least_confidence,
             search=search,
-            symmetry=sweep.symmetry,
+            symmetry=chosen_symmetries(sweep.symmetry, case.part)[0].name,
         )
 
 

@@ -83,9 +83,9 @@ def _picture(result: TransientResult, rows: np.ndarray, shown: np.ndarray):
     h, mesh = result.history, result.mesh
     t, z = h["time"], 1e3 * mesh.z
     moving = _moving(h["centre_line"][rows])
-    line = mesh.rows[:, 0]
+    line = mesh.centre_line
     half = 0.5 * nodal_thickness(mesh)[line]
-    area = 1e4 * 4.0 * h["station_area"]
+    area = 1e4 * mesh.part.copies * h["station_area"]
     figure = new_figure(7.2, 6.0)
     upper, middle, lower = figure.subplots(3, 1, gridspec_kw={"height_ratios": [3, 2, 2]})
 
@@ -103,7 +103,9 @@ def _picture(result: TransientResult, rows: np.ndarray, shown: np.ndarray):
     ]
     top = 1.1 * max(wall(row)[1][1][moving].max() for row in rows)
     upper.set(xlim=(0, z[moving][-1]), ylim=(-top, top), ylabel="y, mm")
-    upper.set_title("Inner (thick) and outer faces at x = 0, where the valve moves", loc="left", fontweight="bold")
+    upper.set_title(
+        f"Inner (thick) and outer faces at {mesh.part.middle}, where the valve moves", loc="left", fontweight="bold"
+    )
     passage = middle.plot(z, area[rows[0]], color=COMPUTED)[0]
     low, high = area[rows][:, moving].min(), area[rows][:, moving].max()
     middle.axhline(0.0, color=REST, lw=0.8)

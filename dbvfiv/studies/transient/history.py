@@ -8,13 +8,9 @@ import numpy as np
 
 from ...flow.gas_stepping import GasState
 from ...flow.line_stepping import LineState
-from ...geometry import QUARTERS
 from ...model.lip import LipCentre
 from ...motion.equations import ValveMotion
 from ...motion.stepper import StepResult
-
-#: Quarters whose faces press on the closing plane from one side.
-_FACES = 2
 
 
 class Reader:
@@ -24,9 +20,9 @@ class Reader:
     ----------
     motion : ValveMotion
     energy : float
-        Energy at the start, J of a quarter.
+        Energy at the start, J of the part.
     work, dissipation, contact_loss : float
-        What went in and out since, J of a quarter.
+        What went in and out since, J of the part.
     """
 
     def __init__(
@@ -41,8 +37,9 @@ class Reader:
         self.contact_loss = contact_loss
         model = motion.model
         index = model.shell.dofs.index
+        self._copies = model.mesh.part.copies
         self._lip = LipCentre(model.mesh, model.shell)
-        centre = index[model.mesh.rows[:, 0], 1]
+        centre = index[model.mesh.centre_line, 1]
         self._centre, self._moves = np.maximum(centre, 0), centre >= 0
         self._inlet_area = float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
 
@@ -74,7 +71,7 @@ class Reader:
         memory, by_group = state.memory, {}
         if memory is not None:
             balance += memory.work.sum()
-            by_group = {"branch_energy": QUARTERS * memory.stored, "branch_loss": QUARTERS * memory.loss}
+            by_group = {"branch_energy": self._copies * memory.stored, "branch_loss": self._copies * memory.loss}
         if state.line is not None:
             by_group |= self._of_line(state.line)
         entered = density * load.speed[-1] * self._inlet_area
@@ -86,10 +83,10 @@ class Reader:
         return by_group | {
             "time": state.time,
             "inlet_pressure": load.inlet,
-            "mass_flow": QUARTERS * out,
-            "inlet_mass_flow": QUARTERS * entered,
-            "outlet_area": QUARTERS * area[0],
-            "smallest_area": QUARTERS * area[throat],
+            "mass_flow": self._copies * out,
+            "inlet_mass_flow": self._copies * entered,
+            "outlet_area": self._copies * area[0],
+            "smallest_area": self._copies * area[throat],
             "throat": float(model.mesh.z[throat]),
             "inlet_velocity": load.speed[-1],
             "outlet_velocity": load.speed[0],
@@ -97,15 +94,15 @@ class Reader:
             "lip_displacement": self._lip.displacement(state.q),
             "lip_velocity": self._lip.displacement(state.v),
             "stops": model.touching(state.q),
-            "kinetic_energy": QUARTERS * kinetic,
-            "outside_energy": QUARTERS * outside,
-            "outside_renewed": QUARTERS * renewed,
-            "strain_energy": QUARTERS * strain,
-            "stop_energy": QUARTERS * stop,
-            "weight_energy": QUARTERS * weight,
-            "pressure_work": QUARTERS * self.work,
-            "dissipation": QUARTERS * self.dissipation,
-            "balance": QUARTERS * balance,
+            "kinetic_energy": self._copies * kinetic,
+            "outside_energy": self._copies * outside,
+            "outside_renewed": self._copies * renewed,
+            "strain_energy": self._copies * strain,
+            "stop_energy": self._copies * stop,
+            "weight_energy": self._copies * weight,
+            "pressure_work": self._copies * self.work,
+            "dissipation": self._copies * self.dissipation,
+            "balance": self._copies * balance,
             "step": h,
             "evaluations": evaluations,
             "station_pressure": load.pressure,
@@ -115,24 +112,24 @@ class Reader:
 
     def _of_gas(self, load, gas: GasState) -> dict[str, float]:
         energy, _ = self.motion.fluid.powers(load.area, load.gas.area_rate, gas.inner)
-        supply, outflow, work, loss = (float(x) for x in QUARTERS * gas.books)
+        supply, outflow, work, loss = (float(x) for x in self._copies * gas.books)
         kept = {"gas_supply": supply, "gas_outflow": outflow, "gas_work": work, "gas_loss": loss}
-        return kept | {"gas_energy": QUARTERS * energy}
+        return kept | {"gas_energy": self._copies * energy}
 
     def _of_faces(self, q: np.ndarray) -> dict[str, Any]:
         contact = self.motion.model.contact.state(q)
         return {
-            "contact_loss": QUARTERS * self.contact_loss,
-            "contact_force": _FACES * contact.total,
+            "contact_loss": self._copies * self.contact_loss,
+            "contact_force": self.motion.model.mesh.part.walls * contact.total,
             "penetration": contact.penetration,
         }
 
     def _of_line(self, line: LineState) -> dict[str, Any]:
         kinetic, elastic = self.motion.waves.energies(line)
-        supply, lost, work = QUARTERS * line.books
+        supply, lost, work = self._copies * line.books
         return {
-            "line_kinetic_energy": QUARTERS * kinetic,
-            "line_elastic_energy": QUARTERS * elastic,
+            "line_kinetic_energy": self._copies * kinetic,
+            "line_elastic_energy": self._copies * elastic,
             "line_supply": supply,
             "line_dissipation": lost,
             "line_work": work,

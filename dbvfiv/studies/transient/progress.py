@@ -32,7 +32,7 @@ class Progress:
     saved : int
         Full states kept so far.
     work, dissipation, energy, renewed, contact_loss : float
-        The books of energy, J of a quarter.
+        The books of energy, J of the computed part.
     control : tuple of float
         Of the step control.
     eigenvalue : complex

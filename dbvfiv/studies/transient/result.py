@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...errors import CaseError
-from ...geometry import QUARTERS
 from ...motion.options import RunOptions
 from ...record.record import Record
 from ...record.vtkhdf import Step
@@ -44,7 +43,7 @@ class TransientState:
     time : float, s
     nodal, nodal_rate : (nn, 5) arrays
         Displacements (m) and rotations (rad) of the nodes, and their rates.
-    station_pressure, station_area : (m,) arrays, Pa, m2 of a quarter
+    station_pressure, station_area : (m,) arrays, Pa, m2 of the part that is computed
     station_velocity : (m,) array, m/s
         At the flange only; the others are not a number.
     """
@@ -130,7 +129,7 @@ class TransientResult(StudyResult):
         if not self.begun:
             return dict(_NO_VERDICT)
         # a run that goes on or was killed has an older one, or none
-        gap = QUARTERS * float(self.history["station_area"][0, 0])
+        gap = self.mesh.part.copies * float(self.history["station_area"][0, 0])
         return assess(self.history, gap).summary()
 
     @property

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
-from ...geometry import QUARTERS
 from ...model import ValveModel
 from ...model.equilibria import model_warnings
 from ...motion.choice import motion_of
@@ -93,7 +92,7 @@ class Runner:
         self.motion = motion_of(model, staggered=case.transient.coupling == "staggered")
         self.stepper = Stepper(self.motion, self.options.scheme, self.drive, self.options.step)
         self.control = step_control(self.stepper, self.options.control)
-        self.gap = QUARTERS * float(model.mesh.rest_area[0] - model.mesh.wall_deduction[0])
+        self.gap = model.mesh.part.copies * float(model.mesh.rest_area[0] - model.mesh.wall_deduction[0])
         self.keeper = Keeper(self.record, model)
 
     def start(self, first: MotionState | None = None) -> TransientRun:
@@ -257,7 +256,8 @@ class Runner:
         if pump is None or not self.motion.moving_fluid:
             return ""
         velocity = state.speed if state.line is None else float(state.line.velocity[0])
-        flow = QUARTERS * float(self.model.mesh.rest_area[-1] - self.model.mesh.wall_deduction[-1]) * velocity
+        mesh = self.model.mesh
+        flow = mesh.part.copies * float(mesh.rest_area[-1] - mesh.wall_deduction[-1]) * velocity
         if pump.holds(flow):
             return ""
         return (

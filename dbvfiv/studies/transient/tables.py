@@ -25,7 +25,7 @@ SCALARS = (
     Column("lip_opening", "m", "Full clear opening between the inner faces of both lips at x = z = 0"),
     Column("lip_displacement", "m", "Displacement in y of the mid-surface of one lip at x = z = 0"),
     Column("lip_velocity", "m/s", "Rate of the lip displacement"),
-    Column("stops", "", "Lip stops, or nodes with their inner face, in contact, of a quarter"),
+    Column("stops", "", "Lip stops, or nodes with their inner face, in contact, of the computed part"),
     Column("kinetic_energy", "J", "Kinetic energy of the wall"),
     Column("outside_energy", "J", "Kinetic energy of the fluid outside the wall"),
     Column(
@@ -47,7 +47,7 @@ SCALARS = (
     Column("step", "s", "Length of the step"),
     Column("evaluations", "", "Residuals evaluated in the step"),
 )
-#: One number a row of the mesh and step; of a quarter.
+#: One number a row of the mesh and step; of the computed part.
 PROFILES = (
     Column(
         "station_pressure",
@@ -95,7 +95,7 @@ STATE_COLUMNS = (
     Column("nodal", "m, rad", "Displacements ux uy uz and two rotations of each node"),
     Column("nodal_rate", "m/s, rad/s", "Their rates"),
     Column("station_pressure", "Pa", "Pressure at each row"),
-    Column("station_area", "m^2", "Flow area of a quarter at each row"),
+    Column("station_area", "m^2", "Flow area at each row, of the part that is computed"),
     Column("inlet_velocity", "m/s", "Velocity at the flange"),
 )
 #: The state of a motion between two steps, see `dbvfiv.motion.state.MotionState`.
@@ -105,7 +105,7 @@ MOTION_COLUMNS = (
     Column("q", "m, rad", "Free unknowns"),
     Column("v", "m/s, rad/s", "Their velocities"),
     Column("a", "m/s^2, rad/s^2", "Their accelerations"),
-    Column("force", "N, N m", "Internal force of a quarter"),
+    Column("force", "N, N m", "Internal force of the computed part"),
     Column("force_rate", "N/s, N m/s", "The scheme's value of its rate"),
     Column("load", "N, N m", "Force of the fluid where the equations were last met"),
     Column("psi", "m^2/s", "Integral of the flow's speed from the inlet, at each row"),
@@ -115,7 +115,7 @@ MOTION_COLUMNS = (
 MEMORY_COLUMNS = (
     Column("branches", "N/m, N", "Section resultants of each Maxwell branch at the Gauss points"),
     Column("stretch", "1, 1/m", "Section strains that the springs of each relaxation time hold there"),
-    Column("branch_work", "J", "Work done against the branches of each group of a quarter since the start"),
+    Column("branch_work", "J", "Work done against the branches of each group of the computed part since the start"),
     Column("branch_loss", "J", "What of it they have dissipated"),
     Column("branch_energy", "J", "Energy that they hold"),
 )
@@ -132,15 +132,17 @@ COUNTS = (
 )
 #: Books of energy, step control and the mode of a kick.
 BOOKS = (
-    Column("work", "J", "Work of the pressure on a quarter since the start"),
-    Column("dissipation", "J", "Energy of a quarter lost to damping since the start"),
-    Column("energy", "J", "Energy of a quarter at the start"),
-    Column("renewed", "J", "Energy of a quarter that renewals of the added mass outside have put in"),
+    Column("work", "J", "Work of the pressure on the computed part since the start"),
+    Column("dissipation", "J", "Energy of the computed part lost to damping since the start"),
+    Column("energy", "J", "Energy of the computed part at the start"),
+    Column("renewed", "J", "Energy of the computed part that renewals of the added mass outside have put in"),
     Column("control", "", "Numbers of the step control"),
     Column("eigenvalue", "1/s", "Real and imaginary part of that of the mode of a kick"),
 )
 #: Books of contact of the inner faces, there where the case has it.
-FACE_BOOKS = (Column("contact_loss", "J", "Energy of a quarter that touching faces took and did not give back"),)
+FACE_BOOKS = (
+    Column("contact_loss", "J", "Energy of the computed part that touching faces took and did not give back"),
+)
 
 
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
