@@ -142,6 +142,8 @@ class FamilyReduction:
         for condition in conditions:
             right, left = self.corrected(first.pairs(condition, most, SNAPSHOT), condition)
             columns += [right.real, right.imag, left.real, left.imag]
+        if not sum(part.shape[1] for part in columns):
+            return first  # nothing leads anywhere: there is nothing to be found better
         return ReducedFamily(self.family, np.hstack(columns), 3e-7)
 
     def correction(self, pairs: Pairs, condition: Condition) -> np.ndarray:

@@ -91,6 +91,9 @@ class SmallSpectra:
         """Leading eigenpairs of one pencil; `chosen` picks among the eigenvalues of the upper half-plane."""
         rows, vectors = self._found([condition])
         values = chosen(np.array(rows[0], complex))
+        if not len(values):  # all so damped that none counts as a mode
+            nothing = np.zeros((0, self.problem([condition]).size), complex)
+            return Refined(values, nothing, nothing, None)
         known = [vectors.get((0, complex(value))) for value in values]
         lacking = [i for i, pair in enumerate(known) if pair is None]
         if lacking:

@@ -140,3 +140,19 @@ def test_divergence_that_the_surrogate_does_not_see():
     assert slow.imag == 0 and slow.real * family.times.max() < 1
     assert own == pytest.approx(slow, rel=1e-8)
     assert phase_counts(reduced, [condition]).number[0] == 1
+
+
+def test_columns_without_any_mode():
+    """In a band below all of them nothing is listed, and what is unstable beyond it is still counted."""
+
+    class Banded(RelaxingFamily):
+        def search(self, condition):
+            return SearchOptions(max_frequency=1e-5)
+
+    family = Banded(2, coupling=0.0)
+    drawn = [c._replace(alpha=0.1) for c in random_conditions(3, 20)]
+    conditions = [c for c in drawn if not family.reach(c).leading(dense(family, c)).size]
+    assert len(conditions) > 3
+    column = ColumnSolver().solve(family, conditions)
+    assert np.isnan(column.growth_rate).all() and not column.certified.any()
+    assert [(dense(family, c).real > 0).sum() for c in conditions] == list(column.unstable)
