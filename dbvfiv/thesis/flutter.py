@@ -45,7 +45,7 @@ def _suddenly(workshop: Workshop, pressure: float, step: str, name: str) -> Outc
     common = _LIGHT | {"drive.pressure": pressure, "transient.step": step}
     # in air the lips slam from the first closing on, which time does not change; a cycle takes its time to settle
     short = {"transient.duration": workshop.duration(0.25, 0.15)}
-    long = {"transient.duration": workshop.duration(1.5, 0.15), "transient.stop_when": ["limit cycle", "steady"]}
+    long = {"transient.duration": workshop.duration(0.9, 0.15), "transient.stop_when": ["limit cycle", "steady"]}
     air, staggered = {"fluid.density": 1.2}, {"transient.coupling": "staggered"}
     readings = {
         "40 kg/m3": long | {"fluid.density": 40.0},
