@@ -32,7 +32,7 @@ from ..solving import solving
 _BASIS = 24
 _NO_PLUG = (
     "Inner fluid answers to the areas of this half of the valve and does not go along where it sways sideways in x: "
-    "frequencies of such modes are too high in a liquid."
+    "such modes are too quick and too lightly damped in a liquid."
 )
 
 
