@@ -151,10 +151,12 @@ def against_the_full_pencil(result: Examined) -> None:
     spectrum, count = result.certified.spectrum, result.certified.count
     band = count.band if np.isfinite(count.band) else 1.5 * spectrum.band
     line = away_from(spectrum.growth_rate, count.line)
-    for points in (1500, 12000):  # where rubber has lost stability the phase turns dozens of times before 3 Hz
-        full = unstable_count(result.state.pencil, band=band, line=line, hints=spectrum.eigenvalues, max_points=points)
-        if full.certain:
-            break
+    hints, slowest = spectrum.eigenvalues, np.abs(spectrum.eigenvalues).min(initial=1e3)
+    full = unstable_count(result.state.pencil, band=band, line=line, hints=hints, max_points=1500)
+    if not full.certain:  # where rubber has lost stability the phase turns dozens of times below 3 Hz
+        full = unstable_count(
+            result.state.pencil, band=band, line=line, hints=hints, max_points=12000, scale=float(slowest)
+        )
     assert full.certain, f"{result.state}: {full.notes}"
     if not np.isfinite(count.band):  # both routes found the same number over all frequencies
         assert result.certified.unstable_count_independent == spectrum.count_right_of(count.line), str(result.state)
