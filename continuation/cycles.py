@@ -136,6 +136,9 @@ class CycleSolver:
             change = _updated(change, steps, linear.units)
             spent += used
             sizes.append(self._size(change, motion))
+            if len(steps) > 1 and sizes[-1] > 2.0 * sizes[-2]:  # of a linearisation that is no good here
+                linear = None
+                continue
             if not sizes[-1] < 10.0 or (len(sizes) > 8 and sizes[-1] > max(0.5 * sizes[-4], 1e-3)):
                 break
             motion, mu = moved(motion, mu, free, change)

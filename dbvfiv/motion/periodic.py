@@ -150,7 +150,9 @@ class PeriodicValve:
             left.append(model.station_forces(nodal))
             right.append(model.rows.jacobian(nodal))
         stiff = StiffnessDamping(mu["beta"])
-        blocks = [self._blocks(model, part) for part in values]
+        sizes = [self._size_of(model, part.mean(axis=0)) for part in (rest, damping)]
+        gyroscopic = min(motion.omega * sizes[1] / sizes[0], 1.0) if sizes[0] else 1.0
+        blocks = [self._blocks(model, part, share) for part, share in zip(values, (1.0, 1.0, gyroscopic, 1.0))]
         terms = [
             Term([(0, blocks[0])], outer=stiff),
             Term(list(enumerate(blocks[1:]))),
@@ -166,11 +168,18 @@ class PeriodicValve:
         operator.average = self._average(model, values.mean(axis=1), (left, right), parts, q, mu)
         return operator
 
-    def _blocks(self, model: ValveModel, values: np.ndarray) -> SparseBlocks:
-        """Matrices (n + l, n + l), nothing on the flow's unknowns, of values (N, nnz) on the structure's pattern."""
+    def _blocks(self, model: ValveModel, values: np.ndarray, share: float = 1.0) -> SparseBlocks:
+        """Matrices (n + l, n + l), nothing on the flow's unknowns, of values (N, nnz) on the structure's pattern; `share`
+        as `SparseBlocks` has it.
+        """
         indptr, indices = model.shell.dofs.pattern
         indptr = np.append(indptr, np.full(self.inner, indptr[-1], indptr.dtype))
-        return SparseBlocks(values, indices, indptr, (self.size, self.size))
+        return SparseBlocks(values, indices, indptr, (self.size, self.size), share)
+
+    def _size_of(self, model: ValveModel, values: np.ndarray) -> float:
+        """Norm of a matrix on the structure's pattern, its unknowns in their sizes."""
+        indptr, indices = model.shell.dofs.pattern
+        return float(np.linalg.norm(values * np.repeat(self.scales[: len(indptr) - 1], np.diff(indptr)) * self.scales[indices]))
 
     def _fluid_term(self, left, right, parts) -> Term:
         """- G p over the flow's equations, from areas and the flow's unknowns."""
