@@ -14,12 +14,64 @@ LEFT_OUT = 1e-6
 ROUGH = 1e-4
 
 
-class SparseBlocks:
-    """N matrices that share a sparsity pattern; entries that are zero in all of them are not kept.
+class BlockRows:
+    """Values of N matrices of one pattern as they come; entries that are zero in all of them are not kept.
 
     Parameters
     ----------
-    values : (N, nnz) array
+    count : int
+        N.
+
+    Examples
+    --------
+    >>> rows = BlockRows(2)
+    >>> for row in ([0.0, 1.0, 0.0], [0.0, 2.0, 3.0]):
+    ...     rows.put(np.array(row))
+    >>> rows.used.tolist(), rows.values.tolist(), rows.mean.tolist()
+    ([1, 2], [[1.0, 0.0], [2.0, 3.0]], [0.0, 1.5, 1.5])
+    """
+
+    def __init__(self, count: int):
+        self._count, self._done = count, 0
+        self._total = self._unused = None
+
+    def put(self, row: np.ndarray) -> None:
+        """Take the values (nnz,) of the next matrix."""
+        if self._total is None:
+            self._total = np.zeros(len(row))
+            self._use(np.flatnonzero(row))
+        elif np.take(row, self._unused, out=self._beside, mode="clip").any():
+            known, values = self.used, self.values
+            self._use(np.union1d(known, np.flatnonzero(row)))
+            self.values[: self._done] = 0.0
+            self.values[: self._done, np.searchsorted(self.used, known)] = values[: self._done]
+        if len(self._unused):
+            np.take(row, self.used, out=self.values[self._done], mode="clip")
+        else:
+            self.values[self._done] = row
+        self._total += row
+        self._done += 1
+
+    def _use(self, used: np.ndarray) -> None:
+        #: (k,) numbers of the entries that are kept.
+        self.used = used
+        self._unused = np.setdiff1d(np.arange(len(self._total)), used, assume_unique=True)
+        self._beside = np.empty(len(self._unused))  # new memory costs more than what is done with it
+        #: (N, k)
+        self.values = np.empty((self._count, len(used)))
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(nnz,) mean of all matrices."""
+        return self._total / self._done
+
+
+class SparseBlocks:
+    """N matrices that share a sparsity pattern.
+
+    Parameters
+    ----------
+    values : (N, nnz) array or BlockRows
     indices, indptr : arrays
         Of the rows, as `scipy.sparse.csr_matrix` has them.
     shape : (int, int)
@@ -38,12 +90,12 @@ class SparseBlocks:
     [3.0, 7.0]
     """
 
-    def __init__(self, values: np.ndarray, indices: np.ndarray, indptr: np.ndarray, shape, share: float = 1.0):
-        used = values.any(axis=0)
-        if not used.all():
-            before = np.concatenate([[0], np.cumsum(used)])
-            values, indices = np.take(values, np.flatnonzero(used), axis=1), indices[used]
-            indptr = before[indptr].astype(indices.dtype)
+    def __init__(
+        self, values: np.ndarray | BlockRows, indices: np.ndarray, indptr: np.ndarray, shape, share: float = 1.0
+    ):
+        if isinstance(values, BlockRows):
+            indptr = np.searchsorted(values.used, indptr).astype(indptr.dtype)
+            indices, values = indices[values.used], values.values
         self.values, self._pattern, self.shape, self.share = values, (indices, indptr), shape, share
 
     def _matrix(self, values: np.ndarray) -> sp.csr_matrix:

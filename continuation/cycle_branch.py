@@ -9,7 +9,7 @@ import numpy as np
 
 from continuation.bordered_cycle import Condition
 from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions, CyclePoint, SpecialCycle
-from continuation.cycle_prediction import POINTS, along, from_onset
+from continuation.cycle_prediction import POINTS, by_arclength, by_parameter, parameter_is_better
 from continuation.cycle_zeros import (
     change_between,
     crossing_of,
@@ -188,7 +188,7 @@ class CycleTracer:
         last = self.points[-1]
         if target is not None:
             return self._solved(self._expected(target, step), last.cycle.mu | {self.parameter: target}, (), ())
-        motion, value = along(self._last(), last.arclength + step, self._series()), self._value_at(step)
+        motion, value = by_arclength(self._last(), last.arclength + step, self._series()), self._value_at(step)
         mu = last.cycle.mu | {self.parameter: value}
         return self._solved(motion, mu, (self.parameter,), (self._plane(motion, value),))
 
@@ -210,11 +210,11 @@ class CycleTracer:
 
     def _expected(self, target: float, step: float) -> PeriodicMotion:
         """The motion at a value about a step ahead."""
-        for onset in self._origin:
-            motion = from_onset(self.points, onset, target, self._series())
+        if parameter_is_better(self.points, self._weight):
+            motion = by_parameter(self.points, target, self._series(), self._weight)
             if motion is not None:
                 return motion
-        return along(self._last(), self.points[-1].arclength + self._way_to(target, step), self._series())
+        return by_arclength(self._last(), self.points[-1].arclength + self._way_to(target, step), self._series())
 
     def _series(self) -> Harmonics:
         """Of the next motion: longer where the last one nearly needed it."""
@@ -301,7 +301,7 @@ class CycleTracer:
     def _interpolated(self, near: Sequence[CyclePoint], arclength: float) -> CyclePoint | None:
         """A cycle between points, at an arclength; None where it is not found."""
         h = max((p.motion.harmonics for p in near), key=lambda h: h.count)
-        guess = along(near, arclength, h)
+        guess = by_arclength(near, arclength, h)
         c, weights = guess.coefficients, lagrange([p.arclength for p in near], arclength)
         value = float(sum(w * p.value for w, p in zip(weights, near)))
         first, last = near[0], near[-1]

@@ -13,40 +13,61 @@ from continuation.periodic import PeriodicMotion
 
 #: Points that predictions are made of.
 POINTS = 4
-#: Most by which errors of points may grow in a prediction: an older point that brings more is not used.
+#: Most by which errors of points may grow in a prediction by the parameter: older points that bring more are not used.
 GROWTH = 50.0
 
 
-def along(points: Sequence[CyclePoint], arclength: float, h: Harmonics) -> PeriodicMotion:
+def by_arclength(points: Sequence[CyclePoint], arclength: float, h: Harmonics) -> PeriodicMotion:
     """The motion at an arclength, by the polynomial through points."""
     weights = lagrange([p.arclength for p in points], arclength)
     coefficients = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, points))
     return PeriodicMotion(h, coefficients, float(sum(w * p.motion.omega for w, p in zip(weights, points))))
 
 
-def from_onset(
-    points: Sequence[CyclePoint], onset: CyclePoint, value: float, h: Harmonics
-) -> PeriodicMotion | None:
-    """The motion at a value of the parameter on a branch that starts at an onset; None where the branch does not lead
-    straight away from it.
+def by_parameter(points: Sequence[CyclePoint], value: float, h: Harmonics, weight: np.ndarray) -> PeriodicMotion | None:
+    """The motion at a value of the parameter, by polynomials in it through the last points; None where these do not
+    lead one way to it.
 
-    With the root z of the distance from the onset as the way, the branch goes on through the onset to the same cycles
-    turned by half a period: odd harmonics over z and even ones are functions of the parameter without a singularity
-    (Hassard, Kazarinoff & Wan 1981, ch. 1), and polynomials of these are good even where the branch starts.
+    Beside an onset the odd harmonics have a size with a root in it; its square, their shape, and all else are functions
+    of the parameter without a singularity (Hassard, Kazarinoff & Wan 1981, ch. 1), so that these are continued.
+
+    Parameters
+    ----------
+    points : sequence of CyclePoint
+    value : float
+    h : Harmonics
+        Of the prediction.
+    weight : (n,) array
+        Of squares of unknowns in sizes.
     """
-    distances = np.array([onset.value - p.value for p in points] + [onset.value - value])
-    if np.any(distances * distances[0] <= 0) or np.any(np.diff(np.abs(distances)) <= 0):
+    values = [p.value for p in points[-POINTS:]]
+    steps = np.diff([*values, value])
+    if len(values) < 2 or not (np.all(steps > 0) or np.all(steps < 0)):
         return None
-    ways, odd = np.sqrt(np.abs(distances)), (np.arange(1, h.size) + 1) // 2 % 2 == 1
-    odd = np.append(False, odd)[:, None]
     count = 2
-    for more in range(3, min(POINTS, len(points)) + 1):
-        if np.abs(lagrange(distances[-1 - more : -1], distances[-1])).sum() <= GROWTH:
+    for more in range(3, len(values) + 1):
+        if np.abs(lagrange(values[-more:], value)).sum() <= GROWTH:
             count = more
-    last = points[-count:]
-    weights = lagrange(distances[-1 - len(last) : -1], distances[-1])
+    odd = np.append(False, (np.arange(1, h.size) + 1) // 2 % 2 == 1)
+    weights = lagrange(values[-count:], value)
+    parts = [h.resized(p.motion.coefficients) for p in points[-count:]]
+    sizes = np.array([np.sqrt(np.sum(c[odd] ** 2 * weight)) for c in parts])
+    square = float(weights @ sizes**2)
+    if square <= 0 or not np.all(sizes > 0):
+        return None
     coefficients = sum(
-        w * h.resized(p.motion.coefficients) * np.where(odd, ways[-1] / way, 1.0)
-        for w, p, way in zip(weights, last, ways[-1 - len(last) : -1])
+        w * c * np.where(odd, np.sqrt(square) / size, 1.0)[:, None] for w, c, size in zip(weights, parts, sizes)
     )
-    return PeriodicMotion(h, coefficients, float(sum(w * p.motion.omega for w, p in zip(weights, last))))
+    omegas = [p.motion.omega for p in points[-count:]]
+    return PeriodicMotion(h, coefficients, float(weights @ omegas))
+
+
+def parameter_is_better(points: Sequence[CyclePoint], weight: np.ndarray) -> bool:
+    """Whether the last point would have been met closer by the parameter than by the arclength."""
+    last, before = points[-1], points[:-1]
+    h, c = last.motion.harmonics, last.motion.coefficients
+    one = by_parameter(before, last.value, h, weight)
+    if one is None:
+        return len(before) < 2
+    other = by_arclength(before[-POINTS:], last.arclength, h)
+    return bool(np.sum((one.coefficients - c) ** 2 * weight) <= np.sum((other.coefficients - c) ** 2 * weight))

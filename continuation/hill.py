@@ -19,8 +19,8 @@ from continuation.harmonics import Harmonics
 _RIGHT, _UP = 0.1, (0.0, 0.25, 0.5)
 #: Steps of an Arnoldi iteration after which its eigenvalues are looked at.
 _STEPS = 60
-#: Least radius about the real shift, over omega, in which all eigenvalues are found: with turns of those whose series is
-#: cut off within the band.
+#: Least radius about the real shift, over omega, in which all eigenvalues are found: with turns of those whose series
+#: is cut off within the band.
 _REACH = 0.75
 #: Most that the outer two harmonics may hold of a perturbation.
 _RIM = 0.05
@@ -302,9 +302,8 @@ def _arnoldi(apply, size: int, dtype, most: int):
         ended = last <= 1e-13 * np.abs(h[: k + 2, : k + 1]).max() or done == size
         if ended or done % _STEPS == 0:
             values, vectors = np.linalg.eig(h[:done, :done])
-            missed = np.zeros(done) if ended else last * np.abs(vectors[-1])
-            good = (missed <= 1e-9 * np.abs(values)) & (values != 0)
-            rest = np.abs(values[~good]).max(initial=0.0)
+            good = (last * np.abs(vectors[-1]) <= 1e-9 * np.abs(values)) & (values != 0)
+            rest = 0.0 if ended else np.abs(values[~good]).max(initial=0.0)
             yield [(complex(values[i]), basis[:, :done] @ vectors[:, i]) for i in np.flatnonzero(good)], rest
         if ended:
             return

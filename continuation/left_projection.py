@@ -1,7 +1,7 @@
 """What a linearisation about a periodic motion gives on a basis, roughly and at a fraction of its cost.
 
-Preconditioners with two levels need V^T A x of full vectors x for a small basis V. Matrices at the samples are sums of a
-few, A_i = sum w_ik A_k, so that V^T A_k, held in single precision, serve all samples in one dense product.
+Preconditioners with two levels need V^T A x of full vectors x for a small basis V. Matrices at the samples are sums of
+a few, A_i = sum w_ik A_k, so that V^T A_k, held in single precision, serve all samples in one dense product.
 """
 
 from __future__ import annotations
