@@ -58,6 +58,7 @@ class PeriodicValve:
         area = float(model.mesh.rest_area[-1])
         self._weight = area  # turns the flow's equations, Pa, into forces
         self._workspace = Workspace()
+        self._known_forces: tuple[ValveModel, np.ndarray, np.ndarray] | None = None
         scale = np.ones(model.shell.dofs.free.shape)
         scale[:, 3:] = 2.0 / float(np.mean(model.shell.geometry.thickness))
         jet = np.sqrt(2.0 * abs(mu["inlet"]) / mu["density"])
@@ -104,7 +105,7 @@ class PeriodicValve:
         p, rest = self.pressures(motion, mu)
         memory = self._memory(mu)
         held = None if memory is None else memory.held(q, rates)
-        slow = np.stack([model.internal_force(x) for x in q])
+        slow = self._internal_forces(model, q)
         out = slow + mu["beta"] * rates.apply(1, slow)
         if model.contact is not None:
             out += np.stack([model.contact.force(x) for x in q])
@@ -115,6 +116,13 @@ class PeriodicValve:
             out[i] += self._inertia(model, nodal, v[i], a[i] + mu["alpha"] * v[i])
             out[i] -= model.pressure_force(nodal, p[i])
         return np.concatenate([out, self._weight * rest], axis=1)
+
+    def _internal_forces(self, model: ValveModel, q: np.ndarray) -> np.ndarray:
+        """(N, n); those of the last positions are kept, for derivatives by frequency and parameters ask again."""
+        known = self._known_forces
+        if known is None or known[0] is not model or not np.array_equal(known[1], q):
+            self._known_forces = known = (model, q.copy(), np.stack([model.internal_force(x) for x in q]))
+        return known[2]
 
     @staticmethod
     def _inertia(model: ValveModel, nodal: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
