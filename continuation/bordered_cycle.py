@@ -10,6 +10,7 @@ import scipy.linalg as la
 
 from continuation.errors import SingularSystem
 from continuation.krylov import gmres
+from continuation.left_projection import LeftProjection
 from continuation.periodic import PeriodicMotion
 
 #: Name of omega among free unknowns.
@@ -71,7 +72,7 @@ class CycleLinearisation:
         self.smoother = system.smoother(self.operator, mu)
         self.scale, self.basis = np.asarray(system.scales), basis
         self._known: dict[str, np.ndarray] = {}
-        self._coarse = None
+        self._coarse = self._rough = None
 
     def _column(self, name: str, force: np.ndarray) -> np.ndarray:
         """Derivative (2 H + 1, n) of the residual, `force` at the motion, by a free unknown."""
@@ -98,7 +99,10 @@ class CycleLinearisation:
         if not added.shape[1]:
             return False
         known, self.basis = self.reduced, np.hstack([self.basis, added])
-        self._coarse = self.operator.reduced(self.scale[:, None] * self.basis, known)
+        v = self.scale[:, None] * self.basis
+        self._coarse = self.operator.reduced(v, known)
+        if self._rough is not None:
+            self._rough = LeftProjection(self.operator, v, self._coarse, self._rough)
         return True
 
     def prepare(self, free: Sequence[str], conditions: Sequence[Condition], force: np.ndarray) -> None:
@@ -146,17 +150,25 @@ class CycleLinearisation:
         force = self.operator.apply(rows) + np.tensordot(extra, self.columns, 1)
         return np.append(force.ravel(), [np.vdot(c.row, rows) + c.extra @ extra for c in self.conditions])
 
+    def _on_basis(self, rows: np.ndarray) -> np.ndarray:
+        """What the operator makes of coefficients, on the basis."""
+        if not self.operator.exact:
+            return self.operator.apply(rows) @ self._v
+        if self._rough is None:
+            self._rough = LeftProjection(self.operator, self._v, self.reduced)
+        return self._rough.apply(rows)
+
     def _precondition(self, force: np.ndarray) -> np.ndarray:
         size, shape = self.motion.coefficients.size, self.motion.coefficients.shape
-        out = np.zeros_like(force)
-        if self.smoother is not None:
-            out[:size] = self.smoother(force[:size].reshape(shape)).ravel()
-            force = force - self.apply(out)
+        out, free = np.zeros_like(force), len(self.free)
         small = np.append((force[:size].reshape(shape) @ self._v).ravel(), force[size:])
+        if self.smoother is not None:
+            rows = self.smoother(force[:size].reshape(shape))
+            small -= np.append(self._on_basis(rows).ravel(), [np.vdot(c.row, rows) for c in self.conditions])
+            out[:size] = rows.ravel()
         found = la.lu_solve(self._factor, self._balance * small, check_finite=False)
-        rows = found[: len(found) - len(self.free)].reshape(shape[0], -1)
-        out[:size] += (rows @ self._v.T).ravel()
-        out[size:] += found[len(found) - len(self.free) :]
+        out[:size] += (found[: len(found) - free].reshape(shape[0], -1) @ self._v.T).ravel()
+        out[size:] += found[len(found) - free :]
         return out
 
     def solve(self, rhs: np.ndarray, tolerance: float, most: int) -> tuple[np.ndarray, int, float]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from continuation.bordered_cycle import Condition
 from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions, CyclePoint, SpecialCycle
+from continuation.cycle_prediction import POINTS, by_arclength, by_parameter, parameter_is_better
 from continuation.cycle_zeros import (
     change_between,
     crossing_of,
@@ -19,8 +20,10 @@ from continuation.cycle_zeros import (
 )
 from continuation.cycles import Cycle, CycleSolver
 from continuation.errors import ContinuationError, NotConverged
+from continuation.harmonics import Harmonics
 from continuation.hill import floquet_exponents
 from continuation.options import require
+from continuation.periodic import PeriodicMotion
 
 
 class CycleTracer:
@@ -167,7 +170,7 @@ class CycleTracer:
 
     def _last(self) -> list[CyclePoint]:
         """Points that predictions are made of."""
-        return [*self._origin, *self.points][-4:]
+        return [*self._origin, *self.points][-POINTS:]
 
     def _way_to(self, target: float, step: float) -> float:
         """Step at which that polynomial has a value that lies about a step ahead."""
@@ -184,11 +187,9 @@ class CycleTracer:
     def _step(self, step: float, target: float | None) -> Cycle:
         last = self.points[-1]
         if target is not None:
-            step = self._way_to(target, step)
-        motion, value = self._predict(last.arclength + step)
-        mu = last.cycle.mu | {self.parameter: value if target is None else target}
-        if target is not None:
-            return self._solved(motion, mu, (), ())
+            return self._solved(self._expected(target, step), last.cycle.mu | {self.parameter: target}, (), ())
+        motion, value = by_arclength(self._last(), last.arclength + step, self._series()), self._value_at(step)
+        mu = last.cycle.mu | {self.parameter: value}
         return self._solved(motion, mu, (self.parameter,), (self._plane(motion, value),))
 
     def _solved(self, motion, mu, free, conditions) -> Cycle:
@@ -207,16 +208,20 @@ class CycleTracer:
             motion, mu = cycle.motion.resized(count), cycle.mu
             conditions = tuple(Condition(motion.harmonics.resized(c.row), c.extra, c.value) for c in conditions)
 
-    def _predict(self, arclength: float):
-        """Motion and parameter ahead by the polynomial through the last points."""
-        last = self._last()
-        h = last[-1].motion.harmonics
-        if last[-1].motion.tail > 0.4 * self.options.tail and h.count + 2 <= self.options.max_harmonics:
-            h = type(h)(h.count + 2)
-        weights = lagrange([p.arclength for p in last], arclength)
-        coefficients = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, last))
-        omega = float(sum(w * p.motion.omega for w, p in zip(weights, last)))
-        return type(last[-1].motion)(h, coefficients, omega), self._value_at(arclength - last[-1].arclength)
+    def _expected(self, target: float, step: float) -> PeriodicMotion:
+        """The motion at a value about a step ahead."""
+        if parameter_is_better(self.points, self._weight):
+            motion = by_parameter(self.points, target, self._series(), self._weight)
+            if motion is not None:
+                return motion
+        return by_arclength(self._last(), self.points[-1].arclength + self._way_to(target, step), self._series())
+
+    def _series(self) -> Harmonics:
+        """Of the next motion: longer where the last one nearly needed it."""
+        last, options = self.points[-1].motion, self.options
+        if last.tail > 0.4 * options.tail and last.harmonics.count + 2 <= options.max_harmonics:
+            return Harmonics(last.harmonics.count + 2)
+        return last.harmonics
 
     def _plane(self, motion, value: float) -> Condition:
         """Normal to the way from the last point, through the prediction."""
@@ -296,9 +301,8 @@ class CycleTracer:
     def _interpolated(self, near: Sequence[CyclePoint], arclength: float) -> CyclePoint | None:
         """A cycle between points, at an arclength; None where it is not found."""
         h = max((p.motion.harmonics for p in near), key=lambda h: h.count)
-        weights = lagrange([p.arclength for p in near], arclength)
-        c = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, near))
-        omega = float(sum(w * p.motion.omega for w, p in zip(weights, near)))
+        guess = by_arclength(near, arclength, h)
+        c, weights = guess.coefficients, lagrange([p.arclength for p in near], arclength)
         value = float(sum(w * p.value for w, p in zip(weights, near)))
         first, last = near[0], near[-1]
         row = h.resized(last.motion.coefficients) - h.resized(first.motion.coefficients)
@@ -307,7 +311,7 @@ class CycleTracer:
         condition = Condition(row * self._weight, extra, float(np.vdot(row * self._weight, c) + extra[-1] * value))
         mu = near[0].cycle.mu | {self.parameter: value}
         try:
-            cycle = self._solved(type(first.motion)(h, c, omega), mu, (self.parameter,), (condition,))
+            cycle = self._solved(guess, mu, (self.parameter,), (condition,))
         except ContinuationError:
             return None
         point = self.described(cycle, after=first)

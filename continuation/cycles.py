@@ -21,6 +21,8 @@ from continuation.periodic import PeriodicMotion
 
 #: Directions of a motion itself that belong to the basis: those above this share of the largest.
 OWN = 1e-4
+#: Contraction that is counted on at most.
+LEAST_CONTRACTION = 0.15
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,8 @@ class CycleOptions:
     Attributes
     ----------
     tolerance : float
-        Size of the last correction over that of the motion about its mean.
+        What the last correction leaves, over the size of the motion about its mean: the size of the next one, by the
+        contraction seen.
     max_iterations : int
         Corrections.
     linear : float
@@ -136,13 +139,16 @@ class CycleSolver:
             change = _updated(change, steps, linear.units)
             spent += used
             sizes.append(self._size(change, motion))
+            if len(steps) > 1 and sizes[-1] > 2.0 * sizes[-2]:  # of a linearisation that is no good here
+                linear = None
+                continue
             if not sizes[-1] < 10.0 or (len(sizes) > 8 and sizes[-1] > max(0.5 * sizes[-4], 1e-3)):
                 break
             motion, mu = moved(motion, mu, free, change)
             if motion.omega <= 0:
                 break
             learnt = self.learn(change[: motion.coefficients.size].reshape(shape))
-            if sizes[-1] <= options.tolerance:
+            if _left(sizes[-len(steps) :]) <= options.tolerance:
                 return Cycle(motion, mu, sizes[-1], len(sizes), spent)
             if _is_slow(sizes[-len(steps) :], options.renew_at) or sizes[-1] > 0.5 or missed > 0.5:
                 linear = None
@@ -233,6 +239,13 @@ def _updated(change: np.ndarray, steps: list[np.ndarray], units: np.ndarray) -> 
         z = z / (1.0 - np.clip(share, -1.0, 0.6))
     steps.append(z)
     return z * units
+
+
+def _left(sizes: Sequence[float]) -> float:
+    """What corrections of these sizes by one linearisation leave: the next one, by the contraction they show."""
+    if len(sizes) < 2:
+        return sizes[-1]
+    return max(LEAST_CONTRACTION, *(b / a for a, b in zip(sizes[-3:], sizes[-2:]))) * sizes[-1]
 
 
 def _is_slow(sizes: Sequence[float], contraction: float) -> bool:

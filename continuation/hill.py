@@ -17,8 +17,11 @@ from continuation.harmonics import Harmonics
 
 #: Shifts: distance right of the axis, and how far up the band of exponents, both over omega.
 _RIGHT, _UP = 0.1, (0.0, 0.25, 0.5)
-#: Steps of each Arnoldi iteration.
+#: Steps of an Arnoldi iteration after which its eigenvalues are looked at.
 _STEPS = 60
+#: Least radius about the real shift, over omega, in which all eigenvalues are found: with turns of those whose series
+#: is cut off within the band.
+_REACH = 0.75
 #: Most that the outer two harmonics may hold of a perturbation.
 _RIM = 0.05
 #: Most corrections of an eigenpair whose projection is not exact.
@@ -96,7 +99,7 @@ def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-3, r
     """
     for left in range(rounds, -1, -1):
         found = _of_projection(linear, count, solver.system.autonomous)
-        missed = [_missed(linear, *pair) for pair in zip(found.as_found, found.vectors)]
+        missed = _missed(linear, found.as_found, found.vectors)
         errors = np.array([share for share, _ in missed])
         found = replace(found, errors=errors)
         limits = tolerance * np.where(np.arange(len(errors)) < 2, 1.0, 4.0)
@@ -108,24 +111,21 @@ def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-3, r
     return found
 
 
-def _missed(linear, sigma: complex, vector: np.ndarray) -> tuple[float, np.ndarray]:
-    """Share that a perturbation misses, and the correction (2 H + 1, n) that one pass of the smoother gives."""
+def _missed(linear, shifts: np.ndarray, vectors: list[np.ndarray]) -> list[tuple[float, np.ndarray]]:
+    """Share that each perturbation misses, and the correction (2 H + 1, n) that one pass of the smoother gives."""
     if linear.smoother is None:
-        return 0.0, np.zeros_like(vector)
-    rest = linear.smoother(linear.operator.apply(vector, sigma))
-    scaled, whole = rest / linear.scale, np.linalg.norm(vector / linear.scale)
-    outside = scaled - (scaled @ linear.basis) @ linear.basis.T
-    return float(np.linalg.norm(outside) / whole), outside * linear.scale
+        return [(0.0, np.zeros_like(vector)) for vector in vectors]
+    missed = []
+    for vector, force in zip(vectors, linear.operator.apply_each(vectors, shifts)):
+        scaled, whole = linear.smoother(force) / linear.scale, np.linalg.norm(vector / linear.scale)
+        outside = scaled - (scaled @ linear.basis) @ linear.basis.T
+        missed.append((float(np.linalg.norm(outside) / whole), outside * linear.scale))
+    return missed
 
 
 def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
-    reduced, motion = linear.reduced, linear.motion
-    omega, h = motion.omega, motion.harmonics
-    pairs = [(s, x.reshape(h.size, -1)) for s, x in _near(reduced, [omega * (_RIGHT + 1j * up) for up in _UP])]
-    inside = lambda sigma: abs(sigma.imag) <= (0.5 + _EDGE) * omega  # noqa: E731
-    pairs = [(s, x) for s, x in pairs if _is_whole(h, x) and (inside(s) or _cut_off(reduced, s, x) <= _CLOSED)]
-    found = _each_once(sorted(pairs, key=lambda pair: not inside(pair[0])), inside, omega)
-    found = sorted(found, key=lambda one: -one[0].real)
+    motion = linear.motion
+    found = _leading(linear.reduced, count + 1)
     found = found[: count + 1] if linear.operator.exact else _all_refined(linear, found, count + 1)
     trivial = 0.0
     if autonomous and found:
@@ -133,7 +133,8 @@ def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
     found = sorted(found, key=lambda one: -one[0].real)[:count]
     v = linear.scale[:, None] * linear.basis
     values, as_found = (np.array(part, complex) for part in ([one[0] for one in found], [one[1] for one in found]))
-    return Exponents(values, [x @ v.T for _, _, x in found], np.zeros(len(found)), trivial, omega, as_found)
+    vectors = [x @ v.T for _, _, x in found]
+    return Exponents(values, vectors, np.zeros(len(found)), trivial, motion.omega, as_found)
 
 
 def _all_refined(linear, found, count: int) -> list[tuple[complex, complex, np.ndarray]]:
@@ -210,23 +211,54 @@ def _is_whole(h: Harmonics, x: np.ndarray) -> bool:
     return bool(rim <= _RIM * weight.sum())
 
 
-def _near(reduced, shifts) -> list[tuple[complex, np.ndarray]]:
-    """Eigenpairs of the projection near shifts; the matrix is quadratic, about each shift where something relaxes."""
-    step, found, parts = 0.25 * reduced.motion.omega, [], None
-    for shift in shifts:
-        if parts is None or not reduced.polynomial:
-            middle = 0.0 if reduced.polynomial else shift
-            here, ahead, behind = (reduced.matrix(middle + d) for d in (0.0, step, -step))
-            first, second = (ahead - behind) / (2 * step), (ahead + behind - 2 * here) / (2 * step**2)
-            parts = (here - middle * first + middle**2 * second, first - 2 * middle * second, second)
-        found += _nearest(parts, shift)
-    return found
+def _leading(reduced, count: int) -> list[tuple[complex, complex, np.ndarray]]:
+    """Perturbations of the projection by decreasing growth, each once, the leading ones among them: see `_each_once`.
+
+    Where the matrix is quadratic in the exponent one real shift serves: the iteration goes on until it has all
+    eigenvalues in a circle that holds the band as far to the left as those wanted lie. Where something relaxes, or that
+    is not reached, what is near shifts up the band is taken, by the quadratic about each.
+    """
+    omega, pairs = reduced.motion.omega, []
+    if reduced.polynomial:
+        shift = _RIGHT * omega
+        for pairs, radius in _nearest(_quadratic(reduced, 0.0), shift):
+            found = _perturbations(reduced, pairs)
+            last = found[count - 1][0].real if len(found) >= count else -np.inf
+            if radius >= max(_REACH * omega, np.hypot(shift - last, (0.5 + _EDGE) * omega)):
+                return found
+    for shift in (omega * (_RIGHT + 1j * up) for up in _UP):
+        *_, (near, _) = _nearest(_quadratic(reduced, 0.0 if reduced.polynomial else shift), shift, _STEPS)
+        pairs = pairs + near
+    return _perturbations(reduced, pairs)
 
 
-def _nearest(parts, shift: complex) -> list[tuple[complex, np.ndarray]]:
-    """Eigenpairs near a shift of l0 + sigma l1 + sigma^2 l2."""
+def _perturbations(reduced, pairs) -> list[tuple[complex, complex, np.ndarray]]:
+    """Eigenpairs that stand for perturbations of the motion, by decreasing growth: see `_each_once`."""
+    h, omega = reduced.motion.harmonics, reduced.motion.omega
+    inside = lambda sigma: abs(sigma.imag) <= (0.5 + _EDGE) * omega  # noqa: E731
+    shaped = ((sigma, x.reshape(h.size, -1)) for sigma, x in pairs)
+    kept = [(s, x) for s, x in shaped if _is_whole(h, x) and (inside(s) or _cut_off(reduced, s, x) <= _CLOSED)]
+    return sorted(_each_once(sorted(kept, key=lambda pair: not inside(pair[0])), inside, omega), key=_decay)
+
+
+def _decay(one) -> float:
+    return -one[0].real
+
+
+def _quadratic(reduced, middle: complex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """l0, l1, l2 of the projection as l0 + sigma l1 + sigma^2 l2, exact or about a shift."""
+    step = 0.25 * reduced.motion.omega
+    here, ahead, behind = (reduced.matrix(middle + d) for d in (0.0, step, -step))
+    first, second = (ahead - behind) / (2 * step), (ahead + behind - 2 * here) / (2 * step**2)
+    return here - middle * first + middle**2 * second, first - 2 * middle * second, second
+
+
+def _nearest(parts, shift: complex, most: int = 3 * _STEPS):
+    """Eigenpairs near a shift of l0 + sigma l1 + sigma^2 l2, and the radius about it in which they are all, again and
+    again as more are found.
+    """
     l0, l1, l2 = parts
-    shift = shift if shift.imag else shift.real
+    shift = shift if np.imag(shift) else np.real(shift)
     matrix = l0 + shift * l1 + shift**2 * l2
     factor = la.lu_factor(matrix, overwrite_a=True, check_finite=False)
     size = len(l0)
@@ -236,7 +268,9 @@ def _nearest(parts, shift: complex) -> list[tuple[complex, np.ndarray]]:
         top = -la.lu_solve(factor, _times(l2, z + shift * y) + _times(l1, y), check_finite=False)
         return np.append(top, y + shift * top)
 
-    return [(shift + 1.0 / value, vector[:size]) for value, vector in _arnoldi(invert, 2 * size, matrix.dtype)]
+    for pairs, next_one in _arnoldi(invert, 2 * size, matrix.dtype, most):
+        radius = 1.0 / next_one if next_one else np.inf
+        yield [(shift + 1.0 / value, vector[:size]) for value, vector in pairs], radius
 
 
 def _times(matrix: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -247,26 +281,30 @@ def _times(matrix: np.ndarray, x: np.ndarray) -> np.ndarray:
     return both[:, 0] + 1j * both[:, 1]
 
 
-def _arnoldi(apply, size: int, dtype) -> list[tuple[complex, np.ndarray]]:
-    """Ritz pairs of the largest eigenvalues that have converged."""
-    steps = min(_STEPS, size)
-    basis = np.zeros((size, steps + 1), dtype)
+def _arnoldi(apply, size: int, dtype, most: int):
+    """Ritz pairs of the largest eigenvalues that have converged, and the size of the largest that has not (zero where
+    the space is exhausted), every so many steps.
+    """
+    basis = np.zeros((size, 1), dtype)
     start = np.random.default_rng(0).standard_normal(size)
     basis[:, 0] = start / np.linalg.norm(start)
-    h = np.zeros((steps + 1, steps), dtype)
-    done = steps
-    for k in range(steps):
+    h = np.zeros((most + 1, most), dtype)
+    for k in range(min(most, size)):
+        if k % _STEPS == 0:
+            basis = np.concatenate([basis, np.zeros((size, _STEPS), dtype)], axis=1)
         w = apply(basis[:, k])
         for _ in range(2):
             part = basis[:, : k + 1].conj().T @ w
             h[: k + 1, k] += part
             w = w - basis[:, : k + 1] @ part
         h[k + 1, k] = np.linalg.norm(w)
-        if abs(h[k + 1, k]) <= 1e-13 * np.abs(h[: k + 2, : k + 1]).max():
-            done = k + 1
-            break
-        basis[:, k + 1] = w / h[k + 1, k]
-    values, vectors = np.linalg.eig(h[:done, :done])
-    last = abs(h[done, done - 1]) if done < len(h) else 0.0
-    good = [i for i in range(done) if last * abs(vectors[-1, i]) <= 1e-9 * abs(values[i]) and values[i]]
-    return [(complex(values[i]), basis[:, :done] @ vectors[:, i]) for i in good]
+        done, last = k + 1, abs(h[k + 1, k])
+        ended = last <= 1e-13 * np.abs(h[: k + 2, : k + 1]).max() or done == size
+        if ended or done % _STEPS == 0:
+            values, vectors = np.linalg.eig(h[:done, :done])
+            good = (last * np.abs(vectors[-1]) <= 1e-9 * np.abs(values)) & (values != 0)
+            rest = 0.0 if ended else np.abs(values[~good]).max(initial=0.0)
+            yield [(complex(values[i]), basis[:, :done] @ vectors[:, i]) for i in np.flatnonzero(good)], rest
+        if ended:
+            return
+        basis[:, k + 1] = w / last

@@ -98,6 +98,16 @@ class Term:
         total = sum(_times(blocks, rates.apply(function, inner)) for function, blocks in self.middle)
         return rates.apply(self.outer, _times(self.left, total))
 
+    def apply_each(self, samples: Sequence[np.ndarray], rates: Sequence[Rates]) -> list[np.ndarray]:
+        """`apply` to samples (N, n) of several motions with rates of their own, the blocks taken up once."""
+        inner = [_times(self.right, one) for one in samples]
+        total = sum(
+            _times(blocks, np.stack([by.apply(function, one) for one, by in zip(inner, rates)], axis=-1))
+            for function, blocks in self.middle
+        )
+        total = _times(self.left, total)
+        return [by.apply(self.outer, total[..., i]) for i, by in enumerate(rates)]
+
     @property
     def polynomial(self) -> bool:
         """Whether d/dt enters by powers up to the second."""
@@ -125,6 +135,8 @@ def _projected(blocks, basis: np.ndarray, known: np.ndarray | None) -> np.ndarra
 def _times(blocks, samples: np.ndarray) -> np.ndarray:
     if blocks is None:
         return samples
+    if isinstance(blocks, SparseBlocks):
+        return blocks.times(samples)
     if isinstance(blocks, np.ndarray):
         if samples.ndim == 2:
             return np.matmul(blocks, samples[:, :, None])[:, :, 0]
@@ -172,6 +184,18 @@ class PeriodicOperator:
         h, rates = self.motion.harmonics, self.rates(shift)
         samples = h.evaluate(coefficients)
         return h.project(sum(term.apply(samples, rates) for term in self.terms))
+
+    def apply_each(self, vectors: Sequence[np.ndarray], shifts: Sequence[complex]) -> list[np.ndarray]:
+        """`apply` to several changes, each with an exponent of its own; cheaper than one by one."""
+        h, rates = self.motion.harmonics, [Rates(self.motion.harmonics, self.motion.omega, s) for s in shifts]
+        samples = [h.evaluate(vector) for vector in vectors]
+        parts = [
+            term.apply_each(samples, rates)
+            if isinstance(term, Term)
+            else [term.apply(one, by) for one, by in zip(samples, rates)]
+            for term in self.terms
+        ]
+        return [h.project(sum(part)) for part in zip(*parts)]
 
     def reduced(self, basis: np.ndarray, known: ReducedOperator | None = None) -> ReducedOperator:
         """Projection on a basis (n, r) at every sample; `known` is that on the first columns of the basis."""

@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from continuation import OutOfDomain
-from continuation.blocks import SparseBlocks
+from continuation.blocks import BlockRows, SparseBlocks
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
 from eigen import CoupledPencil, SingularShiftError, Workspace
 from eigen.pencil import FLUID_PARTS
@@ -58,6 +58,7 @@ class PeriodicValve:
         area = float(model.mesh.rest_area[-1])
         self._weight = area  # turns the flow's equations, Pa, into forces
         self._workspace = Workspace()
+        self._known_forces: tuple[ValveModel, np.ndarray, np.ndarray] | None = None
         scale = np.ones(model.shell.dofs.free.shape)
         scale[:, 3:] = 2.0 / float(np.mean(model.shell.geometry.thickness))
         jet = np.sqrt(2.0 * abs(mu["inlet"]) / mu["density"])
@@ -104,7 +105,7 @@ class PeriodicValve:
         p, rest = self.pressures(motion, mu)
         memory = self._memory(mu)
         held = None if memory is None else memory.held(q, rates)
-        slow = np.stack([model.internal_force(x) for x in q])
+        slow = self._internal_forces(model, q)
         out = slow + mu["beta"] * rates.apply(1, slow)
         if model.contact is not None:
             out += np.stack([model.contact.force(x) for x in q])
@@ -115,6 +116,13 @@ class PeriodicValve:
             out[i] += self._inertia(model, nodal, v[i], a[i] + mu["alpha"] * v[i])
             out[i] -= model.pressure_force(nodal, p[i])
         return np.concatenate([out, self._weight * rest], axis=1)
+
+    def _internal_forces(self, model: ValveModel, q: np.ndarray) -> np.ndarray:
+        """(N, n); those of the last positions are kept, for derivatives by frequency and parameters ask again."""
+        known = self._known_forces
+        if known is None or known[0] is not model or not np.array_equal(known[1], q):
+            self._known_forces = known = (model, q.copy(), np.stack([model.internal_force(x) for x in q]))
+        return known[2]
 
     @staticmethod
     def _inertia(model: ValveModel, nodal: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -133,24 +141,27 @@ class PeriodicValve:
         p, _ = self.pressures(motion, mu)
         memory = self._memory(mu)
         held = None if memory is None else memory.held(q, rates)
-        values = np.empty((4, len(q), len(model.shell.dofs.pattern[1])))
-        own, rest, damping, mass = values
+        parts_of_wall = own, rest, damping, mass = [BlockRows(len(q)) for _ in range(4)]
         left, right, alpha = [], [], mu["alpha"]
         for i in range(len(q)):
             nodal = model.nodal(q[i])
-            own[i] = model.structure(q[i])[1]
-            mass[i] = model.mass(q[i])
+            own.put(model.structure(q[i])[1])
+            inertia = model.mass(q[i])
+            mass.put(inertia)
             moving = (nodal, model.nodal(v[i]), model.nodal(a[i] + alpha * v[i]))
             by_position, by_rate = inertia_slopes(model.shell, *moving)
-            rest[i] = model.follower_stiffness(nodal, p[i], by_position)
-            model.add_contact(q[i], rest[i])
+            follower = model.follower_stiffness(nodal, p[i], by_position)
+            model.add_contact(q[i], follower)
             if held is not None:
-                rest[i] += memory.geometric(q[i], held[i])
-            damping[i] = by_rate + alpha * mass[i]
+                follower += memory.geometric(q[i], held[i])
+            rest.put(follower)
+            damping.put(by_rate + alpha * inertia if alpha else by_rate)
             left.append(model.station_forces(nodal))
             right.append(model.rows.jacobian(nodal))
-        stiff = StiffnessDamping(mu["beta"])
-        blocks = [self._blocks(model, part) for part in values]
+        stiff, means = StiffnessDamping(mu["beta"]), [part.mean for part in parts_of_wall]
+        sizes = [self._size_of(model, mean) for mean in means[1:3]]
+        gyroscopic = min(motion.omega * sizes[1] / sizes[0], 1.0) if sizes[0] else 1.0
+        blocks = [self._blocks(model, part, share) for part, share in zip(parts_of_wall, (1.0, 1.0, gyroscopic, 1.0))]
         terms = [
             Term([(0, blocks[0])], outer=stiff),
             Term(list(enumerate(blocks[1:]))),
@@ -163,28 +174,33 @@ class PeriodicValve:
             coarse = [*terms, *(Term([(0, b)], outer=phi) for b, phi in zip(relaxing, memory.filters))]
             terms.append(MemoryTerm(memory, q, self.size))
         operator = PeriodicOperator(motion, terms, coarse)
-        operator.average = self._average(model, values.mean(axis=1), (left, right), parts, q, mu)
+        operator.average = self._average(model, means, (left, right), parts, q, mu)
         return operator
 
-    def _blocks(self, model: ValveModel, values: np.ndarray) -> SparseBlocks:
-        """Matrices (n + l, n + l), nothing on the flow's unknowns, of values (N, nnz) on the structure's pattern."""
+    def _blocks(self, model: ValveModel, values, share: float = 1.0) -> SparseBlocks:
+        """Matrices (n + l, n + l), nothing on the flow's unknowns, of values on the structure's pattern."""
         indptr, indices = model.shell.dofs.pattern
         indptr = np.append(indptr, np.full(self.inner, indptr[-1], indptr.dtype))
-        return SparseBlocks(values, indices, indptr, (self.size, self.size))
+        return SparseBlocks(values, indices, indptr, (self.size, self.size), share)
+
+    def _size_of(self, model: ValveModel, values: np.ndarray) -> float:
+        """Norm of a matrix on the structure's pattern, its unknowns in their sizes."""
+        indptr, indices = model.shell.dofs.pattern
+        return float(
+            np.linalg.norm(values * np.repeat(self.scales[: len(indptr) - 1], np.diff(indptr)) * self.scales[indices])
+        )
 
     def _fluid_term(self, left, right, parts) -> Term:
         """- G p over the flow's equations, from areas and the flow's unknowns."""
         a0, a1, a2, b0, b1, r0, r1, r2, s0, s1 = (parts[name] for name in FLUID_PARTS)
-        inner, w = sp.identity(self.inner, format="csr"), self._weight
+        w = self._weight
         zero = np.zeros_like(s0), np.zeros_like(b0)
         middle = [
             (0, np.block([[-a0, -b0], [w * r0, w * s0]])),
             (1, np.block([[-a1, -b1], [w * r1, w * s1]])),
             (2, np.block([[-a2, zero[1]], [w * r2, zero[0]]])),
         ]
-        forces = [sp.block_diag((g, inner), format="csr") for g in left]
-        areas = [sp.block_diag((j, inner), format="csr") for j in right]
-        return Term(middle, forces, areas)
+        return Term(middle, *([_with_identity(matrix, self.inner) for matrix in side] for side in (left, right)))
 
     def _average(self, model, means, coupling, parts, q, mu) -> CoupledPencil:
         own, rest, damping, mass = means
@@ -223,6 +239,15 @@ def check_periodic(model: ValveModel) -> None:
             "With fluid outside the wall cycles are not followed: how its added mass changes with the shape within "
             "a cycle is not among the equations; runs in time show them."
         )
+
+
+def _with_identity(matrix: sp.csr_matrix, count: int) -> sp.csr_matrix:
+    """A matrix and the identity on its diagonal."""
+    rows, columns = matrix.shape
+    data = np.append(matrix.data, np.ones(count))
+    indices = np.append(matrix.indices, np.arange(columns, columns + count, dtype=matrix.indices.dtype))
+    indptr = np.append(matrix.indptr, matrix.indptr[-1] + np.arange(1, count + 1, dtype=matrix.indptr.dtype))
+    return sp.csr_matrix((data, indices, indptr), shape=(rows + count, columns + count), copy=False)
 
 
 @dataclass(frozen=True)

@@ -35,13 +35,16 @@ def find_onset(case: Case, walk: StabilityWalk, observer: Observer) -> Onset:
         observer.progress(f"steady state at {axis.parameter} = {value:.6g}")
         return cell(base.at(**{axis.parameter: value}))
 
+    spectra = {}  # the last one is that of the onset
+
     def inside(value: float) -> np.ndarray:
-        return np.asarray(walk.spectrum(base.at(**{axis.parameter: value}), MODES).eigenvalues)
+        spectra[value] = walk.spectrum(base.at(**{axis.parameter: value}), MODES)
+        return np.asarray(spectra[value].eigenvalues)
 
     scan = Scan(sample, axis.log, inside=inside)
     crossings = scan.run(values)
     for crossing in crossings[::-1] if case.cycle.start == "last" else crossings:
-        onset = _onset_at(case, walk, scan, crossing)
+        onset = _onset_at(case, walk, scan, crossing, spectra)
         if onset is not None:
             return onset
     raise SolveError(_without(case, scan))
@@ -56,10 +59,11 @@ def _cells(case: Case, walk: StabilityWalk, places: list[Place]):
     return lambda place: np.asarray(walk.spectrum(place).eigenvalues)
 
 
-def _onset_at(case: Case, walk: StabilityWalk, scan: Scan, crossing: Crossing) -> Onset | None:
+def _onset_at(case: Case, walk: StabilityWalk, scan: Scan, crossing: Crossing, spectra: dict) -> Onset | None:
     value = locate(scan, crossing, LOCATED)
     expected = complex(scan.within(value).eigenvalues[crossing.index])
-    return onset_at(walk, Place.of(case).at(**{case.cycle.axis.parameter: value}), value, expected)
+    place = Place.of(case).at(**{case.cycle.axis.parameter: value})
+    return onset_at(walk, place, value, expected, spectra.get(value))
 
 
 def _without(case: Case, scan: Scan) -> str:
