@@ -338,3 +338,28 @@ def test_column_separation():
     assert volume.max() == pytest.approx(away * section * turn, rel=0.03)
     closed = time[np.flatnonzero(volume > 0.01 * volume.max())[-1]]
     assert closed - 0.5 * stop == pytest.approx(2 * turn + away / back * turn, rel=0.03)
+
+
+def test_columns_that_part_in_the_middle():
+    """Both halves of the fluid in a pipe run outwards, against the same pressure at both ends: a cavity grows between
+    them, and each column of length l, from its end to the cavity, turns back under a = -p_v/(rho l).
+    """
+    cells, length, section, velocity, step = 21, 2.0, 5e-3, 1.0, 1e-4
+    z, area = np.linspace(0.0, length, cells + 1), np.full(cells + 1, section)
+    law, middle = liquid_of(z), cells // 2
+    outward = np.where(np.arange(cells + 1) <= middle, velocity, -velocity)
+    fluid = law.stepping(LIQUID)
+    state = fluid.moving(area, 0 * area, np.concatenate([outward[-1:], outward[:-1], np.zeros(cells)]), 0.0)
+    full, energy, volume, least = state.stored[law.count :], fluid.energy(area, state.inner), [], []
+    time = step * np.arange(1, 171)
+    for _ in time:
+        flow = GasStep(fluid, state, step, 1.0, 0.0).at(area, 0 * area)
+        state = flow.state()
+        volume.append(np.sum(full - state.stored[law.count :]))
+        least.append(flow.pressure.min())
+    slowing = -BOILS / (LIQUID * middle * length / cells)
+    expected = 2.0 * section * (velocity * time - 0.5 * slowing * time**2)
+    assert np.abs(volume - expected).max() < 0.03 * expected.max()
+    assert BOILS - LIQUID * (VAPOUR * WAVES) ** 2 < min(least) < BOILS + 1e3
+    supply, *gone = state.books
+    assert fluid.energy(area, state.inner) - energy == pytest.approx(supply - sum(gone), abs=1e-9 * energy)
