@@ -25,7 +25,7 @@ from .trial import Trial
 #: Speed inwards, relative to the largest speed, that is none.
 INWARD = 1e-6
 #: Least numerical damping of steps that start with fluid drawn in: without any, the kicks that walls get then alternate
-#: from step to step for good. Pressures of a fluid that is compressed do not kick, and take no such steps.
+#: from step to step for good. A motion that is `quiet_inward` takes no such steps.
 DAMPING = 0.2
 
 
@@ -120,7 +120,8 @@ class Stepper:
         self, motion, scheme: Scheme, pressure: Callable[[float], float], options: StepOptions = StepOptions()
     ):
         self.motion, self.scheme, self.pressure, self.options = motion, scheme, pressure, options
-        self._damped = member("generalised-alpha", max(DAMPING, scheme.gamma - 0.5))
+        quiet = getattr(motion, "quiet_inward", False)
+        self._inward = scheme if quiet else member("generalised-alpha", max(DAMPING, scheme.gamma - 0.5))
         self.residuals = self.solves = self.factorisations = 0
         self.forget()
 
@@ -145,7 +146,7 @@ class Stepper:
         """
         before = (self.residuals, self.solves, self.factorisations)
         outward = _outward(self.motion.speeds(state))
-        scheme = self.scheme if outward or state.gas is not None else self._damped
+        scheme = self.scheme if outward else self._inward
         for robust in (self.options.backward or not (outward and self._smooth(state, h)), True):
             trial = Trial(self.motion, scheme, state, h, self.pressure, robust)
             self.motion.begin_step(state, h, trial.fluid.inlet)

@@ -73,6 +73,14 @@ def test_a_stiff_gas_moves_as_the_incompressible_law(valve):
     assert np.abs(plain - gas).max() < 1e-4 * np.abs(plain).max()
 
 
+def test_a_gas_is_drawn_in_without_numerical_damping(valve):
+    """A liquid is not: without it a valve in water rings from step to step after its first hammer."""
+    water = {"fluid.density": 1e3, "fluid.sound_speed": 1480.0, "fluid.heat_capacity_ratio": 7.15}
+    for more, damping in ((SOUND, 0.0), (water, 0.2)):
+        stepper = Stepper(motion_of(valve(AIR | more)), scheme("generalised-alpha"), lambda t: 2e3)
+        assert stepper._inward.gamma - 0.5 == pytest.approx(damping)
+
+
 @pytest.mark.slow
 def test_slams_stay_above_vacuum(tmp_path):
     """6 kPa: without compression pressures of this motion fall to -20 MPa; a gas ends at its absolute pressure."""
