@@ -154,7 +154,7 @@ class GasStep:
         power = self.fluid.powers(flow.area, flow.area_rate, flow.inner)
         new = GasState(flow.inner, flow.stored, rate, flow.area, power, old.books)
         given = self.fluid.law, self.parameters, old.instant, new.instant
-        return replace(new, books=old.books + gas_books.step_books(*given, h, self._rate))
+        return replace(new, books=old.books + np.asarray(gas_books.step_books(*given, h, self._rate)))
 
 
 class GasInstant:

@@ -340,6 +340,7 @@ def test_column_separation():
     assert closed - 0.5 * stop == pytest.approx(2 * turn + away / back * turn, rel=0.03)
 
 
+@pytest.mark.slow
 def test_columns_that_part_in_the_middle():
     """Both halves of the fluid in a pipe run outwards, against the same pressure at both ends: a cavity grows between
     them, and each column of length l, from its end to the cavity, turns back under a = -p_v/(rho l).
