@@ -58,7 +58,8 @@ def tell(mesh: str, run) -> None:
         f"pressed in {1e6 * h['penetration'].max():.1f} um, force {h['contact_force'][-1]:.0f} N at the end, "
         f"turned over {np.abs(np.diff(h['pressure_work'])).sum():.2f} J, "
         f"damping {h['dissipation'][-1]:.2f} J, contact {h['contact_loss'][-1]:.3f} J, "
-        f"unexplained {np.abs(h['balance']).max():.3f} J, failures {list(run.failures)}",
+        f"numerical damping {h['numerical_loss'][-1]:.3f} J, unexplained {np.abs(h['balance']).max():.3f} J, "
+        f"failures {list(run.failures)}",
         flush=True,
     )
 

@@ -16,7 +16,7 @@ Equations (T.23) and (T.24) of docs/theory.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from . import gas_books
+from .gas_books import BOOKS, POWERS, Instant
 from .law import above_floor
 
 if TYPE_CHECKING:
@@ -34,13 +36,11 @@ if TYPE_CHECKING:
 _STEPS, _TOLERANCE, _SMALLEST, _ROUNDING = 40, 1e-11, 1e-12, 1e-9
 #: Share of a step at which its equations are met, and r, for the difference of second order.
 SECOND_ORDER = 1.0, 1.5
-#: Names of the books of a `GasState`.
-BOOKS = ("supply", "outflow", "work", "loss")
 
 
 def packed_size(inner: int) -> int:
     """Length of `GasState.packed` for a number of unknowns."""
-    return 3 * inner + 2 * len(BOOKS)
+    return 3 * inner + (inner + 1) // 2 + POWERS + len(BOOKS)
 
 
 @dataclass(frozen=True)
@@ -53,27 +53,36 @@ class GasState:
         The law's unknowns, m/s.
     stored, rate : (l,) arrays
         What the balances hold and the scheme's value of its rate.
-    power, books : (4,) arrays
-        W and J of the part: taken in at the flange, left through the lips, done on the wall, lost in the passage; the
-        books are since the start.
+    area : (m,) array, m2
+        Of the passage.
+    power : (3,) array, W
+        Of a quarter; see `dbvfiv.flow.gas_books.powers`.
+    books : (6,) array
+        What has become of its energy since the start, J of the part; see `dbvfiv.flow.gas_books.BOOKS`.
     """
 
     inner: np.ndarray
     stored: np.ndarray
     rate: np.ndarray
+    area: np.ndarray
     power: np.ndarray
     books: np.ndarray
 
     @property
+    def instant(self) -> Instant:
+        """The state as the books see it."""
+        return Instant(self.area, self.inner, self.stored, self.rate, self.power)
+
+    @property
     def packed(self) -> np.ndarray:
         """All numbers in one array."""
-        return np.concatenate([self.inner, self.stored, self.rate, self.power, self.books])
+        return np.concatenate([self.inner, self.stored, self.rate, self.area, self.power, self.books])
 
     @classmethod
     def unpacked(cls, numbers: np.ndarray) -> GasState:
         """Undo `packed`."""
-        count, books = (len(numbers) - 2 * len(BOOKS)) // 3, len(BOOKS)
-        cuts = np.cumsum([count, count, count, books])
+        stations = (len(numbers) - POWERS - len(BOOKS) + 3) // 7  # of 2 m - 1 unknowns
+        cuts = np.cumsum([2 * stations - 1] * 3 + [stations, POWERS])
         return cls(*np.split(np.asarray(numbers, float), cuts))
 
 
@@ -122,7 +131,7 @@ class GasStep:
 
     def __init__(self, fluid: GasFluid, old: GasState, h: float, rate: float, inlet: float):
         self.fluid, self.old, self.h, self.weight = fluid, old, h, rate / h
-        self._ahead = 1.0 if rate == 1.0 else 0.5  # of a step's power that at its end, as its difference has it
+        self._rate = rate
         self._known = (1.0 - rate) * old.rate - self.weight * old.stored
         self.parameters = fluid.parameters(inlet)
         self._start = old.inner
@@ -141,10 +150,11 @@ class GasStep:
     def end(self, flow: GasFlow) -> GasState:
         """The state that the step ends with."""
         old, h = self.old, self.h
-        power = self.fluid.powers(flow.area, flow.area_rate, flow.inner)[1]
         rate = (flow.stored - old.stored) / h
-        work = h * (old.power + self._ahead * (power - old.power))
-        return GasState(flow.inner, flow.stored, rate, power, old.books + work)
+        power = self.fluid.powers(flow.area, flow.area_rate, flow.inner)
+        new = GasState(flow.inner, flow.stored, rate, flow.area, power, old.books)
+        given = self.fluid.law, self.parameters, old.instant, new.instant
+        return replace(new, books=old.books + np.asarray(gas_books.step_books(*given, h, self._rate)))
 
 
 class GasInstant:
@@ -190,13 +200,16 @@ class GasFluid:
         inner = np.asarray(inner, float)
         parts = _instant(self.law, self.parameters(inlet), area, area_rate, inner)
         stored, sources, moves = (np.asarray(part) for part in parts)
-        power = self.powers(area, area_rate, inner)[1]
-        return GasState(inner, stored, np.where(moves, -sources, 0.0), power, np.zeros(len(BOOKS)))
+        power = self.powers(area, area_rate, inner)
+        return GasState(inner, stored, np.where(moves, -sources, 0.0), np.asarray(area), power, np.zeros(len(BOOKS)))
 
-    def powers(self, area, area_rate, inner) -> tuple[float, np.ndarray]:
-        """Energy of the fluid, J of the part, and the powers (4,) of `GasState`."""
-        energy, power = _powers(self.law, self.parameters(0.0), area, area_rate, inner)
-        return float(energy), np.asarray(power)
+    def powers(self, area, area_rate, inner) -> np.ndarray:
+        """Powers (3,) of `GasState`, W."""
+        return np.asarray(gas_books.powers(self.law, self.parameters(0.0), area, area_rate, inner))
+
+    def energy(self, area, inner) -> float:
+        """Kinetic energy of the fluid and that of its compression, J of the part."""
+        return float(gas_books.energy(self.law, self.parameters(0.0), area, inner))
 
     def readings(self, area, inner) -> tuple[float, float, float]:
         """Mass flows at outlet and inlet, kg/s of the part, and the largest Mach number."""
@@ -285,24 +298,3 @@ def _readings(law, parameters, area, inner):
     sigma = sigma.at[0].add(law.drawn(speed[0], parameters))
     flow = parameters["density"] * jnp.exp(sigma / parameters["sound_speed"]) * above_floor(area, law.floor) * speed
     return flow[0], flow[-1], jnp.max(jnp.abs(speed) / law.local_sound_speed(sigma, parameters))
-
-
-@jax.jit
-def _powers(law, parameters, area, area_rate, inner):
-    """Energy, J, and powers (4,), W, as `GasState` has them."""
-    channel, density = law.channel, parameters["density"]
-    speed, sigma = law.split(inner, parameters)
-    open_, opening = jax.jvp(lambda a: above_floor(a, law.floor), (area,), (area_rate,))
-    entering = sigma.at[0].add(law.drawn(speed[0], parameters))
-    whole = law.enthalpy(sigma, parameters) + 0.5 * speed**2
-    flow = density * jnp.exp(entering / parameters["sound_speed"]) * open_ * speed
-    head = law.sources(area, area_rate, inner, parameters)[: law.count - 1]
-    lost = head - (whole[:-1] - whole[1:])  # what the cells take besides Bernoulli's heads
-    held = law.inside(sigma)
-    kept = density * jnp.exp(held / parameters["sound_speed"]) * (law.enthalpy(held, parameters) + 0.5 * speed**2)
-    content = open_ * (kept - law.pressure(held, parameters))
-    integral = lambda x: jnp.sum(0.5 * channel.step * (x[1:] + x[:-1]))  # noqa: E731
-    loss = jnp.sum(0.5 * (flow[1:] + flow[:-1]) * lost)
-    return integral(content), jnp.array(
-        [flow[-1] * whole[-1], flow[0] * whole[0], integral(law.pressure(sigma, parameters) * opening), loss]
-    )

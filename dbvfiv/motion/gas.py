@@ -16,9 +16,20 @@ from ..flow.gas_stepping import GasInstant, GasState, GasStep
 from .equations import ValveMotion
 from .terms import Load, Step
 
+#: Absolute pressure, Pa, below which a fluid is a gas: by no more can its pressure fall.
+GAS = 1e6
+
 
 class GasMotion(ValveMotion):
     """The equations of a `ValveModel` whose flow law is `dbvfiv.flow.gas.GasChannel`."""
+
+    @property
+    def quiet_inward(self) -> bool:
+        """Whether steps that draw the fluid in need no numerical damping: a gas is soft, the hammer of a liquid kicks
+        stiff walls as an incompressible fluid does.
+        """
+        law = self.model.flow
+        return self.conditions.density * law.sound_speed**2 / law.ratio < GAS
 
     def fluid_step(self, old: GasState, h: float, rate: float, inlet: float) -> GasStep:
         """The fluid in a step of length h, s; see `GasStep`."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model.linear import SingularMatrix
+from .numerical import numerical_loss
 from .predictor import Predictor
 from .scheme import Scheme
 from .scheme import scheme as member
@@ -24,7 +25,7 @@ from .trial import Trial
 #: Speed inwards, relative to the largest speed, that is none.
 INWARD = 1e-6
 #: Least numerical damping of steps that start with fluid drawn in: without any, the kicks that walls get then alternate
-#: from step to step for good.
+#: from step to step for good. A motion that is `quiet_inward` takes no such steps.
 DAMPING = 0.2
 
 
@@ -83,6 +84,8 @@ class StepResult:
         Estimated local error of the displacements, m.
     contact_loss : float
         Energy that touching faces took and did not store, J.
+    numerical_loss : float
+        Energy that the numerical damping took, J; see `dbvfiv.motion.numerical`.
     """
 
     state: MotionState
@@ -94,6 +97,7 @@ class StepResult:
     factorisations: int
     error: float
     contact_loss: float = 0.0
+    numerical_loss: float = 0.0
 
 
 class StepFailure(ArithmeticError):
@@ -116,7 +120,8 @@ class Stepper:
         self, motion, scheme: Scheme, pressure: Callable[[float], float], options: StepOptions = StepOptions()
     ):
         self.motion, self.scheme, self.pressure, self.options = motion, scheme, pressure, options
-        self._damped = member("generalised-alpha", max(DAMPING, scheme.gamma - 0.5))
+        quiet = getattr(motion, "quiet_inward", False)
+        self._inward = scheme if quiet else member("generalised-alpha", max(DAMPING, scheme.gamma - 0.5))
         self.residuals = self.solves = self.factorisations = 0
         self.forget()
 
@@ -141,7 +146,7 @@ class Stepper:
         """
         before = (self.residuals, self.solves, self.factorisations)
         outward = _outward(self.motion.speeds(state))
-        scheme = self.scheme if outward else self._damped
+        scheme = self.scheme if outward else self._inward
         for robust in (self.options.backward or not (outward and self._smooth(state, h)), True):
             trial = Trial(self.motion, scheme, state, h, self.pressure, robust)
             self.motion.begin_step(state, h, trial.fluid.inlet)
@@ -162,7 +167,8 @@ class Stepper:
         work = [now - then for now, then in zip((self.residuals, self.solves, self.factorisations), before)]
         jump = 0.0 if past is None else self.motion.length(here[1] - past[1]) * h / (here[0] - past[0])
         error = scheme.error_constant * h * h * jump
-        return StepResult(new, trial.load, *self._works(trial), *work, error, trial.contact_loss)
+        taken = trial.contact_loss, numerical_loss(self.motion, trial, new)
+        return StepResult(new, trial.load, *self._works(trial), *work, error, *taken)
 
     @staticmethod
     def _smooth(state: MotionState, h: float) -> bool:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.flow.gas_books import BOOKS
 from dbvfiv.model.dynamics import Conditions, linearise
 from dbvfiv.motion.choice import motion_of
 from dbvfiv.motion.equations import ValveMotion
@@ -72,6 +73,14 @@ def test_a_stiff_gas_moves_as_the_incompressible_law(valve):
     assert np.abs(plain - gas).max() < 1e-4 * np.abs(plain).max()
 
 
+def test_a_gas_is_drawn_in_without_numerical_damping(valve):
+    """A liquid is not: without it a valve in water rings from step to step after its first hammer."""
+    water = {"fluid.density": 1e3, "fluid.sound_speed": 1480.0, "fluid.heat_capacity_ratio": 7.15}
+    for more, damping in ((SOUND, 0.0), (water, 0.2)):
+        stepper = Stepper(motion_of(valve(AIR | more)), scheme("generalised-alpha"), lambda t: 2e3)
+        assert stepper._inward.gamma - 0.5 == pytest.approx(damping)
+
+
 @pytest.mark.slow
 def test_slams_stay_above_vacuum(tmp_path):
     """6 kPa: without compression pressures of this motion fall to -20 MPa; a gas ends at its absolute pressure."""
@@ -82,8 +91,6 @@ def test_slams_stay_above_vacuum(tmp_path):
     assert history["time"][-1] == pytest.approx(0.06)
     assert history["station_pressure"].min() > -1.2 * 343.0**2 / 1.4
     assert history["mach"].max() < 1.3
-    books = history["gas_energy"] - history["gas_energy"][0] + history["gas_outflow"] + history["gas_work"]
-    left = books + history["gas_loss"] - history["gas_supply"]
-    # a slam is over within some steps: 8 J of 66 are missed at this step, 2.6 J at a quarter of it
-    assert np.abs(left[history["time"] < 0.02]).max() < 1e-3 * history["gas_supply"][-1]
-    assert np.abs(left).max() < 0.15 * history["gas_supply"][-1]
+    gained = history["gas_energy"] - history["gas_energy"][0] - history["gas_supply"]
+    gone = sum(history[f"gas_{name}"] for name in BOOKS[1:])
+    assert np.abs(gained + gone).max() < 1e-9 * history["gas_supply"][-1]

@@ -125,6 +125,7 @@ _EXCHANGED = (
     ("pressure_work", "work of the\npressure", {"color": COMPUTED}),
     ("dissipation", "lost to\ndamping", {"color": ACCENT}),
     ("contact_loss", "lost in\ncontact", {"color": "0.45", "ls": "--"}),
+    ("numerical_loss", "numerical\ndamping", {"color": "0.25", "ls": "-."}),
     ("outside_renewed", "renewals of the\nadded mass", {"color": "0.45", "ls": ":"}),
 )
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...flow.gas_books import BOOKS
 from ...flow.gas_stepping import GasState
 from ...flow.line_stepping import LineState
 from ...model.lip import LipCentre
@@ -21,7 +22,7 @@ class Reader:
     motion : ValveMotion
     energy : float
         Energy at the start, J of the part.
-    work, dissipation, contact_loss : float
+    work, dissipation, contact_loss, numerical_loss : float
         What went in and out since, J of the part.
     """
 
@@ -32,9 +33,10 @@ class Reader:
         work: float = 0.0,
         dissipation: float = 0.0,
         contact_loss: float = 0.0,
+        numerical_loss: float = 0.0,
     ):
         self.motion, self.energy, self.work, self.dissipation = motion, energy, work, dissipation
-        self.contact_loss = contact_loss
+        self.contact_loss, self.numerical_loss = contact_loss, numerical_loss
         model = motion.model
         index = model.shell.dofs.index
         self._copies = model.mesh.part.copies
@@ -54,6 +56,7 @@ class Reader:
         self.work += result.work
         self.dissipation += result.dissipation
         self.contact_loss += result.contact_loss
+        self.numerical_loss += result.numerical_loss
         return self._row(result.state, result.load, h, result.residuals)
 
     def _row(self, state, load, h: float, evaluations: int) -> dict[str, Any]:
@@ -67,7 +70,8 @@ class Reader:
         weight = model.weight_energy(state.q)
         renewed = 0.0 if motion.outside is None else motion.outside.renewed
         stored = kinetic + outside + strain + stop + weight
-        balance = stored - self.energy - self.work + self.dissipation + self.contact_loss - renewed
+        lost = self.dissipation + self.contact_loss + self.numerical_loss
+        balance = stored - self.energy - self.work + lost - renewed
         memory, by_group = state.memory, {}
         if memory is not None:
             balance += memory.work.sum()
@@ -102,6 +106,7 @@ class Reader:
             "weight_energy": self._copies * weight,
             "pressure_work": self._copies * self.work,
             "dissipation": self._copies * self.dissipation,
+            "numerical_loss": self._copies * self.numerical_loss,
             "balance": self._copies * balance,
             "step": h,
             "evaluations": evaluations,
@@ -111,10 +116,8 @@ class Reader:
         }
 
     def _of_gas(self, load, gas: GasState) -> dict[str, float]:
-        energy, _ = self.motion.fluid.powers(load.area, load.gas.area_rate, gas.inner)
-        supply, outflow, work, loss = (float(x) for x in self._copies * gas.books)
-        kept = {"gas_supply": supply, "gas_outflow": outflow, "gas_work": work, "gas_loss": loss}
-        return kept | {"gas_energy": self._copies * energy}
+        kept = {f"gas_{name}": self._copies * float(value) for name, value in zip(BOOKS, gas.books, strict=True)}
+        return kept | {"gas_energy": self._copies * self.motion.fluid.energy(load.area, gas.inner)}
 
     def _of_faces(self, q: np.ndarray) -> dict[str, Any]:
         contact = self.motion.model.contact.state(q)

@@ -14,6 +14,9 @@ from ...record.record import Record
 from ...shell import Memory, WallMemory
 from .tables import BOOKS, COUNTS, MEMORY_COLUMNS, MOTION_COLUMNS, RESTART
 
+#: Books that not every file has.
+_LATER = ("contact_loss", "numerical_loss")
+
 
 def memory_row(memory: Memory) -> dict[str, Any]:
     """What of a memory does not follow from positions."""
@@ -31,8 +34,8 @@ class Progress:
     steps : int
     saved : int
         Full states kept so far.
-    work, dissipation, energy, renewed, contact_loss : float
-        The books of energy, J of the computed part.
+    work, dissipation, energy, renewed, contact_loss, numerical_loss : float
+        The books of energy, J of the part.
     control : tuple of float
         Of the step control.
     eigenvalue : complex
@@ -49,6 +52,7 @@ class Progress:
     control: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
     eigenvalue: complex = complex(np.nan, np.nan)
     contact_loss: float = 0.0
+    numerical_loss: float = 0.0
 
     @property
     def rows(self) -> int:
@@ -62,7 +66,7 @@ class Progress:
         apart = ("memory", "line", "gas")
         values |= {f.name: getattr(self.state, f.name) for f in fields(MotionState) if f.name not in apart}
         values |= {name: part.packed for name in apart[1:] if (part := getattr(self.state, name)) is not None}
-        values["contact_loss"] = self.contact_loss
+        values |= {name: getattr(self, name) for name in _LATER}
         return values if self.state.memory is None else values | memory_row(self.state.memory)
 
     @classmethod
@@ -87,7 +91,7 @@ class Progress:
             *(float(values[name]) for name in ("work", "dissipation", "energy", "renewed")),
             tuple(float(value) for value in values["control"]),
             complex(*values["eigenvalue"]),
-            float(record.value(RESTART, "contact_loss", at)) if _has(record, "contact_loss") else 0.0,
+            *(float(record.value(RESTART, name, at)) if _has(record, name) else 0.0 for name in _LATER),
         )
 
 

@@ -123,7 +123,7 @@ class Runner:
         progress = Progress.read(self.record, wall=self.motion.wall)
         self._begin(progress.steps)
         self.control.unpack(progress.control)
-        books = progress.energy, progress.work, progress.dissipation, progress.contact_loss
+        books = progress.energy, progress.work, progress.dissipation, progress.contact_loss, progress.numerical_loss
         self._reader = Reader(self.motion, *books)
         self.stepper.forget()
         if self.motion.outside is not None:
@@ -199,7 +199,7 @@ class Runner:
         self.keeper.append(row)
         progress.steps += 1
         progress.work, progress.dissipation = self._reader.work, self._reader.dissipation
-        progress.contact_loss = self._reader.contact_loss
+        progress.contact_loss, progress.numerical_loss = self._reader.contact_loss, self._reader.numerical_loss
         if (
             options.save_every
             and result.state.time >= (progress.saved * options.save_every) - 1e-9 * options.control.step

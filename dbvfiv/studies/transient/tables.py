@@ -39,10 +39,16 @@ SCALARS = (
     Column("pressure_work", "J", "Work of the pressure on the wall since the start"),
     Column("dissipation", "J", "Energy lost to Rayleigh damping since the start"),
     Column(
+        "numerical_loss",
+        "J",
+        "Energy that the numerical damping of the scheme took since the start; below zero where it gave",
+    ),
+    Column(
         "balance",
         "J",
-        "Energy gained since the start, by Maxwell branches and the fluid outside too, less work plus dissipation and "
-        "what faces that part lost, and less what renewals put in: what the scheme itself adds or takes",
+        "Energy gained since the start, by Maxwell branches and the fluid outside too, less work plus dissipation, "
+        "what faces that part lost and what numerical damping took, and less what renewals put in: what steps of "
+        "finite length and corrections left out add or take",
     ),
     Column("step", "s", "Length of the step"),
     Column("evaluations", "", "Residuals evaluated in the step"),
@@ -81,6 +87,8 @@ GAS = (
     Column("gas_outflow", "J", "Energy that left it at the lips since the start, likewise"),
     Column("gas_work", "J", "Work that it did on the wall since the start"),
     Column("gas_loss", "J", "Energy that it lost in the valve since the start: by friction, jets inside, and shocks"),
+    Column("gas_step_loss", "J", "Energy that differences in time took from it since the start; below zero: gave"),
+    Column("gas_mesh_loss", "J", "Energy that the cells between rows took from it since the start; below zero: gave"),
     Column("mach", "", "Largest Mach number in the valve"),
 )
 #: Contact of the inner faces, there where the case has it.
@@ -123,7 +131,7 @@ MEMORY_COLUMNS = (
 LINE_COLUMNS = (Column("line", "m/s, m/s^2, J", "Velocities, scaled pressures, their rates and books of energy"),)
 #: A fluid that is compressed, as `dbvfiv.flow.gas_stepping.GasState` packs it.
 GAS_COLUMNS = (
-    Column("gas", "m/s, m^2/s, m^3, W, J", "Unknowns, what balances hold and its rates, powers and books of energy"),
+    Column("gas", "m/s, m^2/s, m^3, m^2, J", "Unknowns, what balances hold and its rates, areas and books of energy"),
 )
 #: How far a run has come.
 COUNTS = (
@@ -139,6 +147,8 @@ BOOKS = (
     Column("control", "", "Numbers of the step control"),
     Column("eigenvalue", "1/s", "Real and imaginary part of that of the mode of a kick"),
 )
+#: What numerical damping took; earlier files are without it.
+NUMERICAL_BOOKS = (Column("numerical_loss", "J", "Energy of the part that numerical damping took"),)
 #: Books of contact of the inner faces, there where the case has it.
 FACE_BOOKS = (
     Column("contact_loss", "J", "Energy of the computed part that touching faces took and did not give back"),
@@ -163,7 +173,8 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     if compressed:
         motion["gas"] = (packed_size(int(mesh.gas_unknowns[0])),)
     history = (*SCALARS, *PROFILES, *added_columns(mesh))
-    restart = (*COUNTS, *BOOKS, *MOTION_COLUMNS, *(MEMORY_COLUMNS if groups else ()), *(LINE_COLUMNS if waves else ()))
+    restart = (*COUNTS, *BOOKS, *NUMERICAL_BOOKS, *MOTION_COLUMNS)
+    restart += (*(MEMORY_COLUMNS if groups else ()), *(LINE_COLUMNS if waves else ()))
     restart += GAS_COLUMNS if compressed else ()
     restart += FACE_BOOKS if len(mesh.face_nodes) else ()
     return (
