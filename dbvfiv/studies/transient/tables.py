@@ -148,7 +148,7 @@ BOOKS = (
     Column("eigenvalue", "1/s", "Real and imaginary part of that of the mode of a kick"),
 )
 #: What numerical damping took; earlier files are without it.
-NUMERICAL_BOOKS = (Column("numerical_loss", "J", "Energy of the part that numerical damping took"),)
+NUMERICAL_BOOKS = (Column("numerical_loss", "J", "Energy of the computed part that numerical damping took"),)
 #: Books of contact of the inner faces, there where the case has it.
 FACE_BOOKS = (
     Column("contact_loss", "J", "Energy of the computed part that touching faces took and did not give back"),
