@@ -24,6 +24,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..errors import SolveError
 from . import gas_books
 from .gas_books import BOOKS, POWERS, Instant
 from .law import above_floor
@@ -80,8 +81,18 @@ class GasState:
 
     @classmethod
     def unpacked(cls, numbers: np.ndarray) -> GasState:
-        """Undo `packed`."""
+        """Undo `packed`.
+
+        Raises
+        ------
+        SolveError
+            If the numbers are those of another version.
+        """
         stations = (len(numbers) - POWERS - len(BOOKS) + 3) // 7  # of 2 m - 1 unknowns
+        if packed_size(2 * stations - 1) != len(numbers):
+            raise SolveError(
+                "The state of the compressed fluid was kept by another version and cannot be gone on from."
+            )
         cuts = np.cumsum([2 * stations - 1] * 3 + [stations, POWERS])
         return cls(*np.split(np.asarray(numbers, float), cuts))
 
