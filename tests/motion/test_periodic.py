@@ -21,6 +21,7 @@ LAWS = {
     "storage": {"fluid.continuity": "storage"},
     "steady": {"fluid.unsteady": False},
     "line": {"upstream.length": 2.0, "upstream.diameter": 0.3, "upstream.friction": 0.02},
+    "gas": {"fluid.continuity": "storage", "fluid.sound_speed": 340.0},
     "loss factors": LOSSY,
 }
 
