@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from dbvfiv.case.part import QUARTER
 from dbvfiv.flow.plug import centroid_matrix, centroid_slope, plug_parts
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.shell import Shell, ShellMesh
@@ -106,7 +107,7 @@ def tube(name, velocity, density, shape=(6, 40)):
     patch.nodes[rows[:, 0], 0] = patch.nodes[rows[:, -1], 1] = 0.0
     mesh = ShellMesh.build(patch.nodes, quads, WALL, planes=[(rows[:, 0], 0), (rows[:, -1], 1)])
     symmetry = SYMMETRIES[name]
-    free = symmetry.free_unknowns(SimpleNamespace(nodes=patch.nodes, rows=rows))
+    free = symmetry.free_unknowns(SimpleNamespace(nodes=patch.nodes, rows=rows, part=QUARTER))
     shell = Shell(mesh, isotropic_section(E, 0.0, WALL, RHO), free)
     matrix, still = shell.dofs.matrix, np.zeros(shell.size)
     J = centroid_matrix(centroid_slope(patch.nodes[rows][:, :, :2], symmetry.sway_axis), rows, shell.dofs.index)
