@@ -9,6 +9,7 @@ import pytest
 
 from dbvfiv.thesis import ENTRIES, Number
 from dbvfiv.thesis.openings import layup
+from dbvfiv.thesis.strip import deflections
 
 
 def test_entries_stand_in_the_order_of_the_thesis():
@@ -48,6 +49,16 @@ def test_constants_and_an_opening(command_line, tmp_path):
     assert len(kept) == 1
     assert command_line("reproduce", "7-11", "--quick", "-o", tmp_path).status == 0
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "quick").iterdir()} == kept
+
+
+def test_three_point_bending(command_line, tmp_path):
+    """Stiffer than rubber alone and nearly linear; small deflections go as the load."""
+    outcome = command_line("reproduce", "3-13", "--quick", "-o", tmp_path, "--json")
+    (entry,) = json.loads(outcome.out)["entries"]
+    small, large = (number["ours"] for number in entry["numbers"])
+    assert 0.9 * small < large < small
+    a, b = deflections((8, 4), (0.01, 0.02))
+    assert b == pytest.approx(2 * a, rel=1e-4)
 
 
 def test_a_list_and_a_name_that_is_none(command_line, one_sentence, tmp_path):

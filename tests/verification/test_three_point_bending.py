@@ -15,6 +15,7 @@ import pytest
 
 from dbvfiv.materials import fibre_ply, rubber
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
+from dbvfiv.thesis import strip
 from tests.shell.structures import dead_load, grid, solve_path
 from tests.verification.layered_solid import LayeredSolid
 
@@ -68,6 +69,11 @@ def solid_deflections(stack, loads, nx=32, ny=10, per_layer=1) -> np.ndarray:
 
 
 LOADS = (0.5, 2.0, 5.0, 10.0, 15.0)
+
+
+def test_the_strip_of_the_published_figure_is_this_one():
+    loads = (0.5, 5.0)
+    assert strip.deflections((8, 4), loads) == pytest.approx(shell_deflections(layers(), loads, 8, 4), rel=1e-7)
 
 
 @cache
