@@ -20,6 +20,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from .factorization import SymmetricLU
+from .mass_basis import orthonormal
 from .pencil import CoupledPencil
 
 #: Motions kept of one stiffness at most, those of the most negative.
@@ -28,6 +29,8 @@ MOST = 40
 TOLERANCE = 1e-4
 #: Places on the real axis, per decade, where the motions kept are looked at.
 PER_DECADE = 40
+#: Length in the mass below which a motion has nothing that others lack.
+SAME = 1e-5
 #: Rounds in which further motions are taken in where they look weakest, and relative change of the weakest that ends
 #: them.
 ROUNDS, SETTLED = 4, 1e-3
@@ -95,7 +98,7 @@ def _completed(structure: _Structure, motions: np.ndarray, fastest: float) -> np
     places = np.geomspace(slowest, fastest, max(20, int(PER_DECADE * np.log10(fastest / slowest))))
     weakest = np.inf
     for _ in range(ROUNDS):
-        motions = _orthonormal(structure.mass, motions)
+        motions = orthonormal(structure.mass, motions, SAME)[0]
         size = _weakness(structure, motions, places)
         at = int(np.argmin(size))
         if size[at] > weakest - SETTLED * abs(weakest):
@@ -103,7 +106,7 @@ def _completed(structure: _Structure, motions: np.ndarray, fastest: float) -> np
         weakest = size[at]
         _, further = _lowest(structure.stiffness(places[at]), structure.mass)
         motions = np.hstack([motions, further])
-    return _orthonormal(structure.mass, motions)
+    return orthonormal(structure.mass, motions, SAME)[0]
 
 
 def _weakness(structure: _Structure, motions: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -150,11 +153,3 @@ def _below(stiffness, mass) -> tuple[float, SymmetricLU]:
             break
         high, factor = 0.5 * high, trial
     return -high, factor
-
-
-def _orthonormal(mass, motions: np.ndarray) -> np.ndarray:
-    """The space of motions, orthonormal in the mass."""
-    motions = motions / np.sqrt(np.einsum("ij,ij->j", motions, mass @ motions))
-    weight, turn = np.linalg.eigh(motions.T @ (mass @ motions))
-    kept = weight > 1e-10
-    return (motions @ turn[:, kept]) / np.sqrt(weight[kept])

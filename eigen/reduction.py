@@ -15,8 +15,9 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from .family import Condition, PencilFamily
+from .mass_basis import orthonormal
 from .pencil import CoupledPencil, real_apply
-from .reduced import Pairs, ReducedFamily, orthonormal
+from .reduced import Pairs, ReducedFamily
 from .static_solver import StaticSolver
 from .transfer import TransferBasis
 
