@@ -51,7 +51,8 @@ def history(result: TransientResult) -> Figure:
         panels[0].plot(t, h["mass_flow"], color=COMPUTED, lw=1.3, label="out at the lip")
         if case.fluid.continuity == "storage":
             panels[0].plot(t, h["inlet_mass_flow"], color=ACCENT, lw=1.0, ls="--", label="in at the flange")
-            panels[0].legend(loc="upper left", bbox_to_anchor=(0.0, -0.02), ncols=2)
+            # below the numbers of the axis
+            panels[0].legend(loc="upper left", bbox_to_anchor=(0.0, -0.11), ncols=2, borderaxespad=0.0)
         panels[0].set_ylabel("Mass flow, kg/s")
         panels[2].plot(t, 1e4 * h["smallest_area"], color=ACCENT, lw=1.3, ls="--", label="smallest of all rows")
         panels[2].plot(t, 1e4 * h["outlet_area"], color=COMPUTED, lw=1.0, label="at the lip")
@@ -213,8 +214,9 @@ def spectra(result: TransientResult) -> Figure:
             continue
         series = Series.of(h["time"][half:], factor * h[name][half:])
         heading = f"Spectrum of the second half (Hann window, resolution {1.0 / series.duration:.2g} Hz)"
-        highest = max(highest, _spectrum(axes, series))
+        there = _spectrum(axes, series)
         base = (result.verdict.get(name) or {}).get("frequency")
+        highest = max(highest, min(there, _HARMONICS * base) if base else there)
         if base:
             axes.axvline(base, color=ACCENT, lw=0.9, ls="--", zorder=0)
             axes.set_title(f"frequency by the verdict: {in_steps(base, 1.0 / series.duration)} Hz", **_BESIDE)
@@ -225,6 +227,8 @@ def spectra(result: TransientResult) -> Figure:
     return figure
 
 
+#: Multiples of the frequency of a motion up to which a spectrum is drawn at most: slams fill it to its end.
+_HARMONICS = 25
 _BESIDE = {"loc": "right", "fontsize": 9, "color": ACCENT}
 
 
