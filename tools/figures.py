@@ -111,6 +111,14 @@ ALL = (
         {"history.png": "transient-slamming.png"},
     ),
     Made(
+        "slam-in-air",
+        'dbvfiv transient cases/dbv12.toml --set mesh.around=14 --set mesh.along=24 --set drive.pressure="6 kPa" '
+        "--set fluid.density=1.2 --set damping.alpha=0 --set fluid.continuity=storage --set fluid.sound_speed=343 "
+        '--set supports.contact=faces --set supports.contact_stiffness="1000 MPa/mm" '
+        '--set transient.step="0.1 ms" --set transient.duration="0.8 s"',
+        {"history.png": "transient-slamming-in-air.png"},
+    ),
+    Made(
         "sudden",
         "python cases/studies/sudden_pressure.py {folder}",
         {"sudden-pressure.png": "transient-sudden.png", "sudden-sensitivity.png": "transient-sensitivity.png"},

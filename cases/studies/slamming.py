@@ -31,6 +31,7 @@ def main() -> None:
     parser.add_argument("--step", default="0.5 ms")
     parser.add_argument("--duration", default="0.5 s")
     parser.add_argument("--since", type=float, default=0.05, help="s")
+    parser.add_argument("--open", type=float, default=5.0, help="cm2 that lips must open between two slams that count")
     takes_keys(parser)
     given = parser.parse_args()
     around, along = given.mesh.split("x")
@@ -50,7 +51,8 @@ def main() -> None:
     for variant in given.variants:
         name, _, changes = variant.partition(":")
         case = base.replace(dict(_pair(part) for part in changes.split(",") if part))
-        rows.append({"variant": name} | statistics(kept_run(case, given.folder / f"{name}.h5"), given.since))
+        run = kept_run(case, given.folder / f"{name}.h5")
+        rows.append({"variant": name} | statistics(run, given.since, given.open))
         print(
             ", ".join(
                 f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
@@ -72,9 +74,9 @@ def _pair(text: str):
         return key.strip(), value.strip()
 
 
-def statistics(result, since: float) -> dict:
+def statistics(result, since: float, open_: float = 5.0) -> dict:
     """Numbers of a run from a time on, weighted by the lengths of its steps; their uncertainty is the spread between
-    its two halves.
+    its two halves, that of the interval between slams its scatter over the root of their number.
     """
     h = result.history
     kept = h["time"] >= since
@@ -84,7 +86,7 @@ def statistics(result, since: float) -> dict:
     def mean(x, part=slice(None)):
         return float(np.average(x[part], weights=step[part]))
 
-    slams = slam_times(t, area)
+    slams = slam_times(t, area, open_=open_)
     half = [t < 0.5 * (t[0] + t[-1]), t >= 0.5 * (t[0] + t[-1])]
     gaps = 1e3 * np.diff(slams)
     work = np.diff(h["pressure_work"][kept])
@@ -95,6 +97,7 @@ def statistics(result, since: float) -> dict:
         "slams": len(slams),
         "interval_ms": float(gaps.mean()) if len(gaps) else float("nan"),
         "interval_scatter_ms": float(gaps.std()) if len(gaps) else float("nan"),
+        "interval_error_ms": float(gaps.std() / np.sqrt(len(gaps))) if len(gaps) else float("nan"),
         "shut_share": mean(area < 1.0),
         "lip_mean_mm": mean(lip),
         "lip_mean_halves": abs(mean(lip, half[0]) - mean(lip, half[1])) / 2,
