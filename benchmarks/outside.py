@@ -63,13 +63,14 @@ def modes():
         }
     )
     fluxes, impedance = wet.outside.operator(q)
-    size = impedance.nbytes + wet.outside.added_mass(q, structure).columns.nbytes
+    added = wet.outside.added_mass(q, structure)
+    size, panels = impedance.nbytes + added.columns.nbytes, impedance.shape[0]
     yield Row(
         "added mass of one state",
         times["added"],
         "s",
         target=1.0,
-        note=f"of it the panels {times['operator']:.2f} s; {size / 2**20:.0f} MiB, rank {30} of {len(impedance)}",
+        note=f"of it the panels {times['operator']:.2f} s; {size / 2**20:.0f} MiB, rank {added.rank} of {panels}",
     )
     yield Row(
         "ten leading pairs with water outside over those without, linearisation included",
