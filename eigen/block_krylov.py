@@ -12,16 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Share of a vector's squared length below which what is left of it is rounding.
-ROUNDING = 1e-16
-#: Least eigenvalue of the products of a block's vectors of unit length that are made orthonormal together.
-ALIKE = 1e-8
+from .mass_basis import beside
+
 #: Blocks after which the search is given up.
 MOST_BLOCKS = 60
-
-
-class NotPositiveError(ArithmeticError):
-    """K is not positive definite."""
 
 
 class NotConvergedError(ArithmeticError):
@@ -86,10 +80,9 @@ def largest_pairs(
     >>> np.round(found.values, 12)
     array([9., 2.])
     """
-    space, newest = _Space(stiffness, start.shape[1]), start
+    space, newest = _Space(*start.shape), start
     for _ in range(MOST_BLOCKS):
-        raw = solve(newest)
-        share, fresh, loads = space.orthonormal(raw, newest)
+        share, fresh, loads = beside(space.basis, space.loads, stiffness, solve(newest))
         if space.size:
             values, turns = space.extremes(share, count)
             # A V = K V T + K fresh (fresh' A V_last) E_last'
@@ -104,9 +97,9 @@ def largest_pairs(
 class _Space:
     """A basis (n, size) orthonormal in K, K times it, A times it, and A projected on all of it but the last block."""
 
-    def __init__(self, stiffness, block: int):
-        self.size, self._stiffness, self._block = 0, stiffness, block
-        self._arrays = np.empty((3, 0, stiffness.shape[0]))
+    def __init__(self, n: int, block: int):
+        self.size, self._block = 0, block
+        self._arrays = np.empty((3, 0, n))
         self._projected = np.zeros((0, 0))
 
     def _part(self, which: int) -> np.ndarray:
@@ -115,6 +108,10 @@ class _Space:
     @property
     def basis(self) -> np.ndarray:
         return self._part(0)
+
+    @property
+    def loads(self) -> np.ndarray:
+        return self._part(1)
 
     @property
     def images(self) -> np.ndarray:
@@ -138,59 +135,3 @@ class _Space:
         self._projected = np.block([[self._projected, share[:old]], [share[:old].T, share[old:]]])
         values, turns = np.linalg.eigh(0.5 * (self._projected + self._projected.T))
         return values[::-1][:count], turns[:, ::-1][:, :count]
-
-    def orthonormal(self, vectors, loads) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Products (size, b) of the basis with loads (n, b), of which vectors are the solutions; and these made
-        orthonormal in K to the basis and to each other, with their loads. What is left of a vector that the others
-        hold already goes.
-        """
-        size = _squares(vectors, loads)
-        share = self._part(1).T @ vectors
-        # loads anew: those that were solved for drift from the vectors by what the solutions are inexact
-        vectors = vectors - self.basis @ share
-        loads = self._stiffness @ vectors
-        left = _squares(vectors, loads)
-        if np.any(size < 0.0) or np.any(left < -ROUNDING * size):
-            raise NotPositiveError("The matrix is not positive definite.")
-        kept = left > ROUNDING * size
-        vectors, loads = _among_each_other(vectors[:, kept] / np.sqrt(left[kept]), loads[:, kept] / np.sqrt(left[kept]))
-        # twice is enough; what loses much once more was rounding
-        vectors = vectors - self.basis @ (self._part(1).T @ vectors)
-        loads = self._stiffness @ vectors
-        kept = _squares(vectors, loads) > 0.5
-        return share, *_among_each_other(vectors[:, kept], loads[:, kept])
-
-
-def _among_each_other(vectors, loads):
-    """Vectors of about unit length made orthonormal to each other in K, with their loads."""
-    if not vectors.shape[1]:
-        return vectors, loads
-    lengths, turn = np.linalg.eigh(vectors.T @ loads)
-    if lengths[0] < -ALIKE:
-        raise NotPositiveError("The matrix is not positive definite.")
-    if lengths[0] < ALIKE:
-        return _one_by_one(vectors, loads)
-    turn = turn / np.sqrt(lengths)
-    return vectors @ turn, loads @ turn
-
-
-def _squares(vectors, loads):
-    return np.einsum("ij,ij->j", vectors, loads)
-
-
-def _one_by_one(vectors, loads):
-    """Vectors of unit length made orthonormal in their order (Gram and Schmidt, twice), without those that the ones
-    before them hold.
-    """
-    kept, pushed = [], []
-    for vector, load in zip(vectors.T, loads.T, strict=True):
-        for _ in range(2):
-            for other, its_load in zip(kept, pushed, strict=True):
-                part = its_load @ vector
-                vector, load = vector - part * other, load - part * its_load
-        square = vector @ load
-        if square > ROUNDING:
-            kept.append(vector / np.sqrt(square))
-            pushed.append(load / np.sqrt(square))
-    n = len(vectors)
-    return np.array(kept).reshape(-1, n).T, np.array(pushed).reshape(-1, n).T
