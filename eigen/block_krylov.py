@@ -120,7 +120,7 @@ class _Space:
     def extend(self, basis, loads, images) -> None:
         more = basis.shape[1]
         if self.size + more > self._arrays.shape[1]:
-            wider = np.empty((3, 2 * self._arrays.shape[1] + 6 * self._block, self._arrays.shape[2]))
+            wider = np.empty((3, 2 * self._arrays.shape[1] + 10 * self._block, self._arrays.shape[2]))
             wider[:, : self.size] = self._arrays[:, : self.size]
             self._arrays = wider
         for array, block in zip(self._arrays, (basis, loads, images), strict=True):
@@ -134,4 +134,5 @@ class _Space:
         old = self._projected.shape[0]
         self._projected = np.block([[self._projected, share[:old]], [share[:old].T, share[old:]]])
         values, turns = np.linalg.eigh(0.5 * (self._projected + self._projected.T))
-        return values[::-1][:count], turns[:, ::-1][:, :count]
+        # columns that run forwards in memory: products with a reversed view leave BLAS aside
+        return values[::-1][:count], np.ascontiguousarray(turns[:, ::-1][:, :count])

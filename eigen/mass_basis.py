@@ -82,7 +82,9 @@ def _long(X, MX, least: float) -> tuple[np.ndarray, np.ndarray]:
     if np.any(size < -ALIKE):
         raise NotPositiveError
     kept = size > least
-    return X[:, kept] / np.sqrt(size[kept]), MX[:, kept] / np.sqrt(size[kept])
+    if not kept.all():
+        X, MX, size = X[:, kept], MX[:, kept], size[kept]
+    return X / np.sqrt(size), MX / np.sqrt(size)
 
 
 def _apart(X, MX) -> tuple[np.ndarray, np.ndarray]:
