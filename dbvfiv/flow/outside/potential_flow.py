@@ -94,11 +94,6 @@ class Impedance(LinearOperator):
 
     _transpose = _adjoint
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of what it holds."""
-        return self._factor[0].nbytes + sum(x.nbytes for term in self._terms for x in term if x is not None)
-
     def matrix(self) -> np.ndarray:
         """All of it (wet, wet)."""
         (potential, _), *others = self._terms
