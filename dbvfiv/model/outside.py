@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from eigen import CoupledPencil, NotPositiveError, SingularShiftError, Workspace, largest_pairs
+from eigen import CoupledPencil, NotConvergedError, NotPositiveError, SingularShiftError, Workspace, largest_pairs
 
 from ..case.model import Case
 from ..errors import CaseError, SolveError
@@ -32,7 +32,7 @@ from ..shell.face import OuterFace
 #: Motions kept of the added mass.
 KEPT = 30
 #: Motions that are looked for together, and how well they are told. What is kept of the added mass is exact on them
-#: whatever they are; one of 1e-3 moves frequencies by less than 1e-9 of themselves.
+#: whatever they are; an error of 1e-3 moves eigenvalues by less than 1e-8 of themselves.
 BLOCK, TOLERANCE = 16, 1e-4
 #: Length of the rigid tube that goes on upstream in unbounded fluid, in diameters of the flange.
 TUBE = 4.0
@@ -217,6 +217,11 @@ def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Works
     structure : (n, n) sparse matrix
         Symmetric; where it is not positive it is shifted by a small part of its diagonal.
     kept : int
+
+    Raises
+    ------
+    SolveError
+        If the stiffness is far from positive, or the motions are not found.
     """
     n = structure.shape[0]
     kept = min(kept, fluxes.shape[0] - 2, n - 2)
@@ -231,6 +236,9 @@ def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Works
             pairs = largest_pairs(apply, stiffness, solver.solve, start, kept + 1, TOLERANCE)
         except (SingularShiftError, NotPositiveError):
             continue
+        except NotConvergedError as error:
+            raise SolveError(f"The added mass of the fluid outside was not found: {error}") from error
+        kept = min(kept, len(pairs.values) - 1)
         # signs that stay from state to state: differences are taken of the columns
         signs = np.where(start[:, 0] @ pairs.vectors[:, :kept] < 0.0, -1.0, 1.0)
         return AddedMass(pairs.images[:, :kept] * (signs / np.sqrt(pairs.values[:kept])), pairs.values)
