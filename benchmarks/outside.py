@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from time import process_time
 
 import numpy as np
@@ -62,14 +63,17 @@ def modes():
             **{f"pairs {name}": lambda m=model: pairs(m) for name, model in models.items()},
         }
     )
-    fluxes, impedance = wet.outside.operator(q)
-    size = impedance.nbytes + wet.outside.added_mass(q, structure).columns.nbytes
+    tracemalloc.start()
+    added = wet.outside.added_mass(q, structure)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    panels = len(wet.shell.mesh.quads)
     yield Row(
         "added mass of one state",
         times["added"],
         "s",
         target=1.0,
-        note=f"of it the panels {times['operator']:.2f} s; {size / 2**20:.0f} MiB, rank {30} of {len(impedance)}",
+        note=f"of it the panels {times['operator']:.2f} s; {peak / 2**20:.0f} MiB, rank {added.rank} of {panels}",
     )
     yield Row(
         "ten leading pairs with water outside over those without, linearisation included",

@@ -1,6 +1,7 @@
 """Spectra of large sparse quadratic pencils with a low-rank, frequency-dependent coupling."""
 
 from .agreement import Certificate
+from .block_krylov import LargestPairs, NotConvergedError, largest_pairs
 from .certificate import CertifiedSpectrum, certified_spectrum, listed_unstable
 from .columns import Column, ColumnSolver
 from .condensation import Workspace
@@ -8,6 +9,7 @@ from .coverage import CLEAR
 from .derivative import PencilDerivative, difference, eigenvalue_derivative
 from .factorization import SingularShiftError
 from .family import Condition, PencilFamily
+from .mass_basis import NotPositiveError
 from .options import SearchOptions
 from .pencil import CoupledPencil
 from .reduction import FamilyReduction
@@ -31,7 +33,10 @@ __all__ = [
     "Count",
     "CoupledPencil",
     "FamilyReduction",
+    "LargestPairs",
     "Mode",
+    "NotConvergedError",
+    "NotPositiveError",
     "Oval",
     "PencilDerivative",
     "PencilFamily",
@@ -47,6 +52,7 @@ __all__ = [
     "certified_spectrum",
     "difference",
     "eigenvalue_derivative",
+    "largest_pairs",
     "leading_modes",
     "listed_unstable",
     "lowest_frequencies",

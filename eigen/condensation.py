@@ -12,6 +12,7 @@ from .factorization import (
     SuperluFactorization,
     petsc_is_complex,
 )
+from .full_rows import FullRows
 from .pencil import CoupledPencil, real_apply
 
 
@@ -92,6 +93,11 @@ class ShiftedPencil:
     factor : object with solve, solve_transposed
         LU of the structure, sigma^2 M + sigma C + K and what relaxes.
 
+    Attributes
+    ----------
+    motion, force : FullRows
+        J and the transpose of G.
+
     Raises
     ------
     SingularShiftError
@@ -104,12 +110,10 @@ class ShiftedPencil:
         self.shift = shift.real if shift.imag == 0.0 else shift
         self.damping_shifted = structure.combine(self.shift, 1.0, 0.0)
         self._A, self._B, self._R, self._S = pencil.fluid_at(self.shift)
-        self._J = pencil.J
-        self._GT = pencil.G.T.tocsr()
-        self._JT = pencil.J.T.tocsr()
+        self.motion, self.force = FullRows(pencil.J), FullRows(pencil.G.T)
         # m further right-hand sides, once
         self.response = factor.solve(pencil.G.toarray())
-        self.transfer = real_apply(pencil.J, self.response)
+        self.transfer = self.motion @ self.response
         small = condensed_matrix(self._A, self._B, self._R, self._S, self.transfer)
         # rows and columns differ by powers of the fluid's density: equilibrate before pivoting
         self._row = _scale(small, 1)
@@ -137,7 +141,7 @@ class ShiftedPencil:
         q = self.factor.solve(f)
         if self._small is None:
             return q, np.array(g)
-        y = real_apply(self._J, q)
+        y = self.motion @ q
         right = np.concatenate([self._A @ y, g - self._R @ y])
         unknown = _times(self._col, self._back(_times(self._row, right), 0))
         m = self._A.shape[0]
@@ -155,7 +159,7 @@ class ShiftedPencil:
         unknown = _times(self._row, self._back(_times(self._col, right), 1))
         z, W = unknown[:m], unknown[m:]
         h = self._A.T @ z - self._R.T @ W
-        return self.factor.solve_transposed(f + real_apply(self._JT, h)), W
+        return self.factor.solve_transposed(f + self.motion.transposed(h)), W
 
     def _back(self, right, transposed):
         if np.iscomplexobj(right) and not np.iscomplexobj(self._small[0]):

@@ -58,8 +58,7 @@ class _ShiftAndInvert:
         self._R12 = p.R1 + s * p.R2
         self._MT = p.M.T.tocsr() if transposed else None
         self._CT = shifted.damping_shifted.T.tocsr() if transposed else None
-        self._GT = p.G.T.tocsr()
-        self._JT = p.J.T.tocsr()
+        self._J, self._GT = shifted.motion, shifted.force
         self.applications = 0
 
     def mult(self, _matrix, x, y):
@@ -74,8 +73,8 @@ class _ShiftAndInvert:
         f = real_apply(p.M, v_in) + _apply(self.shifted.damping_shifted, q_in)
         g = np.zeros(self.b, dtype=np.result_type(x, s))
         if p.m:
-            yv, yq = p.J @ v_in, p.J @ q_in
-            f -= real_apply(p.G, p.A2 @ yv + self._A12 @ yq + p.B1 @ u_in)
+            yv, yq = (self._J @ np.stack([v_in, q_in], axis=1)).T
+            f -= self._GT.transposed(p.A2 @ yv + self._A12 @ yq + p.B1 @ u_in)
             g = p.R2 @ yv + self._R12 @ yq
         g = g + p.S1 @ u_in
         q, u = self.shifted.solve(-f, -g)
@@ -92,8 +91,8 @@ class _ShiftAndInvert:
         e3 = p.S1.T @ W
         if p.m:
             t = self._GT @ w
-            a = a + real_apply(self._JT, self._R12.T @ W - self._A12.T @ t)
-            e2 = e2 + real_apply(self._JT, p.R2.T @ W - p.A2.T @ t)
+            a = a + self._J.transposed(self._R12.T @ W - self._A12.T @ t)
+            e2 = e2 + self._J.transposed(p.R2.T @ W - p.A2.T @ t)
             e3 = e3 - p.B1.T @ t
         return np.concatenate([a, e2 * self.scale, e3])
 

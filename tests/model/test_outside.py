@@ -29,7 +29,8 @@ def valve(fluid="same", pressure=10e3, **outside) -> tuple[ValveModel, np.ndarra
 @cache
 def parts(**outside):
     model, q = valve(**outside)
-    return linearise(model, q, 10e3), *model.outside.operator(q)
+    fluxes, impedance = model.outside.operator(q)
+    return linearise(model, q, 10e3), fluxes, impedance.matrix()
 
 
 def frequencies(state, added, count: int) -> np.ndarray:

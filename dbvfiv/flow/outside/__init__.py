@@ -1,6 +1,6 @@
 """Potential flow on the outer face of the wall; knows panels only."""
 
 from .panels import Panels
-from .potential_flow import BODY, ROOM, PotentialFlow, Surroundings
+from .potential_flow import BODY, ROOM, Impedance, PotentialFlow, Surroundings
 
-__all__ = ["BODY", "ROOM", "Panels", "PotentialFlow", "Surroundings"]
+__all__ = ["BODY", "ROOM", "Impedance", "Panels", "PotentialFlow", "Surroundings"]

@@ -30,111 +30,150 @@ def image_signs(name: str) -> np.ndarray:
     return np.array([1.0, a, b, a * b])
 
 
-@numba.njit(cache=True)
-def _exact(x, corners, normal, own, out):
-    """Integral of 1/r over a flat panel and its gradient, out (4,)."""
+#: Sources that are taken together: where one of them is near, all are looked at again.
+BLOCK = 8
+#: How a panel is integrated that is not far: by four points, or exactly.
+POINTS, NEAR = 1, 2
+#: Division by zero gives infinity, which is left out again: a test for it would keep loops from being vectorised.
+_compiled = numba.njit(cache=True, error_model="numpy", fastmath={"contract", "arcp", "nsz"})
+
+
+@_compiled
+def _exact(x, corners, sides, lengths, normal, own, r, p, out):
+    """Integral of 1/r over a flat panel and its gradient, out (4,); r (4,) and p (4, 3) are room to work in.
+
+    The panel's solid angle is that of its two triangles (van Oosterom and Strackee 1983), halves added as arguments.
+    """
     out[:] = 0.0
     w = 0.0
-    for i in range(3):
-        w += (x[i] - corners[0, i]) * normal[i]
     for a in range(4):
-        b = (a + 1) % 4
-        ra = rb = d = 0.0
         for i in range(3):
-            ra += (x[i] - corners[a, i]) ** 2
-            rb += (x[i] - corners[b, i]) ** 2
-            d += (corners[b, i] - corners[a, i]) ** 2
+            p[a, i] = corners[a, i] - x[i]
+        r[a] = math.sqrt(p[a, 0] ** 2 + p[a, 1] ** 2 + p[a, 2] ** 2)
+    for i in range(3):
+        w -= p[0, i] * normal[i]
+    for a in range(4):
+        d = lengths[a]
         if d == 0.0:
             continue
-        ra, rb, d = math.sqrt(ra), math.sqrt(rb), math.sqrt(d)
-        e0 = (corners[b, 0] - corners[a, 0]) / d
-        e1 = (corners[b, 1] - corners[a, 1]) / d
-        e2 = (corners[b, 2] - corners[a, 2]) / d
-        # outward in the plane: edge x normal
-        m0 = e1 * normal[2] - e2 * normal[1]
-        m1 = e2 * normal[0] - e0 * normal[2]
-        m2 = e0 * normal[1] - e1 * normal[0]
-        reach = (corners[a, 0] - x[0]) * m0 + (corners[a, 1] - x[1]) * m1 + (corners[a, 2] - x[2]) * m2
-        log = math.log((ra + rb + d) / max(ra + rb - d, 1e-300))
+        both = r[a] + r[(a + 1) % 4]
+        reach = p[a, 0] * sides[a, 0] + p[a, 1] * sides[a, 1] + p[a, 2] * sides[a, 2]
+        log = math.log((both + d) / max(both - d, 1e-300))
         out[0] += reach * log
-        out[1] -= m0 * log
-        out[2] -= m1 * log
-        out[3] -= m2 * log
+        for i in range(3):
+            out[1 + i] -= sides[a, i] * log
     angle = 2.0 * math.pi
     if not own:
-        angle = _solid_angle(x, corners, 0, 1, 2) + _solid_angle(x, corners, 0, 2, 3)
+        first, second = _triangle(p, r, 1, 2), _triangle(p, r, 2, 3)
+        angle = -2.0 * math.atan2(
+            first[0] * second[1] + first[1] * second[0], first[1] * second[1] - first[0] * second[0]
+        )
         out[0] -= w * angle
     for i in range(3):
         out[1 + i] -= angle * normal[i]
 
 
-@numba.njit(cache=True)
-def _solid_angle(x, corners, a, b, c):
-    """Signed solid angle of a triangle, positive above it (van Oosterom and Strackee 1983)."""
-    p0, p1, p2 = corners[a, 0] - x[0], corners[a, 1] - x[1], corners[a, 2] - x[2]
-    q0, q1, q2 = corners[b, 0] - x[0], corners[b, 1] - x[1], corners[b, 2] - x[2]
-    r0, r1, r2 = corners[c, 0] - x[0], corners[c, 1] - x[1], corners[c, 2] - x[2]
-    p = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
-    q = math.sqrt(q0 * q0 + q1 * q1 + q2 * q2)
-    r = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-    triple = p0 * (q1 * r2 - q2 * r1) + p1 * (q2 * r0 - q0 * r2) + p2 * (q0 * r1 - q1 * r0)
-    below = p * q * r + (p0 * q0 + p1 * q1 + p2 * q2) * r
-    below += (q0 * r0 + q1 * r1 + q2 * r2) * p + (r0 * p0 + r1 * p1 + r2 * p2) * q
-    return -2.0 * math.atan2(triple, below)
+@_compiled
+def _triangle(p, r, b, c):
+    """Sine and cosine of half the solid angle of the triangle of corners 0, b and c, times a positive number."""
+    triple = p[0, 0] * (p[b, 1] * p[c, 2] - p[b, 2] * p[c, 1])
+    triple += p[0, 1] * (p[b, 2] * p[c, 0] - p[b, 0] * p[c, 2])
+    triple += p[0, 2] * (p[b, 0] * p[c, 1] - p[b, 1] * p[c, 0])
+    below = r[0] * r[b] * r[c] + (p[0, 0] * p[b, 0] + p[0, 1] * p[b, 1] + p[0, 2] * p[b, 2]) * r[c]
+    below += (p[b, 0] * p[c, 0] + p[b, 1] * p[c, 1] + p[b, 2] * p[c, 2]) * r[0]
+    below += (p[c, 0] * p[0, 0] + p[c, 1] * p[0, 1] + p[c, 2] * p[0, 2]) * r[b]
+    return triple, below
 
 
-@numba.njit(cache=True)
-def _by_points(x, points, weights, out):
-    """The same by quadrature."""
-    out[:] = 0.0
-    for k in range(points.shape[0]):
-        d0, d1, d2 = x[0] - points[k, 0], x[1] - points[k, 1], x[2] - points[k, 2]
-        square = d0 * d0 + d1 * d1 + d2 * d2
-        value = weights[k] / math.sqrt(square)
-        slope = value / square
-        out[0] += value
-        out[1] -= slope * d0
-        out[2] -= slope * d1
-        out[3] -= slope * d2
+@_compiled
+def _point(x, n, y0, y1, y2, strength):
+    """Potential and normal velocity of a point source, with their signs changed."""
+    d0, d1, d2 = x[0] - y0, x[1] - y1, x[2] - y2
+    inverse = 1.0 / math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    value = strength * inverse
+    return value, -value * (inverse * inverse) * (d0 * n[0] + d1 * n[1] + d2 * n[2])
 
 
-@numba.njit(cache=True, fastmath={"contract", "arcp", "nsz"})
-def _influence(targets, sources, rule, signs, shift, potential, velocity):
-    """Fill potential and velocity (t, s); target i + shift is panel i of the sources."""
-    points, normals = targets
-    corners, panel_normals, gauss, weights, centres, areas = sources
-    rule_points, rule_centres, reach = rule
-    out, x, n = np.empty(4), np.empty(3), np.empty(3)
-    factor = 1.0 / (4.0 * math.pi)
-    potential[:] = 0.0
-    velocity[:] = 0.0
-    for i in range(points.shape[0]):
+@_compiled
+def _add_far(x, n, held, sign, y, areas, held_sources, reach, kind, phi, u):
+    """Add all panels that are far by one point, and tell the kinds of the others."""
+    for j in range(len(areas)):
+        value, slope = _point(x, n, y[0, j], y[1, j], y[2, j], sign * areas[j])
+        away = (held[0] - held_sources[0, j]) ** 2
+        away += (held[1] - held_sources[1, j]) ** 2
+        away += (held[2] - held_sources[2, j]) ** 2
+        far = away >= FOUR * reach[j]
+        phi[j] -= value if far else 0.0
+        u[j] -= slope if far else 0.0
+        kind[j] = (away < FOUR * reach[j]) + (away < EXACT * reach[j])
+
+
+@_compiled
+def _add_point(x, n, sign, y0, y1, y2, weights, kind, phi, u):
+    """Add one of the four points of panels that are taken by them."""
+    for j in range(len(kind)):
+        value, slope = _point(x, n, y0[j], y1[j], y2[j], sign * weights[j])
+        here = kind[j] == POINTS
+        phi[j] -= value if here else 0.0
+        u[j] -= slope if here else 0.0
+
+
+@_compiled
+def _add_points(x, n, sign, gauss, weights, kind, some, phi, u):
+    """Add the panels that are taken by points, in runs of blocks that have any: long loops are the fast ones."""
+    first = 0
+    while first < len(some):
+        last = first
+        while last < len(some) and some[last] & POINTS:
+            last += 1
+        lo, hi = first * BLOCK, last * BLOCK
+        if hi > lo:
+            for g in range(4):
+                y0, y1, y2 = gauss[g, 0, lo:hi], gauss[g, 1, lo:hi], gauss[g, 2, lo:hi]
+                _add_point(x, n, sign, y0, y1, y2, weights[g, lo:hi], kind[lo:hi], phi[lo:hi], u[lo:hi])
+        first = last + 1
+
+
+@_compiled
+def _influence(targets, sources, points, rule, signs, shift, potential, velocity):
+    """Fill potential and velocity (t, s); target i + shift is panel i of the sources.
+
+    Points of sources and what chooses the rule have panels last, as many as whole blocks hold.
+    """
+    places, normals, held = targets
+    corners, sides, lengths, panel_normals = sources
+    y, areas, gauss, weights = points
+    held_sources, reach = rule
+    count, blocks = len(corners), len(areas) // BLOCK
+    out, r, p = np.empty(4), np.empty(4), np.empty((4, 3))
+    kind, some = np.empty(len(areas), np.uint8), np.empty(blocks, np.uint8)
+    phi, u = np.empty(len(areas)), np.empty(len(areas))
+    for i in range(len(places)):
+        phi[:] = 0.0
+        u[:] = 0.0
         for k in range(4):
             # the target mirrored in place of the source
-            for c in range(3):
-                x[c] = REFLECTIONS[k, c] * points[i, c]
-                n[c] = REFLECTIONS[k, c] * normals[i, c]
-            r0, r1, r2 = (
-                REFLECTIONS[k, 0] * rule_points[i, 0],
-                REFLECTIONS[k, 1] * rule_points[i, 1],
-                REFLECTIONS[k, 2] * rule_points[i, 2],
-            )
-            sign = factor * signs[k]
-            for j in range(corners.shape[0]):
-                far = (r0 - rule_centres[j, 0]) ** 2 + (r1 - rule_centres[j, 1]) ** 2 + (r2 - rule_centres[j, 2]) ** 2
-                if far >= FOUR * reach[j]:
-                    d0, d1, d2 = x[0] - centres[j, 0], x[1] - centres[j, 1], x[2] - centres[j, 2]
-                    inverse = 1.0 / (d0 * d0 + d1 * d1 + d2 * d2)
-                    value = sign * areas[j] * math.sqrt(inverse)
-                    potential[i, j] -= value
-                    velocity[i, j] += value * inverse * (d0 * n[0] + d1 * n[1] + d2 * n[2])
-                    continue
-                if far < EXACT * reach[j]:
-                    _exact(x, corners[j], panel_normals[j], k == 0 and i + shift == j, out)
-                else:
-                    _by_points(x, gauss[j], weights[j], out)
-                potential[i, j] -= sign * out[0]
-                velocity[i, j] -= sign * (out[1] * n[0] + out[2] * n[1] + out[3] * n[2])
+            m0, m1, m2 = REFLECTIONS[k]
+            x = (m0 * places[i, 0], m1 * places[i, 1], m2 * places[i, 2])
+            n = (m0 * normals[i, 0], m1 * normals[i, 1], m2 * normals[i, 2])
+            h = (m0 * held[i, 0], m1 * held[i, 1], m2 * held[i, 2])
+            sign = signs[k] / (4.0 * math.pi)
+            _add_far(x, n, h, sign, y, areas, held_sources, reach, kind, phi, u)
+            for block in range(blocks):
+                some[block] = 0
+                for j in range(block * BLOCK, (block + 1) * BLOCK):
+                    some[block] |= kind[j]
+            _add_points(x, n, sign, gauss, weights, kind, some, phi, u)
+            for block in range(blocks):
+                if some[block] & NEAR:
+                    for j in range(block * BLOCK, min((block + 1) * BLOCK, count)):
+                        if kind[j] == NEAR:
+                            own = k == 0 and i + shift == j
+                            _exact(x, corners[j], sides[j], lengths[j], panel_normals[j], own, r, p, out)
+                            phi[j] -= sign * out[0]
+                            u[j] -= sign * (out[1] * n[0] + out[2] * n[1] + out[3] * n[2])
+        potential[i] = phi[:count]
+        velocity[i] = u[:count]
 
 
 def influence(
@@ -165,10 +204,13 @@ def influence(
     shape = len(targets), len(sources)
     potential, velocity = np.empty(shape), np.empty(shape)
     near, far = (targets, sources) if frozen is None else frozen
+    gauss, weights = _gauss(sources)
+    sides, lengths = _sides(sources)
     _influence(
-        (targets.centres, targets.normals),
-        (sources.corners, sources.normals, *_gauss(sources), sources.centres, sources.areas),
-        (near.centres, far.centres, far.extents**2),
+        (targets.centres, targets.normals, near.centres),
+        (sources.corners, sides, lengths, sources.normals),
+        (_rows(sources.centres), _rows(sources.areas), _rows(gauss), _rows(weights)),
+        (_rows(far.centres), _rows(far.extents**2)),
         np.asarray(signs, float),
         -(10**9) if shift is None else shift,
         potential,
@@ -178,6 +220,21 @@ def influence(
         rows = np.arange(shape[0])
         velocity[rows, rows + shift] += targets.bend
     return potential, velocity
+
+
+def _rows(array: np.ndarray) -> np.ndarray:
+    """With the panels (k, ...) last, as vector units want them, and filled up to whole blocks with zeros."""
+    rest = -len(array) % BLOCK
+    whole = np.concatenate([array, np.zeros((rest, *array.shape[1:]))])
+    return np.ascontiguousarray(np.moveaxis(whole, 0, -1))
+
+
+def _sides(panels: Panels) -> tuple[np.ndarray, np.ndarray]:
+    """Outward unit normals (k, 4, 3) of the sides of panels in their planes, and the sides' lengths (k, 4)."""
+    way = np.roll(panels.corners, -1, axis=1) - panels.corners
+    length = np.linalg.norm(way, axis=2)
+    outward = np.cross(way, panels.normals[:, None]) / np.where(length > 0.0, length, 1.0)[..., None]
+    return outward, length
 
 
 def _gauss(panels: Panels) -> tuple[np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
+from scipy.sparse.linalg import LinearOperator
 
 from .influence import image_signs, influence
 from .panels import Panels
@@ -45,6 +46,61 @@ class Surroundings:
 
 #: Flux through a closed boundary, on the fluid's side, of sources on it over their strength: of a body, of a room.
 BODY, ROOM = 1.0, 0.0
+
+
+class Impedance(LinearOperator):
+    """Mean potential of panels, with its sign changed, for unit volume flux through others: 1/m, symmetric.
+
+    Known by the factors of the panels' conditions: a few products cost less than the matrix, see `matrix`.
+
+    Parameters
+    ----------
+    terms : list of (array, array or None)
+        Potentials of the wet panels (wet, j) for sources (j, k) that follow from those of the moving panels; None for
+        these themselves. The first has the latter.
+    rows : (k, k) array
+        Conditions on sources of the moving panels; overwritten.
+    areas : (wet,) array, m2
+    """
+
+    def __init__(self, terms: list, rows: np.ndarray, areas: np.ndarray):
+        super().__init__(float, (len(areas), len(areas)))
+        self._terms, self._areas, self._count = terms, areas, len(rows)
+        # LAPACK factors columns: the transpose goes without a copy
+        self._factor = la.lu_factor(rows.T, overwrite_a=True, check_finite=False)
+
+    def _solve(self, x, transposed):
+        return la.lu_solve(self._factor, x, trans=0 if transposed else 1, check_finite=False)
+
+    def _matmat(self, fluxes: np.ndarray) -> np.ndarray:
+        """Half of the discretised operator on fluxes (wet, k) and half of its transpose."""
+        wet, areas = len(self._areas), self._areas[:, None]
+        strength = np.zeros((self._count, fluxes.shape[1]))
+        strength[:wet] = fluxes / areas
+        source, received = self._solve(strength, False), np.zeros((self._count, fluxes.shape[1]))
+        found = np.zeros(fluxes.shape)
+        for potential, carried in self._terms:
+            sign = 1.0 if carried is None else -1.0
+            found += sign * (potential @ (source if carried is None else carried @ source))
+            back = potential.T @ fluxes
+            received += sign * (back if carried is None else carried.T @ back)
+        return -0.5 * (found + self._solve(received, True)[:wet] / areas)
+
+    def _matvec(self, fluxes: np.ndarray) -> np.ndarray:
+        return self._matmat(np.reshape(fluxes, (-1, 1)))
+
+    def _adjoint(self) -> Impedance:
+        return self
+
+    _transpose = _adjoint
+
+    def matrix(self) -> np.ndarray:
+        """All of it (wet, wet)."""
+        (potential, _), *others = self._terms
+        for other, carried in others:
+            potential = potential - other @ carried
+        found = -self._solve(potential.T, True)[: len(self._areas)].T / self._areas
+        return 0.5 * (found + found.T)
 
 
 class PotentialFlow:
@@ -95,7 +151,8 @@ class PotentialFlow:
 
         Returns
         -------
-        (wet, wet) array, 1/m
+        Impedance
+            (wet, wet), 1/m.
         """
         wet = len(moving) if wet is None else wet
         held, shut = moving if frozen is None else frozen, len(moving) - open_count
@@ -104,7 +161,8 @@ class PotentialFlow:
         if self.closed is not None:
             own, fixed_own = self._own(moving, blocks if self.symmetry == "SS" else self._symmetric(moving, held))
             velocity[np.diag_indices(len(moving))] += own
-        rows, potential = np.concatenate([velocity[:shut], potential[shut:]]), potential[:wet]
+        rows = np.concatenate([velocity[:shut], potential[shut:]])
+        terms = [(potential[:wet], None)]
         if self._fixed is not None:
             matrix = self._rows(*alone)
             if self.closed is not None:
@@ -112,12 +170,8 @@ class PotentialFlow:
                 matrix[rigid, rigid] += fixed_own[: self._open]
             carried = la.lu_solve(la.lu_factor(matrix, check_finite=False), self._rows(*back), check_finite=False)
             rows -= np.concatenate([across[1][:shut], across[0][shut:]]) @ carried
-            potential = potential - across[0][:wet] @ carried
-        # potential rows^-1 by solves with the transpose
-        factor = la.lu_factor(rows.T, overwrite_a=True, check_finite=False)
-        solved = la.lu_solve(factor, potential.T, overwrite_b=True, check_finite=False)[:wet].T
-        found = -solved / moving.areas[:wet]
-        return 0.5 * (found + found.T)
+            terms.append((across[0][:wet], carried))
+        return Impedance(terms, rows, moving.areas[:wet])
 
     def _blocks(self, moving: Panels, held: Panels, signs: np.ndarray):
         """Potentials and velocities of moving on moving panels, of the surroundings on them, of them on the

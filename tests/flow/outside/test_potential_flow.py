@@ -36,7 +36,7 @@ def sphere(n: int) -> Panels:
 def heaving(n: int, symmetry: str, axis: int) -> float:
     panels = sphere(n)
     flux = panels.normals[:, axis] * panels.areas
-    return 4.0 * float(flux @ PotentialFlow(symmetry=symmetry, closed=BODY).impedance(panels) @ flux)
+    return 4.0 * float(flux @ (PotentialFlow(symmetry=symmetry, closed=BODY).impedance(panels) @ flux))
 
 
 @pytest.mark.parametrize("symmetry, axis", [("SS", 2), ("AS", 0), ("SA", 1)])
@@ -143,7 +143,10 @@ def test_the_matrix_is_symmetric_and_positive_also_beside_rigid_and_open_panels(
     for open_count in (0, 12):
         moving = Panels.joined(tube, strip(edge, edge * [1.0, 0.0, 1.0]))
         found = PotentialFlow(Surroundings(end_face(contour, 2.0, True))).impedance(moving, len(tube), open_count)
+        some = np.random.default_rng(3).standard_normal((len(tube), 4))
+        products, found = found @ some, found.matrix()
         assert np.array_equal(found, found.T)
+        np.testing.assert_allclose(products, found @ some, rtol=1e-10, atol=1e-12 * np.abs(products).max())
         assert np.linalg.eigvalsh(found)[0] > 0.0
 
 
