@@ -24,6 +24,8 @@ from .periodic_inertia import inertia_slopes
 REST = 0.02
 #: The same of all of a rough linearisation.
 ROUGH = 0.1
+#: The same where something touches, over the ratio of stiffnesses of stops and of the wall.
+HARD = 100.0
 #: Phases that the structure's tangent is taken at if the motion has harmonics for them, at least.
 LEAST = 13
 
@@ -94,10 +96,10 @@ class WallSlopes:
         h, alpha = motion.harmonics, mu["alpha"]
         samples = motion.samples[:, : model.size]
         few = min(h.count + 3 | 1 if rough else max(2 * h.count - 1, LEAST), h.size)
-        if few >= h.samples or any(model.touching(q) for q in samples):  # stops and contacts come and go at once
-            few = h.samples
-        spread = between_phases(few, h.samples) if few < h.samples else None
         weight, none = ROUGH if rough else 1.0, np.zeros(len(model.shell.dofs.pattern[1]))
+        if any(model.touching(q) for q in samples):  # stops and contacts come and go at once, and outweigh the wall
+            few, rough, weight = h.samples, False, HARD
+        spread = between_phases(few, h.samples) if few < h.samples else None
         own, mass, inertia = self._of_shape(model, motion, few, alpha, rough)
         pressed = self._rows("pressed", h.samples)
         for i, q in enumerate(samples):
@@ -115,7 +117,7 @@ class WallSlopes:
                 self._used[name], mean = rows.used, rows.mean
                 size = motion.omega**power * self._norm(model, mean)
                 share = min(size / whole, 1.0) if whole else 1.0
-                middle.append((power, self.blocks(model, rows, REST * share, spread)))
+                middle.append((power, self.blocks(model, rows, REST * weight * share, spread)))
                 rest, damping = (rest + mean, damping) if power == 0 else (rest, damping + mean)
         structure = Term([(0, self.blocks(model, own, weight, spread))], outer=StiffnessDamping(mu["beta"]))
         return [structure, Term(middle)], (stiffness, rest, damping, masses)
