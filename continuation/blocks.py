@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cached_property
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
 
-#: Size over the largest of those combinations of the matrices that projections leave out.
+from continuation.dense_blocks import DenseBlocks
+from continuation.harmonics import Harmonics
+from continuation.sparse_products import LANES, TOGETHER, add_products, add_products_of_one, padded
+
+#: Size over the largest of those combinations of the matrices that are left out.
 LEFT_OUT = 1e-6
+#: Type of entries in products: rounding is below what is left out.
+SINGLE = np.float32
 #: The same of rough projections, which prepare corrections: an error there costs a part of an iteration.
 ROUGH = 1e-4
 
@@ -21,6 +26,8 @@ class BlockRows:
     ----------
     count : int
         N.
+    used : (k,) array of int, optional
+        Numbers of entries that are kept, which others join where they are not zero; those of the first matrix without.
 
     Examples
     --------
@@ -31,16 +38,15 @@ class BlockRows:
     ([1, 2], [[1.0, 0.0], [2.0, 3.0]], [0.0, 1.5, 1.5])
     """
 
-    def __init__(self, count: int):
-        self._count, self._done = count, 0
-        self._total = self._unused = None
+    def __init__(self, count: int, used: np.ndarray | None = None):
+        self._count, self._done, self.used = count, 0, used
 
     def put(self, row: np.ndarray) -> None:
         """Take the values (nnz,) of the next matrix."""
-        if self._total is None:
-            self._total = np.zeros(len(row))
-            self._use(np.flatnonzero(row))
-        elif np.take(row, self._unused, out=self._beside, mode="clip").any():
+        if not self._done:
+            self._size = len(row)
+            self._use(np.flatnonzero(row) if self.used is None else self.used)
+        if len(self._unused) and np.take(row, self._unused, out=self._beside, mode="clip").any():
             known, values = self.used, self.values
             self._use(np.union1d(known, np.flatnonzero(row)))
             self.values[: self._done] = 0.0
@@ -49,13 +55,14 @@ class BlockRows:
             np.take(row, self.used, out=self.values[self._done], mode="clip")
         else:
             self.values[self._done] = row
-        self._total += row
         self._done += 1
 
     def _use(self, used: np.ndarray) -> None:
         #: (k,) numbers of the entries that are kept.
         self.used = used
-        self._unused = np.setdiff1d(np.arange(len(self._total)), used, assume_unique=True)
+        unused = np.ones(self._size, bool)
+        unused[used] = False
+        self._unused = np.flatnonzero(unused)
         self._beside = np.empty(len(self._unused))  # new memory costs more than what is done with it
         #: (N, k)
         self.values = np.empty((self._count, len(used)))
@@ -63,97 +70,128 @@ class BlockRows:
     @property
     def mean(self) -> np.ndarray:
         """(nnz,) mean of all matrices."""
-        return self._total / self._done
+        total = np.zeros(self._size)
+        total[self.used] = self.values[: self._done].mean(axis=0)
+        return total
 
 
 class SparseBlocks:
-    """N matrices that share a sparsity pattern.
+    """N matrices that share a sparsity pattern, kept as sums of the few of their combinations that count.
 
     Parameters
     ----------
-    values : (N, nnz) array or BlockRows
+    values : (M, nnz) array or BlockRows
+        Of M matrices that they are sums of: themselves without `spread`.
     indices, indptr : arrays
         Of the rows, as `scipy.sparse.csr_matrix` has them.
     shape : (int, int)
     share : float
-        Size of these matrices over that of others that they are added to: projections leave out the more of them, the
-        smaller it is.
+        What these matrices weigh beside others that they are added to: the smaller it is, the more of them is left out.
+    spread : (N, M) array, optional
+        Weights of those in these.
+
+    Attributes
+    ----------
+    weights : (N, k) array
+    values : (k, nnz) array
+        Combinations, by decreasing size.
 
     Examples
     --------
     >>> blocks = SparseBlocks(np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([0, 1]), np.array([0, 1, 2]), (2, 2))
-    >>> [block.toarray().tolist() for block in blocks]
-    [[[1.0, 0.0], [0.0, 2.0]], [[3.0, 0.0], [0.0, 4.0]]]
-    >>> blocks.times(np.array([[1.0, 1.0], [1.0, -1.0]])).tolist()
+    >>> blocks.times(np.array([[1.0, 1.0], [1.0, -1.0]])).round(12).tolist()
     [[1.0, 2.0], [3.0, -4.0]]
-    >>> blocks.projected(np.array([[1.0], [1.0]])).ravel().round(12).tolist()
+    >>> blocks.projected(np.array([[1.0], [1.0]])).stack.ravel().round(12).tolist()
     [3.0, 7.0]
     """
 
     def __init__(
-        self, values: np.ndarray | BlockRows, indices: np.ndarray, indptr: np.ndarray, shape, share: float = 1.0
+        self,
+        values: np.ndarray | BlockRows,
+        indices: np.ndarray,
+        indptr: np.ndarray,
+        shape,
+        share: float = 1.0,
+        spread: np.ndarray | None = None,
     ):
         if isinstance(values, BlockRows):
             indptr = np.searchsorted(values.used, indptr).astype(indptr.dtype)
             indices, values = indices[values.used], values.values
-        self.values, self._pattern, self.shape, self.share = values, (indices, indptr), shape, share
-
-    def _matrix(self, values: np.ndarray) -> sp.csr_matrix:
-        return sp.csr_matrix((values, *self._pattern), shape=self.shape, copy=False)
+        self._pattern, self.shape = (indices, indptr), tuple(shape)
+        sizes, vectors = np.linalg.eigh(values @ values.T)
+        sizes, vectors = np.sqrt(np.maximum(sizes[::-1], 0.0)), vectors[:, ::-1]
+        least = min(LEFT_OUT / max(share, 1e-300), 1.0)
+        kept = max(int(np.sum(sizes >= least * sizes[0])), 1) if LEFT_OUT else len(sizes)
+        combinations = np.ascontiguousarray(vectors[:, :kept])
+        self.weights = combinations if spread is None else spread @ combinations
+        self.values = combinations.T @ values
+        self._rough = max(int(np.sum(sizes[:kept] >= min(ROUGH, 1.0) * sizes[0])), 1)
+        self._entries = self._lanes = None
 
     def __len__(self) -> int:
-        return len(self.values)
+        return len(self.weights)
 
-    def __iter__(self) -> Iterator[sp.csr_matrix]:
-        return (self._matrix(row) for row in self.values)
-
-    def _in_turn(self, rows: np.ndarray) -> Iterator[sp.csr_matrix]:
-        """Matrices of values (k, nnz); one that changes, for it is dear to make."""
-        matrix = self._matrix(rows[0])
-        for row in rows:
+    def _in_turn(self):
+        """The combinations; one matrix that changes, for it is dear to make."""
+        matrix = sp.csr_matrix((self.values[0], *self._pattern), shape=self.shape, copy=False)
+        for row in self.values:
             matrix.data = row
             yield matrix
+
+    def add_to(self, out: np.ndarray, x: np.ndarray) -> None:
+        """Add to samples (n, v, N') the products with samples (m, v, N') of v real motions, N' being N filled up to a
+        multiple of `LANES`.
+        """
+        if self._entries is None:
+            multiple = TOGETHER if len(self.values) > 1 else 1
+            self._entries = np.ascontiguousarray(padded(self.values, 0, multiple).T, SINGLE)
+            self._lanes = padded(padded(np.ascontiguousarray(self.weights.T, SINGLE), 0, multiple), 1, LANES)
+        indices, indptr = self._pattern
+        add = add_products if len(self._lanes) > 1 else add_products_of_one
+        add(indptr, indices, self._entries, self._lanes, x, out)
 
     def times(self, samples: np.ndarray) -> np.ndarray:
         """Products (N, n) or (N, n, k) with as many vectors, or some each, real or complex."""
         if np.iscomplexobj(samples):
-            flat = np.ascontiguousarray(samples).reshape(*samples.shape[:2], -1)
-            return self.times(flat.view(float)).view(complex).reshape(len(samples), -1, *samples.shape[2:])
-        return np.stack([matrix @ x for matrix, x in zip(self._in_turn(self.values), samples)])
+            return self.times(samples.real) + 1j * self.times(samples.imag)
+        x = np.moveaxis(samples.reshape(*samples.shape[:2], -1), 0, 2)
+        x = padded(np.ascontiguousarray(x), 2, LANES)
+        out = np.zeros((self.shape[0], *x.shape[1:]))
+        self.add_to(out, x)
+        return np.moveaxis(out[..., : len(samples)], 2, 0).reshape(len(samples), -1, *samples.shape[2:])
 
-    @cached_property
-    def _combined(self) -> tuple[np.ndarray, np.ndarray]:
-        """Weights (N, k) and values (k, nnz) of k matrices that the N are sums of: those of their singular vectors that
-        count, by decreasing size.
+    def projected(self, basis: np.ndarray, known: DenseBlocks | None = None, rough: bool = False) -> DenseBlocks:
+        """V^T A V for a basis V (n, r); `known` is that of its first columns. With `rough`, V^T A of the combinations
+        that count most as well.
         """
-        sizes, vectors = np.linalg.eigh(self.values @ self.values.T)
-        sizes, vectors = sizes[::-1], vectors[:, ::-1]
-        least = min(LEFT_OUT / max(self.share, 1e-300), 1.0)
-        kept = sizes >= least**2 * sizes[0] if LEFT_OUT else np.ones(len(sizes), bool)
-        weights = np.ascontiguousarray(vectors[:, kept])
-        return weights, weights.T @ self.values
-
-    def left_projected(self, basis: np.ndarray, count: int | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Weights (N, k) and single-precision stack (k, r, n) of which V^T A for a basis V (n, r) are sums, roughly: of
-        as many matrices as asked for, or as count.
-        """
-        weights, values = self._combined
-        if count is None:
-            sizes = np.linalg.norm(values, axis=1)
-            count = int(np.sum(sizes >= min(ROUGH / max(self.share, 1e-300), 1.0) * sizes[0]))
-        rows = [(matrix.T @ basis).T for matrix in self._in_turn(values[:count])]
-        return weights[:, :count], np.array(rows, np.float32)
-
-    def projected(self, basis: np.ndarray, known: np.ndarray | None = None) -> np.ndarray:
-        """V^T A V (N, r, r) for a basis V (n, r); `known` is that of its first columns."""
-        weights, values = self._combined
-        size, old = basis.shape[1], 0 if known is None else known.shape[1]
-        small = np.empty((len(values), size, size))
+        old = 0 if known is None else known.parts.shape[1]
+        added, size, count = np.ascontiguousarray(basis[:, old:]), basis.shape[1], len(self.values)
+        parts, rows = np.empty((count, size, size)), []
         if old:
-            small[:, :old, :old] = np.tensordot(weights.T, known, 1)
-        added = np.ascontiguousarray(basis[:, old:])
-        for one, matrix in zip(small, self._in_turn(values)):
-            one[:, old:] = basis.T @ (matrix @ added)
+            parts[:, :old, :old] = known.parts
+        for k, matrix in enumerate(self._in_turn()):
+            row = (matrix.T @ added).T
+            parts[k, old:] = row @ basis
             if old:
-                one[old:, :old] = (matrix.T @ added).T @ basis[:, :old]
-        return np.tensordot(weights, small, 1)
+                parts[k, :old, old:] = basis[:, :old].T @ (matrix @ added)
+            if rough and k < self._rough:
+                rows.append(row.astype(np.float32))
+        stack = np.array(rows) if rough else None
+        if old and rough:
+            stack = np.concatenate([known.rows, stack], axis=1)
+        return DenseBlocks(self.weights, parts, stack)
+
+
+def sum_of_products(h: Harmonics, blocks: Sequence[SparseBlocks], motions: Sequence[np.ndarray]) -> np.ndarray:
+    """Coefficients (v, 2 H + 1, n) of the sum of matrices times real motions (v, 2 H + 1, m), one set for each."""
+    lanes, count = padded(h.basis, 0, LANES), len(motions[0])
+    out = np.zeros((blocks[0].shape[0], count, len(lanes)))
+    x = np.empty((blocks[0].shape[1], count, len(lanes)))
+    last = None
+    for one, coefficients in zip(blocks, motions):
+        if coefficients is not last:
+            for v in range(count):
+                x[:, v] = coefficients[v].T @ lanes.T
+        last = coefficients
+        one.add_to(out, x)
+    return np.array([lanes.T @ out[:, v].T for v in range(count)]) / h.samples

@@ -64,12 +64,17 @@ class CycleLinearisation:
     mu : mapping
     basis : (n, r) array
         Orthonormal in unknowns over their scales.
+    rough : bool
+        Whether it is for corrections, which a rough one serves.
+    smoother : callable, optional
+        That of a motion nearby with as many harmonics.
     """
 
-    def __init__(self, system, motion, mu, basis: np.ndarray):
+    def __init__(self, system, motion, mu, basis: np.ndarray, rough: bool = False, smoother=None):
         self.system, self.motion, self.mu = system, motion, dict(mu)
-        self.operator = system.linearise(motion, mu)
-        self.smoother = system.smoother(self.operator, mu)
+        self.operator = system.linearise(motion, mu, rough)
+        self.smoother = system.smoother(self.operator, mu) if smoother is None else smoother
+        self._by_rows = rough and self.operator.exact
         self.scale, self.basis = np.asarray(system.scales), basis
         self._known: dict[str, np.ndarray] = {}
         self._coarse = self._rough = None
@@ -86,7 +91,7 @@ class CycleLinearisation:
     def reduced(self):
         """Projection on the basis."""
         if self._coarse is None:
-            self._coarse = self.operator.reduced(self.scale[:, None] * self.basis)
+            self._coarse = self.operator.reduced(self.scale[:, None] * self.basis, rough=self._by_rows)
         return self._coarse
 
     def extend(self, directions: np.ndarray) -> bool:
@@ -99,10 +104,7 @@ class CycleLinearisation:
         if not added.shape[1]:
             return False
         known, self.basis = self.reduced, np.hstack([self.basis, added])
-        v = self.scale[:, None] * self.basis
-        self._coarse = self.operator.reduced(v, known)
-        if self._rough is not None:
-            self._rough = LeftProjection(self.operator, v, self._coarse, self._rough)
+        self._coarse, self._rough = self.operator.reduced(self.scale[:, None] * self.basis, known, self._by_rows), None
         return True
 
     def prepare(self, free: Sequence[str], conditions: Sequence[Condition], force: np.ndarray) -> None:
@@ -152,10 +154,10 @@ class CycleLinearisation:
 
     def _on_basis(self, rows: np.ndarray) -> np.ndarray:
         """What the operator makes of coefficients, on the basis."""
-        if not self.operator.exact:
+        if not self._by_rows:
             return self.operator.apply(rows) @ self._v
         if self._rough is None:
-            self._rough = LeftProjection(self.operator, self._v, self.reduced)
+            self._rough = LeftProjection(self.operator, self.reduced)
         return self._rough.apply(rows)
 
     def _precondition(self, force: np.ndarray) -> np.ndarray:

@@ -21,6 +21,8 @@ from continuation.periodic import PeriodicMotion
 
 #: Directions of a motion itself that belong to the basis: those above this share of the largest.
 OWN = 1e-4
+#: Distance over the size of a motion within which the smoother of another one is used again.
+NEAR = 0.1
 #: Contraction that is counted on at most.
 LEAST_CONTRACTION = 0.15
 
@@ -97,6 +99,7 @@ class CycleSolver:
         self._given = la.orth(np.asarray(basis, float) / np.asarray(system.scales)[:, None])
         self._learnt = np.zeros((len(self._given), 0))
         self._of_perturbations = np.zeros((len(self._given), 0))
+        self._smoothed: tuple | None = None
 
     def solve(
         self,
@@ -133,7 +136,8 @@ class CycleSolver:
             if not np.isfinite(unbalance).all():
                 break
             if linear is None:
-                linear, steps = self.linearise(motion, mu), []
+                linear, steps = CycleLinearisation(self.system, motion, mu, self.basis_for(motion), rough=True), []
+                self._smoothed = motion, linear.smoother
                 linear.prepare(free, conditions, unbalance[: motion.coefficients.size].reshape(shape))
             change, used, missed = linear.solve(-unbalance, options.linear, options.krylov)
             change = _updated(change, steps, linear.units)
@@ -186,7 +190,12 @@ class CycleSolver:
         """Linearisation about a motion, with the basis as it is now; with that of perturbations too where these are
         asked for.
         """
-        return CycleLinearisation(self.system, motion, mu, self.basis_for(motion, perturbed))
+        basis, near = self.basis_for(motion, perturbed), None
+        if self._smoothed is not None and self._smoothed[0].harmonics.count == motion.harmonics.count:
+            known, smoother = self._smoothed
+            change = np.append((motion.coefficients - known.coefficients).ravel(), 0.0)
+            near = smoother if self._size(change, motion) < NEAR else None
+        return CycleLinearisation(self.system, motion, mu, basis, smoother=near)
 
     def basis_for(self, motion: PeriodicMotion, perturbed: bool = False) -> np.ndarray:
         """Orthonormal directions (n, r) of unknowns over their scales: those of the motion itself, given, learnt; and

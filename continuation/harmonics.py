@@ -127,13 +127,13 @@ class Rates:
         self.harmonics, self.omega = harmonics, float(omega)
         self.shift = shift.real if not np.imag(shift) else complex(shift)
         self._known: dict = {}
+        self._turns: dict = {}
 
     def filter(self, function: Callable[[np.ndarray], np.ndarray] | int) -> np.ndarray:
         """(N, N) matrix of a function of d/dt, or of an integer power of it; real for a real shift."""
         if function not in self._known:
             n = self.harmonics.samples
-            s = 1j * self.omega * np.fft.fftfreq(n, 1.0 / n) + self.shift
-            values = s**function if isinstance(function, int) else np.asarray(function(s))
+            values = self._values(function, np.fft.fftfreq(n, 1.0 / n))
             matrix = np.fft.ifft(values[:, None] * np.fft.fft(np.eye(n), axis=0), axis=0)
             self._known[function] = matrix if np.iscomplexobj(self.shift) else np.ascontiguousarray(matrix.real)
         return self._known[function]
@@ -143,3 +143,32 @@ class Rates:
         if isinstance(function, int) and function == 0:
             return samples
         return np.tensordot(self.filter(function), samples, 1)
+
+    def _values(self, function, multiples: np.ndarray) -> np.ndarray:
+        """A function of d/dt at multiples of the frequency."""
+        s = 1j * self.omega * multiples + self.shift
+        return s**function if isinstance(function, int) else np.asarray(function(s))
+
+    def _turn(self, function) -> tuple[np.ndarray, np.ndarray]:
+        """a_k, b_k (H + 1,) of what it makes of cosines, a cos + b sin, and of sines, a sin - b cos."""
+        if function not in self._turns:
+            k = np.arange(self.harmonics.count + 1)
+            ahead, behind = self._values(function, k), self._values(function, -k)
+            a, b = 0.5 * (ahead + behind), 0.5j * (ahead - behind)
+            self._turns[function] = (a, b) if np.iscomplexobj(self.shift) else (a.real, b.real)
+        return self._turns[function]
+
+    def act(self, function, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients of a function of d/dt, or of a power of it, applied to those (2 H + 1, ...) of a motion."""
+        if isinstance(function, int) and function == 0:
+            return coefficients
+        a, b = (x.reshape((-1,) + (1,) * (coefficients.ndim - 1)) for x in self._turn(function))
+        cosine, sine = coefficients[1::2], coefficients[2::2]
+        out = np.empty(coefficients.shape, np.result_type(a, coefficients))
+        out[0] = a[0] * coefficients[0]
+        out[1::2], out[2::2] = a[1:] * cosine - b[1:] * sine, b[1:] * cosine + a[1:] * sine
+        return out
+
+    def matrix(self, function) -> np.ndarray:
+        """(2 H + 1, 2 H + 1): `act` on coefficients."""
+        return self.act(function, np.eye(self.harmonics.size))

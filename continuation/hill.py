@@ -115,12 +115,21 @@ def _missed(linear, shifts: np.ndarray, vectors: list[np.ndarray]) -> list[tuple
     """Share that each perturbation misses, and the correction (2 H + 1, n) that one pass of the smoother gives."""
     if linear.smoother is None:
         return [(0.0, np.zeros_like(vector)) for vector in vectors]
-    missed = []
+    missed, basis = [], linear.basis
+    vectors = [v.real if s.imag == 0.0 and not v.imag.any() else v for s, v in zip(shifts, vectors)]
+    shifts = [s.real if np.isrealobj(v) else s for s, v in zip(shifts, vectors)]
     for vector, force in zip(vectors, linear.operator.apply_each(vectors, shifts)):
         scaled, whole = linear.smoother(force) / linear.scale, np.linalg.norm(vector / linear.scale)
-        outside = scaled - (scaled @ linear.basis) @ linear.basis.T
+        outside = scaled - _by_parts(lambda part: (part @ basis) @ basis.T, scaled)
         missed.append((float(np.linalg.norm(outside) / whole), outside * linear.scale))
     return missed
+
+
+def _by_parts(linear_map, x: np.ndarray) -> np.ndarray:
+    """A real linear map of an array that may be complex, whose matrices stay real."""
+    if not np.iscomplexobj(x):
+        return linear_map(x)
+    return linear_map(np.ascontiguousarray(x.real)) + 1j * linear_map(np.ascontiguousarray(x.imag))
 
 
 def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
@@ -133,7 +142,7 @@ def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
     found = sorted(found, key=lambda one: -one[0].real)[:count]
     v = linear.scale[:, None] * linear.basis
     values, as_found = (np.array(part, complex) for part in ([one[0] for one in found], [one[1] for one in found]))
-    vectors = [x @ v.T for _, _, x in found]
+    vectors = [_by_parts(lambda part: part @ v.T, x) for _, _, x in found]
     return Exponents(values, vectors, np.zeros(len(found)), trivial, motion.omega, as_found)
 
 

@@ -15,13 +15,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import comb
 from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
-from continuation.blocks import SparseBlocks
+from continuation.blocks import SparseBlocks, sum_of_products
+from continuation.dense_blocks import DenseBlocks
 from continuation.harmonics import Harmonics, Rates
+
+#: Least size over the largest of parts that projections of terms through few numbers are sums of.
+TAKEN = 1e-8
 
 Filter = Callable[[np.ndarray], np.ndarray] | int
 
@@ -62,6 +67,12 @@ class PeriodicMotion:
         """Rates (len, n) at phases, rad."""
         return self.omega * (self.harmonics.basis_at(phases) @ self.harmonics.rate(self.coefficients))
 
+    def with_rates(self, phases) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Values, rates and second rates (len, n) at phases, rad."""
+        h, basis = self.harmonics, self.harmonics.basis_at(phases)
+        rate = self.omega * h.rate(self.coefficients)
+        return basis @ self.coefficients, basis @ rate, basis @ (self.omega * h.rate(rate))
+
     def resized(self, count: int) -> PeriodicMotion:
         """With another number of harmonics."""
         other = Harmonics(count)
@@ -77,8 +88,8 @@ class PeriodicMotion:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """One term of a linearisation; blocks are N matrices, a `SparseBlocks`, one stack (N, a, b), or None for the
-    identity.
+    """One term of a linearisation; blocks are N matrices, a `SparseBlocks`, `DenseBlocks`, one stack (N, a, b), or None
+    for the identity.
 
     Attributes
     ----------
@@ -92,21 +103,30 @@ class Term:
     right: Any = None
     outer: Filter = 0
 
+    @property
+    def narrow(self) -> bool:
+        """Whether it goes through few numbers."""
+        return self.left is not None or self.right is not None
+
     def apply(self, samples: np.ndarray, rates: Rates) -> np.ndarray:
         """Samples (N, n) or (N, n, k) of what it makes of samples of a motion."""
         inner = _times(self.right, samples)
         total = sum(_times(blocks, rates.apply(function, inner)) for function, blocks in self.middle)
         return rates.apply(self.outer, _times(self.left, total))
 
-    def apply_each(self, samples: Sequence[np.ndarray], rates: Sequence[Rates]) -> list[np.ndarray]:
-        """`apply` to samples (N, n) of several motions with rates of their own, the blocks taken up once."""
-        inner = [_times(self.right, one) for one in samples]
-        total = sum(
-            _times(blocks, np.stack([by.apply(function, one) for one, by in zip(inner, rates)], axis=-1))
-            for function, blocks in self.middle
-        )
-        total = _times(self.left, total)
-        return [by.apply(self.outer, total[..., i]) for i, by in enumerate(rates)]
+    def on_series(self, motions: Sequence[np.ndarray], rates: Sequence[Rates]) -> list[np.ndarray]:
+        """Coefficients (2 H + 1, n) of what it makes of those of several motions, with rates of their own."""
+        h = rates[0].harmonics
+        if self.narrow or not all(isinstance(blocks, SparseBlocks) for _, blocks in self.middle):
+            return [h.project(self.apply(h.evaluate(one), by)) for one, by in zip(motions, rates)]
+        is_complex = [np.iscomplexobj(one) or np.iscomplexobj(by.shift) for one, by in zip(motions, rates)]
+        real = {}
+        for function in {f for f, _ in self.middle}:
+            filtered = [by.act(function, one) for one, by in zip(motions, rates)]
+            real[function] = [p for x, both in zip(filtered, is_complex) for p in (_parts(x) if both else (x,))]
+        found = iter(sum_of_products(h, [b for _, b in self.middle], [real[f] for f, _ in self.middle]))
+        whole = [next(found) + 1j * next(found) if both else next(found) for both in is_complex]
+        return [by.act(self.outer, one) for one, by in zip(whole, rates)]
 
     @property
     def polynomial(self) -> bool:
@@ -114,22 +134,47 @@ class Term:
         used = [self.outer, *(function for function, _ in self.middle)]
         return all(isinstance(f, int) or getattr(f, "polynomial", False) for f in used)
 
-    def reduced(self, basis: np.ndarray, known: Term | None = None) -> Term:
-        """Its projection on a basis (n, r), dense at each sample; `known` is that on the first columns of the basis."""
-        if self.left is None and self.right is None:
+    def reduced(self, basis: np.ndarray, known: Term | None = None, rough: bool = False) -> Term:
+        """Its projection on a basis (n, r), dense at each sample; `known` is that on the first columns of the basis,
+        `rough` asks for what `continuation.left_projection` needs.
+        """
+        if not self.narrow:
             before = [None] * len(self.middle) if known is None else [blocks for _, blocks in known.middle]
-            middle = [(f, _projected(blocks, basis, old)) for (f, blocks), old in zip(self.middle, before)]
+            middle = [(f, _projected(blocks, basis, old, rough)) for (f, blocks), old in zip(self.middle, before)]
             return Term(middle, outer=self.outer)
-        left = np.stack([(block.T @ basis).T for block in self.left])
-        right = np.stack([block @ basis for block in self.right])
-        return Term([(f, left @ blocks) for f, blocks in self.middle], right=right, outer=self.outer)
+        added = basis if known is None else np.ascontiguousarray(basis[:, known.right.shape[2] :])
+        left = np.stack([(block.T @ added).T for block in self.left])
+        right = np.stack([block @ added for block in self.right])
+        if known is not None:
+            left, right = np.concatenate([known.left, left], axis=1), np.concatenate([known.right, right], axis=2)
+        return Term(self.middle, left, right, self.outer)
+
+    def widened(self, rates: Rates) -> list[tuple[Filter, DenseBlocks]]:
+        """Filters and blocks that a projection through few numbers comes to, with powers of d/dt of products taken by
+        the rule for these; that differs by what products have in harmonics beyond those of the samples.
+        """
+        if not self.narrow:
+            return list(self.middle)
+        sums: dict[int, np.ndarray] = {}
+        for power, blocks in self.middle:
+            before = self.left @ blocks
+            for taken in range(power + 1):
+                part = comb(power, taken) * (before @ rates.apply(taken, self.right))
+                sums[power - taken] = sums[power - taken] + part if power - taken in sums else part
+        return [(power, DenseBlocks.of_stack(stack, tolerance=TAKEN)) for power, stack in sums.items()]
 
 
-def _projected(blocks, basis: np.ndarray, known: np.ndarray | None) -> np.ndarray:
-    """V^T A V (N, r, r) of matrices A at each sample; `known` holds the part of the first columns of V."""
+def _parts(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Real and imaginary part, each of its own memory: products with parts of a complex array are slow."""
+    return np.ascontiguousarray(x.real), np.ascontiguousarray(x.imag)
+
+
+def _projected(blocks, basis: np.ndarray, known: DenseBlocks | None, rough: bool) -> DenseBlocks:
+    """V^T A V of matrices A at each sample; `known` holds the part of the first columns of V."""
     if isinstance(blocks, SparseBlocks):
-        return blocks.projected(basis, known)
-    return np.stack([basis.T @ (block @ basis) for block in blocks])
+        return blocks.projected(basis, known, rough)
+    rows = np.stack([basis.T @ block for block in blocks])
+    return DenseBlocks.of_stack(rows @ basis, rows.astype(np.float32) if rough else None)
 
 
 def _times(blocks, samples: np.ndarray) -> np.ndarray:
@@ -137,6 +182,8 @@ def _times(blocks, samples: np.ndarray) -> np.ndarray:
         return samples
     if isinstance(blocks, SparseBlocks):
         return blocks.times(samples)
+    if isinstance(blocks, DenseBlocks):
+        blocks = blocks.stack
     if isinstance(blocks, np.ndarray):
         if samples.ndim == 2:
             return np.matmul(blocks, samples[:, :, None])[:, :, 0]
@@ -181,26 +228,25 @@ class PeriodicOperator:
 
     def apply(self, coefficients: np.ndarray, shift: complex = 0.0) -> np.ndarray:
         """Coefficients (2 H + 1, n) of the change of the residual for those of a change exp(shift t) of the motion."""
-        h, rates = self.motion.harmonics, self.rates(shift)
-        samples = h.evaluate(coefficients)
-        return h.project(sum(term.apply(samples, rates) for term in self.terms))
+        return self.apply_each([coefficients], [shift])[0]
 
     def apply_each(self, vectors: Sequence[np.ndarray], shifts: Sequence[complex]) -> list[np.ndarray]:
         """`apply` to several changes, each with an exponent of its own; cheaper than one by one."""
-        h, rates = self.motion.harmonics, [Rates(self.motion.harmonics, self.motion.omega, s) for s in shifts]
-        samples = [h.evaluate(vector) for vector in vectors]
+        h, rates = self.motion.harmonics, [self.rates(s) for s in shifts]
         parts = [
-            term.apply_each(samples, rates)
+            term.on_series(vectors, rates)
             if isinstance(term, Term)
-            else [term.apply(one, by) for one, by in zip(samples, rates)]
+            else [h.project(term.apply(h.evaluate(one), by)) for one, by in zip(vectors, rates)]
             for term in self.terms
         ]
-        return [h.project(sum(part)) for part in zip(*parts)]
+        return [sum(part) for part in zip(*parts)]
 
-    def reduced(self, basis: np.ndarray, known: ReducedOperator | None = None) -> ReducedOperator:
-        """Projection on a basis (n, r) at every sample; `known` is that on the first columns of the basis."""
+    def reduced(self, basis: np.ndarray, known: ReducedOperator | None = None, rough: bool = False) -> ReducedOperator:
+        """Projection on a basis (n, r) at every sample; `known` is that on the first columns of the basis, `rough` asks
+        for what `continuation.left_projection` needs.
+        """
         before = [None] * len(self._coarse) if known is None else known.terms
-        terms = [term.reduced(basis, old) for term, old in zip(self._coarse, before)]
+        terms = [term.reduced(basis, old, rough) for term, old in zip(self._coarse, before)]
         return ReducedOperator(self.motion, terms, basis.shape[1])
 
 
@@ -212,7 +258,7 @@ class ReducedOperator(PeriodicOperator):
     motion : PeriodicMotion
         Of the full system.
     terms : sequence of Term
-        With dense blocks, and nothing on their left.
+        With dense blocks; of those through few numbers filters are powers of d/dt.
     size : int
         r.
     """
@@ -222,40 +268,32 @@ class ReducedOperator(PeriodicOperator):
         self.size = size
         #: Whether exponents enter as powers up to the second.
         self.polynomial = all(term.polynomial for term in terms)
-        self._sums: dict[tuple[Filter, Filter], np.ndarray] = {}
-        for term in (term for term in terms if term.right is None):
-            for function, blocks in term.middle:
-                key = term.outer, function
-                self._sums[key] = self._sums[key] + blocks if key in self._sums else blocks
+        #: Outer filter, inner filter and blocks of all of it.
+        self.parts = [(t.outer, *some) for t in terms for some in t.widened(motion.rates)]
+
+    @cached_property
+    def between_harmonics(self) -> list[np.ndarray]:
+        """Of each of the parts, what weights of their parts make of coefficients; see `DenseBlocks`."""
+        return [blocks.between_harmonics(self.motion.harmonics) for *_, blocks in self.parts]
+
+    @cached_property
+    def _all_parts(self) -> np.ndarray:
+        return np.concatenate([blocks.parts.reshape(len(blocks.parts), -1) for *_, blocks in self.parts])
 
     def matrix(self, shift: complex = 0.0) -> np.ndarray:
         """Dense matrix ((2 H + 1) r, (2 H + 1) r); coefficients are ordered by harmonics, unknowns within."""
         h, r, rates = self.motion.harmonics, self.size, self.rates(shift)
-        total = np.zeros((h.size**2, r * r))
-        for (outer, function), blocks in self._sums.items():
-            inner = rates.apply(function, h.basis)
-            weights = np.einsum("ti,is->tsi", self._projection(outer, rates), inner).reshape(h.size**2, h.samples)
-            total = total + _by_parts(weights, blocks.reshape(h.samples, r * r))
-        total = total.reshape(h.size, h.size, r, r).transpose(0, 2, 1, 3).reshape(h.size * r, h.size * r)
-        for term in (term for term in self.terms if term.right is not None):
-            inner = (term.right[:, :, None, :] * h.basis[:, None, :, None]).reshape(h.samples, -1, h.size * r)
-            sums = sum(_by_parts(blocks, rates.apply(f, inner)) for f, blocks in term.middle)
-            total = total + np.tensordot(self._projection(term.outer, rates), sums, 1).reshape(total.shape)
-        return total
-
-    def _projection(self, outer: Filter, rates: Rates) -> np.ndarray:
-        """(2 H + 1, N): coefficients of samples that a filter is applied to."""
-        h = self.motion.harmonics
-        plain = h.basis.T / h.samples
-        return plain if isinstance(outer, int) and outer == 0 else plain @ rates.filter(outer)
+        pairs = zip(self.parts, self.between_harmonics)
+        weights = [rates.matrix(outer) @ (each @ rates.matrix(f)) for (outer, f, _), each in pairs]
+        total = _by_parts(np.concatenate(weights).reshape(-1, h.size**2).T, self._all_parts)
+        return total.reshape(h.size, h.size, r, r).transpose(0, 2, 1, 3).reshape(h.size * r, h.size * r)
 
 
 def _by_parts(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Product of two matrices, or stacks, one of which may be complex; the other stays real."""
+    """Product of a matrix that may be complex with a real one."""
     if np.iscomplexobj(left):
-        return left.real @ right + 1j * (left.imag @ right)
-    if np.iscomplexobj(right):
-        return left @ right.real + 1j * (left @ right.imag)
+        real, imaginary = _parts(left)
+        return real @ right + 1j * (imaginary @ right)
     return left @ right
 
 
@@ -277,8 +315,10 @@ class PeriodicSystem(Protocol):
         """Residual (N, n) at the samples."""
         ...
 
-    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> PeriodicOperator:
-        """Linearisation about a motion that need not solve the equations."""
+    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float], rough: bool = False) -> PeriodicOperator:
+        """Linearisation about a motion that need not solve the equations; a rough one, if that is cheaper, serves to
+        correct the motion, which takes an error of some per cent in how the linearisation changes within a period.
+        """
         ...
 
     def coarse_basis(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> np.ndarray:

@@ -12,13 +12,11 @@ Equation (T.15) of docs/theory.md.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
 from continuation import OutOfDomain
-from continuation.blocks import BlockRows, SparseBlocks
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
 from eigen import CoupledPencil, SingularShiftError, Workspace
 from eigen.pencil import FLUID_PARTS
@@ -27,8 +25,8 @@ from ..errors import SolveError
 from ..flow import FlowMotion
 from ..model import ValveModel
 from .kernels import inertia_force
-from .periodic_inertia import inertia_slopes
 from .periodic_memory import MemoryTerm, PeriodicMemory
+from .periodic_wall import WallSlopes
 
 #: Distance from the imaginary axis, over the angular frequency, of the matrices that smooth: clear of neutral modes.
 CLEAR = 0.15
@@ -64,6 +62,7 @@ class PeriodicValve:
         jet = np.sqrt(2.0 * abs(mu["inlet"]) / mu["density"])
         #: (n + l,): m and rad that are alike at the face of the wall, and m/s that go with them.
         self.scales = np.append(scale[model.shell.dofs.free], np.full(self.inner, 10.0 * jet))
+        self._wall = WallSlopes(self.size, self.scales[: model.size])
 
     def model(self, mu: Mapping[str, float]) -> ValveModel:
         """The model for parameters."""
@@ -131,64 +130,34 @@ class PeriodicValve:
         inertia_force(shell.mesh.quads, shell._integrals, d1, d2, model.nodal(v), model.nodal(a), out)
         return shell.dofs.restrict(out)
 
-    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> PeriodicOperator:
-        """Linearisation about a motion; its `average` is the pencil of the mean of all samples."""
+    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float], rough: bool = False) -> PeriodicOperator:
+        """Linearisation about a motion; its `average` is the pencil of the mean of all samples. A rough one has the
+        structure's tangent at half as many phases.
+        """
         model, rates = self.model(mu), motion.rates
         q, _ = self._split(motion.samples)
-        v, a = rates.apply(1, q), rates.apply(2, q)
-        slopes = [model.flow.linearise(passage, mu).parts() for passage in self.passages(motion, mu)]
+        passages = self.passages(motion, mu)
+        slopes = [model.flow.linearise(passage, mu).parts() for passage in passages]
         parts = {name: np.array([one[name] for one in slopes]) for name in FLUID_PARTS}
-        p, _ = self.pressures(motion, mu)
+        p = np.array([model.flow.evaluate(passage, mu)[0] for passage in passages])
         memory = self._memory(mu)
-        held = None if memory is None else memory.held(q, rates)
-        parts_of_wall = own, rest, damping, mass = [BlockRows(len(q)) for _ in range(4)]
-        left, right, alpha = [], [], mu["alpha"]
-        for i in range(len(q)):
-            nodal = model.nodal(q[i])
-            own.put(model.structure(q[i])[1])
-            inertia = model.mass(q[i])
-            mass.put(inertia)
-            moving = (nodal, model.nodal(v[i]), model.nodal(a[i] + alpha * v[i]))
-            by_position, by_rate = inertia_slopes(model.shell, *moving)
-            follower = model.follower_stiffness(nodal, p[i], by_position)
-            model.add_contact(q[i], follower)
-            if held is not None:
-                follower += memory.geometric(q[i], held[i])
-            rest.put(follower)
-            damping.put(by_rate + alpha * inertia if alpha else by_rate)
-            left.append(model.station_forces(nodal))
-            right.append(model.rows.jacobian(nodal))
-        stiff, means = StiffnessDamping(mu["beta"]), [part.mean for part in parts_of_wall]
-        sizes = [self._size_of(model, mean) for mean in means[1:3]]
-        gyroscopic = min(motion.omega * sizes[1] / sizes[0], 1.0) if sizes[0] else 1.0
-        blocks = [self._blocks(model, part, share) for part, share in zip(parts_of_wall, (1.0, 1.0, gyroscopic, 1.0))]
-        terms = [
-            Term([(0, blocks[0])], outer=stiff),
-            Term(list(enumerate(blocks[1:]))),
-            self._fluid_term(left, right, parts),
-        ]
+        geometric = None
+        if memory is not None:
+            held = memory.held(q, rates)
+            geometric = lambda i: memory.geometric(q[i], held[i])  # noqa: E731
+        terms, means = self._wall.terms(model, motion, mu, p, rough, geometric)
+        left = [model.station_forces(model.nodal(x)) for x in q]
+        right = [model.rows.jacobian(model.nodal(x)) for x in q]
+        terms.append(self._fluid_term(left, right, parts))
         coarse = None
         if memory is not None:
             groups = zip(*(model.shell.relaxing_tangents(x) for x in q))
-            relaxing = [self._blocks(model, np.array(group)) for group in groups]
+            relaxing = [self._wall.blocks(model, np.array(group)) for group in groups]
             coarse = [*terms, *(Term([(0, b)], outer=phi) for b, phi in zip(relaxing, memory.filters))]
             terms.append(MemoryTerm(memory, q, self.size))
         operator = PeriodicOperator(motion, terms, coarse)
         operator.average = self._average(model, means, (left, right), parts, q, mu)
         return operator
-
-    def _blocks(self, model: ValveModel, values, share: float = 1.0) -> SparseBlocks:
-        """Matrices (n + l, n + l), nothing on the flow's unknowns, of values on the structure's pattern."""
-        indptr, indices = model.shell.dofs.pattern
-        indptr = np.append(indptr, np.full(self.inner, indptr[-1], indptr.dtype))
-        return SparseBlocks(values, indices, indptr, (self.size, self.size), share)
-
-    def _size_of(self, model: ValveModel, values: np.ndarray) -> float:
-        """Norm of a matrix on the structure's pattern, its unknowns in their sizes."""
-        indptr, indices = model.shell.dofs.pattern
-        return float(
-            np.linalg.norm(values * np.repeat(self.scales[: len(indptr) - 1], np.diff(indptr)) * self.scales[indices])
-        )
 
     def _fluid_term(self, left, right, parts) -> Term:
         """- G p over the flow's equations, from areas and the flow's unknowns."""
@@ -248,17 +217,6 @@ def _with_identity(matrix: sp.csr_matrix, count: int) -> sp.csr_matrix:
     indices = np.append(matrix.indices, np.arange(columns, columns + count, dtype=matrix.indices.dtype))
     indptr = np.append(matrix.indptr, matrix.indptr[-1] + np.arange(1, count + 1, dtype=matrix.indptr.dtype))
     return sp.csr_matrix((data, indices, indptr), shape=(rows + count, columns + count), copy=False)
-
-
-@dataclass(frozen=True)
-class StiffnessDamping:
-    """1 + beta d/dt, what stiffness damping makes of the internal force."""
-
-    beta: float
-    polynomial: bool = True
-
-    def __call__(self, s):
-        return 1.0 + self.beta * s
 
 
 class AveragedSolves:

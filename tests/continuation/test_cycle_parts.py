@@ -53,9 +53,12 @@ def operator_of() -> PeriodicOperator:
     return PeriodicOperator(motion, terms)
 
 
-def test_products_are_those_of_each_matrix():
-    """Where an entry is zero at the first samples only, too."""
-    values = rows_of()
+@pytest.mark.parametrize(("single", "error"), [(float, 1e-12), (np.float32, 2e-6)])
+@pytest.mark.parametrize("rank", [1, 3, 6])
+def test_products_are_those_of_each_matrix(monkeypatch, single, error, rank):
+    """Where an entry is zero at the first samples only, too; sums of one, few and more matrices."""
+    monkeypatch.setattr(blocks, "SINGLE", single)
+    values = rows_of(rank)
     values[0, 1:9] = 0.0
     values[1, 5:9] = 0.0
     found, dense = blocks_of(values), dense_of(values)
@@ -63,7 +66,21 @@ def test_products_are_those_of_each_matrix():
     for shape in ((SIZE,), (SIZE, 3)):
         x = RNG.standard_normal((SERIES.samples, *shape)) + 1j * RNG.standard_normal((SERIES.samples, *shape))
         for samples in (x.real, x):
-            assert np.allclose(found.times(samples), np.stack([a @ one for a, one in zip(dense, samples)]))
+            exact = np.stack([a @ one for a, one in zip(dense, samples)])
+            assert np.abs(found.times(samples) - exact).max() < error * np.abs(exact).max()
+
+
+def test_values_at_fewer_phases_serve_all_samples():
+    """A motion's linearisation is of few harmonics: at seven phases those of three are whole."""
+    few, basis = Harmonics(3, 7), RNG.standard_normal((SIZE, 4))
+    coefficients = RNG.standard_normal((few.size, PATTERN.nnz))
+    many = Harmonics(3, 15)
+    pattern = PATTERN.indices, PATTERN.indptr, PATTERN.shape
+    spread = many.basis @ few.basis.T / few.samples
+    found = SparseBlocks(few.basis @ coefficients, *pattern, spread=spread)
+    exact = SparseBlocks(many.basis @ coefficients, *pattern)
+    assert len(found) == len(exact) == 15
+    assert np.allclose(found.projected(basis).stack, exact.projected(basis).stack)
 
 
 def test_several_changes_at_once_are_as_each():
@@ -75,18 +92,19 @@ def test_several_changes_at_once_are_as_each():
 
 def test_rough_projections(monkeypatch):
     """In single precision where nothing is left out, and by as much as is left out; those of a basis that grew too."""
-    operator = operator_of()
     x, basis = RNG.standard_normal((SERIES.size, SIZE)), RNG.standard_normal((SIZE, 5))
-    exact = operator.apply(x) @ basis
 
-    def found():
-        few = LeftProjection(operator, basis[:, :3], operator.reduced(basis[:, :3]))
-        return LeftProjection(operator, basis, operator.reduced(basis), few).apply(x)
+    def found_and_exact(operator):
+        few = operator.reduced(basis[:, :3], rough=True)
+        found = LeftProjection(operator, operator.reduced(basis, few, rough=True)).apply(x)
+        return found, operator.apply(x) @ basis
 
     monkeypatch.setattr(blocks, "ROUGH", 0.0)
-    assert np.allclose(found(), exact, rtol=0, atol=1e-5 * np.abs(exact).max())
+    found, exact = found_and_exact(operator_of())
+    assert np.allclose(found, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
     monkeypatch.setattr(blocks, "ROUGH", 1.0)  # one combination each
-    assert np.abs(found() - exact).max() > 0.05 * np.abs(exact).max()
+    found, exact = found_and_exact(operator_of())
+    assert np.abs(found - exact).max() > 0.05 * np.abs(exact).max()
 
 
 def point_of(value: float, coefficients: np.ndarray, omega: float, arclength: float):

@@ -26,7 +26,7 @@ class SmallPeriodic:
     def residual(self, motion, mu):
         return np.asarray(self._residual(*self._at(motion), mu))
 
-    def linearise(self, motion, mu):
+    def linearise(self, motion, mu, rough=False):
         k, c, m = (np.asarray(part) for part in self._slopes(*self._at(motion), mu))
         return PeriodicOperator(motion, [Term([(0, k), (1, c), (2, m)])])
 
