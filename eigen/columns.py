@@ -8,17 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .agreement import Certificate
+from .cell_counts import CellCounts, count_unstable, uncounted
 from .certificate import certified_spectrum
 from .condensation import Workspace
 from .factorization import SingularShiftError
 from .family import Condition, PencilFamily
-from .phase_count import phase_counts
 from .reduced import ReducedFamily
 from .reduction import FamilyReduction
 from .search import leading_modes
 from .snapshots import between, spread
 from .static_solver import StaticSolver
-from .winding import unstable_count
 
 #: Estimated relative error of an eigenvalue above which a cell is treated directly.
 TOLERANCE = 1e-6
@@ -26,8 +25,6 @@ TOLERANCE = 1e-6
 JOINT = 3e-3
 #: How a cell was found.
 REDUCED, DIRECT, MISSING = 0, 1, 2
-#: Share of a band up to which eigenvalues are counted, clear of those at its end.
-INSIDE = 0.999
 #: Leading eigenvalues kept of a cell.
 KEPT = 8
 #: Conditions at least at which they are taken where the loss factors differ.
@@ -174,7 +171,7 @@ class ColumnSolver:
         values = fine.eigenvalues(conditions)
         leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
         counted = _beside_changes(leading) if edges else np.arange(len(conditions))
-        counts = _uncounted(family, conditions)
+        counts = uncounted(family, conditions)
         counter = first
         if any(conditions[i].loss for i in counted) and error <= TOLERANCE:
             # static responses alone say little of what relaxes; with the vectors that the list rests on they are enough
@@ -213,7 +210,7 @@ class ColumnSolver:
 
     def _uncoupled(self, family: PencilFamily, conditions) -> Column:
         """A structure that nothing couples: its full spectra and counts, each once for every damping."""
-        column, known = _blank(len(conditions), _uncounted(family, conditions)), {}
+        column, known = _blank(len(conditions), uncounted(family, conditions)), {}
         for i, condition in enumerate(conditions):
             key = condition.alpha, condition.beta, condition.loss
             if key not in known:
@@ -253,35 +250,9 @@ class ColumnSolver:
         return column
 
 
-@dataclass(frozen=True)
-class _Counts:
-    number: np.ndarray
-    certain: np.ndarray
-    line: np.ndarray
-    band: np.ndarray
-
-    def enter(self, cells: np.ndarray, found: _Counts) -> None:
-        """Put counts of some cells in."""
-        for own, other in zip(vars(self).values(), vars(found).values()):
-            own[cells] = other
-
-
 def _is_banded(family: PencilFamily, condition: Condition) -> bool:
     """Whether all modes of a band are close to neutral, as they are where only it makes modes leading."""
     return condition.loss == 0 and np.isfinite(family.reach(condition).band)
-
-
-def _counted_band(family: PencilFamily, condition: Condition) -> float:
-    """Angular frequency up to which eigenvalues are counted: all where the stiffness relaxes, which damps all."""
-    return family.reach(condition).band if family.relaxation(condition.loss) is None else np.inf
-
-
-def _uncounted(family: PencilFamily, conditions) -> _Counts:
-    """What is known before anything is counted."""
-    cells = len(conditions)
-    bands = np.array([_counted_band(family, c) for c in conditions])
-    band = np.where(np.isinf(bands), np.inf, INSIDE * bands / (2 * np.pi))
-    return _Counts(np.full(cells, -1), np.zeros(cells, bool), np.zeros(cells), band)
 
 
 def _beside_changes(leading) -> np.ndarray:
@@ -289,45 +260,6 @@ def _beside_changes(leading) -> np.ndarray:
     number = np.array([int((row.real > 0).sum()) for row in leading])
     change = np.flatnonzero(np.diff(number))
     return np.unique(np.concatenate([change, change + 1]))
-
-
-def count_unstable(reduced: ReducedFamily, conditions, hints) -> _Counts:
-    """Count unstable eigenvalues at many conditions, each in its band.
-
-    Parameters
-    ----------
-    reduced : ReducedFamily
-    conditions : sequence of Condition
-    hints : sequence of complex arrays
-        For each condition, places near which the phase may turn fast.
-    """
-    cells = len(conditions)
-    counts = _Counts(np.zeros(cells, int), np.zeros(cells, bool), np.zeros(cells), np.full(cells, np.inf))
-    bands = np.array([_counted_band(reduced.family, c) for c in conditions])
-    damped = np.array([any(c.damping) for c in conditions])
-    whole = np.flatnonzero(np.isinf(bands) & damped)
-    if whole.size:
-        beside = [_beside(hints[i], conditions[i]) for i in whole]
-        found = phase_counts(reduced, [conditions[i] for i in whole], beside)
-        counts.number[whole], counts.certain[whole] = found.number, found.certain
-    for i in np.setdiff1d(np.arange(cells), whole):
-        band = None if np.isinf(bands[i]) else INSIDE * bands[i] / (2 * np.pi)
-        found = unstable_count(reduced.pencil(conditions[i]), scale=_scale(reduced), hints=list(hints[i]), band=band)
-        counts.number[i], counts.certain[i] = found.number, found.certain
-        counts.line[i], counts.band[i] = found.line, found.band
-    return counts
-
-
-def _beside(hints, condition: Condition):
-    """Those hints that a count looks beside: the leading ones, and all unstable ones where they cost nothing else."""
-    number = 2 if condition.loss == 0 else max(2, int((np.asarray(hints).real > 0).sum()) + 1)
-    return hints[:number]
-
-
-def _scale(reduced: ReducedFamily) -> float:
-    """Lowest angular frequency of the structure, rad/s."""
-    square = np.linalg.eigvalsh(0.5 * (reduced.K + reduced.K.T))
-    return float(np.sqrt(square[square > 0].min(initial=np.inf))) if (square > 0).any() else 1.0
 
 
 def _error(reduction: FamilyReduction, fine: ReducedFamily, conditions, places) -> float:
@@ -361,7 +293,7 @@ def _vouch(column: Column, cell: int, own) -> None:
     column.line[cell], column.band[cell] = own.line, own.band
 
 
-def _blank(cells: int, counts: _Counts) -> Column:
+def _blank(cells: int, counts: CellCounts) -> Column:
     nothing = [np.full(cells, np.nan) for _ in range(3)]
     return Column(
         *nothing,
@@ -376,7 +308,7 @@ def _blank(cells: int, counts: _Counts) -> Column:
     )
 
 
-def _column(leading, values, counts: _Counts, error: float) -> Column:
+def _column(leading, values, counts: CellCounts, error: float) -> Column:
     inside = np.abs(values.imag) <= 2 * np.pi * counts.band[:, None]
     first = [row[0] if len(row) else complex(np.nan, np.nan) for row in leading]
     return Column(
