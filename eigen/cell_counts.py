@@ -17,6 +17,16 @@ INSIDE = 0.999
 
 @dataclass(frozen=True)
 class CellCounts:
+    """Of some cells.
+
+    Attributes
+    ----------
+    number : (cells,) int array
+        Eigenvalues right of `line` up to `band`, conjugates counted apart; -1 where nobody asked.
+    certain : (cells,) bool array
+    line, band : (cells,) arrays, 1/s, Hz
+    """
+
     number: np.ndarray
     certain: np.ndarray
     line: np.ndarray

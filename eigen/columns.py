@@ -11,10 +11,13 @@ from .agreement import Certificate
 from .cell_counts import CellCounts, count_unstable, uncounted
 from .certificate import certified_spectrum
 from .condensation import Workspace
+from .distant import brought, joined
 from .factorization import SingularShiftError
 from .family import Condition, PencilFamily
 from .reduced import ReducedFamily
 from .reduction import FamilyReduction
+from .runaway import Runaway
+from .runaway_cells import RunawayCells, is_near
 from .search import leading_modes
 from .snapshots import between, spread
 from .static_solver import StaticSolver
@@ -40,13 +43,15 @@ class Column:
     Attributes
     ----------
     growth_rate, frequency : (cells,) arrays, 1/s, Hz
-        Of the leading mode; NaN if none was found.
+        Of the leading mode, what of the structure runs away by itself included; NaN if none was found.
     second : (cells,) array, 1/s
         Growth rate of the next mode.
     unstable : (cells,) int array
         Eigenvalues right of `line` up to `band`, conjugates counted apart, by the spectrum.
+    runaway : (cells,) int array
+        Those of them in which the structure runs away by itself, without any fluid; see `eigen.runaway`.
     counted : (cells,) int array
-        The same by the argument principle; -1 where nobody asked.
+        As many as `unstable`, by the argument principle; -1 where nobody asked.
     certain : (cells,) bool array
         That count followed the phase everywhere.
     error : float
@@ -62,13 +67,14 @@ class Column:
     cell : callable or None
         From any further condition at the same state to a column of this one cell.
     leading : list of arrays
-        Leading eigenvalues of the cells.
+        Leading eigenvalues of the cells without what runs away.
     """
 
     growth_rate: np.ndarray
     frequency: np.ndarray
     second: np.ndarray
     unstable: np.ndarray
+    runaway: np.ndarray
     counted: np.ndarray
     certain: np.ndarray
     error: float
@@ -102,13 +108,14 @@ class ColumnSolver:
     """Solves families of one pattern after another."""
 
     def __init__(self):
-        self._static, self._stiffened, self._workspace = StaticSolver(), StaticSolver(), Workspace()
+        self._static, self._stiffened = StaticSolver(), StaticSolver()
+        self._workspace, self._structures = Workspace(), Workspace()
         self._last: FamilyReduction | None = None
 
     def reduction(self, family: PencilFamily) -> FamilyReduction:
         """Small models of a family; the last one is kept."""
         if self._last is None or self._last.family is not family:
-            self._last = FamilyReduction(family, self._static, self._stiffened)
+            self._last = FamilyReduction(family, self._static, self._stiffened, self._structures)
         return self._last
 
     def solve(self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False) -> Column:
@@ -139,6 +146,7 @@ class ColumnSolver:
         losses = [c.loss for c in conditions]
         mixed = len(set(losses)) > 1
         least = max(snapshots, LOSSES) if mixed else snapshots
+        alone = reduction.runaways(conditions)
         # more vectors are far cheaper than every cell with the full pencil
         for number in (least, 2 * least + 1, 4 * least + 3):
             places = spread(conditions, number)
@@ -150,7 +158,10 @@ class ColumnSolver:
             error = _error(reduction, fine, conditions, checked)
             if error <= TOLERANCE:
                 break
-        column = self._on(first, fine, conditions, error, edges)
+        own = RunawayCells.beside(fine, alone)
+        if not own.empty:
+            error = max(error, _error_of_runaway(reduction, own, conditions))
+        column = self._on(first, fine, own, conditions, error, edges)
 
         def eigenvalues(condition):
             condition = Condition(*condition)
@@ -161,27 +172,34 @@ class ColumnSolver:
             return complex(reduction.correction(fine.near(condition, eigenvalue), condition)[0])
 
         def cell(condition):
-            return self._on(first, fine, [Condition(*condition)], error)
+            asked = [Condition(*condition)]
+            return self._on(first, fine, replace(own, alone=reduction.runaways(asked)), asked, error)
 
         return replace(column, eigenvalues=eigenvalues, corrected=corrected, cell=cell)
 
-    def _on(self, first: ReducedFamily, fine: ReducedFamily, conditions, error: float, edges: bool = False) -> Column:
+    def _on(
+        self, first: ReducedFamily, fine: ReducedFamily, own: RunawayCells, conditions, error, edges=False
+    ) -> Column:
         """Cells on a small model, counted on that of the first stage; those without a certificate directly."""
         family = first.family
         values = fine.eigenvalues(conditions)
+        away = own.eigenvalues(conditions)
+        for row, known in zip(values, away):
+            row[is_near(row, known)] = np.nan  # the modes' space may hold one too
         leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
         counted = _beside_changes(leading) if edges else np.arange(len(conditions))
         counts = uncounted(family, conditions)
         counter = first
         if any(conditions[i].loss for i in counted) and error <= TOLERANCE:
             # static responses alone say little of what relaxes; with the vectors that the list rests on they are enough
-            counter = ReducedFamily(family, fine.V, JOINT, base=first)
+            counter = ReducedFamily(family, own.space.V, JOINT, base=first)
         if len(counted):
-            found = count_unstable(counter, [conditions[i] for i in counted], [leading[i] for i in counted])
+            hints = [np.concatenate([away[i], leading[i]]) for i in counted]
+            found = count_unstable(counter, [conditions[i] for i in counted], hints)
             counts.enter(counted, found)
-        column = _column(leading, values, counts, error)
+        column = _column(leading, away, values, counts, error)
         doubtful = counted[~column.certified[counted]]
-        return self._repaired(column, family, conditions, doubtful)
+        return self._repaired(column, family, conditions, doubtful, own)
 
     def direct(self, family: PencilFamily, condition, count: int = 6):
         """Leading modes of the full pencil, an `eigen.Spectrum`.
@@ -199,14 +217,25 @@ class ColumnSolver:
 
     def _directly(self, reduction: FamilyReduction, conditions) -> Column:
         family, cells = reduction.family, len(conditions)
-        spectra = [self.direct(family, c) for c in conditions]
+        alone = reduction.runaways(conditions)
+        spectra = [self._whole(family, c, alone[c.damping]) for c in conditions]
         banded = any(_is_banded(family, c) for c in conditions)
         first = reduction.wide if banded else reduction.coarse
         counts = count_unstable(first, conditions, [s.eigenvalues[:1] for s in spectra])
         column = _blank(cells, counts)
         for i, spectrum in enumerate(spectra):
-            _enter(column, i, spectrum)
-        return self._recounted(column, family, conditions, np.flatnonzero(~column.certified))
+            _enter(column, i, spectrum, alone[conditions[i].damping].rates)
+        return self._recounted(column, family, conditions, np.flatnonzero(~column.certified), alone)
+
+    def _whole(self, family: PencilFamily, condition: Condition, alone: Runaway):
+        """Leading modes of the full pencil together with what runs away."""
+        modes = self.direct(family, condition)
+        if not alone.rates.size:
+            return modes
+        pencil = family.pencil(condition)
+        starts = [(rate, motion, np.zeros(pencil.b)) for rate, motion in zip(alone.rates, alone.motions.T)]
+        found = brought(pencil, starts, modes, 0.0, family.search(condition), self._workspace)
+        return modes if found is None else joined(modes, found, 0.0)
 
     def _uncoupled(self, family: PencilFamily, conditions) -> Column:
         """A structure that nothing couples: its full spectra and counts, each once for every damping."""
@@ -220,21 +249,24 @@ class ColumnSolver:
             modes = found.spectrum
             if condition.loss:
                 modes = modes.select(np.flatnonzero(family.reach(condition).is_mode(modes.eigenvalues)))
-            _enter(column, i, modes)
+            real = modes.eigenvalues[(modes.eigenvalues.imag == 0) & (modes.eigenvalues.real > 0)].real
+            _enter(column, i, modes, real if condition.loss else real[:0])
             _vouch(column, i, found.certificate)
         return column
 
-    def _repaired(self, column: Column, family, conditions, cells) -> Column:
+    def _repaired(self, column: Column, family, conditions, cells, own: RunawayCells) -> Column:
         for i in cells:
+            alone = own.alone[conditions[i].damping]
             try:
-                spectrum = self.direct(family, conditions[i])
+                spectrum = self._whole(family, conditions[i], alone)
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue  # stays without a certificate
             if len(spectrum):
-                _enter(column, i, spectrum)
-        return self._recounted(column, family, conditions, [i for i in cells if not column.certificate(i).agrees])
+                _enter(column, i, spectrum, alone.rates)
+        open_cells = [i for i in cells if not column.certificate(i).agrees]
+        return self._recounted(column, family, conditions, open_cells, own.alone)
 
-    def _recounted(self, column: Column, family, conditions, cells) -> Column:
+    def _recounted(self, column: Column, family, conditions, cells, alone) -> Column:
         """Cells that still lack agreement, with a count of their own on a basis of structural modes, made finer as far
         as it takes.
         """
@@ -245,7 +277,7 @@ class ColumnSolver:
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue
             if len(found.spectrum):
-                _enter(column, i, found.spectrum)
+                _enter(column, i, found.spectrum, alone[conditions[i].damping].rates)
                 _vouch(column, i, found.certificate)
         return column
 
@@ -275,15 +307,29 @@ def _error(reduction: FamilyReduction, fine: ReducedFamily, conditions, places) 
     return worst
 
 
-def _enter(column: Column, cell: int, spectrum) -> None:
-    """Put a direct spectrum into a cell."""
+def _error_of_runaway(reduction: FamilyReduction, own: RunawayCells, conditions) -> float:
+    """The same of what runs away, under the heaviest coupling."""
+    worst = 0.0
+    for damping, alone in own.alone.items():
+        heaviest = max((c for c in conditions if c.damping == damping), key=lambda c: c.inertia)
+        pairs = own.pairs(heaviest)
+        if len(pairs.values) and alone.rates.size:
+            change = reduction.correction(pairs, heaviest, runaway=True)
+            worst = max(worst, float((np.abs(change) / np.abs(pairs.values)).max()))
+    return worst
+
+
+def _enter(column: Column, cell: int, spectrum, rates: np.ndarray) -> None:
+    """Put a direct spectrum into a cell; `rates` are those at which the structure runs away by itself."""
     column.how[cell] = DIRECT
     if not len(spectrum):
         return
     column.growth_rate[cell], column.frequency[cell] = spectrum.growth_rate[0], spectrum.frequency[0]
     column.second[cell] = spectrum.growth_rate[1] if len(spectrum) > 1 else np.nan
     inside = np.flatnonzero(spectrum.frequency <= column.band[cell])
-    column.leading[cell] = spectrum.eigenvalues[:KEPT]
+    away = is_near(spectrum.eigenvalues, rates)
+    column.leading[cell] = spectrum.eigenvalues[~away][:KEPT]
+    column.runaway[cell] = _conjugates(spectrum.eigenvalues[away])
     column.unstable[cell] = spectrum.select(inside).count_right_of(column.line[cell])
 
 
@@ -298,6 +344,7 @@ def _blank(cells: int, counts: CellCounts) -> Column:
     return Column(
         *nothing,
         np.zeros(cells, int),
+        np.zeros(cells, int),
         counts.number,
         counts.certain,
         0.0,
@@ -308,14 +355,22 @@ def _blank(cells: int, counts: CellCounts) -> Column:
     )
 
 
-def _column(leading, values, counts: CellCounts, error: float) -> Column:
+def _conjugates(values: np.ndarray) -> int:
+    """Number of eigenvalues of which a conjugate pair is given once."""
+    return int(values.size + np.sum(values.imag > 0))
+
+
+def _column(leading, away, values, counts: CellCounts, error: float) -> Column:
     inside = np.abs(values.imag) <= 2 * np.pi * counts.band[:, None]
-    first = [row[0] if len(row) else complex(np.nan, np.nan) for row in leading]
+    rows = [np.concatenate(pair) for pair in zip(away, leading)]
+    first = [row[0] if len(row) else complex(np.nan, np.nan) for row in rows]
+    runaway = np.array([_conjugates(row) for row in away])
     return Column(
         growth_rate=np.array([value.real for value in first]),
         frequency=np.array([value.imag / (2 * np.pi) for value in first]),
-        second=np.array([row[1].real if len(row) > 1 else np.nan for row in leading]),
-        unstable=((values.real > counts.line[:, None]) & inside).sum(axis=1),
+        second=np.array([row[1].real if len(row) > 1 else np.nan for row in rows]),
+        unstable=((values.real > counts.line[:, None]) & inside).sum(axis=1) + runaway,
+        runaway=runaway,
         counted=counts.number,
         certain=counts.certain,
         error=error,

@@ -214,7 +214,7 @@ class ReducedFamily:
             found = self.small.leading_pairs(
                 condition, lambda values: np.array([v for v in reach.leading(values) if v.real > lowest][:most])
             )
-            return self._of_rational(found)
+            return self.of_rational(found)
         floor, band = reach.floor, reach.band
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
         keep = np.flatnonzero((values.imag >= 0) & (values.imag <= band) & (values.real > share * floor))
@@ -223,12 +223,12 @@ class ReducedFamily:
     def near(self, condition: Condition, eigenvalue: complex) -> Pairs:
         """The eigenpair nearest to a place."""
         if self.family.relaxation(condition.loss) is not None:
-            return self._of_rational(self.small.pairs(condition, [eigenvalue]))
+            return self.of_rational(self.small.pairs(condition, [eigenvalue]))
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
         return self._lifted(condition, values, left, right, [int(np.argmin(np.abs(values - eigenvalue)))])
 
-    def _of_rational(self, found: Refined) -> Pairs:
-        """Eigenpairs of what relaxes, lifted."""
+    def of_rational(self, found: Refined) -> Pairs:
+        """Eigenpairs of the small pencils of what relaxes, lifted."""
         k = self.size
         right, left = found.right.T, found.left.T
         return Pairs(found.values, real_apply(self.V, right[:k]), right[k:], real_apply(self.V, left[:k]), left[k:])

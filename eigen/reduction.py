@@ -14,9 +14,12 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
+from .condensation import Workspace
 from .family import Condition, PencilFamily
+from .inertia import SymmetricStructure
 from .pencil import CoupledPencil, real_apply
 from .reduced import Pairs, ReducedFamily, orthonormal
+from .runaway import Runaway
 from .static_solver import StaticSolver
 from .transfer import TransferBasis
 
@@ -31,6 +34,8 @@ MOTIONS = 20
 CORRECTIONS = 2
 #: Lowest motions of the structure taken where a band is searched.
 LOWEST = 24
+#: Relative distance from an eigenvalue at which its vector is corrected.
+BESIDE = 1e-3
 
 
 class FamilyReduction:
@@ -42,6 +47,8 @@ class FamilyReduction:
     solver, stiffened : StaticSolver, optional
         Keep the symbolic factorisation between families of one pattern: of the stiffness, and of that which a typical
         motion sees where parts of it relax.
+    workspace : Workspace, optional
+        Keeps the pattern of the structure likewise.
 
     Raises
     ------
@@ -49,8 +56,15 @@ class FamilyReduction:
         If the stiffness is singular.
     """
 
-    def __init__(self, family: PencilFamily, solver: StaticSolver | None = None, stiffened: StaticSolver | None = None):
-        self.family = family
+    def __init__(
+        self,
+        family: PencilFamily,
+        solver: StaticSolver | None = None,
+        stiffened: StaticSolver | None = None,
+        workspace: Workspace | None = None,
+    ):
+        self.family, self._workspace = family, workspace or Workspace()
+        self._runaways: dict[tuple[float, float, float], Runaway] = {}
         self.solver = solver or StaticSolver()
         self.solver.factor(family)
         self._stiffened, self._loss = stiffened or StaticSolver(), None
@@ -77,6 +91,21 @@ class FamilyReduction:
         structure = CoupledPencil(family.mass, sp.csr_matrix(family.mass.shape), family.stiffness)
         lowest = TransferBasis(structure, modes=LOWEST).V
         return ReducedFamily(family, np.hstack([lowest, self.coarse.V]), COMPRESSION)
+
+    def runaway(self, condition: Condition) -> Runaway:
+        """What of the structure runs away by itself at the damping of a condition."""
+        family, damping = self.family, condition.damping
+        if family.relaxation(condition.loss) is None:
+            return Runaway.none(family.mass.shape[0])
+        if damping not in self._runaways:
+            self._runaways[damping] = Runaway.of(self._structure(condition))
+        return self._runaways[damping]
+
+    def _structure(self, condition: Condition) -> SymmetricStructure:
+        family, relaxation = self.family, self.family.relaxation(condition.loss)
+        damping = condition.alpha * family.mass + condition.beta * family.damping
+        structure = CoupledPencil(family.mass, damping, family.stiffness, relaxation=relaxation)
+        return SymmetricStructure(self._workspace.structure(structure))
 
     def residual(self, values, q, u, condition: Condition, left: bool = False):
         """T(lambda) x of pairs, or T^H w of left vectors: force part (n, k) and inner part (b, k)."""
@@ -146,12 +175,28 @@ class FamilyReduction:
             return first  # nothing leads anywhere: there is nothing to be found better
         return ReducedFamily(self.family, np.hstack(columns), 3e-7)
 
-    def correction(self, pairs: Pairs, condition: Condition) -> np.ndarray:
+    def runaways(self, conditions) -> dict[tuple[float, float, float], Runaway]:
+        """The same at the dampings of all conditions."""
+        return {c.damping: self.runaway(c) for c in conditions}
+
+    def runaway_corrected(self, pairs: Pairs, condition: Condition) -> tuple[np.ndarray, np.ndarray]:
+        """Right and left vectors of what of the structure runs away by itself, corrected at the place of each."""
+        structure = self._structure(condition)
+        force, _ = self.residual(pairs.values, pairs.q, pairs.u, condition)
+        back, _ = self.residual(pairs.values, pairs.w, pairs.c, condition, left=True)
+        right, left = pairs.q.copy(), pairs.w.copy()
+        for i, value in enumerate(pairs.values.real):
+            with structure.factored(structure.at(value * (1.0 + BESIDE))) as factor:
+                right[:, i] -= factor.solve(force[:, i].real)
+                left[:, i] -= factor.solve(back[:, i].real)
+        return right, left
+
+    def correction(self, pairs: Pairs, condition: Condition, runaway: bool = False) -> np.ndarray:
         """Newton's correction of eigenvalues by the full matrices, -w^H T x / (w^H T' x), complex (k,).
 
         Vectors are corrected once outside the space first; what the space lacks shows in it.
         """
-        right, left = self.corrected(pairs, condition)
+        right, left = (self.runaway_corrected if runaway else self.corrected)(pairs, condition)
         force, inner = self.residual(pairs.values, right, pairs.u, condition)
         top = np.einsum("ij,ij->j", left.conj(), force) + np.einsum("ij,ij->j", pairs.c.conj(), inner)
         # T' by a difference quotient, good enough for the size of a correction

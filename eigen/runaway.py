@@ -1,7 +1,7 @@
 r"""Motions in which a structure that relaxes runs away by itself, once for all conditions of one state and damping.
 
-They are those of `eigen.negative_stiffness` whose D(s) has real unstable eigenvalues. A fluid hardly moves these, so that
-a space with their motions in it holds them under every fluid; one that holds such motions by halves has some unstable
+They are those of `eigen.negative_stiffness` whose D(s) has real unstable eigenvalues. A fluid hardly moves these, so a
+space with their motions in it holds them under every fluid; one that holds such motions by halves has unstable
 eigenvalues or none by chance.
 """
 
@@ -20,8 +20,8 @@ from .negative_stiffness import motions_of, places_of
 STEPS, SETTLED = 5, 1e-4
 #: Relative distance below which two are one.
 SAME = 1e-8
-#: Relative distance from the rate of the structure alone within which an eigenvalue of a coupled pencil is its own.
-NEAR = 0.1
+#: Relative distance that one may move from a space to the full matrices.
+MOVED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,18 +66,12 @@ class Runaway:
         found: list[tuple[float, np.ndarray]] = []
         for place, motion in _on_space(structure, space):
             rate, motion = _refined(structure, place, motion)
-            if abs(rate - place) <= NEAR * place and all(abs(rate - r) > SAME * rate for r, _ in found):
+            if abs(rate - place) <= MOVED * place and all(abs(rate - r) > SAME * rate for r, _ in found):
                 found.append((rate, motion))
         if not found:
             return cls.none(structure.size)
         found.sort(key=lambda pair: -pair[0])
         return cls(np.array([rate for rate, _ in found]), np.stack([motion for _, motion in found], axis=1))
-
-
-def is_runaway(values: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Which eigenvalues of a coupled pencil are those of its structure alone at given rates."""
-    values = np.asarray(values)
-    return (np.abs(values[..., None] - rates) <= NEAR * rates).any(axis=-1)
 
 
 def _on_space(structure: SymmetricStructure, space: np.ndarray) -> list[tuple[float, np.ndarray]]:

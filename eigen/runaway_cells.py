@@ -1,0 +1,72 @@
+"""What runs away of a structure by itself, under the conditions of many cells: the small pencils of its motions and of
+the modes of a column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .family import Condition
+from .rational import SAME, refined, started
+from .reduced import Pairs, ReducedFamily
+from .runaway import Runaway
+
+#: Length over that of a motion above which what it has outside the modes is taken in.
+DISTINCT = 1e-6
+#: Relative distance from the rate of the structure alone within which an eigenvalue of a cell is its own.
+NEAR = 0.1
+
+
+def is_near(values: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Which eigenvalues of a cell are those of the structure alone."""
+    return (np.abs(np.asarray(values)[:, None] - rates) <= NEAR * np.abs(rates)).any(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class RunawayCells:
+    """Unstable eigenvalues of cells that are those of the structure alone, moved a little by what couples it.
+
+    Attributes
+    ----------
+    space : ReducedFamily
+        Modes and motions that run away.
+    alone : mapping
+        From a damping to what runs away then.
+    """
+
+    space: ReducedFamily
+    alone: Mapping[tuple[float, float, float], Runaway]
+
+    @classmethod
+    def beside(cls, modes: ReducedFamily, alone: Mapping[tuple[float, float, float], Runaway]) -> RunawayCells:
+        """With the modes of a column."""
+        motions = np.hstack([found.motions for found in alone.values()])
+        space = ReducedFamily(modes.family, motions, DISTINCT, base=modes) if motions.shape[1] else modes
+        return cls(space, alone)
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing runs away under any damping."""
+        return not any(found.rates.size for found in self.alone.values())
+
+    def eigenvalues(self, conditions: list[Condition]) -> list[np.ndarray]:
+        """Of each cell, the fastest first, a conjugate pair given once; (r,) complex each."""
+        rows: list[list[complex]] = [[] for _ in conditions]
+        rates = [self.alone[c.damping].rates for c in conditions]
+        cells = np.repeat(np.arange(len(conditions)), [own.size for own in rates])
+        if cells.size:
+            problem, starts = self.space.small.problem(conditions), np.concatenate(rates)
+            found = refined(problem, cells, started(problem, None, cells, starts))
+            near = found.settled & (np.abs(found.values - starts) <= NEAR * starts)
+            for i, value in zip(cells[near], found.values[near]):
+                value = complex(value.real, abs(value.imag))
+                if all(abs(value - other) > SAME * abs(other) for other in rows[i]):
+                    rows[i].append(value)
+        return [np.array(sorted(row, key=lambda value: -value.real), complex) for row in rows]
+
+    def pairs(self, condition: Condition) -> Pairs:
+        """Eigenpairs of one cell, lifted to the full unknowns."""
+        return self.space.of_rational(self.space.small.pairs(condition, self.eigenvalues([condition])[0]))
