@@ -32,6 +32,10 @@ class CellCounts:
     line: np.ndarray
     band: np.ndarray
 
+    def select(self, some) -> CellCounts:
+        """Those of some cells."""
+        return CellCounts(*(own[some] for own in vars(self).values()))
+
     def enter(self, cells: np.ndarray, found: CellCounts) -> None:
         """Put counts of some cells in."""
         for own, other in zip(vars(self).values(), vars(found).values()):
@@ -51,7 +55,7 @@ def uncounted(family: PencilFamily, conditions) -> CellCounts:
     return CellCounts(np.full(cells, -1), np.zeros(cells, bool), np.zeros(cells), band)
 
 
-def count_unstable(reduced: ReducedFamily, conditions, hints) -> CellCounts:
+def count_unstable(reduced: ReducedFamily, conditions, hints, within_band: bool = False) -> CellCounts:
     """Count unstable eigenvalues at many conditions, each in its band.
 
     Parameters
@@ -60,10 +64,13 @@ def count_unstable(reduced: ReducedFamily, conditions, hints) -> CellCounts:
     conditions : sequence of Condition
     hints : sequence of complex arrays
         For each condition, places near which the phase may turn fast.
+    within_band : bool
+        Also where the stiffness relaxes.
     """
     cells = len(conditions)
     counts = CellCounts(np.zeros(cells, int), np.zeros(cells, bool), np.zeros(cells), np.full(cells, np.inf))
-    bands = np.array([counted_band(reduced.family, c) for c in conditions])
+    family = reduced.family
+    bands = np.array([family.reach(c).band if within_band else counted_band(family, c) for c in conditions])
     damped = np.array([any(c.damping) for c in conditions])
     whole = np.flatnonzero(np.isinf(bands) & damped)
     if whole.size:

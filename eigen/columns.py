@@ -16,16 +16,15 @@ from .factorization import SingularShiftError
 from .family import Condition, PencilFamily
 from .reduced import ReducedFamily
 from .reduction import FamilyReduction
-from .runaway import Runaway
-from .runaway_cells import RunawayCells, is_near
+from .runaway_cells import RunawayCells, is_near, runaway_cells
 from .search import leading_modes
 from .snapshots import between, spread
 from .static_solver import StaticSolver
 
 #: Estimated relative error of an eigenvalue above which a cell is treated directly.
 TOLERANCE = 1e-6
-#: Directions weaker than this are left out where two spaces are put together.
-JOINT = 3e-3
+#: Directions weaker than these are left out where two spaces are put together: at first, and where counts disagree.
+JOINT, CLOSE = 3e-3, 1e-5
 #: How a cell was found.
 REDUCED, DIRECT, MISSING = 0, 1, 2
 #: Leading eigenvalues kept of a cell.
@@ -158,9 +157,8 @@ class ColumnSolver:
             error = _error(reduction, fine, conditions, checked)
             if error <= TOLERANCE:
                 break
-        own = RunawayCells.beside(fine, alone)
-        if not own.empty:
-            error = max(error, _error_of_runaway(reduction, own, conditions))
+        own, far = runaway_cells(reduction, fine, alone, conditions, TOLERANCE)
+        error = max(error, far)
         column = self._on(first, fine, own, conditions, error, edges)
 
         def eigenvalues(condition):
@@ -192,13 +190,24 @@ class ColumnSolver:
         counter = first
         if any(conditions[i].loss for i in counted) and error <= TOLERANCE:
             # static responses alone say little of what relaxes; with the vectors that the list rests on they are enough
-            counter = ReducedFamily(family, own.space.V, JOINT, base=first)
+            counter = ReducedFamily(family, own.core, JOINT, base=first)
         if len(counted):
             hints = [np.concatenate([away[i], leading[i]]) for i in counted]
             found = count_unstable(counter, [conditions[i] for i in counted], hints)
             counts.enter(counted, found)
         column = _column(leading, away, values, counts, error)
         doubtful = counted[~column.certified[counted]]
+        if len(doubtful) and counter is not first:
+            # a mode that is all but neutral has to be met to a fraction of its growth rate; what else a finer space has
+            # are single elements by halves, far beyond the band
+            finer = ReducedFamily(family, own.core, CLOSE, base=first)
+            hints = [np.concatenate([away[i], leading[i]]) for i in doubtful]
+            found = count_unstable(finer, [conditions[i] for i in doubtful], hints, within_band=True)
+            listed = [_listed(values[i], away[i], *region) for i, *region in zip(doubtful, found.line, found.band)]
+            agree = found.certain & (found.number == listed) & np.isfinite(column.growth_rate[doubtful])
+            counts.enter(doubtful[agree], found.select(agree))
+            column.unstable[doubtful[agree]] = np.array(listed)[agree]
+            doubtful = doubtful[~column.certified[doubtful]]
         return self._repaired(column, family, conditions, doubtful, own)
 
     def direct(self, family: PencilFamily, condition, count: int = 6):
@@ -215,10 +224,27 @@ class ColumnSolver:
             return found
         return found.select(np.flatnonzero(family.reach(condition).is_mode(found.eigenvalues)))
 
+    def whole(self, family: PencilFamily, condition, count: int = 6):
+        """The same together with what of the structure runs away by itself.
+
+        Raises
+        ------
+        SingularShiftError
+            If no usable shift was found.
+        """
+        condition = Condition(*condition)
+        modes, alone = self.direct(family, condition, count), self.reduction(family).runaway(condition)
+        if not alone.rates.size:
+            return modes
+        pencil = family.pencil(condition)
+        starts = [(rate, motion, np.zeros(pencil.b)) for rate, motion in zip(alone.rates, alone.motions.T)]
+        found = brought(pencil, starts, modes, 0.0, family.search(condition), self._workspace)
+        return modes if found is None else joined(modes, found, 0.0)
+
     def _directly(self, reduction: FamilyReduction, conditions) -> Column:
         family, cells = reduction.family, len(conditions)
         alone = reduction.runaways(conditions)
-        spectra = [self._whole(family, c, alone[c.damping]) for c in conditions]
+        spectra = [self.whole(family, c) for c in conditions]
         banded = any(_is_banded(family, c) for c in conditions)
         first = reduction.wide if banded else reduction.coarse
         counts = count_unstable(first, conditions, [s.eigenvalues[:1] for s in spectra])
@@ -226,16 +252,6 @@ class ColumnSolver:
         for i, spectrum in enumerate(spectra):
             _enter(column, i, spectrum, alone[conditions[i].damping].rates)
         return self._recounted(column, family, conditions, np.flatnonzero(~column.certified), alone)
-
-    def _whole(self, family: PencilFamily, condition: Condition, alone: Runaway):
-        """Leading modes of the full pencil together with what runs away."""
-        modes = self.direct(family, condition)
-        if not alone.rates.size:
-            return modes
-        pencil = family.pencil(condition)
-        starts = [(rate, motion, np.zeros(pencil.b)) for rate, motion in zip(alone.rates, alone.motions.T)]
-        found = brought(pencil, starts, modes, 0.0, family.search(condition), self._workspace)
-        return modes if found is None else joined(modes, found, 0.0)
 
     def _uncoupled(self, family: PencilFamily, conditions) -> Column:
         """A structure that nothing couples: its full spectra and counts, each once for every damping."""
@@ -256,13 +272,12 @@ class ColumnSolver:
 
     def _repaired(self, column: Column, family, conditions, cells, own: RunawayCells) -> Column:
         for i in cells:
-            alone = own.alone[conditions[i].damping]
             try:
-                spectrum = self._whole(family, conditions[i], alone)
+                spectrum = self.whole(family, conditions[i])
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue  # stays without a certificate
             if len(spectrum):
-                _enter(column, i, spectrum, alone.rates)
+                _enter(column, i, spectrum, own.alone[conditions[i].damping].rates)
         open_cells = [i for i in cells if not column.certificate(i).agrees]
         return self._recounted(column, family, conditions, open_cells, own.alone)
 
@@ -307,18 +322,6 @@ def _error(reduction: FamilyReduction, fine: ReducedFamily, conditions, places) 
     return worst
 
 
-def _error_of_runaway(reduction: FamilyReduction, own: RunawayCells, conditions) -> float:
-    """The same of what runs away, under the heaviest coupling."""
-    worst = 0.0
-    for damping, alone in own.alone.items():
-        heaviest = max((c for c in conditions if c.damping == damping), key=lambda c: c.inertia)
-        pairs = own.pairs(heaviest)
-        if len(pairs.values) and alone.rates.size:
-            change = reduction.correction(pairs, heaviest, runaway=True)
-            worst = max(worst, float((np.abs(change) / np.abs(pairs.values)).max()))
-    return worst
-
-
 def _enter(column: Column, cell: int, spectrum, rates: np.ndarray) -> None:
     """Put a direct spectrum into a cell; `rates` are those at which the structure runs away by itself."""
     column.how[cell] = DIRECT
@@ -360,17 +363,20 @@ def _conjugates(values: np.ndarray) -> int:
     return int(values.size + np.sum(values.imag > 0))
 
 
+def _listed(values: np.ndarray, away: np.ndarray, line: float, band: float) -> int:
+    """Number of unstable eigenvalues of a cell: all others, and one of each pair of what runs away."""
+    return int(((values.real > line) & (np.abs(values.imag) <= 2 * np.pi * band)).sum()) + _conjugates(away)
+
+
 def _column(leading, away, values, counts: CellCounts, error: float) -> Column:
-    inside = np.abs(values.imag) <= 2 * np.pi * counts.band[:, None]
     rows = [np.concatenate(pair) for pair in zip(away, leading)]
     first = [row[0] if len(row) else complex(np.nan, np.nan) for row in rows]
-    runaway = np.array([_conjugates(row) for row in away])
     return Column(
         growth_rate=np.array([value.real for value in first]),
         frequency=np.array([value.imag / (2 * np.pi) for value in first]),
         second=np.array([row[1].real if len(row) > 1 else np.nan for row in rows]),
-        unstable=((values.real > counts.line[:, None]) & inside).sum(axis=1) + runaway,
-        runaway=runaway,
+        unstable=np.array([_listed(*row) for row in zip(values, away, counts.line, counts.band)]),
+        runaway=np.array([_conjugates(row) for row in away]),
         counted=counts.number,
         certain=counts.certain,
         error=error,

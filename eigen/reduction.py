@@ -179,8 +179,12 @@ class FamilyReduction:
         """The same at the dampings of all conditions."""
         return {c.damping: self.runaway(c) for c in conditions}
 
-    def runaway_corrected(self, pairs: Pairs, condition: Condition) -> tuple[np.ndarray, np.ndarray]:
-        """Right and left vectors of what of the structure runs away by itself, corrected at the place of each."""
+    def runaway_correction(self, pairs: Pairs, condition: Condition) -> tuple[float, np.ndarray]:
+        """Largest relative correction by the full matrices of eigenvalues of the structure by itself, and vectors that
+        hold it, right and left, (n, 2k); each corrected at its place.
+        """
+        if not pairs.values.size:
+            return 0.0, pairs.q.real
         structure = self._structure(condition)
         force, _ = self.residual(pairs.values, pairs.q, pairs.u, condition)
         back, _ = self.residual(pairs.values, pairs.w, pairs.c, condition, left=True)
@@ -189,14 +193,17 @@ class FamilyReduction:
             with structure.factored(structure.at(value * (1.0 + BESIDE))) as factor:
                 right[:, i] -= factor.solve(force[:, i].real)
                 left[:, i] -= factor.solve(back[:, i].real)
-        return right, left
+        change = self._newton(pairs, right, left, condition)
+        return float((np.abs(change) / np.abs(pairs.values)).max()), np.hstack([right.real, left.real])
 
-    def correction(self, pairs: Pairs, condition: Condition, runaway: bool = False) -> np.ndarray:
+    def correction(self, pairs: Pairs, condition: Condition) -> np.ndarray:
         """Newton's correction of eigenvalues by the full matrices, -w^H T x / (w^H T' x), complex (k,).
 
         Vectors are corrected once outside the space first; what the space lacks shows in it.
         """
-        right, left = (self.runaway_corrected if runaway else self.corrected)(pairs, condition)
+        return self._newton(pairs, *self.corrected(pairs, condition), condition)
+
+    def _newton(self, pairs: Pairs, right, left, condition: Condition) -> np.ndarray:
         force, inner = self.residual(pairs.values, right, pairs.u, condition)
         top = np.einsum("ij,ij->j", left.conj(), force) + np.einsum("ij,ij->j", pairs.c.conj(), inner)
         # T' by a difference quotient, good enough for the size of a correction

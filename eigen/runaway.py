@@ -34,15 +34,19 @@ class Runaway:
         The fastest first.
     motions : (n, r) array
         Of unit mass.
+    core : (n, m) array
+        As few motions as have as many eigenvalues: a motion that runs away does so at two rates, and what its two
+        vectors differ by is another motion, which swings.
     """
 
     rates: np.ndarray
     motions: np.ndarray
+    core: np.ndarray
 
     @classmethod
     def none(cls, size: int) -> Runaway:
         """Of a structure of so many unknowns that holds."""
-        return cls(np.zeros(0), np.zeros((size, 0)))
+        return cls(np.zeros(0), np.zeros((size, 0)), np.zeros((size, 0)))
 
     @classmethod
     def of(cls, structure: SymmetricStructure) -> Runaway:
@@ -71,7 +75,8 @@ class Runaway:
         if not found:
             return cls.none(structure.size)
         found.sort(key=lambda pair: -pair[0])
-        return cls(np.array([rate for rate, _ in found]), np.stack([motion for _, motion in found], axis=1))
+        motions = np.stack([motion for _, motion in found], axis=1)
+        return cls(np.array([rate for rate, _ in found]), motions, _core(structure, motions))
 
 
 def _on_space(structure: SymmetricStructure, space: np.ndarray) -> list[tuple[float, np.ndarray]]:
@@ -90,6 +95,19 @@ def _on_space(structure: SymmetricStructure, space: np.ndarray) -> list[tuple[fl
         root = brentq(lambda s, j=j: np.linalg.eigvalsh(at(s))[j], places[i], places[i + 1], rtol=1e-10)
         found.append((root, space @ np.linalg.eigh(at(root))[1][:, j]))
     return found
+
+
+def _core(structure: SymmetricStructure, motions: np.ndarray) -> np.ndarray:
+    """As few directions of motions as have as many real unstable eigenvalues."""
+    mass = np.eye(len(structure.at(0.0)))[0]
+    weight, turn = np.linalg.eigh(motions.T @ structure.times(mass, motions))
+    kept = np.flatnonzero(weight > 1e-10 * weight[-1])[::-1]
+    for number in range((len(weight) + 1) // 2, len(kept) + 1):
+        some = kept[:number]
+        core = (motions @ turn[:, some]) / np.sqrt(weight[some])
+        if len(_on_space(structure, core)) == len(weight):
+            break
+    return core
 
 
 def _refined(structure: SymmetricStructure, rate: float, motion: np.ndarray) -> tuple[float, np.ndarray]:

@@ -5,13 +5,14 @@ the modes of a column.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .family import Condition
 from .rational import SAME, refined, started
 from .reduced import Pairs, ReducedFamily
+from .reduction import FamilyReduction
 from .runaway import Runaway
 
 #: Length over that of a motion above which what it has outside the modes is taken in.
@@ -33,11 +34,14 @@ class RunawayCells:
     ----------
     space : ReducedFamily
         Modes and motions that run away.
+    core : (n, k) array
+        The same with as few motions as have as many eigenvalues.
     alone : mapping
         From a damping to what runs away then.
     """
 
     space: ReducedFamily
+    core: np.ndarray
     alone: Mapping[tuple[float, float, float], Runaway]
 
     @classmethod
@@ -45,12 +49,11 @@ class RunawayCells:
         """With the modes of a column."""
         motions = np.hstack([found.motions for found in alone.values()])
         space = ReducedFamily(modes.family, motions, DISTINCT, base=modes) if motions.shape[1] else modes
-        return cls(space, alone)
+        return cls(space, np.hstack([modes.V, *(found.core for found in alone.values())]), alone)
 
-    @property
-    def empty(self) -> bool:
-        """Whether nothing runs away under any damping."""
-        return not any(found.rates.size for found in self.alone.values())
+    def wider(self, vectors: np.ndarray) -> RunawayCells:
+        """The same on a space with further vectors."""
+        return replace(self, space=ReducedFamily(self.space.family, vectors, DISTINCT, base=self.space))
 
     def eigenvalues(self, conditions: list[Condition]) -> list[np.ndarray]:
         """Of each cell, the fastest first, a conjugate pair given once; (r,) complex each."""
@@ -70,3 +73,37 @@ class RunawayCells:
     def pairs(self, condition: Condition) -> Pairs:
         """Eigenpairs of one cell, lifted to the full unknowns."""
         return self.space.of_rational(self.space.small.pairs(condition, self.eigenvalues([condition])[0]))
+
+
+def runaway_cells(
+    reduction: FamilyReduction, modes: ReducedFamily, alone, conditions, tolerance: float
+) -> tuple[RunawayCells, float]:
+    """What runs away in cells, and the relative error of its eigenvalues: under the heaviest coupling; where that is
+    above a tolerance, under one of the middle once vectors corrected under the heaviest have been taken in.
+
+    Parameters
+    ----------
+    reduction : FamilyReduction
+    modes : ReducedFamily
+        Small model of the modes.
+    alone : mapping
+        From a damping to what runs away then.
+    conditions : sequence of Condition
+    tolerance : float
+    """
+    own, worst = RunawayCells.beside(modes, alone), 0.0
+    further = []
+    for damping, found in alone.items():
+        if not found.rates.size:
+            continue
+        cells = sorted((c for c in conditions if c.damping == damping), key=lambda c: c.inertia)
+        change, vectors = reduction.runaway_correction(own.pairs(cells[-1]), cells[-1])
+        if change > tolerance:
+            further.append((cells[len(cells) // 2], vectors))
+        else:
+            worst = max(worst, change)
+    if further:
+        own = own.wider(np.hstack([vectors for _, vectors in further]))
+        changes = [reduction.runaway_correction(own.pairs(cell), cell)[0] for cell, _ in further]
+        worst = max(worst, *changes)
+    return own, worst
