@@ -58,23 +58,25 @@ class ReducedFamily:
         else:
             self._own = _outside(base.V, family.mass, space, compression)
             self.V = np.hstack([base.V, self._own])
-        self.K = self._projected(family.stiffness, None if base is None else base.K)
-        self.D = self._projected(family.damping, None if base is None else base.D)
-        self.M = self._projected(family.mass, None if base is None else base.M)
+        self._images: dict[object, np.ndarray] = {}
+        self.K = self._projected("K", family.stiffness, None if base is None else base.K)
+        self.D = self._projected("D", family.damping, None if base is None else base.D)
+        self.M = self._projected("M", family.mass, None if base is None else base.M)
         self.G = family.forces.T.dot(self.V).T
         self.J = family.slope @ self.V
         self._coupled: dict[object, dict[str, np.ndarray]] = {}
         #: What `eigen.phase_count` keeps of the structure's response, by damping.
         self.responses: dict[tuple, object] = {}
 
-    def _projected(self, matrix, known: np.ndarray | None) -> np.ndarray:
-        """V^T A V, of which the part on the base may be known."""
+    def _projected(self, name, matrix, known: np.ndarray | None) -> np.ndarray:
+        """V^T A V, of which the part on the base may be known, and A V of the base under a name."""
         image = matrix @ self._own
         if known is None:
+            self._images[name] = image
             return self._own.T @ image
-        first = self._base.V
-        back = first.T @ (matrix.T @ self._own)
-        return np.block([[known, first.T @ image], [back.T, self._own.T @ image]])
+        first, before = self._base.V, self._base._images.get(name)
+        back = (first.T @ (matrix.T @ self._own)).T if before is None else self._own.T @ before
+        return np.block([[known, first.T @ image], [back, self._own.T @ image]])
 
     @property
     def size(self) -> int:
@@ -87,7 +89,8 @@ class ReducedFamily:
         relaxation = self.family.relaxation(1.0)
         matrices = () if relaxation is None else relaxation.matrices
         known = [None] * len(matrices) if self._base is None else self._base.relaxing
-        return np.array([self._projected(*pair) for pair in zip(matrices, known)]).reshape(-1, self.size, self.size)
+        parts = [self._projected(i, *pair) for i, pair in enumerate(zip(matrices, known))]
+        return np.array(parts).reshape(-1, self.size, self.size)
 
     def relaxation(self, loss: float) -> Relaxation | None:
         """What relaxes, on the space."""

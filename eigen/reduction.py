@@ -65,6 +65,7 @@ class FamilyReduction:
     ):
         self.family, self._workspace = family, workspace or Workspace()
         self._runaways: dict[tuple[float, float, float], Runaway] = {}
+        self._last: tuple[tuple[float, float, float], SymmetricStructure] | None = None
         self.solver = solver or StaticSolver()
         self.solver.factor(family)
         self._stiffened, self._loss = stiffened or StaticSolver(), None
@@ -102,25 +103,40 @@ class FamilyReduction:
         return self._runaways[damping]
 
     def _structure(self, condition: Condition) -> SymmetricStructure:
-        family, relaxation = self.family, self.family.relaxation(condition.loss)
-        damping = condition.alpha * family.mass + condition.beta * family.damping
-        structure = CoupledPencil(family.mass, damping, family.stiffness, relaxation=relaxation)
-        return SymmetricStructure(self._workspace.structure(structure))
+        """Of the damping of a condition; the last one is kept."""
+        if self._last is None or self._last[0] != condition.damping:
+            family, relaxation = self.family, self.family.relaxation(condition.loss)
+            damping = condition.alpha * family.mass + condition.beta * family.damping
+            structure = CoupledPencil(family.mass, damping, family.stiffness, relaxation=relaxation)
+            self._last = condition.damping, SymmetricStructure(self._workspace.structure(structure))
+        return self._last[1]
 
     def residual(self, values, q, u, condition: Condition, left: bool = False):
         """T(lambda) x of pairs, or T^H w of left vectors: force part (n, k) and inner part (b, k)."""
-        family, s = self.family, np.conj(values) if left else values
+        return self._residual(self._products(q, condition, left), values, u, condition, left)
+
+    def _products(self, q, condition: Condition, left: bool = False):
+        """What a residual needs of structural vectors, whatever their eigenvalues."""
+        family, relaxation = self.family, self.family.relaxation(condition.loss)
         turn = (lambda a: a.T) if left else (lambda a: a)
         q = np.asarray(q, complex)
-        mq, kq = real_apply(family.mass, q), real_apply(turn(family.stiffness), q)
+        return (
+            real_apply(family.mass, q),
+            real_apply(turn(family.stiffness), q),
+            real_apply(turn(family.damping), q) if condition.beta else None,
+            [] if relaxation is None else [real_apply(turn(matrix), q) for matrix in relaxation.matrices],
+            real_apply(family.forces.T if left else family.slope, q),
+        )
+
+    def _residual(self, products, values, u, condition: Condition, left: bool = False):
+        family, s = self.family, np.conj(values) if left else values
+        mq, kq, dq, relaxing, y = products
         force = mq * (s * s + condition.alpha * s) + kq
-        if condition.beta:
-            force += real_apply(turn(family.damping), q) * (condition.beta * s)
-        relaxation = family.relaxation(condition.loss)
-        if relaxation is not None:
-            for factor, matrix in zip(relaxation.factors(s), relaxation.matrices):
-                force += real_apply(turn(matrix), q) * factor
-        y = real_apply(family.forces.T if left else family.slope, q)
+        if dq is not None:
+            force += dq * (condition.beta * s)
+        if relaxing:
+            for factor, image in zip(family.relaxation(condition.loss).factors(s), relaxing):
+                force += image * factor
         inner = np.zeros((u.shape[0], len(values)), complex)
         pressure = np.zeros_like(y)
         for i, value in enumerate(s):
@@ -177,7 +193,7 @@ class FamilyReduction:
 
     def runaways(self, conditions) -> dict[tuple[float, float, float], Runaway]:
         """The same at the dampings of all conditions."""
-        return {c.damping: self.runaway(c) for c in conditions}
+        return {damping: self.runaway(c) for damping, c in {c.damping: c for c in conditions}.items()}
 
     def runaway_correction(self, pairs: Pairs, condition: Condition) -> tuple[float, np.ndarray]:
         """Largest relative correction by the full matrices of eigenvalues of the structure by itself, and vectors that
@@ -204,11 +220,12 @@ class FamilyReduction:
         return self._newton(pairs, *self.corrected(pairs, condition), condition)
 
     def _newton(self, pairs: Pairs, right, left, condition: Condition) -> np.ndarray:
-        force, inner = self.residual(pairs.values, right, pairs.u, condition)
+        products = self._products(right, condition)
+        force, inner = self._residual(products, pairs.values, pairs.u, condition)
         top = np.einsum("ij,ij->j", left.conj(), force) + np.einsum("ij,ij->j", pairs.c.conj(), inner)
         # T' by a difference quotient, good enough for the size of a correction
         step = 1e-3 * np.maximum(np.abs(pairs.values), 1.0)
-        ahead = self.residual(pairs.values + step, right, pairs.u, condition)
+        ahead = self._residual(products, pairs.values + step, pairs.u, condition)
         slope = (
             np.einsum("ij,ij->j", left.conj(), ahead[0] - force)
             + np.einsum("ij,ij->j", pairs.c.conj(), ahead[1] - inner)
