@@ -63,11 +63,13 @@ def negative_motions(pencil: CoupledPencil) -> np.ndarray:
     return motions_of(SymmetricStructure(StructureMatrices(pencil)))
 
 
-def motions_of(structure: SymmetricStructure, rounds: int = ROUNDS) -> np.ndarray:
-    """The same of a structure that relaxes, with fewer rounds where a rough space will do."""
+def motions_of(structure: SymmetricStructure, rough: bool = False) -> np.ndarray:
+    """The same of a structure that relaxes; of a rough space only the number of negative motions is right where they
+    look weakest.
+    """
     search = _Search(structure)
     motions = np.hstack([search.lowest(weights) for weights in partial_sums(structure)])
-    return _completed(search, motions, rounds) if motions.shape[1] else motions
+    return _completed(search, motions, rough) if motions.shape[1] else motions
 
 
 def partial_sums(structure: SymmetricStructure) -> list[np.ndarray]:
@@ -84,13 +86,17 @@ class _Search:
         self.structure, self._added = structure, 0.0
         self.mass, self._slow = np.eye(len(structure.at(0.0)))[[0, 2]]
 
-    def lowest(self, weights: np.ndarray) -> np.ndarray:
-        """Motions (n, k) in which a sum is negative, the lowest ones; k = 0 where it is positive."""
+    def negative(self, weights: np.ndarray) -> int:
+        """Number of negative eigenvalues of a sum."""
+        with self.structure.factored(weights) as factor:
+            return factor.negative
+
+    def lowest(self, weights: np.ndarray, known: int = 0) -> np.ndarray:
+        """Motions (n, k) in which a sum is negative, the lowest ones; k = 0 where there are no more than are known."""
         structure = self.structure
         n = structure.size
-        with structure.factored(weights) as factor:
-            number = factor.negative
-        if not number:
+        number = self.negative(weights)
+        if number <= known:
             return np.zeros((n, 0))
         if n <= DENSE:
             full, mass = (structure.times(w, np.eye(n)) for w in (weights, self.mass))
@@ -127,20 +133,21 @@ class _Search:
                 self._added = 8.0 * self._added or 1e-6 * float(np.divide(*(np.median(d) for d in diagonal)))
 
 
-def _completed(search: _Search, motions: np.ndarray, rounds: int) -> np.ndarray:
+def _completed(search: _Search, motions: np.ndarray, rough: bool) -> np.ndarray:
     """Motions of unit mass, with those that D has where the ones given look weakest."""
     structure = search.structure
     weakest = np.inf
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         motions = _orthonormal(structure, search.mass, motions)
         on_space = structure.on_space(motions)
         places = places_of(structure, on_space)
-        size = [_lowest_on(on_space, structure.at(s)) / s**2 for s in places]
-        at = int(np.argmin(size))
-        if size[at] > weakest - SETTLED * abs(weakest):
+        squares = np.array([np.linalg.eigvalsh(np.tensordot(structure.at(s), on_space, 1)) / s**2 for s in places])
+        at = int(np.argmin(squares[:, 0]))
+        if squares[at, 0] > weakest - SETTLED * abs(weakest):
             break
-        weakest = size[at]
-        motions = np.hstack([motions, search.lowest(structure.at(places[at]))])
+        weakest = squares[at, 0]
+        known = int((squares[at] < 0).sum()) if rough else 0
+        motions = np.hstack([motions, search.lowest(structure.at(places[at]), known)])
     return _orthonormal(structure, search.mass, motions)
 
 

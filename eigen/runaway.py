@@ -17,11 +17,11 @@ from .negative_stiffness import motions_of, places_of
 
 #: Inverse iterations on an eigenvalue at most, and the relative change that ends them; their error falls with the third
 #: power.
-STEPS, SETTLED = 5, 1e-4
+STEPS, SETTLED = 5, 1e-3
 #: Relative distance below which two are one.
 SAME = 1e-8
 #: Relative distance that one may move from a space to the full matrices.
-MOVED = 0.1
+MOVED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,12 +66,15 @@ class Runaway:
         >>> Runaway.of(SymmetricStructure(StructureMatrices(pencil))).rates.round(6)
         array([8.347015, 1.142161])
         """
-        space = motions_of(structure, rounds=1)
-        found: list[tuple[float, np.ndarray]] = []
-        for place, motion in _on_space(structure, space):
-            rate, motion = _refined(structure, place, motion)
-            if abs(rate - place) <= MOVED * place and all(abs(rate - r) > SAME * rate for r, _ in found):
-                found.append((rate, motion))
+        for rough in (True, False):
+            starts = _on_space(structure, motions_of(structure, rough))
+            found: list[tuple[float, np.ndarray]] = []
+            for place, motion in starts:
+                rate, motion = _refined(structure, place, motion)
+                if abs(rate - place) <= MOVED * place and all(abs(rate - r) > SAME * rate for r, _ in found):
+                    found.append((rate, motion))
+            if len(found) == len(starts):
+                break
         if not found:
             return cls.none(structure.size)
         found.sort(key=lambda pair: -pair[0])
