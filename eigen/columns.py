@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
-from .agreement import Certificate
 from .cell_counts import CellCounts, count_unstable, uncounted
 from .certificate import certified_spectrum
+from .column import DIRECT, REDUCED, TOLERANCE, Column
 from .condensation import Workspace
 from .distant import brought, joined
 from .factorization import SingularShiftError
@@ -21,86 +20,14 @@ from .search import leading_modes
 from .snapshots import between, spread
 from .static_solver import StaticSolver
 
-#: Estimated relative error of an eigenvalue above which a cell is treated directly.
-TOLERANCE = 1e-6
 #: Directions weaker than these are left out where two spaces are put together: at first, and where counts disagree.
 JOINT, CLOSE = 3e-3, 1e-5
-#: How a cell was found.
-REDUCED, DIRECT, MISSING = 0, 1, 2
 #: Leading eigenvalues kept of a cell.
 KEPT = 8
 #: Conditions at least at which they are taken where the loss factors differ.
 LOSSES = 4
 #: Leading vectors taken at each condition: where damping orders the modes, and for a band.
 MOST, MOST_IN_BAND = 4, 12
-
-
-@dataclass(frozen=True)
-class Column:
-    """Cells of one state.
-
-    Attributes
-    ----------
-    growth_rate, frequency : (cells,) arrays, 1/s, Hz
-        Of the leading mode, what of the structure runs away by itself included; NaN if none was found.
-    second : (cells,) array, 1/s
-        Growth rate of the next mode.
-    unstable : (cells,) int array
-        Eigenvalues right of `line` up to `band`, conjugates counted apart, by the spectrum.
-    runaway : (cells,) int array
-        Those of them in which the structure runs away by itself, without any fluid; see `eigen.runaway`.
-    counted : (cells,) int array
-        As many as `unstable`, by the argument principle; -1 where nobody asked.
-    certain : (cells,) bool array
-        That count followed the phase everywhere.
-    error : float
-        Largest estimated relative error of leading eigenvalues among the checked cells.
-    how : (cells,) int array
-        `REDUCED` or `DIRECT`.
-    line, band : (cells,) arrays, 1/s, Hz
-        Region counted.
-    eigenvalues : callable or None
-        From any condition at the same state to its leading eigenvalues on the small model, sorted by growth rate.
-    corrected : callable or None
-        From a condition and an eigenvalue of the small model to Newton's correction of it by the full matrices.
-    cell : callable or None
-        From any further condition at the same state to a column of this one cell.
-    leading : list of arrays
-        Leading eigenvalues of the cells without what runs away.
-    """
-
-    growth_rate: np.ndarray
-    frequency: np.ndarray
-    second: np.ndarray
-    unstable: np.ndarray
-    runaway: np.ndarray
-    counted: np.ndarray
-    certain: np.ndarray
-    error: float
-    how: np.ndarray
-    line: np.ndarray
-    band: np.ndarray
-    eigenvalues: Callable[[Condition], np.ndarray] | None = None
-    corrected: Callable[[Condition, complex], complex] | None = None
-    cell: Callable[[Condition], Column] | None = None
-    leading: list[np.ndarray] = field(default_factory=list)
-
-    @property
-    def certified(self) -> np.ndarray:
-        """Cells for which both counts agree and the leading eigenvalue is accurate."""
-        return np.array([self.certificate(i).agrees for i in range(len(self.unstable))], bool)
-
-    def certificate(self, cell: int) -> Certificate:
-        """What vouches for a cell."""
-        accurate = self.how[cell] == DIRECT or self.error <= TOLERANCE
-        known = bool(np.isfinite(self.growth_rate[cell]))
-        return Certificate(
-            int(self.unstable[cell]),
-            int(self.counted[cell]),
-            bool(self.certain[cell] and accurate and known),
-            float(self.line[cell]),
-            float(self.band[cell]),
-        )
 
 
 class ColumnSolver:
@@ -110,6 +37,7 @@ class ColumnSolver:
         self._static, self._stiffened = StaticSolver(), StaticSolver()
         self._workspace, self._structures = Workspace(), Workspace()
         self._last: FamilyReduction | None = None
+        self._counter: tuple[ReducedFamily, RunawayCells, ReducedFamily] | None = None
 
     def reduction(self, family: PencilFamily) -> FamilyReduction:
         """Small models of a family; the last one is kept."""
@@ -165,6 +93,9 @@ class ColumnSolver:
             condition = Condition(*condition)
             return family.reach(condition).leading(fine.eigenvalues([condition])[0])[:KEPT]
 
+        def nearest(condition, place):
+            return fine.nearest(Condition(*condition), place)
+
         def corrected(condition, eigenvalue):
             condition = Condition(*condition)
             return complex(reduction.correction(fine.near(condition, eigenvalue), condition)[0])
@@ -173,7 +104,7 @@ class ColumnSolver:
             asked = [Condition(*condition)]
             return self._on(first, fine, replace(own, alone=reduction.runaways(asked)), asked, error)
 
-        return replace(column, eigenvalues=eigenvalues, corrected=corrected, cell=cell)
+        return replace(column, eigenvalues=eigenvalues, nearest=nearest, corrected=corrected, cell=cell)
 
     def _on(
         self, first: ReducedFamily, fine: ReducedFamily, own: RunawayCells, conditions, error, edges=False
@@ -187,28 +118,39 @@ class ColumnSolver:
         leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
         counted = _beside_changes(leading) if edges else np.arange(len(conditions))
         counts = uncounted(family, conditions)
-        counter = first
-        if any(conditions[i].loss for i in counted) and error <= TOLERANCE:
-            # static responses alone say little of what relaxes; with the vectors that the list rests on they are enough
-            counter = ReducedFamily(family, own.core, JOINT, base=first)
+        hints = [np.concatenate(pair) for pair in zip(away, leading)]
+
+        def count(counter, cells, within_band=False):
+            asked = [conditions[i] for i in cells], [hints[i] for i in cells]
+            return count_unstable(counter, *asked, within_band=within_band)
+
+        joint = error <= TOLERANCE and any(conditions[i].loss for i in counted)
+        counter = self._joint(first, own) if joint else first
         if len(counted):
-            hints = [np.concatenate([away[i], leading[i]]) for i in counted]
-            found = count_unstable(counter, [conditions[i] for i in counted], hints)
-            counts.enter(counted, found)
+            counts.enter(counted, count(counter, counted))
         column = _column(leading, away, values, counts, error)
         doubtful = counted[~column.certified[counted]]
-        if len(doubtful) and counter is not first:
+        if len(doubtful) and joint and self._counter[1] is not own:
+            counts.enter(doubtful, count(self._joint(first, own, anew=True), doubtful))
+            doubtful = doubtful[~column.certified[doubtful]]
+        if len(doubtful) and joint:
             # a mode that is all but neutral has to be met to a fraction of its growth rate; what else a finer space has
             # are single elements by halves, far beyond the band
-            finer = ReducedFamily(family, own.core, CLOSE, base=first)
-            hints = [np.concatenate([away[i], leading[i]]) for i in doubtful]
-            found = count_unstable(finer, [conditions[i] for i in doubtful], hints, within_band=True)
+            found = count(ReducedFamily(family, own.core, CLOSE, base=first), doubtful, within_band=True)
             listed = [_listed(values[i], away[i], *region) for i, *region in zip(doubtful, found.line, found.band)]
             agree = found.certain & (found.number == listed) & np.isfinite(column.growth_rate[doubtful])
             counts.enter(doubtful[agree], found.select(agree))
             column.unstable[doubtful[agree]] = np.array(listed)[agree]
             doubtful = doubtful[~column.certified[doubtful]]
         return self._repaired(column, family, conditions, doubtful, own)
+
+    def _joint(self, first: ReducedFamily, own: RunawayCells, anew: bool = False) -> ReducedFamily:
+        """Space of a count where stiffness relaxes: static responses alone say little of that; with the vectors that a
+        list rests on, of this column or of the one before at the same state, they are enough.
+        """
+        if anew or self._counter is None or self._counter[0] is not first:
+            self._counter = first, own, ReducedFamily(first.family, own.core, JOINT, base=first)
+        return self._counter[2]
 
     def direct(self, family: PencilFamily, condition, count: int = 6):
         """Leading modes of the full pencil, an `eigen.Spectrum`.

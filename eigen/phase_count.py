@@ -27,6 +27,8 @@ from .structure_response import NEAR, RelaxingResponse, Response, response
 LARGEST_STEP = np.pi / 3
 #: Determinants evaluated at once, so that they stay in the processor's cache.
 CHUNK = 96
+#: Share of its distance from the axis by which a place beside an eigenvalue may be moved, so that cells share it.
+PLAY = 0.6
 #: Distance of the last phase from its limit that calls for higher frequencies, rad.
 LATE = 0.1
 #: Distance from a whole number up to which a count is certain.
@@ -167,7 +169,7 @@ class _Walk:
             for value in [*np.asarray(hint, complex), *self._own_zeros(i)]:
                 width, middle = max(abs(value.real), 1e-6 * abs(value)), abs(value.imag)
                 own += [
-                    _shared(middle + f * width, 0.3 * width)
+                    _shared(middle + f * width, PLAY * width)
                     for f in (-1.0, 0.0, 1.0)
                     if middle + f * width > 0.3 * width
                 ]

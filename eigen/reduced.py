@@ -223,6 +223,13 @@ class ReducedFamily:
         keep = np.flatnonzero((values.imag >= 0) & (values.imag <= band) & (values.real > share * floor))
         return self._lifted(condition, values, left, right, keep[np.argsort(-values.real[keep])][:most])
 
+    def nearest(self, condition: Condition, place: complex) -> complex:
+        """The eigenvalue nearest to a place close to it."""
+        if self.family.relaxation(condition.loss) is not None:
+            return complex(self.small.pairs(condition, [place]).values[0])
+        values = np.linalg.eigvals(self.first_order([condition])[0])
+        return complex(values[int(np.argmin(np.abs(values - place)))])
+
     def near(self, condition: Condition, eigenvalue: complex) -> Pairs:
         """The eigenpair nearest to a place."""
         if self.family.relaxation(condition.loss) is not None:

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from eigen import Certificate, ColumnSolver, Condition, CoupledPencil, PencilFamily, SearchOptions, certified_spectrum
 from eigen.cell_counts import count_unstable
-from eigen.columns import DIRECT, REDUCED
+from eigen.column import DIRECT, REDUCED
 from eigen.reduced import POWERS
 from eigen.reduction import FamilyReduction
 
