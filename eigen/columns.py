@@ -15,7 +15,8 @@ from .factorization import SingularShiftError
 from .family import Condition, PencilFamily
 from .reduced import ReducedFamily
 from .reduction import FamilyReduction
-from .runaway_cells import RunawayCells, is_near, runaway_cells
+from .runaway import is_near
+from .runaway_cells import RunawayCells, corrected_cells
 from .search import leading_modes
 from .snapshots import between, spread
 from .static_solver import StaticSolver
@@ -80,14 +81,15 @@ class ColumnSolver:
             banded = any(_is_banded(family, conditions[i]) for i in places)
             first = reduction.wide if banded else reduction.coarse
             fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
+            own = RunawayCells.beside(fine, alone)
             # vectors corrected in a few steps are worst where most relaxes
             checked = [*between(places), int(np.argmax(losses))] if mixed else between(places)
-            error = _error(reduction, fine, conditions, checked)
+            error = _error(reduction, own.modes, conditions, checked)
             if error <= TOLERANCE:
                 break
-        own, far = runaway_cells(reduction, fine, alone, conditions, TOLERANCE)
-        error = max(error, far)
-        column = self._on(first, fine, own, conditions, error, edges)
+        own, far = corrected_cells(reduction, own, conditions, TOLERANCE)
+        error, fine = max(error, far), own.modes
+        column = self._on(first, own, conditions, error, edges)
 
         def eigenvalues(condition):
             condition = Condition(*condition)
@@ -102,19 +104,14 @@ class ColumnSolver:
 
         def cell(condition):
             asked = [Condition(*condition)]
-            return self._on(first, fine, replace(own, alone=reduction.runaways(asked)), asked, error)
+            return self._on(first, replace(own, alone=reduction.runaways(asked)), asked, error)
 
         return replace(column, eigenvalues=eigenvalues, nearest=nearest, corrected=corrected, cell=cell)
 
-    def _on(
-        self, first: ReducedFamily, fine: ReducedFamily, own: RunawayCells, conditions, error, edges=False
-    ) -> Column:
+    def _on(self, first: ReducedFamily, own: RunawayCells, conditions, error: float, edges: bool = False) -> Column:
         """Cells on a small model, counted on that of the first stage; those without a certificate directly."""
         family = first.family
-        values = fine.eigenvalues(conditions)
-        away = own.eigenvalues(conditions)
-        for row, known in zip(values, away):
-            row[is_near(row, known)] = np.nan  # the modes' space may hold one too
+        values, away = own.modes.eigenvalues(conditions), own.eigenvalues(conditions)
         leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
         counted = _beside_changes(leading) if edges else np.arange(len(conditions))
         counts = uncounted(family, conditions)

@@ -20,6 +20,8 @@ from .negative_stiffness import motions_of, places_of
 STEPS, SETTLED = 5, 1e-3
 #: Relative distance below which two are one.
 SAME = 1e-8
+#: Relative distance from the rate of the structure alone within which an eigenvalue of a coupled pencil is its own.
+NEAR = 0.1
 #: Relative distance that one may move from a space to the full matrices.
 MOVED = 0.5
 
@@ -80,6 +82,12 @@ class Runaway:
         found.sort(key=lambda pair: -pair[0])
         motions = np.stack([motion for _, motion in found], axis=1)
         return cls(np.array([rate for rate, _ in found]), motions, _core(structure, motions))
+
+
+def is_near(values: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Which eigenvalues of a coupled pencil are those of its structure alone at given rates."""
+    values = np.array(values, complex).reshape(-1, 1)
+    return (np.abs(values - rates) <= NEAR * np.abs(rates)).any(axis=1)
 
 
 def _on_space(structure: SymmetricStructure, space: np.ndarray) -> list[tuple[float, np.ndarray]]:

@@ -13,17 +13,10 @@ from .family import Condition
 from .rational import SAME, refined, started
 from .reduced import Pairs, ReducedFamily
 from .reduction import FamilyReduction
-from .runaway import Runaway
+from .runaway import NEAR, Runaway
 
 #: Length over that of a motion above which what it has outside the modes is taken in.
 DISTINCT = 1e-6
-#: Relative distance from the rate of the structure alone within which an eigenvalue of a cell is its own.
-NEAR = 0.1
-
-
-def is_near(values: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Which eigenvalues of a cell are those of the structure alone."""
-    return (np.abs(np.asarray(values)[:, None] - rates) <= NEAR * np.abs(rates)).any(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,14 +25,17 @@ class RunawayCells:
 
     Attributes
     ----------
+    modes : ReducedFamily
+        Modes and motions that run away, for eigenvalues of the modes: without those motions it may hold them by halves.
     space : ReducedFamily
-        Modes and motions that run away.
+        That or a wider one, for eigenvalues of what runs away.
     core : (n, k) array
         The same with as few motions as have as many eigenvalues.
     alone : mapping
         From a damping to what runs away then.
     """
 
+    modes: ReducedFamily
     space: ReducedFamily
     core: np.ndarray
     alone: Mapping[tuple[float, float, float], Runaway]
@@ -48,8 +44,12 @@ class RunawayCells:
     def beside(cls, modes: ReducedFamily, alone: Mapping[tuple[float, float, float], Runaway]) -> RunawayCells:
         """With the modes of a column."""
         motions = np.hstack([found.motions for found in alone.values()])
-        space = ReducedFamily(modes.family, motions, DISTINCT, base=modes) if motions.shape[1] else modes
-        return cls(space, np.hstack([modes.V, *(found.core for found in alone.values())]), alone)
+        if not motions.shape[1]:
+            return cls(modes, modes, modes.V, alone)
+        base = ReducedFamily(modes.family, motions, DISTINCT)
+        rates = {damping: found.rates for damping, found in alone.items()}
+        both = ReducedFamily(modes.family, modes.V, DISTINCT, base=base, rates=rates)
+        return cls(both, both, np.hstack([modes.V, *(found.core for found in alone.values())]), alone)
 
     def wider(self, vectors: np.ndarray) -> RunawayCells:
         """The same on a space with further vectors."""
@@ -75,8 +75,8 @@ class RunawayCells:
         return self.space.of_rational(self.space.small.pairs(condition, self.eigenvalues([condition])[0]))
 
 
-def runaway_cells(
-    reduction: FamilyReduction, modes: ReducedFamily, alone, conditions, tolerance: float
+def corrected_cells(
+    reduction: FamilyReduction, own: RunawayCells, conditions, tolerance: float
 ) -> tuple[RunawayCells, float]:
     """What runs away in cells, and the relative error of its eigenvalues: under the heaviest coupling; where that is
     above a tolerance, under one of the middle once vectors corrected under the heaviest have been taken in.
@@ -84,16 +84,12 @@ def runaway_cells(
     Parameters
     ----------
     reduction : FamilyReduction
-    modes : ReducedFamily
-        Small model of the modes.
-    alone : mapping
-        From a damping to what runs away then.
+    own : RunawayCells
     conditions : sequence of Condition
     tolerance : float
     """
-    own, worst = RunawayCells.beside(modes, alone), 0.0
-    further = []
-    for damping, found in alone.items():
+    worst, further = 0.0, []
+    for damping, found in own.alone.items():
         if not found.rates.size:
             continue
         cells = sorted((c for c in conditions if c.damping == damping), key=lambda c: c.inertia)

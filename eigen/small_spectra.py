@@ -8,6 +8,7 @@ import numpy as np
 
 from .creep import OVERDAMPED
 from .rational import SAME, RationalCells, Refined, Surrogate, real_roots, refined, started
+from .runaway import is_near
 from .structure_response import relative
 
 if TYPE_CHECKING:
@@ -137,6 +138,9 @@ class SmallSpectra:
             _joined(rows[i], complex(value))
         for i in np.flatnonzero(doubtful):
             rows[i] = list(self._exactly(conditions[i]))
+        for i, rates in enumerate(map(self.reduced.rates, conditions)):
+            if rates.size:  # what runs away of the structure by itself is no mode
+                rows[i] = [value for value, own in zip(rows[i], is_near(rows[i], rates)) if not own]
         return rows, vectors
 
     def pairs(self, condition: Condition, values) -> Refined:
@@ -157,9 +161,10 @@ class SmallSpectra:
     def _starts(self, conditions, problem: RationalCells) -> tuple[np.ndarray, Refined]:
         """Cells, and pairs to start from in the upper half-plane."""
         surrogate = Surrogate.at(problem, self.frequency)
-        flat = self.reduced.relaxing.reshape(len(self.reduced.relaxing), -1)
-        shape = (-1, self.reduced.size, self.reduced.size)
-        matrices = self.reduced.first_order(
+        reduced = self.reduced.holding  # the surrogate is far off where the structure runs away
+        flat = reduced.relaxing.reshape(len(reduced.relaxing), -1)
+        shape = (-1, reduced.size, reduced.size)
+        matrices = reduced.first_order(
             conditions, (surrogate.level @ flat).reshape(shape), (surrogate.slope @ flat).reshape(shape)
         )
         values = np.linalg.eigvals(matrices)

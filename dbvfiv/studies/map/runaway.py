@@ -40,8 +40,8 @@ def of_the_wall(plan: MapPlan, columns: Iterable[MapColumn]) -> list[str]:
     first, last = (f"{value / parameter.scale:.4g}" for value in (min(own), max(own)))
     where = f"{plan.across.parameter} = {first} and {last} {parameter.shown_unit}".rstrip()
     return [
-        f"In {cells} cells, of columns between {where}, the wall runs away by itself, at up to {max(rates):.3g} 1/s without oscillating: loss factors make rubber stiffer the "
-        "faster it is strained, which is no hold where its constants have lost stability (materials.strain_level, or a "
-        "fit over a wider range). Such cells are unstable whether the valve flutters or not; onset curves are those of "
-        "flutter there too."
+        f"In {cells} cells, of columns between {where}, the wall runs away by itself, at up to {max(rates):.3g} 1/s "
+        "without oscillating: loss factors make rubber stiffer the faster it is strained, which is no hold where its "
+        "constants have lost stability (materials.strain_level, or a fit over a wider range). Such cells are unstable "
+        "whether the valve flutters or not; onset curves are those of flutter there too."
     ]
