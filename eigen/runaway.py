@@ -21,7 +21,7 @@ STEPS, SETTLED = 5, 1e-3
 #: Relative distance below which two are one.
 SAME = 1e-8
 #: Relative distance from the rate of the structure alone within which an eigenvalue of a coupled pencil is its own.
-NEAR = 0.1
+NEAR = 0.4
 #: Relative distance that one may move from a space to the full matrices.
 MOVED = 0.5
 

@@ -11,12 +11,14 @@ import numpy as np
 
 from .family import Condition
 from .rational import SAME, refined, started
-from .reduced import Pairs, ReducedFamily
+from .reduced import Pairs, ReducedFamily, orthonormal
 from .reduction import FamilyReduction
 from .runaway import NEAR, Runaway
 
 #: Length over that of a motion above which what it has outside the modes is taken in.
 DISTINCT = 1e-6
+#: Size, over that of the largest, of what motions under several dampings differ by up to which they are one.
+APART = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,8 @@ class RunawayCells:
         base = ReducedFamily(modes.family, motions, DISTINCT)
         rates = {damping: found.rates for damping, found in alone.items()}
         both = ReducedFamily(modes.family, modes.V, DISTINCT, base=base, rates=rates)
-        return cls(both, both, np.hstack([modes.V, *(found.core for found in alone.values())]), alone)
+        core, _ = orthonormal(modes.family.mass, np.hstack([found.core for found in alone.values()]), APART)
+        return cls(both, both, np.hstack([modes.V, core]), alone)
 
     def wider(self, vectors: np.ndarray) -> RunawayCells:
         """The same on a space with further vectors."""
