@@ -140,7 +140,9 @@ class SmallSpectra:
             rows[i] = list(self._exactly(conditions[i]))
         for i, rates in enumerate(map(self.reduced.rates, conditions)):
             if rates.size:  # what runs away of the structure by itself is no mode
-                rows[i] = [value for value, own in zip(rows[i], is_near(rows[i], rates)) if not own]
+                band = self.reduced.family.reach(conditions[i]).band
+                known = is_near(rows[i], rates)
+                rows[i] = [value for value, own in zip(rows[i], known) if not own and value.imag <= ROOM * band]
         return rows, vectors
 
     def pairs(self, condition: Condition, values) -> Refined:
@@ -172,7 +174,9 @@ class SmallSpectra:
         swings = (values.imag > OVERDAMPED * np.abs(values)) | ((values.imag >= 0) & (values.real > 0))
         growth = np.where(swings, self._estimates(problem, surrogate, np.where(swings, values, 1.0)).real, -np.inf)
         band = np.array([self.reduced.family.reach(c).band for c in conditions])
-        growth = np.where((values.imag <= ROOM * band[:, None]) | (values.real > 0), growth, -np.inf)
+        # beside motions that run away, what is unstable beyond the band are single elements held by halves
+        beyond = (values.real > 0) & (reduced is self.reduced)
+        growth = np.where((values.imag <= ROOM * band[:, None]) | beyond, growth, -np.inf)
         order = np.argsort(-growth, axis=1)[:, :STARTED]
         cells = np.repeat(np.arange(len(conditions)), order.shape[1])
         kept = np.isfinite(np.take_along_axis(growth, order, 1)).ravel()
