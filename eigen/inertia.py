@@ -163,6 +163,11 @@ class SymmetricStructure:
         """Upper half of a sum."""
         return sp.csr_matrix((weights @ self._data, self._indices, self._indptr), (self.size, self.size))
 
+    def full(self, weights: np.ndarray) -> sp.csr_matrix:
+        """A sum."""
+        upper = self.upper(weights)
+        return (upper + sp.triu(upper, 1).T).tocsr()
+
     def factored(self, weights: np.ndarray) -> SymmetricFactor | _DiagonalFactor:
         """A sum, factored.
 

@@ -21,6 +21,7 @@ import scipy.sparse.linalg as spla
 
 from .factorization import StructureMatrices
 from .inertia import SymmetricStructure
+from .mass_basis import orthonormal
 from .pencil import CoupledPencil
 
 #: Motions kept of one stiffness at most, those of the most negative.
@@ -31,6 +32,8 @@ TOLERANCES = (1e-2, 1e-4, 1e-8)
 DENSE = 100
 #: Places on the real axis, per decade, where the motions kept are looked at.
 PER_DECADE = 40
+#: Length in the mass below which a motion has nothing that others lack.
+SAME = 1e-5
 #: Rounds in which further motions are taken in where they look weakest, and relative change of the weakest that ends
 #: them.
 ROUNDS, SETTLED = 4, 1e-3
@@ -135,10 +138,10 @@ class _Search:
 
 def _completed(search: _Search, motions: np.ndarray, rough: bool) -> np.ndarray:
     """Motions of unit mass, with those that D has where the ones given look weakest."""
-    structure = search.structure
+    structure, mass = search.structure, search.structure.full(search.mass)
     weakest = np.inf
     for _ in range(ROUNDS):
-        motions = _orthonormal(structure, search.mass, motions)
+        motions = orthonormal(mass, motions, SAME)[0]
         on_space = structure.on_space(motions)
         places = places_of(structure, on_space)
         squares = np.array([np.linalg.eigvalsh(np.tensordot(structure.at(s), on_space, 1)) / s**2 for s in places])
@@ -148,7 +151,7 @@ def _completed(search: _Search, motions: np.ndarray, rough: bool) -> np.ndarray:
         weakest = squares[at, 0]
         known = int((squares[at] < 0).sum()) if rough else 0
         motions = np.hstack([motions, search.lowest(structure.at(places[at]), known)])
-    return _orthonormal(structure, search.mass, motions)
+    return orthonormal(mass, motions, SAME)[0]
 
 
 def places_of(structure: SymmetricStructure, on_space: np.ndarray) -> np.ndarray:
@@ -162,11 +165,3 @@ def places_of(structure: SymmetricStructure, on_space: np.ndarray) -> np.ndarray
 def _lowest_on(on_space: np.ndarray, weights: np.ndarray) -> float:
     """Lowest eigenvalue of a sum on a space."""
     return float(np.linalg.eigvalsh(np.tensordot(weights, on_space, 1))[0])
-
-
-def _orthonormal(structure: SymmetricStructure, mass: np.ndarray, motions: np.ndarray) -> np.ndarray:
-    """The space of motions, orthonormal in the mass."""
-    motions = motions / np.sqrt(np.einsum("ij,ij->j", motions, structure.times(mass, motions)))
-    weight, turn = np.linalg.eigh(motions.T @ structure.times(mass, motions))
-    kept = weight > 1e-10
-    return (motions @ turn[:, kept]) / np.sqrt(weight[kept])

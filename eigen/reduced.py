@@ -16,6 +16,7 @@ import numpy as np
 import scipy.linalg as la
 
 from .family import Condition, PencilFamily
+from .mass_basis import orthonormal, outside
 from .pencil import CoupledPencil, real_apply
 from .rational import Refined
 from .relaxation import Relaxation
@@ -66,7 +67,7 @@ class ReducedFamily:
             self._own, _ = orthonormal(family.mass, space, compression)
             self.V = self._own
         else:
-            self._own = _outside(base.V, family.mass, space, compression)
+            self._own = outside(base.V, family.mass, space, compression)
             self.V = np.hstack([base.V, self._own])
         self._images: dict[object, np.ndarray] = {}
         self.K = self._projected("K", family.stiffness, None if base is None else base.K)
@@ -277,34 +278,3 @@ class ReducedFamily:
         return Pairs(
             values[keep], real_apply(self.V, right[:k]), right[2 * k :], real_apply(self.V, under[:k]), under[k:]
         )
-
-
-def orthonormal(mass, X: np.ndarray, compression: float, passes: int = 2) -> tuple[np.ndarray, np.ndarray]:
-    """Mass-orthonormal basis of the span of columns, and mass times it; directions weaker than `compression` left out,
-    each column counts alike.
-    """
-    MX = mass @ X
-    size = np.sqrt(np.einsum("ij,ij->j", X, MX))
-    X, MX = X[:, size > 0] / size[size > 0], MX[:, size > 0] / size[size > 0]
-    # a second pass removes what rounding left in the first; the mass goes along, which spares a product
-    for threshold in (max(compression**2, 1e-14), 1e-14)[:passes]:
-        gram = X.T @ MX
-        weight, turn = np.linalg.eigh(0.5 * (gram + gram.T))
-        keep = weight > threshold * weight[-1]
-        turn = turn[:, keep][:, ::-1] / np.sqrt(weight[keep][::-1])
-        X, MX = X @ turn, MX @ turn
-    return X, MX
-
-
-def _outside(V: np.ndarray, mass, X: np.ndarray, least: float) -> np.ndarray:
-    """Mass-orthonormal basis of what columns of length one in the mass have outside an orthonormal space; what is
-    shorter than `least` left out.
-    """
-    size = np.sqrt(np.einsum("ij,ij->j", X, mass @ X))
-    X = X[:, size > 0] / size[size > 0]
-    for threshold in (least**2, 0.5):  # the second pass removes what rounding left in the first
-        X = X - V @ (V.T @ (mass @ X))
-        weight, turn = np.linalg.eigh(X.T @ (mass @ X))
-        keep = weight > threshold
-        X = X @ (turn[:, keep][:, ::-1] / np.sqrt(weight[keep][::-1]))
-    return X

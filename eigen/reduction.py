@@ -17,8 +17,9 @@ import scipy.sparse as sp
 from .condensation import Workspace
 from .family import Condition, PencilFamily
 from .inertia import SymmetricStructure
+from .mass_basis import orthonormal
 from .pencil import CoupledPencil, real_apply
-from .reduced import Pairs, ReducedFamily, orthonormal
+from .reduced import Pairs, ReducedFamily
 from .runaway import Runaway
 from .static_solver import StaticSolver
 from .transfer import TransferBasis

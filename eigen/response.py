@@ -23,6 +23,7 @@ from .inertia import is_positive_definite
 from .oscillators import Oscillators
 from .pencil import CoupledPencil, real_apply, stable_fluid
 from .relaxation import Relaxation
+from .systems import solved
 
 #: Numbers at most in one stack of dense matrices.
 _STACK = 1_000_000
@@ -216,7 +217,9 @@ class Determinant:
         if self._modes is not None:
             H, total = self._modes.response(self.line + z)
         else:
-            response, total = _solved_with_determinants(self._dynamic_stiffness(self.line + z), self._G)
+            response, total = solved(self._dynamic_stiffness(self.line + z), self._G)
+            if np.isnan(total).any():
+                raise np.linalg.LinAlgError("A matrix is singular.")
             H, total = self._J @ response, total - self._mass_log
         if self.structure_is_reference:
             return H, np.zeros(z.size)
@@ -316,28 +319,6 @@ def _dissipates(relaxation: Relaxation | None) -> bool:
         return False
     weight = (relaxation.strengths * relaxation.times).sum(axis=1)
     return is_positive_definite(sum(x * part for x, part in zip(weight, relaxation.matrices)))
-
-
-def _solved_with_determinants(matrices: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Solutions of complex systems (k, n, n) and logarithms of their determinants, from one factorisation each.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If a matrix is singular.
-    """
-    right = np.asarray(right, complex)
-    factor, solve = la.get_lapack_funcs(("getrf", "getrs"), (matrices, right))
-    solved, logarithms = np.empty((len(matrices), *right.shape), complex), np.empty(len(matrices), complex)
-    for i, matrix in enumerate(matrices):
-        # of the transpose, whose columns lie in memory as the rows of the matrix
-        lu, pivots, singular = factor(matrix.T, overwrite_a=True)
-        if singular > 0:
-            raise np.linalg.LinAlgError("A matrix is singular.")
-        solved[i] = solve(lu, pivots, right, trans=1)[0]
-        swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
-        logarithms[i] = np.log(lu.diagonal()).sum() + 1j * np.pi * swaps
-    return solved, logarithms
 
 
 def _log_determinant(stack) -> np.ndarray:

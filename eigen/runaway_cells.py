@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .family import Condition
+from .mass_basis import orthonormal
 from .rational import SAME, refined, started
-from .reduced import Pairs, ReducedFamily, orthonormal
+from .reduced import Pairs, ReducedFamily
 from .reduction import FamilyReduction
 from .runaway import NEAR, Runaway
 

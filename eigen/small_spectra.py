@@ -92,16 +92,14 @@ class SmallSpectra:
         """Leading eigenpairs of one pencil; `chosen` picks among the eigenvalues of the upper half-plane."""
         rows, vectors = self._found([condition])
         values = chosen(np.array(rows[0], complex))
-        if not len(values):  # all so damped that none counts as a mode
-            nothing = np.zeros((0, self.problem([condition]).size), complex)
-            return Refined(values, nothing, nothing, None)
         known = [vectors.get((0, complex(value))) for value in values]
         lacking = [i for i, pair in enumerate(known) if pair is None]
         if lacking:
             found = self.pairs(condition, values[lacking])
             for place, i in enumerate(lacking):
                 known[i] = found.right[place], found.left[place]
-        right, left = (np.array([pair[side] for pair in known]).reshape(len(values), -1) for side in (0, 1))
+        size = self.reduced.size + len(self.reduced.coupling(condition.law)["S0"])
+        right, left = (np.array([pair[side] for pair in known]).reshape(len(values), size) for side in (0, 1))
         return Refined(values, right, left, None)
 
     def _found(self, conditions: list[Condition]) -> tuple[list[list[complex]], dict]:

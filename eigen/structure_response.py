@@ -15,6 +15,7 @@ import numpy as np
 import scipy.linalg as la
 
 from .oscillators import Oscillators
+from .systems import solved
 
 if TYPE_CHECKING:
     from .reduced import ReducedFamily
@@ -118,7 +119,7 @@ class RelaxingResponse:
         self.top = 30.0 * float(max(stiffest, beta * stiffest**2, alpha))
         motion, force = reduced.J.astype(complex), reduced.G.astype(complex)
         omega = self.scale * np.array(SAMPLED)
-        self.P, self.Q = _both_patterns(motion @ _solved_with_signs(self._at(omega), force)[0])
+        self.P, self.Q = _both_patterns(motion @ solved(self._at(omega), force)[0])
         self._out, self._in = self.P.T @ motion, force @ self.Q
 
     def _at(self, omega: np.ndarray) -> np.ndarray:
@@ -139,26 +140,13 @@ class RelaxingResponse:
         """
         new = np.array([w for w in omega if w not in self._known], float)
         if new.size:
-            solved, own = _solved_with_signs(self._at(new), self._in)
-            h = self._out @ solved
+            response, own = solved(self._at(new), self._in)
+            h = self._out @ response
             passive = np.angle(self._oscillators.values(self._relaxation, 1j * new)).sum(axis=1)
-            phase = np.angle(np.linalg.slogdet(h)[0] * own * np.exp(-1j * passive))
+            phase = np.angle(np.linalg.slogdet(h)[0] * np.exp(1j * (own.imag - passive)))
             self._known.update(zip(new, zip(np.linalg.inv(h), phase)))
         inverses, phases = zip(*(self._known[w] for w in omega))
         return np.array(inverses), np.array(phases)
-
-
-def _solved_with_signs(matrices: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Solutions of complex systems, and the signs of their determinants, from one factorisation each."""
-    factor, solve = la.get_lapack_funcs(("getrf", "getrs"), (matrices, right))
-    solved, signs = np.empty((len(matrices), *right.shape), complex), np.empty(len(matrices), complex)
-    for i, matrix in enumerate(matrices):
-        lu, pivots, _ = factor(matrix)
-        solved[i] = solve(lu, pivots, right)[0]
-        diagonal = lu.diagonal()
-        swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
-        signs[i] = (-1.0) ** swaps * np.prod(diagonal / np.abs(diagonal))
-    return solved, signs
 
 
 @dataclass(frozen=True)

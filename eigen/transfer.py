@@ -11,6 +11,7 @@ import scipy.sparse.linalg as spla
 
 from .condensation import Workspace
 from .factorization import MumpsFactorization, SingularShiftError, StructureMatrices
+from .mass_basis import outside
 from .pencil import FLUID_PARTS, CoupledPencil
 from .relaxation import Relaxation
 
@@ -102,17 +103,9 @@ class TransferBasis:
 
     def _extend(self, X, compression: float = 1e-10):
         """M-orthonormalise X against V and keep the directions that matter."""
-        size = np.sqrt(np.einsum("ij,ij->j", X, self._M @ X))
-        X = X[:, size > 0] / size[size > 0]
-        scale = 1.0
-        for _sweep in range(2):
-            X = X - self.V @ (self.V.T @ (self._M @ X))
-            gram = X.T @ (self._M @ X)
-            weight, turn = np.linalg.eigh(0.5 * (gram + gram.T))
-            keep = weight > max(compression**2, 1e-15) * scale
-            X = (X @ turn[:, keep]) / np.sqrt(weight[keep])
+        X = outside(self.V, self._M, X, compression)
         room = self.V.shape[0] - self.V.shape[1]
-        self.V = np.hstack([self.V, X[:, ::-1][:, :room]])
+        self.V = np.hstack([self.V, X[:, :room]])
         self._projected.clear()
         self._structure = (None, None, None, None), None
         self._reduced_G = self.V.T @ self._G

@@ -76,6 +76,26 @@ def straight_beam(element: str, shape: str, nx: int = 6, ny: int = 1, load: int 
     return tip / {1: 0.1081, 2: 0.4321}[load]
 
 
+def bending_energy(element: str, lean: tuple[float, float]) -> float:
+    """Energy of one element 1 x 0.2, its sides leaning by x over y, bent to a circle in its plane at its nodes, over
+    that of beam theory.
+    """
+    width, e, nu, h = 0.2, 1e7, 0.3, 0.1
+
+    def place(u, v):
+        y = width * (v - 0.5)
+        return u + (lean[0] * (1 - u) + lean[1] * u) * y, y, 0 * u
+
+    patch = grid(1, 1, place)
+    shell = build(patch, isotropic_section(e, nu, h), all_free(patch), element, h=h, material_axis=(1.0, 0, 0))
+    x, y = patch.nodes[:, 0], patch.nodes[:, 1]
+    bent = np.zeros((4, 5))
+    bent[:, 0], bent[:, 1] = x * y, -0.5 * (x**2 + nu * y**2)
+    q = shell.dofs.restrict(bent)
+    energy = 0.5 * q @ shell.dofs.matrix(shell.force_and_tangent(np.zeros(shell.size))[1]) @ q
+    return energy / (0.5 * e * h * width**3 / 12)
+
+
 def cook(element: str, n: int, angle: float = 0.0) -> float:
     """Tapered panel under an end shear: deflection of the loaded edge's middle; n even."""
 

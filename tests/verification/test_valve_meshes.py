@@ -76,7 +76,8 @@ def test_onset_and_flow_converge():
 
 def test_isotropic_valve():
     """Five lowest frequencies on 28 x 48 beside 13.49, 18.63, 23.96, 30.81, 39.70 Hz of other codes on 112 x 192:
-    within 0.6 %, of which 0.3 % is the mesh (56 x 96: 13.51, 18.66, 24.03, 30.85, 39.73).
+    within 0.6 %, of which 0.3 % is the mesh (56 x 96: 13.51, 18.66, 24.03, 30.85, 39.73; 112 x 192: 13.50, 18.65,
+    24.01, 30.83, 39.71, and with even rows and columns and the plain element 13.49, 18.64, 24.00, 30.82, 39.70).
     """
     own = frequencies(28, 48, 5 / 6, 5)
     print(f"\n28 x 48 {np.round(own, 3)}")
