@@ -3,7 +3,8 @@
 from .agreement import Certificate
 from .block_krylov import LargestPairs, NotConvergedError, largest_pairs
 from .certificate import CertifiedSpectrum, certified_spectrum, listed_unstable
-from .columns import Column, ColumnSolver
+from .column import Column
+from .columns import ColumnSolver
 from .condensation import Workspace
 from .coverage import CLEAR
 from .derivative import PencilDerivative, difference, eigenvalue_derivative

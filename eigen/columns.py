@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
-from .agreement import Certificate
+from .cell_counts import CellCounts, count_unstable, uncounted
 from .certificate import certified_spectrum
+from .column import DIRECT, REDUCED, TOLERANCE, Column
 from .condensation import Workspace
+from .distant import brought, joined
 from .factorization import SingularShiftError
 from .family import Condition, PencilFamily
-from .phase_count import phase_counts
 from .reduced import ReducedFamily
 from .reduction import FamilyReduction
+from .runaway import is_near
+from .runaway_cells import RunawayCells, corrected_cells
 from .search import leading_modes
 from .snapshots import between, spread
 from .static_solver import StaticSolver
-from .winding import unstable_count
 
-#: Estimated relative error of an eigenvalue above which a cell is treated directly.
-TOLERANCE = 1e-6
-#: Directions weaker than this are left out where two spaces are put together.
-JOINT = 3e-3
-#: How a cell was found.
-REDUCED, DIRECT, MISSING = 0, 1, 2
-#: Share of a band up to which eigenvalues are counted, clear of those at its end.
-INSIDE = 0.999
+#: Directions weaker than these are left out where two spaces are put together: at first, and where counts disagree.
+JOINT, CLOSE = 3e-3, 1e-5
 #: Leading eigenvalues kept of a cell.
 KEPT = 8
 #: Conditions at least at which they are taken where the loss factors differ.
@@ -36,82 +31,19 @@ LOSSES = 4
 MOST, MOST_IN_BAND = 4, 12
 
 
-@dataclass(frozen=True)
-class Column:
-    """Cells of one state.
-
-    Attributes
-    ----------
-    growth_rate, frequency : (cells,) arrays, 1/s, Hz
-        Of the leading mode; NaN if none was found.
-    second : (cells,) array, 1/s
-        Growth rate of the next mode.
-    unstable : (cells,) int array
-        Eigenvalues right of `line` up to `band`, conjugates counted apart, by the spectrum.
-    counted : (cells,) int array
-        The same by the argument principle; -1 where nobody asked.
-    certain : (cells,) bool array
-        That count followed the phase everywhere.
-    error : float
-        Largest estimated relative error of leading eigenvalues among the checked cells.
-    how : (cells,) int array
-        `REDUCED` or `DIRECT`.
-    line, band : (cells,) arrays, 1/s, Hz
-        Region counted.
-    eigenvalues : callable or None
-        From any condition at the same state to its leading eigenvalues on the small model, sorted by growth rate.
-    corrected : callable or None
-        From a condition and an eigenvalue of the small model to Newton's correction of it by the full matrices.
-    cell : callable or None
-        From any further condition at the same state to a column of this one cell.
-    leading : list of arrays
-        Leading eigenvalues of the cells.
-    """
-
-    growth_rate: np.ndarray
-    frequency: np.ndarray
-    second: np.ndarray
-    unstable: np.ndarray
-    counted: np.ndarray
-    certain: np.ndarray
-    error: float
-    how: np.ndarray
-    line: np.ndarray
-    band: np.ndarray
-    eigenvalues: Callable[[Condition], np.ndarray] | None = None
-    corrected: Callable[[Condition, complex], complex] | None = None
-    cell: Callable[[Condition], Column] | None = None
-    leading: list[np.ndarray] = field(default_factory=list)
-
-    @property
-    def certified(self) -> np.ndarray:
-        """Cells for which both counts agree and the leading eigenvalue is accurate."""
-        return np.array([self.certificate(i).agrees for i in range(len(self.unstable))], bool)
-
-    def certificate(self, cell: int) -> Certificate:
-        """What vouches for a cell."""
-        accurate = self.how[cell] == DIRECT or self.error <= TOLERANCE
-        known = bool(np.isfinite(self.growth_rate[cell]))
-        return Certificate(
-            int(self.unstable[cell]),
-            int(self.counted[cell]),
-            bool(self.certain[cell] and accurate and known),
-            float(self.line[cell]),
-            float(self.band[cell]),
-        )
-
-
 class ColumnSolver:
     """Solves families of one pattern after another."""
 
     def __init__(self):
-        self._static, self._stiffened, self._workspace = StaticSolver(), StaticSolver(), Workspace()
+        self._static, self._stiffened = StaticSolver(), StaticSolver()
+        self._workspace, self._structures = Workspace(), Workspace()
         self._last: FamilyReduction | None = None
+        self._counter: tuple[ReducedFamily, RunawayCells, ReducedFamily] | None = None
 
     def reduction(self, family: PencilFamily) -> FamilyReduction:
         """Small models of a family; the last one is kept."""
         if self._last is None or self._last.family is not family:
-            self._last = FamilyReduction(family, self._static, self._stiffened)
+            self._last = FamilyReduction(family, self._static, self._stiffened, self._structures)
         return self._last
 
     def solve(self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False) -> Column:
@@ -142,49 +74,80 @@ class ColumnSolver:
         losses = [c.loss for c in conditions]
         mixed = len(set(losses)) > 1
         least = max(snapshots, LOSSES) if mixed else snapshots
+        alone = reduction.runaways(conditions)
         # more vectors are far cheaper than every cell with the full pencil
         for number in (least, 2 * least + 1, 4 * least + 3):
             places = spread(conditions, number)
             banded = any(_is_banded(family, conditions[i]) for i in places)
             first = reduction.wide if banded else reduction.coarse
             fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
+            own = RunawayCells.beside(fine, alone)
             # vectors corrected in a few steps are worst where most relaxes
             checked = [*between(places), int(np.argmax(losses))] if mixed else between(places)
-            error = _error(reduction, fine, conditions, checked)
+            error = _error(reduction, own.modes, conditions, checked)
             if error <= TOLERANCE:
                 break
-        column = self._on(first, fine, conditions, error, edges)
+        own, far = corrected_cells(reduction, own, conditions, TOLERANCE)
+        error, fine = max(error, far), own.modes
+        column = self._on(first, own, conditions, error, edges)
 
         def eigenvalues(condition):
             condition = Condition(*condition)
             return family.reach(condition).leading(fine.eigenvalues([condition])[0])[:KEPT]
+
+        def nearest(condition, place):
+            return fine.nearest(Condition(*condition), place)
 
         def corrected(condition, eigenvalue):
             condition = Condition(*condition)
             return complex(reduction.correction(fine.near(condition, eigenvalue), condition)[0])
 
         def cell(condition):
-            return self._on(first, fine, [Condition(*condition)], error)
+            asked = [Condition(*condition)]
+            return self._on(first, replace(own, alone=reduction.runaways(asked)), asked, error)
 
-        return replace(column, eigenvalues=eigenvalues, corrected=corrected, cell=cell)
+        return replace(column, eigenvalues=eigenvalues, nearest=nearest, corrected=corrected, cell=cell)
 
-    def _on(self, first: ReducedFamily, fine: ReducedFamily, conditions, error: float, edges: bool = False) -> Column:
+    def _on(self, first: ReducedFamily, own: RunawayCells, conditions, error: float, edges: bool = False) -> Column:
         """Cells on a small model, counted on that of the first stage; those without a certificate directly."""
         family = first.family
-        values = fine.eigenvalues(conditions)
+        values, away = own.modes.eigenvalues(conditions), own.eigenvalues(conditions)
         leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
         counted = _beside_changes(leading) if edges else np.arange(len(conditions))
-        counts = _uncounted(family, conditions)
-        counter = first
-        if any(conditions[i].loss for i in counted) and error <= TOLERANCE:
-            # static responses alone say little of what relaxes; with the vectors that the list rests on they are enough
-            counter = ReducedFamily(family, fine.V, JOINT, base=first)
+        counts = uncounted(family, conditions)
+        hints = [np.concatenate(pair) for pair in zip(away, leading)]
+
+        def count(counter, cells, within_band=False):
+            asked = [conditions[i] for i in cells], [hints[i] for i in cells]
+            return count_unstable(counter, *asked, within_band=within_band)
+
+        joint = error <= TOLERANCE and any(conditions[i].loss for i in counted)
+        counter = self._joint(first, own) if joint else first
         if len(counted):
-            found = count_unstable(counter, [conditions[i] for i in counted], [leading[i] for i in counted])
-            counts.enter(counted, found)
-        column = _column(leading, values, counts, error)
+            counts.enter(counted, count(counter, counted))
+        column = _column(leading, away, values, counts, error)
         doubtful = counted[~column.certified[counted]]
-        return self._repaired(column, family, conditions, doubtful)
+        if len(doubtful) and joint and self._counter[1] is not own:
+            counts.enter(doubtful, count(self._joint(first, own, anew=True), doubtful))
+            doubtful = doubtful[~column.certified[doubtful]]
+        if len(doubtful) and joint:
+            # a mode that is all but neutral has to be met to a fraction of its growth rate; what else a finer space has
+            # are single elements by halves, far beyond the band
+            found = count(ReducedFamily(family, own.core, CLOSE, base=first), doubtful, within_band=True)
+            listed = [_listed(values[i], away[i], *region) for i, *region in zip(doubtful, found.line, found.band)]
+            agree = found.certain & (found.number == listed) & np.isfinite(column.growth_rate[doubtful])
+            counts.enter(doubtful[agree], found.select(agree))
+            column.unstable[doubtful[agree]] = np.array(listed)[agree]
+            doubtful = doubtful[~column.certified[doubtful]]
+        return self._repaired(column, family, conditions, doubtful, own)
+
+    def _joint(self, first: ReducedFamily, own: RunawayCells, anew: bool = False) -> ReducedFamily:
+        """Space of a count where stiffness relaxes: static responses alone say little of that; with the vectors that a
+        list rests on, of this column or of the one before at the same state, they are enough.
+        """
+        if anew or self._counter is None or self._counter[0] is not first:
+            self._counter = first, own, ReducedFamily(first.family, own.core, JOINT, base=first)
+        return self._counter[2]
 
     def direct(self, family: PencilFamily, condition, count: int = 6):
         """Leading modes of the full pencil, an `eigen.Spectrum`.
@@ -200,20 +163,38 @@ class ColumnSolver:
             return found
         return found.select(np.flatnonzero(family.reach(condition).is_mode(found.eigenvalues)))
 
+    def whole(self, family: PencilFamily, condition, count: int = 6):
+        """The same together with what of the structure runs away by itself.
+
+        Raises
+        ------
+        SingularShiftError
+            If no usable shift was found.
+        """
+        condition = Condition(*condition)
+        modes, alone = self.direct(family, condition, count), self.reduction(family).runaway(condition)
+        if not alone.rates.size:
+            return modes
+        pencil = family.pencil(condition)
+        starts = [(rate, motion, np.zeros(pencil.b)) for rate, motion in zip(alone.rates, alone.motions.T)]
+        found = brought(pencil, starts, modes, 0.0, family.search(condition), self._workspace)
+        return modes if found is None else joined(modes, found, 0.0)
+
     def _directly(self, reduction: FamilyReduction, conditions) -> Column:
         family, cells = reduction.family, len(conditions)
-        spectra = [self.direct(family, c) for c in conditions]
+        alone = reduction.runaways(conditions)
+        spectra = [self.whole(family, c) for c in conditions]
         banded = any(_is_banded(family, c) for c in conditions)
         first = reduction.wide if banded else reduction.coarse
         counts = count_unstable(first, conditions, [s.eigenvalues[:1] for s in spectra])
         column = _blank(cells, counts)
         for i, spectrum in enumerate(spectra):
-            _enter(column, i, spectrum)
-        return self._recounted(column, family, conditions, np.flatnonzero(~column.certified))
+            _enter(column, i, spectrum, alone[conditions[i].damping].rates)
+        return self._recounted(column, family, conditions, np.flatnonzero(~column.certified), alone)
 
     def _uncoupled(self, family: PencilFamily, conditions) -> Column:
         """A structure that nothing couples: its full spectra and counts, each once for every damping."""
-        column, known = _blank(len(conditions), _uncounted(family, conditions)), {}
+        column, known = _blank(len(conditions), uncounted(family, conditions)), {}
         for i, condition in enumerate(conditions):
             key = condition.alpha, condition.beta, condition.loss
             if key not in known:
@@ -223,21 +204,23 @@ class ColumnSolver:
             modes = found.spectrum
             if condition.loss:
                 modes = modes.select(np.flatnonzero(family.reach(condition).is_mode(modes.eigenvalues)))
-            _enter(column, i, modes)
+            real = modes.eigenvalues[(modes.eigenvalues.imag == 0) & (modes.eigenvalues.real > 0)].real
+            _enter(column, i, modes, real if condition.loss else real[:0])
             _vouch(column, i, found.certificate)
         return column
 
-    def _repaired(self, column: Column, family, conditions, cells) -> Column:
+    def _repaired(self, column: Column, family, conditions, cells, own: RunawayCells) -> Column:
         for i in cells:
             try:
-                spectrum = self.direct(family, conditions[i])
+                spectrum = self.whole(family, conditions[i])
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue  # stays without a certificate
             if len(spectrum):
-                _enter(column, i, spectrum)
-        return self._recounted(column, family, conditions, [i for i in cells if not column.certificate(i).agrees])
+                _enter(column, i, spectrum, own.alone[conditions[i].damping].rates)
+        open_cells = [i for i in cells if not column.certificate(i).agrees]
+        return self._recounted(column, family, conditions, open_cells, own.alone)
 
-    def _recounted(self, column: Column, family, conditions, cells) -> Column:
+    def _recounted(self, column: Column, family, conditions, cells, alone) -> Column:
         """Cells that still lack agreement, with a count of their own on a basis of structural modes, made finer as far
         as it takes.
         """
@@ -248,22 +231,9 @@ class ColumnSolver:
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue
             if len(found.spectrum):
-                _enter(column, i, found.spectrum)
+                _enter(column, i, found.spectrum, alone[conditions[i].damping].rates)
                 _vouch(column, i, found.certificate)
         return column
-
-
-@dataclass(frozen=True)
-class _Counts:
-    number: np.ndarray
-    certain: np.ndarray
-    line: np.ndarray
-    band: np.ndarray
-
-    def enter(self, cells: np.ndarray, found: _Counts) -> None:
-        """Put counts of some cells in."""
-        for own, other in zip(vars(self).values(), vars(found).values()):
-            own[cells] = other
 
 
 def _is_banded(family: PencilFamily, condition: Condition) -> bool:
@@ -271,63 +241,11 @@ def _is_banded(family: PencilFamily, condition: Condition) -> bool:
     return condition.loss == 0 and np.isfinite(family.reach(condition).band)
 
 
-def _counted_band(family: PencilFamily, condition: Condition) -> float:
-    """Angular frequency up to which eigenvalues are counted: all where the stiffness relaxes, which damps all."""
-    return family.reach(condition).band if family.relaxation(condition.loss) is None else np.inf
-
-
-def _uncounted(family: PencilFamily, conditions) -> _Counts:
-    """What is known before anything is counted."""
-    cells = len(conditions)
-    bands = np.array([_counted_band(family, c) for c in conditions])
-    band = np.where(np.isinf(bands), np.inf, INSIDE * bands / (2 * np.pi))
-    return _Counts(np.full(cells, -1), np.zeros(cells, bool), np.zeros(cells), band)
-
-
 def _beside_changes(leading) -> np.ndarray:
     """Cells whose neighbour has another number of unstable eigenvalues."""
     number = np.array([int((row.real > 0).sum()) for row in leading])
     change = np.flatnonzero(np.diff(number))
     return np.unique(np.concatenate([change, change + 1]))
-
-
-def count_unstable(reduced: ReducedFamily, conditions, hints) -> _Counts:
-    """Count unstable eigenvalues at many conditions, each in its band.
-
-    Parameters
-    ----------
-    reduced : ReducedFamily
-    conditions : sequence of Condition
-    hints : sequence of complex arrays
-        For each condition, places near which the phase may turn fast.
-    """
-    cells = len(conditions)
-    counts = _Counts(np.zeros(cells, int), np.zeros(cells, bool), np.zeros(cells), np.full(cells, np.inf))
-    bands = np.array([_counted_band(reduced.family, c) for c in conditions])
-    damped = np.array([any(c.damping) for c in conditions])
-    whole = np.flatnonzero(np.isinf(bands) & damped)
-    if whole.size:
-        beside = [_beside(hints[i], conditions[i]) for i in whole]
-        found = phase_counts(reduced, [conditions[i] for i in whole], beside)
-        counts.number[whole], counts.certain[whole] = found.number, found.certain
-    for i in np.setdiff1d(np.arange(cells), whole):
-        band = None if np.isinf(bands[i]) else INSIDE * bands[i] / (2 * np.pi)
-        found = unstable_count(reduced.pencil(conditions[i]), scale=_scale(reduced), hints=list(hints[i]), band=band)
-        counts.number[i], counts.certain[i] = found.number, found.certain
-        counts.line[i], counts.band[i] = found.line, found.band
-    return counts
-
-
-def _beside(hints, condition: Condition):
-    """Those hints that a count looks beside: the leading ones, and all unstable ones where they cost nothing else."""
-    number = 2 if condition.loss == 0 else max(2, int((np.asarray(hints).real > 0).sum()) + 1)
-    return hints[:number]
-
-
-def _scale(reduced: ReducedFamily) -> float:
-    """Lowest angular frequency of the structure, rad/s."""
-    square = np.linalg.eigvalsh(0.5 * (reduced.K + reduced.K.T))
-    return float(np.sqrt(square[square > 0].min(initial=np.inf))) if (square > 0).any() else 1.0
 
 
 def _error(reduction: FamilyReduction, fine: ReducedFamily, conditions, places) -> float:
@@ -343,15 +261,17 @@ def _error(reduction: FamilyReduction, fine: ReducedFamily, conditions, places) 
     return worst
 
 
-def _enter(column: Column, cell: int, spectrum) -> None:
-    """Put a direct spectrum into a cell."""
+def _enter(column: Column, cell: int, spectrum, rates: np.ndarray) -> None:
+    """Put a direct spectrum into a cell; `rates` are those at which the structure runs away by itself."""
     column.how[cell] = DIRECT
     if not len(spectrum):
         return
     column.growth_rate[cell], column.frequency[cell] = spectrum.growth_rate[0], spectrum.frequency[0]
     column.second[cell] = spectrum.growth_rate[1] if len(spectrum) > 1 else np.nan
     inside = np.flatnonzero(spectrum.frequency <= column.band[cell])
-    column.leading[cell] = spectrum.eigenvalues[:KEPT]
+    away = is_near(spectrum.eigenvalues, rates)
+    column.leading[cell] = spectrum.eigenvalues[~away][:KEPT]
+    column.runaway[cell] = _conjugates(spectrum.eigenvalues[away])
     column.unstable[cell] = spectrum.select(inside).count_right_of(column.line[cell])
 
 
@@ -361,10 +281,11 @@ def _vouch(column: Column, cell: int, own) -> None:
     column.line[cell], column.band[cell] = own.line, own.band
 
 
-def _blank(cells: int, counts: _Counts) -> Column:
+def _blank(cells: int, counts: CellCounts) -> Column:
     nothing = [np.full(cells, np.nan) for _ in range(3)]
     return Column(
         *nothing,
+        np.zeros(cells, int),
         np.zeros(cells, int),
         counts.number,
         counts.certain,
@@ -376,14 +297,25 @@ def _blank(cells: int, counts: _Counts) -> Column:
     )
 
 
-def _column(leading, values, counts: _Counts, error: float) -> Column:
-    inside = np.abs(values.imag) <= 2 * np.pi * counts.band[:, None]
-    first = [row[0] if len(row) else complex(np.nan, np.nan) for row in leading]
+def _conjugates(values: np.ndarray) -> int:
+    """Number of eigenvalues of which a conjugate pair is given once."""
+    return int(values.size + np.sum(values.imag > 0))
+
+
+def _listed(values: np.ndarray, away: np.ndarray, line: float, band: float) -> int:
+    """Number of unstable eigenvalues of a cell: all others, and one of each pair of what runs away."""
+    return int(((values.real > line) & (np.abs(values.imag) <= 2 * np.pi * band)).sum()) + _conjugates(away)
+
+
+def _column(leading, away, values, counts: CellCounts, error: float) -> Column:
+    rows = [np.concatenate(pair) for pair in zip(away, leading)]
+    first = [row[0] if len(row) else complex(np.nan, np.nan) for row in rows]
     return Column(
         growth_rate=np.array([value.real for value in first]),
         frequency=np.array([value.imag / (2 * np.pi) for value in first]),
-        second=np.array([row[1].real if len(row) > 1 else np.nan for row in leading]),
-        unstable=((values.real > counts.line[:, None]) & inside).sum(axis=1),
+        second=np.array([row[1].real if len(row) > 1 else np.nan for row in rows]),
+        unstable=np.array([_listed(*row) for row in zip(values, away, counts.line, counts.band)]),
+        runaway=np.array([_conjugates(row) for row in away]),
         counted=counts.number,
         certain=counts.certain,
         error=error,

@@ -57,12 +57,21 @@ def distant_pairs(
     chosen = list(unstable[values.imag[unstable] == 0][:MOST_REAL])
     if options.max_frequency is None:
         chosen += list(unstable[values.imag[unstable] > 2 * np.pi * spectrum.band][:MOST])
-    workspace, pairs = Workspace(), []
-    for i in chosen:
-        start = values[i], basis.lift(q[:, i]), u[:, i]
+    starts = [(values[i], basis.lift(q[:, i]), u[:, i]) for i in chosen]
+    return brought(pencil, starts, spectrum, line, options, Workspace())
+
+
+def brought(
+    pencil: CoupledPencil, starts, spectrum: Spectrum, line: float, options: SearchOptions, workspace: Workspace
+) -> Found | None:
+    """Unstable pairs of a pencil near places to start from, each an eigenvalue, structural part and inner unknowns,
+    that a spectrum does not list; None where there is none.
+    """
+    pairs = []
+    for start in starts:
         pair = newton(pencil, *start, workspace=workspace, tolerance=options.tolerance, steps=STEPS)
         value, _, _, residual, backward = pair
-        near = abs(value - values[i]) <= MOVED * abs(values[i])
+        near = abs(value - start[0]) <= MOVED * abs(start[0])
         known = [abs(value - x) <= SAME * abs(x) for x in (*spectrum.eigenvalues, *(other[0] for other in pairs))]
         if near and value.real > line and acceptable(residual, backward, options.tolerance) and not any(known):
             pairs.append(pair)

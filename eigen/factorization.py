@@ -9,6 +9,7 @@ real MUMPS refactorisation, the equivalent real form of twice the size 6 times.
 from __future__ import annotations
 
 import weakref
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,7 +32,10 @@ class StructureMatrices:
     Attributes
     ----------
     indptr, indices : ndarray of int32
-        The union pattern in compressed rows.
+        The union pattern in compressed rows, made symmetric.
+    data : (parts, entries) array
+        M, C, K and what relaxes on it.
+    relaxation : Relaxation or None
     """
 
     def __init__(self, pencil: CoupledPencil):
@@ -39,11 +43,10 @@ class StructureMatrices:
         self._sources = None
         self.shape = pencil.M.shape
         pattern = sum(sp.csr_matrix((np.ones(p.nnz), p.indices, p.indptr), p.shape) for p in parts)
-        pattern = (pattern + sp.identity(pencil.n, format="csr")).tocsr()
+        pattern = (pattern + pattern.T + sp.identity(pencil.n, format="csr")).tocsr()
         pattern.sort_indices()
         self.indptr = pattern.indptr.astype(np.int32)
         self.indices = pattern.indices.astype(np.int32)
-        self._transpose = None
         self.load(pencil)
 
     def fits(self, pencil: CoupledPencil) -> bool:
@@ -70,7 +73,7 @@ class StructureMatrices:
     def load(self, pencil: CoupledPencil) -> None:
         """Take the numbers of a pencil whose entries lie on the common pattern."""
         parts = _parts(pencil)
-        self._relaxation = pencil.relaxation
+        self.relaxation = pencil.relaxation
         if not self.fits(pencil):
             keys = _keys(self.indptr, self.indices, self.shape[1])
             self._places = [np.searchsorted(keys, _keys(p.indptr, p.indices, self.shape[1])) for p in parts]
@@ -83,8 +86,8 @@ class StructureMatrices:
         """Entries of s^2 M + s C + K + sum phi_g(s) K_g on the common pattern; real for a real s."""
         s = _real_if_real(s)
         values = s * s * self.data[0] + s * self.data[1] + self.data[2]
-        if self._relaxation is not None:
-            values = values + self._relaxation.factors(s) @ self.data[3:]
+        if self.relaxation is not None:
+            values = values + self.relaxation.factors(s) @ self.data[3:]
         return values
 
     def combine(self, m: complex, c: complex, k: complex) -> sp.csr_matrix:
@@ -94,13 +97,23 @@ class StructureMatrices:
 
     def columns(self, values: np.ndarray) -> sp.csc_matrix:
         """Entries on the common pattern as compressed columns."""
-        if self._transpose is None:
-            order = sp.csr_matrix(
-                (np.arange(self.indices.size, dtype=float), self.indices, self.indptr), self.shape
-            ).tocsc()
-            self._transpose = (order.indptr, order.indices, order.data.astype(np.int64))
         indptr, indices, order = self._transpose
         return sp.csc_matrix((values[order], indices, indptr), self.shape)
+
+    @cached_property
+    def _transpose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        places = np.arange(self.indices.size, dtype=float)
+        order = sp.csr_matrix((places, self.indices, self.indptr), self.shape).tocsc()
+        return order.indptr, order.indices, order.data.astype(np.int64)
+
+    @cached_property
+    def upper(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Places of the upper half of the pattern and of its mirror image, and that half in compressed rows."""
+        rows = np.repeat(np.arange(self.shape[0]), np.diff(self.indptr))
+        places = np.flatnonzero(rows <= self.indices)
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(rows[places], minlength=self.shape[0]))])
+        # in compressed columns a symmetric pattern has its rows again
+        return places, self._transpose[2][places], indptr.astype(np.int32), self.indices[places]
 
 
 class MumpsFactorization:
@@ -306,54 +319,6 @@ def superlu(matrix: sp.csc_matrix) -> ScaledLU:
         If a pivot is exactly zero.
     """
     return ScaledLU(sp.csc_matrix(matrix))
-
-
-class SymmetricLU:
-    """SuperLU of a symmetric matrix with pivots from the diagonal only: their signs are its inertia (Sylvester).
-
-    Raises
-    ------
-    SingularShiftError
-        If a pivot is zero, or had to be taken from elsewhere.
-    """
-
-    def __init__(self, matrix: sp.spmatrix):
-        matrix = sp.csc_matrix(matrix)
-        size = np.abs(matrix.diagonal())
-        self._scale = 1.0 / np.sqrt(np.where(size > 0, size, 1.0))
-        scale = sp.diags(self._scale)
-        try:
-            self._lu = spla.splu(
-                (scale @ matrix @ scale).tocsc(),
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
-        except RuntimeError as error:
-            raise SingularShiftError(f"SuperLU could not factor the matrix ({error}).") from error
-        if not np.array_equal(self._lu.perm_r, self._lu.perm_c):
-            raise SingularShiftError("A pivot of the symmetric matrix is zero.")
-        #: Pivots of the matrix scaled to a diagonal of ones.
-        self.pivots = self._lu.U.diagonal()
-
-    @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues."""
-        return int(np.sum(self.pivots < 0))
-
-    def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solution for one right-hand side, shape (n,)."""
-        return self._scale * self._lu.solve(self._scale * b)
-
-
-def is_positive_definite(matrix: sp.spmatrix) -> bool:
-    """Whether a symmetric sparse matrix is positive definite, by its pivots."""
-    if (matrix.diagonal() <= 0).any():
-        return False
-    try:
-        return bool((SymmetricLU(matrix).pivots > 1e-13).all())
-    except SingularShiftError:
-        return False
 
 
 def petsc_is_complex() -> bool:

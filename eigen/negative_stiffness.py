@@ -16,17 +16,20 @@ mean of the partial sums K + N_1 + ... + N_j: where all of these are positive de
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
+import scipy.linalg as la
 import scipy.sparse.linalg as spla
 
-from .factorization import SymmetricLU
+from .factorization import StructureMatrices
+from .inertia import SymmetricStructure
 from .mass_basis import orthonormal
 from .pencil import CoupledPencil
 
 #: Motions kept of one stiffness at most, those of the most negative.
 MOST = 40
-#: Accuracy of their squares.
-TOLERANCE = 1e-4
+#: Accuracies of them, one after another until their space has as many negative motions as the stiffness.
+TOLERANCES = (1e-2, 1e-4, 1e-8)
+#: Unknowns up to which all motions are computed.
+DENSE = 100
 #: Places on the real axis, per decade, where the motions kept are looked at.
 PER_DECADE = 40
 #: Length in the mass below which a motion has nothing that others lack.
@@ -60,96 +63,105 @@ def negative_motions(pencil: CoupledPencil) -> np.ndarray:
     """
     if pencil.relaxation is None:
         return np.zeros((pencil.n, 0))
-    structure = _Structure(pencil)
-    found = [_lowest(stiffness, structure.mass) for stiffness in structure.partial_sums()]
-    motions = np.hstack([motions for _, motions in found])
-    if not motions.shape[1]:
-        return motions
-    fastest = float(np.sqrt(-min(squares.min(initial=0.0) for squares, _ in found)))
-    return _completed(structure, motions, fastest)
+    return motions_of(SymmetricStructure(StructureMatrices(pencil)))
 
 
-class _Structure:
-    """Symmetric parts of a structure that relaxes."""
+def motions_of(structure: SymmetricStructure, rough: bool = False) -> np.ndarray:
+    """The same of a structure that relaxes; of a rough space only the number of negative motions is right where they
+    look weakest.
+    """
+    search = _Search(structure)
+    motions = np.hstack([search.lowest(weights) for weights in partial_sums(structure)])
+    return _completed(search, motions, rough) if motions.shape[1] else motions
 
-    def __init__(self, pencil: CoupledPencil):
-        self.relaxation = pencil.relaxation
-        self.mass, self.damping, self.slow, *self.parts = (
-            ((part + part.T) * 0.5).tocsc() for part in (pencil.M, pencil.C, pencil.K, *pencil.relaxing)
+
+def partial_sums(structure: SymmetricStructure) -> list[np.ndarray]:
+    """Weights of K, K + N_1, K + N_1 + N_2, ..., slowest branch first."""
+    relaxation = structure.relaxation
+    sums = np.cumsum(relaxation.strengths[:, np.argsort(-relaxation.times)], axis=1).T
+    return [structure.stiffness(factors) for factors in (np.zeros(len(relaxation.matrices)), *sums)]
+
+
+class _Search:
+    """Negative motions of sums, found relative to a positive one."""
+
+    def __init__(self, structure: SymmetricStructure):
+        self.structure, self._added = structure, 0.0
+        self.mass, self._slow = np.eye(len(structure.at(0.0)))[[0, 2]]
+
+    def negative(self, weights: np.ndarray) -> int:
+        """Number of negative eigenvalues of a sum."""
+        with self.structure.factored(weights) as factor:
+            return factor.negative
+
+    def lowest(self, weights: np.ndarray, known: int = 0) -> np.ndarray:
+        """Motions (n, k) in which a sum is negative, the lowest ones; k = 0 where there are no more than are known."""
+        structure = self.structure
+        n = structure.size
+        number = self.negative(weights)
+        if number <= known:
+            return np.zeros((n, 0))
+        if n <= DENSE:
+            full, mass = (structure.times(w, np.eye(n)) for w in (weights, self.mass))
+            return la.eigh(full, mass, subset_by_index=(0, min(number, MOST) - 1))[1]
+        number = min(number, MOST, n - 1)
+        positive, factor = self._positive(weights)
+        product, other, inverse = (
+            spla.LinearOperator((n, n), matvec=lambda x, act=act: act(np.ravel(x)))
+            for act in (structure.acting(weights), structure.acting(positive), factor.solve)
         )
+        start = np.random.default_rng(5).standard_normal(n)
+        with factor:
+            for tolerance in TOLERANCES:
+                size = min(n, max(2 * number + 1, 10))
+                _, motions = spla.eigsh(
+                    product, number, other, Minv=inverse, which="SA", v0=start, tol=tolerance, ncv=size
+                )
+                if (np.linalg.eigvalsh(motions.T @ structure.times(weights, motions)) < 0).all():
+                    break
+        return motions
 
-    def partial_sums(self) -> list[sp.csc_matrix]:
-        """K, K + N_1, K + N_1 + N_2, ..., slowest branch first."""
-        order = np.argsort(-self.relaxation.times)
-        sums = np.cumsum(self.relaxation.strengths[:, order], axis=1).T
-        return [self.slow, *(self._with(factors) for factors in sums)]
+    def _positive(self, weights: np.ndarray):
+        """A positive sum close to one that is not, and its factor: inertia and damping of that one, the slow stiffness,
+        and inertia as much as it takes beyond.
+        """
+        positive = self._slow.copy()
+        positive[:2] = weights[:2]
+        while True:
+            factor = self.structure.factored(positive + self._added * self.mass)
+            if not factor.negative:
+                return positive + self._added * self.mass, factor
+            with factor:
+                diagonal = (abs(self.structure.upper(w).diagonal()) for w in (positive, self.mass))
+                self._added = 8.0 * self._added or 1e-6 * float(np.divide(*(np.median(d) for d in diagonal)))
 
-    def stiffness(self, s: float) -> sp.csc_matrix:
-        """D(s) - s^2 M."""
-        return self._with(self.relaxation.factors(s)) + s * self.damping
 
-    def _with(self, factors) -> sp.csc_matrix:
-        return self.slow + sum(x * part for x, part in zip(factors, self.parts))
-
-
-def _completed(structure: _Structure, motions: np.ndarray, fastest: float) -> np.ndarray:
+def _completed(search: _Search, motions: np.ndarray, rough: bool) -> np.ndarray:
     """Motions of unit mass, with those that D has where the ones given look weakest."""
-    slowest = 1e-3 / structure.relaxation.times.max()
-    places = np.geomspace(slowest, fastest, max(20, int(PER_DECADE * np.log10(fastest / slowest))))
+    structure, mass = search.structure, search.structure.full(search.mass)
     weakest = np.inf
     for _ in range(ROUNDS):
-        motions = orthonormal(structure.mass, motions, SAME)[0]
-        size = _weakness(structure, motions, places)
-        at = int(np.argmin(size))
-        if size[at] > weakest - SETTLED * abs(weakest):
+        motions = orthonormal(mass, motions, SAME)[0]
+        on_space = structure.on_space(motions)
+        places = places_of(structure, on_space)
+        squares = np.array([np.linalg.eigvalsh(np.tensordot(structure.at(s), on_space, 1)) / s**2 for s in places])
+        at = int(np.argmin(squares[:, 0]))
+        if squares[at, 0] > weakest - SETTLED * abs(weakest):
             break
-        weakest = size[at]
-        _, further = _lowest(structure.stiffness(places[at]), structure.mass)
-        motions = np.hstack([motions, further])
-    return orthonormal(structure.mass, motions, SAME)[0]
+        weakest = squares[at, 0]
+        known = int((squares[at] < 0).sum()) if rough else 0
+        motions = np.hstack([motions, search.lowest(structure.at(places[at]), known)])
+    return orthonormal(mass, motions, SAME)[0]
 
 
-def _weakness(structure: _Structure, motions: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Lowest eigenvalue of D(s)/s^2 on a space, at each place."""
-    slow, damping, *parts = (
-        motions.T @ (part @ motions) for part in (structure.slow, structure.damping, *structure.parts)
-    )
-    found = []
-    for s in places:
-        on_space = slow + s * damping + sum(x * part for x, part in zip(structure.relaxation.factors(s), parts))
-        found.append(1.0 + np.linalg.eigvalsh(on_space)[0] / s**2)
-    return np.array(found)
+def places_of(structure: SymmetricStructure, on_space: np.ndarray) -> np.ndarray:
+    """Places on the real axis between which the motions of a space may run away."""
+    lowest = min(_lowest_on(on_space, weights) for weights in partial_sums(structure))
+    slowest = 1e-3 / structure.relaxation.times.max()
+    fastest = 1.1 * max(float(np.sqrt(max(-lowest, 0.0))), 2.0 * slowest)
+    return np.geomspace(slowest, fastest, max(20, int(PER_DECADE * np.log10(fastest / slowest))))
 
 
-def _lowest(stiffness: sp.csc_matrix, mass: sp.csc_matrix) -> tuple[np.ndarray, np.ndarray]:
-    """Negative squares of a stiffness, the lowest ones, and their motions (n, k); k = 0 where it is positive."""
-    number = SymmetricLU(stiffness).negative
-    n = stiffness.shape[0]
-    if not number:
-        return np.zeros(0), np.zeros((n, 0))
-    shift, factor = _below(stiffness, mass)
-    number = min(number, MOST, n - 1)
-    inverse = spla.LinearOperator((n, n), matvec=lambda x: factor.solve(np.ravel(x)))
-    start = np.random.default_rng(5).standard_normal(n)
-    return spla.eigsh(stiffness, number, mass, sigma=shift, OPinv=inverse, v0=start, tol=TOLERANCE)
-
-
-def _below(stiffness, mass) -> tuple[float, SymmetricLU]:
-    """A place a little below all squares, and the stiffness shifted there, factored."""
-    high = 1e-6 * float(np.median(np.abs(stiffness.diagonal())) / np.median(mass.diagonal()))
-    factor = SymmetricLU(stiffness + high * mass)
-    step = 8.0 if factor.negative else 0.125
-    while step > 1.0 and factor.negative:
-        high *= step
-        factor = SymmetricLU(stiffness + high * mass)
-    while step < 1.0:
-        trial = SymmetricLU(stiffness + step * high * mass)
-        if trial.negative:
-            break
-        high, factor = step * high, trial
-    for _ in range(2):
-        trial = SymmetricLU(stiffness + 0.5 * high * mass)
-        if trial.negative:
-            break
-        high, factor = 0.5 * high, trial
-    return -high, factor
+def _lowest_on(on_space: np.ndarray, weights: np.ndarray) -> float:
+    """Lowest eigenvalue of a sum on a space."""
+    return float(np.linalg.eigvalsh(np.tensordot(weights, on_space, 1))[0])

@@ -20,13 +20,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from .pencil import fluid_zeros, stable_fluid
-from .reduced import POWERS, ReducedFamily
+from .reduced import ReducedFamily
 from .structure_response import NEAR, RelaxingResponse, Response, response
 
 #: Largest accepted step of the phase between neighbours, rad.
 LARGEST_STEP = np.pi / 3
 #: Determinants evaluated at once, so that they stay in the processor's cache.
 CHUNK = 96
+#: Share of its distance from the axis by which a place beside an eigenvalue may be moved, so that cells share it.
+PLAY = 0.6
 #: Distance of the last phase from its limit that calls for higher frequencies, rad.
 LATE = 0.1
 #: Distance from a whole number up to which a count is certain.
@@ -94,7 +96,10 @@ class _Walk:
         self.points = 0
         self._cut = [False] * len(conditions)
         self._laden = [_turning(reduced.laden_frequencies(c), c) for c in conditions]
-        self._same = len({id(p) for p in self._parts}) == 1
+        kinds = list({id(p): p for p in self._parts}.values())
+        self._bordered = [self._together(p) for p in kinds]
+        self._which = np.array([next(k for k, p in enumerate(kinds) if p is own) for own in self._parts])
+        self._same = len(kinds) == 1
 
     def _condensed(self, parts):
         P, Q = self.response.P, self.response.Q
@@ -106,6 +111,16 @@ class _Walk:
                 made[name] = value @ P if name[0] in "AR" else value
             self._known[key] = parts, made  # an object that lives on keeps its id
         return self._known[key][1]
+
+    def _together(self, parts) -> np.ndarray:
+        """[-A, -B; R, S] of the powers of z, (3, r + b, r + b)."""
+        r, b = parts["A0"].shape[0], self.inner
+        out = np.zeros((3, r + b, r + b))
+        for power in range(3):
+            out[power, :r, :r], out[power, r:, :r] = -parts[f"A{power}"], parts[f"R{power}"]
+            if power < 2:
+                out[power, :r, r:], out[power, r:, r:] = -parts[f"B{power}"], parts[f"S{power}"]
+        return out
 
     def _angles(self, cells: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Phase of d(i omega), for pairs of a cell and a frequency."""
@@ -121,25 +136,17 @@ class _Walk:
     def _chunk(self, cells, omega, inverse) -> np.ndarray:
         """Phase of det [h^-1 - A, -B; R, S]."""
         r, b = inverse.shape[1], self.inner
-        z = (1j * omega * self.root[cells])[:, None, None]
-        parts = (
-            self._parts[0] if self._same else {name: np.stack([self._parts[i][name] for i in cells]) for name in POWERS}
-        )
-        A = z * parts["A2"]
-        A += parts["A1"]
-        A *= z
-        A += parts["A0"]
-        np.subtract(inverse, A, out=A)
-        if b:
-            matrix = np.empty((len(omega), r + b, r + b), complex)
-            matrix[:, :r, :r] = A
-            matrix[:, :r, r:] = -(parts["B0"] + z * parts["B1"])
-            matrix[:, r:, :r] = parts["R0"] + z * (parts["R1"] + z * parts["R2"])
-            matrix[:, r:, r:] = parts["S0"] + z * parts["S1"]
-            A = matrix
-        angle = np.angle(np.linalg.slogdet(A)[0])
+        z = 1j * omega * self.root[cells]
+        powers = np.stack([np.ones_like(z), z, z * z], axis=1).view(float).reshape(-1, 3, 2)
+        matrix = np.empty((len(omega), r + b, r + b), complex)
+        for which in np.unique(self._which[cells]):
+            mine = slice(None) if self._same else self._which[cells] == which
+            flat = self._bordered[which].reshape(3, -1).T
+            matrix[mine] = np.matmul(flat, powers[mine]).view(complex).reshape(-1, r + b, r + b)
+        matrix[:, :r, :r] += inverse
+        angle = np.angle(np.linalg.slogdet(matrix)[0])
         if b > 1:
-            angle -= np.array([np.angle(at - self._fluid[i]).sum() for i, at in zip(cells, z[:, 0, 0])])
+            angle -= np.array([np.angle(at - self._fluid[i]).sum() for i, at in zip(cells, z)])
         return angle
 
     def _add(self, cells, omega):
@@ -162,7 +169,7 @@ class _Walk:
             for value in [*np.asarray(hint, complex), *self._own_zeros(i)]:
                 width, middle = max(abs(value.real), 1e-6 * abs(value)), abs(value.imag)
                 own += [
-                    _shared(middle + f * width, 0.3 * width)
+                    _shared(middle + f * width, PLAY * width)
                     for f in (-1.0, 0.0, 1.0)
                     if middle + f * width > 0.3 * width
                 ]

@@ -96,9 +96,9 @@ class RationalCells:
             mine = self.law[cells] == law
             flat = self.bases[law].reshape(weights.shape[1], -1)
             if np.iscomplexobj(weights):
-                # one product of real matrices, whose rows are real and imaginary parts in turn
-                both = np.ascontiguousarray(weights[mine].T).view(float).T @ flat
-                out[mine] = (both[0::2] + 1j * both[1::2]).reshape(-1, n, n)
+                # one product of real matrices, whose columns are real and imaginary parts
+                both = np.ascontiguousarray(weights[mine]).view(float).reshape(-1, weights.shape[1], 2)
+                out[mine] = np.matmul(flat.T, both).view(complex).reshape(-1, n, n)
             else:
                 out[mine] = (weights[mine] @ flat).reshape(-1, n, n)
         return out

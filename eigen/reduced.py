@@ -7,6 +7,8 @@ what is rational then.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,34 +49,61 @@ class ReducedFamily:
     base : ReducedFamily, optional
         Of the same family: its space is kept as it is, and made wider by what `space` has outside it; directions below
         `compression` of a vector's length are left out then.
+    rates : mapping, optional
+        From a damping to the rates, 1/s, at which the structure runs away by itself then, in motions that are the space
+        of the base.
     """
 
     def __init__(
-        self, family: PencilFamily, space: np.ndarray, compression: float = 1e-9, base: ReducedFamily | None = None
+        self,
+        family: PencilFamily,
+        space: np.ndarray,
+        compression: float = 1e-9,
+        base: ReducedFamily | None = None,
+        rates: Mapping[tuple[float, float, float], np.ndarray] | None = None,
     ):
-        self.family, self._base = family, base
+        self.family, self._base, self._rates = family, base, rates
         if base is None:
             self._own, _ = orthonormal(family.mass, space, compression)
             self.V = self._own
         else:
             self._own = outside(base.V, family.mass, space, compression)
             self.V = np.hstack([base.V, self._own])
-        known = (None, None, None) if base is None else (base.K, base.D, base.M)
-        self.K, self.D, self.M = map(self._projected, (family.stiffness, family.damping, family.mass), known)
+        self._images: dict[object, np.ndarray] = {}
+        self.K = self._projected("K", family.stiffness, None if base is None else base.K)
+        self.D = self._projected("D", family.damping, None if base is None else base.D)
+        self.M = self._projected("M", family.mass, None if base is None else base.M)
         self.G = family.forces.T.dot(self.V).T
         self.J = family.slope @ self.V
         self._coupled: dict[object, dict[str, np.ndarray]] = {}
         #: What `eigen.phase_count` keeps of the structure's response, by damping.
         self.responses: dict[tuple, object] = {}
 
-    def _projected(self, matrix, known: np.ndarray | None) -> np.ndarray:
-        """V^T A V, of which the part on the base may be known."""
+    def _projected(self, name, matrix, known: np.ndarray | None) -> np.ndarray:
+        """V^T A V, of which the part on the base may be known, and A V of the base under a name."""
         image = matrix @ self._own
         if known is None:
+            self._images[name] = image
             return self._own.T @ image
-        first = self._base.V
-        back = first.T @ (matrix.T @ self._own)
-        return np.block([[known, first.T @ image], [back.T, self._own.T @ image]])
+        first, before = self._base.V, self._base._images.get(name)
+        back = (first.T @ (matrix.T @ self._own)).T if before is None else self._own.T @ before
+        return np.block([[known, first.T @ image], [back, self._own.T @ image]])
+
+    def rates(self, condition: Condition) -> np.ndarray:
+        """Rates at which the structure runs away by itself, 1/s."""
+        return np.zeros(0) if self._rates is None else self._rates.get(condition.damping, np.zeros(0))
+
+    @cached_property
+    def holding(self) -> ReducedFamily:
+        """The same without the motions that run away."""
+        if self._rates is None:
+            return self
+        other, skip = copy(self), self._base.size
+        other._rates, other.relaxing = None, self.relaxing[:, skip:, skip:]
+        other.V, other.G, other.J = self.V[:, skip:], self.G[skip:], self.J[:, skip:]
+        other.K, other.D, other.M = (part[skip:, skip:] for part in (self.K, self.D, self.M))
+        other._coupled, other.responses = {}, {}
+        return other
 
     @property
     def size(self) -> int:
@@ -87,7 +116,8 @@ class ReducedFamily:
         relaxation = self.family.relaxation(1.0)
         matrices = () if relaxation is None else relaxation.matrices
         known = [None] * len(matrices) if self._base is None else self._base.relaxing
-        return np.array([self._projected(*pair) for pair in zip(matrices, known)]).reshape(-1, self.size, self.size)
+        parts = [self._projected(i, *pair) for i, pair in enumerate(zip(matrices, known))]
+        return np.array(parts).reshape(-1, self.size, self.size)
 
     def relaxation(self, loss: float) -> Relaxation | None:
         """What relaxes, on the space."""
@@ -214,21 +244,28 @@ class ReducedFamily:
             found = self.small.leading_pairs(
                 condition, lambda values: np.array([v for v in reach.leading(values) if v.real > lowest][:most])
             )
-            return self._of_rational(found)
+            return self.of_rational(found)
         floor, band = reach.floor, reach.band
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
         keep = np.flatnonzero((values.imag >= 0) & (values.imag <= band) & (values.real > share * floor))
         return self._lifted(condition, values, left, right, keep[np.argsort(-values.real[keep])][:most])
 
+    def nearest(self, condition: Condition, place: complex) -> complex:
+        """The eigenvalue nearest to a place close to it."""
+        if self.family.relaxation(condition.loss) is not None:
+            return complex(self.small.pairs(condition, [place]).values[0])
+        values = np.linalg.eigvals(self.first_order([condition])[0])
+        return complex(values[int(np.argmin(np.abs(values - place)))])
+
     def near(self, condition: Condition, eigenvalue: complex) -> Pairs:
         """The eigenpair nearest to a place."""
         if self.family.relaxation(condition.loss) is not None:
-            return self._of_rational(self.small.pairs(condition, [eigenvalue]))
+            return self.of_rational(self.small.pairs(condition, [eigenvalue]))
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
         return self._lifted(condition, values, left, right, [int(np.argmin(np.abs(values - eigenvalue)))])
 
-    def _of_rational(self, found: Refined) -> Pairs:
-        """Eigenpairs of what relaxes, lifted."""
+    def of_rational(self, found: Refined) -> Pairs:
+        """Eigenpairs of the small pencils of what relaxes, lifted."""
         k = self.size
         right, left = found.right.T, found.left.T
         return Pairs(found.values, real_apply(self.V, right[:k]), right[k:], real_apply(self.V, left[:k]), left[k:])

@@ -14,10 +14,13 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
+from .condensation import Workspace
 from .family import Condition, PencilFamily
+from .inertia import SymmetricStructure
 from .mass_basis import orthonormal
 from .pencil import CoupledPencil, real_apply
 from .reduced import Pairs, ReducedFamily
+from .runaway import Runaway
 from .static_solver import StaticSolver
 from .transfer import TransferBasis
 
@@ -32,6 +35,8 @@ MOTIONS = 20
 CORRECTIONS = 2
 #: Lowest motions of the structure taken where a band is searched.
 LOWEST = 24
+#: Relative distance from an eigenvalue at which its vector is corrected.
+BESIDE = 1e-3
 
 
 class FamilyReduction:
@@ -43,6 +48,8 @@ class FamilyReduction:
     solver, stiffened : StaticSolver, optional
         Keep the symbolic factorisation between families of one pattern: of the stiffness, and of that which a typical
         motion sees where parts of it relax.
+    workspace : Workspace, optional
+        Keeps the pattern of the structure likewise.
 
     Raises
     ------
@@ -50,8 +57,16 @@ class FamilyReduction:
         If the stiffness is singular.
     """
 
-    def __init__(self, family: PencilFamily, solver: StaticSolver | None = None, stiffened: StaticSolver | None = None):
-        self.family = family
+    def __init__(
+        self,
+        family: PencilFamily,
+        solver: StaticSolver | None = None,
+        stiffened: StaticSolver | None = None,
+        workspace: Workspace | None = None,
+    ):
+        self.family, self._workspace = family, workspace or Workspace()
+        self._runaways: dict[tuple[float, float, float], Runaway] = {}
+        self._last: tuple[tuple[float, float, float], SymmetricStructure] | None = None
         self.solver = solver or StaticSolver()
         self.solver.factor(family)
         self._stiffened, self._loss = stiffened or StaticSolver(), None
@@ -79,20 +94,50 @@ class FamilyReduction:
         lowest = TransferBasis(structure, modes=LOWEST).V
         return ReducedFamily(family, np.hstack([lowest, self.coarse.V]), COMPRESSION)
 
+    def runaway(self, condition: Condition) -> Runaway:
+        """What of the structure runs away by itself at the damping of a condition."""
+        family, damping = self.family, condition.damping
+        if family.relaxation(condition.loss) is None:
+            return Runaway.none(family.mass.shape[0])
+        if damping not in self._runaways:
+            self._runaways[damping] = Runaway.of(self._structure(condition))
+        return self._runaways[damping]
+
+    def _structure(self, condition: Condition) -> SymmetricStructure:
+        """Of the damping of a condition; the last one is kept."""
+        if self._last is None or self._last[0] != condition.damping:
+            family, relaxation = self.family, self.family.relaxation(condition.loss)
+            damping = condition.alpha * family.mass + condition.beta * family.damping
+            structure = CoupledPencil(family.mass, damping, family.stiffness, relaxation=relaxation)
+            self._last = condition.damping, SymmetricStructure(self._workspace.structure(structure))
+        return self._last[1]
+
     def residual(self, values, q, u, condition: Condition, left: bool = False):
         """T(lambda) x of pairs, or T^H w of left vectors: force part (n, k) and inner part (b, k)."""
-        family, s = self.family, np.conj(values) if left else values
+        return self._residual(self._products(q, condition, left), values, u, condition, left)
+
+    def _products(self, q, condition: Condition, left: bool = False):
+        """What a residual needs of structural vectors, whatever their eigenvalues."""
+        family, relaxation = self.family, self.family.relaxation(condition.loss)
         turn = (lambda a: a.T) if left else (lambda a: a)
         q = np.asarray(q, complex)
-        mq, kq = real_apply(family.mass, q), real_apply(turn(family.stiffness), q)
+        return (
+            real_apply(family.mass, q),
+            real_apply(turn(family.stiffness), q),
+            real_apply(turn(family.damping), q) if condition.beta else None,
+            [] if relaxation is None else [real_apply(turn(matrix), q) for matrix in relaxation.matrices],
+            real_apply(family.forces.T if left else family.slope, q),
+        )
+
+    def _residual(self, products, values, u, condition: Condition, left: bool = False):
+        family, s = self.family, np.conj(values) if left else values
+        mq, kq, dq, relaxing, y = products
         force = mq * (s * s + condition.alpha * s) + kq
-        if condition.beta:
-            force += real_apply(turn(family.damping), q) * (condition.beta * s)
-        relaxation = family.relaxation(condition.loss)
-        if relaxation is not None:
-            for factor, matrix in zip(relaxation.factors(s), relaxation.matrices):
-                force += real_apply(turn(matrix), q) * factor
-        y = real_apply(family.forces.T if left else family.slope, q)
+        if dq is not None:
+            force += dq * (condition.beta * s)
+        if relaxing:
+            for factor, image in zip(family.relaxation(condition.loss).factors(s), relaxing):
+                force += image * factor
         inner = np.zeros((u.shape[0], len(values)), complex)
         pressure = np.zeros_like(y)
         for i, value in enumerate(s):
@@ -147,17 +192,41 @@ class FamilyReduction:
             return first  # nothing leads anywhere: there is nothing to be found better
         return ReducedFamily(self.family, np.hstack(columns), 3e-7)
 
+    def runaways(self, conditions) -> dict[tuple[float, float, float], Runaway]:
+        """The same at the dampings of all conditions."""
+        return {damping: self.runaway(c) for damping, c in {c.damping: c for c in conditions}.items()}
+
+    def runaway_correction(self, pairs: Pairs, condition: Condition) -> tuple[float, np.ndarray]:
+        """Largest relative correction by the full matrices of eigenvalues of the structure by itself, and vectors that
+        hold it, right and left, (n, 2k); each corrected at its place.
+        """
+        if not pairs.values.size:
+            return 0.0, pairs.q.real
+        structure = self._structure(condition)
+        force, _ = self.residual(pairs.values, pairs.q, pairs.u, condition)
+        back, _ = self.residual(pairs.values, pairs.w, pairs.c, condition, left=True)
+        right, left = pairs.q.copy(), pairs.w.copy()
+        for i, value in enumerate(pairs.values.real):
+            with structure.factored(structure.at(value * (1.0 + BESIDE))) as factor:
+                right[:, i] -= factor.solve(force[:, i].real)
+                left[:, i] -= factor.solve(back[:, i].real)
+        change = self._newton(pairs, right, left, condition)
+        return float((np.abs(change) / np.abs(pairs.values)).max()), np.hstack([right.real, left.real])
+
     def correction(self, pairs: Pairs, condition: Condition) -> np.ndarray:
         """Newton's correction of eigenvalues by the full matrices, -w^H T x / (w^H T' x), complex (k,).
 
         Vectors are corrected once outside the space first; what the space lacks shows in it.
         """
-        right, left = self.corrected(pairs, condition)
-        force, inner = self.residual(pairs.values, right, pairs.u, condition)
+        return self._newton(pairs, *self.corrected(pairs, condition), condition)
+
+    def _newton(self, pairs: Pairs, right, left, condition: Condition) -> np.ndarray:
+        products = self._products(right, condition)
+        force, inner = self._residual(products, pairs.values, pairs.u, condition)
         top = np.einsum("ij,ij->j", left.conj(), force) + np.einsum("ij,ij->j", pairs.c.conj(), inner)
         # T' by a difference quotient, good enough for the size of a correction
         step = 1e-3 * np.maximum(np.abs(pairs.values), 1.0)
-        ahead = self.residual(pairs.values + step, right, pairs.u, condition)
+        ahead = self._residual(products, pairs.values + step, pairs.u, condition)
         slope = (
             np.einsum("ij,ij->j", left.conj(), ahead[0] - force)
             + np.einsum("ij,ij->j", pairs.c.conj(), ahead[1] - inner)

@@ -18,7 +18,8 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from .condensation import condensed_matrix
-from .factorization import SingularShiftError, StructureMatrices, SuperluFactorization, is_positive_definite, superlu
+from .factorization import SingularShiftError, StructureMatrices, SuperluFactorization, superlu
+from .inertia import is_positive_definite
 from .oscillators import Oscillators
 from .pencil import CoupledPencil, real_apply, stable_fluid
 from .relaxation import Relaxation

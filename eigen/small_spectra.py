@@ -8,6 +8,7 @@ import numpy as np
 
 from .creep import OVERDAMPED
 from .rational import SAME, RationalCells, Refined, Surrogate, real_roots, refined, started
+from .runaway import is_near
 from .structure_response import relative
 
 if TYPE_CHECKING:
@@ -135,6 +136,11 @@ class SmallSpectra:
             _joined(rows[i], complex(value))
         for i in np.flatnonzero(doubtful):
             rows[i] = list(self._exactly(conditions[i]))
+        for i, rates in enumerate(map(self.reduced.rates, conditions)):
+            if rates.size:  # what runs away of the structure by itself is no mode
+                band = self.reduced.family.reach(conditions[i]).band
+                known = is_near(rows[i], rates)
+                rows[i] = [value for value, own in zip(rows[i], known) if not own and value.imag <= ROOM * band]
         return rows, vectors
 
     def pairs(self, condition: Condition, values) -> Refined:
@@ -155,9 +161,10 @@ class SmallSpectra:
     def _starts(self, conditions, problem: RationalCells) -> tuple[np.ndarray, Refined]:
         """Cells, and pairs to start from in the upper half-plane."""
         surrogate = Surrogate.at(problem, self.frequency)
-        flat = self.reduced.relaxing.reshape(len(self.reduced.relaxing), -1)
-        shape = (-1, self.reduced.size, self.reduced.size)
-        matrices = self.reduced.first_order(
+        reduced = self.reduced.holding  # the surrogate is far off where the structure runs away
+        flat = reduced.relaxing.reshape(len(reduced.relaxing), -1)
+        shape = (-1, reduced.size, reduced.size)
+        matrices = reduced.first_order(
             conditions, (surrogate.level @ flat).reshape(shape), (surrogate.slope @ flat).reshape(shape)
         )
         values = np.linalg.eigvals(matrices)
@@ -165,7 +172,9 @@ class SmallSpectra:
         swings = (values.imag > OVERDAMPED * np.abs(values)) | ((values.imag >= 0) & (values.real > 0))
         growth = np.where(swings, self._estimates(problem, surrogate, np.where(swings, values, 1.0)).real, -np.inf)
         band = np.array([self.reduced.family.reach(c).band for c in conditions])
-        growth = np.where((values.imag <= ROOM * band[:, None]) | (values.real > 0), growth, -np.inf)
+        # beside motions that run away, what is unstable beyond the band are single elements held by halves
+        beyond = (values.real > 0) & (reduced is self.reduced)
+        growth = np.where((values.imag <= ROOM * band[:, None]) | beyond, growth, -np.inf)
         order = np.argsort(-growth, axis=1)[:, :STARTED]
         cells = np.repeat(np.arange(len(conditions)), order.shape[1])
         kept = np.isfinite(np.take_along_axis(growth, order, 1)).ravel()

@@ -126,10 +126,12 @@ class RelaxingResponse:
         """Dynamic stiffness at i omega, (len(omega), k, k)."""
         factors = self._relaxation.factors(1j * omega).T
         even, odd = np.ones_like(omega), np.zeros_like(omega)
-        real = np.column_stack([even, -(omega**2), odd, factors.real]) @ self._flat
-        imaginary = np.column_stack([odd, odd, omega, factors.imag]) @ self._flat
+        real = np.column_stack([even, -(omega**2), odd, factors.real])
+        imaginary = np.column_stack([odd, odd, omega, factors.imag])
         out = np.empty((len(omega), *self._shape), complex)
-        out.real, out.imag = real.reshape(out.shape), imaginary.reshape(out.shape)
+        # real and imaginary parts side by side, as complex numbers are kept
+        both = out.view(float).reshape(len(omega), -1, 2)
+        np.matmul(self._flat.T, np.stack([real, imaginary], axis=-1), out=both)
         return out
 
     def inverse(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

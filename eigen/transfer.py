@@ -17,6 +17,8 @@ from .relaxation import Relaxation
 
 #: Frequency at which a stiffness that relaxes is taken for a basis, over the lowest one.
 TYPICAL = 3.0
+#: Vectors that a search for the very lowest mode works with.
+FEW = 12
 
 
 class TransferBasis:
@@ -230,4 +232,5 @@ def _lowest_by_inverse(stiffness, mass, count, workspace):
     n = mass.shape[0]
     inverse = spla.LinearOperator((n, n), matvec=lambda x: factor.solve(np.ravel(x)).real)
     start = np.random.default_rng(5).standard_normal(n)
-    return spla.eigsh(stiffness, count, mass, sigma=-shift, OPinv=inverse, v0=start, tol=1e-9)
+    kept = min(n, max(2 * count + 1, FEW))
+    return spla.eigsh(stiffness, count, mass, sigma=-shift, OPinv=inverse, v0=start, tol=1e-9, ncv=kept)

@@ -6,7 +6,8 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from eigen import Certificate, ColumnSolver, Condition, CoupledPencil, PencilFamily, SearchOptions, certified_spectrum
-from eigen.columns import DIRECT, REDUCED, count_unstable
+from eigen.cell_counts import count_unstable
+from eigen.column import DIRECT, REDUCED
 from eigen.reduced import POWERS
 from eigen.reduction import FamilyReduction
 

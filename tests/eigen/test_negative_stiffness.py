@@ -6,7 +6,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from eigen import CoupledPencil, Relaxation, SearchOptions, certified_spectrum
-from eigen.factorization import SymmetricLU
+from eigen.inertia import SymmetricLU
 from eigen.negative_stiffness import negative_motions
 from eigen.response import Determinant
 from tests.systems.random_pencils import dense_eigenvalues

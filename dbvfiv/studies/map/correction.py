@@ -21,6 +21,8 @@ CORRECTIONS = 5
 STEP = 1e-4
 #: Largest step along the column, relative.
 REACH = 0.05
+#: Largest relative distance of a mode from where it was looked for.
+MOVED = 0.1
 #: Largest relative difference of one mode on the small model and with the full matrices.
 SAME = 1e-2
 
@@ -70,8 +72,9 @@ class OnsetCorrection:
         return (value, abs(near.imag) / (2 * np.pi), left) if left <= ACCURATE else None
 
     def _small(self, value: float, near: complex) -> complex | None:
-        """Eigenvalue of the small model; None where it has no leading one and all cells needed the full matrices."""
-        return _nearest(self.column.eigenvalues(self.condition(value)), near)
+        """Eigenvalue of the small model; None where it has none near, as where all cells needed the full matrices."""
+        found = self.column.nearest(self.condition(value), near)
+        return found if abs(found - near) <= MOVED * max(abs(near), 1.0) else None
 
     def _slope(self, eigenvalue, value: float, near: complex) -> float:
         step = STEP * (abs(value) or 1.0)

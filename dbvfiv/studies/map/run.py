@@ -17,6 +17,7 @@ from .checks import Check, check_cells
 from .column import ColumnTask, MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, doubts, linked
 from .pool import ColumnPool
+from .runaway import of_the_wall
 from .web import Web
 
 
@@ -167,6 +168,7 @@ def run_map(
                 warnings += doubts(plan, curves)
             warnings += _doubts(plan, ordered, checks)
             warnings += _outside(case, ordered)
+            warnings += of_the_wall(plan, ordered)
         except KeyboardInterrupt:
             interrupted = True
     for sentence in warnings:

@@ -191,8 +191,8 @@ class StabilityWalk:
         """
         return self.family(place).search(place.condition)
 
-    def spectrum(self, place: Place, count: int = 6):
-        """Leading modes of the full pencil, an `eigen.Spectrum`.
+    def spectrum(self, place: Place, count: int = 6, runaway: bool = False):
+        """Leading modes of the full pencil, an `eigen.Spectrum`; where asked with what of the wall runs away by itself.
 
         Raises
         ------
@@ -200,7 +200,8 @@ class StabilityWalk:
         """
         family = self.family(place)
         with _explained(place):
-            return self.built(place).solver.direct(family, place.condition, count)
+            solver = self.built(place).solver
+            return (solver.whole if runaway else solver.direct)(family, place.condition, count)
 
     def column(self, places: list[Place], snapshots: int = 3, edges: bool = False) -> Column:
         """Cells that share a steady state.

@@ -19,7 +19,11 @@ def pair(value, neutral):
 
 
 def corrected_by(values, shift=SMALL - EXACT):
-    column = SimpleNamespace(eigenvalues=values, corrected=lambda condition, found: complex(3.0 * shift, 0.0))
+    def nearest(condition, place):
+        found = values(condition)
+        return complex(found[np.argmin(np.abs(found - place))]) if found.size else complex(np.nan)
+
+    column = SimpleNamespace(nearest=nearest, corrected=lambda condition, found: complex(3.0 * shift, 0.0))
     return OnsetCorrection(column, lambda value: value, lambda value: pair(value, EXACT))
 
 

@@ -262,7 +262,7 @@ def test_without_mpiexec_there_is_one_process(monkeypatch):
 
 def test_cells_that_the_count_does_not_confirm_are_uncertain(case, monkeypatch):
     # a count that sees one pair too many, whatever the model
-    monkeypatch.setattr("eigen.columns.phase_counts", lambda reduced, conditions, hints: _more(conditions))
+    monkeypatch.setattr("eigen.cell_counts.phase_counts", lambda reduced, conditions, hints: _more(conditions))
     monkeypatch.setattr("eigen.columns.certified_spectrum", _refuse)
     result = run_map(case.replace({"map.x": "pressure=3000:8000:2", "map.refine": 0, "map.checks": 0}))
     assert not result.grid("certified").any()

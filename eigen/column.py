@@ -1,0 +1,87 @@
+"""Cells of one state, and what vouches for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .agreement import Certificate
+from .family import Condition
+
+#: Estimated relative error of an eigenvalue above which a cell is treated directly.
+TOLERANCE = 1e-6
+#: How a cell was found.
+REDUCED, DIRECT, MISSING = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Column:
+    """Cells of one state.
+
+    Attributes
+    ----------
+    growth_rate, frequency : (cells,) arrays, 1/s, Hz
+        Of the leading mode, what of the structure runs away by itself included; NaN if none was found.
+    second : (cells,) array, 1/s
+        Growth rate of the next mode.
+    unstable : (cells,) int array
+        Eigenvalues right of `line` up to `band`, conjugates counted apart, by the spectrum.
+    runaway : (cells,) int array
+        Those of them in which the structure runs away by itself, without any fluid; see `eigen.runaway`.
+    counted : (cells,) int array
+        As many as `unstable`, by the argument principle; -1 where nobody asked.
+    certain : (cells,) bool array
+        That count followed the phase everywhere.
+    error : float
+        Largest estimated relative error of leading eigenvalues among the checked cells.
+    how : (cells,) int array
+        `REDUCED` or `DIRECT`.
+    line, band : (cells,) arrays, 1/s, Hz
+        Region counted.
+    eigenvalues : callable or None
+        From any condition at the same state to its leading eigenvalues on the small model, sorted by growth rate.
+    nearest : callable or None
+        From a condition and a place to the eigenvalue of the small model next to it.
+    corrected : callable or None
+        From a condition and an eigenvalue of the small model to Newton's correction of it by the full matrices.
+    cell : callable or None
+        From any further condition at the same state to a column of this one cell.
+    leading : list of arrays
+        Leading eigenvalues of the cells without what runs away.
+    """
+
+    growth_rate: np.ndarray
+    frequency: np.ndarray
+    second: np.ndarray
+    unstable: np.ndarray
+    runaway: np.ndarray
+    counted: np.ndarray
+    certain: np.ndarray
+    error: float
+    how: np.ndarray
+    line: np.ndarray
+    band: np.ndarray
+    eigenvalues: Callable[[Condition], np.ndarray] | None = None
+    nearest: Callable[[Condition, complex], complex] | None = None
+    corrected: Callable[[Condition, complex], complex] | None = None
+    cell: Callable[[Condition], Column] | None = None
+    leading: list[np.ndarray] = field(default_factory=list)
+
+    @property
+    def certified(self) -> np.ndarray:
+        """Cells for which both counts agree and the leading eigenvalue is accurate."""
+        return np.array([self.certificate(i).agrees for i in range(len(self.unstable))], bool)
+
+    def certificate(self, cell: int) -> Certificate:
+        """What vouches for a cell."""
+        accurate = self.how[cell] == DIRECT or self.error <= TOLERANCE
+        known = bool(np.isfinite(self.growth_rate[cell]))
+        return Certificate(
+            int(self.unstable[cell]),
+            int(self.counted[cell]),
+            bool(self.certain[cell] and accurate and known),
+            float(self.line[cell]),
+            float(self.band[cell]),
+        )
