@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import nnls
 
 from dbvfiv.materials.checks import MaterialError
+from dbvfiv.materials.nonnegative import nonnegative
 
 LEAST_MARGIN = 0.01
 _MAX_CUTS = 200
@@ -68,5 +68,5 @@ def _least_squares_above(matrix, target, normals) -> np.ndarray:
     q, r = np.linalg.qr(matrix)
     centre = q.T @ target
     reduced = np.linalg.solve(r.T, normals.T).T  # normals R^-1
-    weights, _ = nnls(reduced.T, -centre)  # nearest point of a cone, by its polar
+    weights = nonnegative(reduced.T, -centre)  # nearest point of a cone, by its polar
     return np.linalg.solve(r, centre + reduced.T @ weights)

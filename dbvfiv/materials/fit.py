@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import nnls
 
 from dbvfiv.materials import ogden_fit
 from dbvfiv.materials.checks import MaterialError
@@ -22,6 +21,7 @@ from dbvfiv.materials.constrained import LEAST_MARGIN, stable_constants, states_
 from dbvfiv.materials.hill import least_modulus
 from dbvfiv.materials.law import Law
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
+from dbvfiv.materials.nonnegative import nonnegative
 from dbvfiv.materials.rubber_forms import Form, equivalent_strain, form_of, invariant_columns
 from dbvfiv.materials.stability import StableRange, stable_range_of
 from dbvfiv.materials.tension_test import TensionTest
@@ -259,7 +259,7 @@ class _Problem:
         scaled = free
         if constrained and self.constraint == "non-negative":
             sign = np.sign(exponents) if len(exponents) else np.ones(len(scale))
-            scaled = sign * nnls(matrix * sign, self.target)[0] if np.any(sign * free < 0.0) else free
+            scaled = sign * nonnegative(matrix * sign, self.target) if np.any(sign * free < 0.0) else free
         elif constrained and self.constraint == "stable":
             moduli = self.form.moduli(self.states, exponents) / scale[:, None, None]
             scaled = stable_constants(matrix, self.target, free, moduli, self.reach)

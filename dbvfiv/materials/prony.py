@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import nnls
 
 from dbvfiv.materials.checks import MaterialError
+from dbvfiv.materials.nonnegative import nonnegative
 
 #: How far beyond its branches a series keeps its loss factor when it is scaled, in decades; and rounds to do so.
 _MARGIN, _ROUNDS = 0.1, 60
@@ -120,7 +120,7 @@ def _scaled(prony: Prony, factor: float) -> Prony:
     matrix = branch.imag - target[:, None] * branch.real  # times g: target where tan delta is met
     storage = prony.modulus(1j * omega).real
     for _ in range(_ROUNDS):
-        strengths = nnls(matrix / storage[:, None], target / storage)[0]
+        strengths = nonnegative(matrix / storage[:, None], target / storage)
         before, storage = storage, 1.0 + branch.real @ strengths
         if np.abs(storage - before).max() <= 1e-14 * storage.max():
             break

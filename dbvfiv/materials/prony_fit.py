@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from dbvfiv.materials.checks import MaterialError
+from dbvfiv.materials.nonnegative import nonnegative
 from dbvfiv.materials.prony import Prony
 
 LARGEST_LOSS_FACTOR = 2.0
@@ -170,7 +170,7 @@ def fit_moduli(frequency, storage, loss, times) -> PronyFit:
             np.hstack([0 * one, branch.imag]) * (even / loss)[:, None],
         ]
     )
-    found = nnls(matrix, np.concatenate([even, even]))[0]
+    found = nonnegative(matrix, np.concatenate([even, even]))
     prony = Prony(_over_slow(found, "storage modulus"), times)
     wanted = loss / storage
     return PronyFit(prony, "moduli", frequency, prony.loss_factor(frequency) / wanted - 1.0)
@@ -198,7 +198,7 @@ def fit_relaxation(time, modulus, times) -> PronyFit:
     decay = np.exp(-np.multiply.outer(time, 1.0 / times))
     even = _even_weights(time)
     matrix = np.hstack([np.ones((len(time), 1)), decay]) * (even / modulus)[:, None]
-    found = nnls(matrix, even)[0]
+    found = nonnegative(matrix, even)
     prony = Prony(_over_slow(found, "relaxing modulus"), times)
     fitted = found[0] + decay @ found[1:]
     return PronyFit(prony, "relaxing modulus", time, fitted / modulus - 1.0)
@@ -300,7 +300,7 @@ def _fit_loss(frequency: np.ndarray, wanted: np.ndarray, times: np.ndarray, leve
     best, found = np.inf, np.zeros(len(times))
     for _ in range(_ROUNDS):
         scale = weights / (wanted * storage)
-        strengths = nnls((branch.imag - wanted[:, None] * branch.real) * scale[:, None], weights / storage)[0]
+        strengths = nonnegative((branch.imag - wanted[:, None] * branch.real) * scale[:, None], weights / storage)
         before, storage = storage, 1.0 + branch.real @ strengths
         error = branch.imag @ strengths / storage / wanted - 1.0
         if level:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dbvfiv.materials import MaterialError, Prony, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
@@ -23,7 +23,9 @@ def series(strengths) -> Prony:
 # -- what a series made is found again
 
 
+# the last goes round in circles where products are rounded in wide registers
 @given(STRENGTHS)
+@example([1.7578125, 1.0, 1.6912310801556503, 0.0, 0.0078125, 0.0])
 def test_tan_delta_of_a_series_gives_the_series(strengths):
     made = series(strengths)
     if made.loss_factor(FREQUENCY).max() > 2 or made.loss_factor(FREQUENCY).min() < 1e-6:
