@@ -73,7 +73,6 @@ def test_both_laws_and_pairs_without_the_load(coarse_case):
     assert result.grid("certified").all() and all(check.agrees for check in result.checks)
 
 
-@pytest.mark.slow
 def test_two_structural_axes(coarse_case):
     result = run_map(
         coarse_case.replace(
