@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -68,6 +68,14 @@ class Column:
     corrected: Callable[[Condition, complex], complex] | None = None
     cell: Callable[[Condition], Column] | None = None
     leading: list[np.ndarray] = field(default_factory=list)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Column]) -> Column:
+        """Cells of several columns as one, which has no small model."""
+        own = [field.name for field in fields(cls) if isinstance(getattr(parts[0], field.name), np.ndarray)]
+        cells = {name: np.concatenate([getattr(part, name) for part in parts]) for name in own}
+        leading = [row for part in parts for row in part.leading]
+        return cls(**cells, error=max(part.error for part in parts), leading=leading)
 
     @property
     def certified(self) -> np.ndarray:

@@ -196,7 +196,7 @@ class ColumnSolver:
         """A structure that nothing couples: its full spectra and counts, each once for every damping."""
         column, known = _blank(len(conditions), uncounted(family, conditions)), {}
         for i, condition in enumerate(conditions):
-            key = condition.alpha, condition.beta, condition.loss
+            key = condition.damping
             if key not in known:
                 asked = family.pencil(condition), 6, family.search(condition)
                 known[key] = certified_spectrum(*asked, workspace=self._workspace)

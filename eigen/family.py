@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -128,3 +128,14 @@ class Reach(NamedTuple):
         if not kept.size and upper.size:
             kept = upper[[int(np.argmax(upper.real))]]
         return kept[np.argsort(-kept.real)]
+
+
+def bordered(parts: Mapping[str, np.ndarray]) -> np.ndarray:
+    """[-A, -B; R, S] of the parts of a coupling, for each power of the scaled eigenvalue, (3, k + b, k + b)."""
+    k, b = len(parts["A0"]), len(parts["S0"])
+    out = np.zeros((3, k + b, k + b))
+    for power in range(3):
+        out[power, :k, :k], out[power, k:, :k] = -parts[f"A{power}"], parts[f"R{power}"]
+        if power < 2:
+            out[power, :k, k:], out[power, k:, k:] = -parts[f"B{power}"], parts[f"S{power}"]
+    return out

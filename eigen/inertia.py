@@ -118,7 +118,7 @@ class _DiagonalFactor(SymmetricLU):
     """The same by SuperLU."""
 
     def __init__(self, upper: sp.csr_matrix):
-        super().__init__(upper + sp.triu(upper, 1).T)
+        super().__init__(_mirrored(upper))
 
     def __enter__(self) -> _DiagonalFactor:
         return self
@@ -140,12 +140,15 @@ class SymmetricStructure:
     relaxation : Relaxation
     size : int
         Number n of unknowns.
+    mass, slow : (3 + g,) arrays
+        Weights of M alone and of K alone.
     """
 
     def __init__(self, matrices: StructureMatrices):
         upper, mirrored, self._indptr, self._indices = matrices.upper
         self.size, self.relaxation = matrices.shape[0], matrices.relaxation
         self._data = 0.5 * (matrices.data[:, upper] + matrices.data[:, mirrored])
+        self.mass, _, self.slow = np.eye(3, len(self._data))
 
     def at(self, s: float) -> np.ndarray:
         """Weights of M, C, K and the K_g in D(s) = s^2 M + s C + K + sum phi_g(s) K_g."""
@@ -165,8 +168,7 @@ class SymmetricStructure:
 
     def full(self, weights: np.ndarray) -> sp.csr_matrix:
         """A sum."""
-        upper = self.upper(weights)
-        return (upper + sp.triu(upper, 1).T).tocsr()
+        return _mirrored(self.upper(weights)).tocsr()
 
     def factored(self, weights: np.ndarray) -> SymmetricFactor | _DiagonalFactor:
         """A sum, factored.
@@ -191,6 +193,11 @@ class SymmetricStructure:
         """The parts on a space, (3 + g, k, k): sums of them are those of the matrices."""
         units = np.eye(len(self._data))
         return np.array([motions.T @ self.times(unit, motions) for unit in units])
+
+
+def _mirrored(upper: sp.csr_matrix):
+    """A symmetric matrix by its upper half."""
+    return upper + sp.triu(upper, 1).T
 
 
 def is_positive_definite(matrix: sp.spmatrix) -> bool:

@@ -87,7 +87,6 @@ class _Search:
 
     def __init__(self, structure: SymmetricStructure):
         self.structure, self._added = structure, 0.0
-        self.mass, self._slow = np.eye(len(structure.at(0.0)))[[0, 2]]
 
     def negative(self, weights: np.ndarray) -> int:
         """Number of negative eigenvalues of a sum."""
@@ -102,7 +101,7 @@ class _Search:
         if number <= known:
             return np.zeros((n, 0))
         if n <= DENSE:
-            full, mass = (structure.times(w, np.eye(n)) for w in (weights, self.mass))
+            full, mass = (structure.times(w, np.eye(n)) for w in (weights, structure.mass))
             return la.eigh(full, mass, subset_by_index=(0, min(number, MOST) - 1))[1]
         number = min(number, MOST, n - 1)
         positive, factor = self._positive(weights)
@@ -125,20 +124,20 @@ class _Search:
         """A positive sum close to one that is not, and its factor: inertia and damping of that one, the slow stiffness,
         and inertia as much as it takes beyond.
         """
-        positive = self._slow.copy()
+        mass, positive = self.structure.mass, self.structure.slow.copy()
         positive[:2] = weights[:2]
         while True:
-            factor = self.structure.factored(positive + self._added * self.mass)
+            factor = self.structure.factored(positive + self._added * mass)
             if not factor.negative:
-                return positive + self._added * self.mass, factor
+                return positive + self._added * mass, factor
             with factor:
-                diagonal = (abs(self.structure.upper(w).diagonal()) for w in (positive, self.mass))
+                diagonal = (abs(self.structure.upper(w).diagonal()) for w in (positive, mass))
                 self._added = 8.0 * self._added or 1e-6 * float(np.divide(*(np.median(d) for d in diagonal)))
 
 
 def _completed(search: _Search, motions: np.ndarray, rough: bool) -> np.ndarray:
     """Motions of unit mass, with those that D has where the ones given look weakest."""
-    structure, mass = search.structure, search.structure.full(search.mass)
+    structure, mass = search.structure, search.structure.full(search.structure.mass)
     weakest = np.inf
     for _ in range(ROUNDS):
         motions = orthonormal(mass, motions, SAME)[0]

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .family import bordered
 from .pencil import fluid_zeros, stable_fluid
 from .reduced import ReducedFamily
 from .structure_response import NEAR, RelaxingResponse, Response, response
@@ -97,7 +98,7 @@ class _Walk:
         self._cut = [False] * len(conditions)
         self._laden = [_turning(reduced.laden_frequencies(c), c) for c in conditions]
         kinds = list({id(p): p for p in self._parts}.values())
-        self._bordered = [self._together(p) for p in kinds]
+        self._bordered = [bordered(p) for p in kinds]
         self._which = np.array([next(k for k, p in enumerate(kinds) if p is own) for own in self._parts])
         self._same = len(kinds) == 1
 
@@ -111,16 +112,6 @@ class _Walk:
                 made[name] = value @ P if name[0] in "AR" else value
             self._known[key] = parts, made  # an object that lives on keeps its id
         return self._known[key][1]
-
-    def _together(self, parts) -> np.ndarray:
-        """[-A, -B; R, S] of the powers of z, (3, r + b, r + b)."""
-        r, b = parts["A0"].shape[0], self.inner
-        out = np.zeros((3, r + b, r + b))
-        for power in range(3):
-            out[power, :r, :r], out[power, r:, :r] = -parts[f"A{power}"], parts[f"R{power}"]
-            if power < 2:
-                out[power, :r, r:], out[power, r:, r:] = -parts[f"B{power}"], parts[f"S{power}"]
-        return out
 
     def _angles(self, cells: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Phase of d(i omega), for pairs of a cell and a frequency."""

@@ -110,8 +110,7 @@ def _on_space(structure: SymmetricStructure, space: np.ndarray) -> list[tuple[fl
 
 def _core(structure: SymmetricStructure, motions: np.ndarray) -> np.ndarray:
     """As few directions of motions as have as many real unstable eigenvalues."""
-    mass = np.eye(len(structure.at(0.0)))[0]
-    weight, turn = np.linalg.eigh(motions.T @ structure.times(mass, motions))
+    weight, turn = np.linalg.eigh(motions.T @ structure.times(structure.mass, motions))
     kept = np.flatnonzero(weight > 1e-10 * weight[-1])[::-1]
     for number in range((len(weight) + 1) // 2, len(kept) + 1):
         some = kept[:number]
@@ -123,12 +122,11 @@ def _core(structure: SymmetricStructure, motions: np.ndarray) -> np.ndarray:
 
 def _refined(structure: SymmetricStructure, rate: float, motion: np.ndarray) -> tuple[float, np.ndarray]:
     """An eigenvalue near a place, and its motion, by inverse iteration with the full matrices."""
-    mass = np.eye(len(structure.at(0.0)))[0]
     for _ in range(STEPS):
         before = rate
         with structure.factored(structure.at(rate)) as factor:
             motion = factor.solve(structure.times(structure.slope(rate), motion))
-        motion = motion / np.sqrt(motion @ structure.times(mass, motion))
+        motion = motion / np.sqrt(motion @ structure.times(structure.mass, motion))
         parts = structure.on_space(motion[:, None])[:, 0, 0]
         rate = _zero_near(structure, parts, rate)
         if abs(rate - before) <= SETTLED * before:

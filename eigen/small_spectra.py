@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .creep import OVERDAMPED
+from .family import bordered
 from .rational import SAME, RationalCells, Refined, Surrogate, real_roots, refined, started
 from .runaway import is_near
 from .structure_response import relative
@@ -66,15 +67,10 @@ class SmallSpectra:
     def _basis(self, law) -> np.ndarray:
         """Bordered matrices of `RationalCells` under one law."""
         reduced, k = self.reduced, self.reduced.size
-        c = reduced.coupling(law)
-        n = k + c["S0"].shape[0]
-        basis = np.zeros((6 + len(reduced.relaxing), n, n))
+        coupling = bordered(reduced.coupling(law))
+        basis = np.zeros((6 + len(reduced.relaxing), *coupling.shape[1:]))
         basis[:3, :k, :k] = reduced.K, reduced.M, reduced.D
-        for power in range(3):
-            basis[3 + power, :k, :k] = -c[f"A{power}"]
-            basis[3 + power, k:, :k] = c[f"R{power}"]
-            if power < 2:
-                basis[3 + power, :k, k:], basis[3 + power, k:, k:] = -c[f"B{power}"], c[f"S{power}"]
+        basis[3:6] = coupling
         basis[6:, :k, :k] = reduced.relaxing
         return basis
 

@@ -258,10 +258,7 @@ def _known(along: Axis, column: Column) -> dict[float, Sample]:
 
 def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):
     """Both axes change the steady state: every cell has its own, solved directly, whatever columns came before."""
-    parts = [walk.column([place]) for place in places]
-    names = ("growth_rate", "frequency", "second", "unstable", "runaway", "counted", "certain", "how", "line", "band")
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    column = Column(**joined, error=0.0, leading=[part.leading[0] for part in parts])
+    column = Column.joined([walk.column([place]) for place in places])
     parameter = plan.along.parameter
 
     def cell(other: float) -> Column:
