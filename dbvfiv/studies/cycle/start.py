@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from scipy.optimize import brentq
 
 from ...case.parameters import PARAMETERS
 from ...errors import SolveError
 from ...observer import Observer
 from ..case import Case
-from ..orbits.onset import MODES, Onset, onset_at
-from ..stability.crossings import Crossing, Sample, Scan, locate
+from ..orbits.onset import Onset, onset_at
+from ..stability.correction import OnsetCorrection
+from ..stability.crossings import Crossing, Scan, locate
 from ..stability.place import Place, is_surrounding
 from ..stability.walk import StabilityWalk
 
@@ -18,8 +20,6 @@ from ..stability.walk import StabilityWalk
 SCANNED = 13
 #: Relative accuracy of an onset.
 LOCATED = 1e-5
-#: Part of the value over which a small model tells how fast a growth rate changes, and corrections by that at most.
-NEAR, CORRECTED = 1e-3, 6
 
 
 def find_onset(case: Case, walk: StabilityWalk, observer: Observer) -> Onset:
@@ -32,30 +32,22 @@ def find_onset(case: Case, walk: StabilityWalk, observer: Observer) -> Onset:
     """
     axis, base = case.cycle.axis, Place.of(case)
     values = [axis.values[i] for i in np.unique(np.linspace(0, len(axis.values) - 1, SCANNED).astype(int))]
-    column = _column(case, walk, [base.at(**{axis.parameter: v}) for v in values])
 
-    def sample(value: float) -> np.ndarray:
+    def place(value: float) -> Place:
+        return base.at(**{axis.parameter: value})
+
+    def spectrum(value: float) -> np.ndarray:
         observer.progress(f"steady state at {axis.parameter} = {value:.6g}")
-        place = base.at(**{axis.parameter: value})
-        if column is None:
-            return np.asarray(walk.spectrum(place).eigenvalues)
-        return np.asarray(column.cell(place.condition).leading[0])
+        return np.asarray(walk.spectrum(place(value)).eigenvalues)
 
-    def rough(value: float) -> np.ndarray:
-        return np.asarray(column.eigenvalues(base.at(**{axis.parameter: value}).condition))
-
-    spectra = {}  # the last one is that of the onset
-
-    def inside(value: float) -> np.ndarray:
-        spectra[value] = walk.spectrum(base.at(**{axis.parameter: value}), MODES)
-        return np.asarray(spectra[value].eigenvalues)
-
-    scan = Scan(sample, axis.log, inside=inside)
+    column = _column(case, walk, [place(v) for v in values])
+    scan = Scan(spectrum, axis.log) if column is None else _scan_of(column, axis, place)
     crossings = scan.run(values)
     for crossing in crossings[::-1] if case.cycle.start == "last" else crossings:
-        value = locate(scan, crossing, LOCATED) if column is None else _located(scan, crossing, rough)
-        expected = complex(scan.within(value).eigenvalues[crossing.index])
-        onset = onset_at(walk, base.at(**{axis.parameter: value}), value, expected, spectra.get(value))
+        value, expected = _located(scan, crossing)
+        if column is not None:
+            value, expected = _corrected(column, place, spectrum, crossing, value, expected)
+        onset = onset_at(walk, place(value), value, expected)
         if onset is not None:
             return onset
     raise SolveError(_without(case, scan))
@@ -66,30 +58,33 @@ def _column(case: Case, walk: StabilityWalk, places: list[Place]):
     if not is_surrounding(case, case.cycle.axis.parameter):
         return None
     column = walk.column(places, len(places))
-    return None if column.cell is None else column
+    return None if column.cell is None or column.eigenvalues is None else column
 
 
-def _located(scan: Scan, crossing: Crossing, rough) -> float:
-    """The value of a crossing by the full matrices: from where a small model has it, along the slope it has there."""
+def _scan_of(column, axis, place: Callable[[float], Place]) -> Scan:
+    """Cells of a column, and inside a bracket what its small model says."""
 
-    def growth(value: float) -> float:
-        return float(Sample(value, rough(value)).growth[crossing.index])
+    def leading(value: float) -> np.ndarray:
+        return np.asarray(column.cell(place(value).condition).leading[0])
 
-    low, high = crossing.low.value, crossing.high.value
-    if growth(low) * growth(high) >= 0:
-        return locate(scan, crossing, LOCATED)
-    value = float(brentq(growth, low, high, xtol=LOCATED * max(abs(low), abs(high))))
-    beside = value * (1.0 + NEAR * np.array([-1.0, 1.0]))
-    slope = (growth(beside[1]) - growth(beside[0])) / (beside[1] - beside[0])
-    for _ in range(CORRECTED):
-        found = scan.within(value)
-        step = np.inf if found is None or slope == 0.0 else float(found.growth[crossing.index]) / slope
-        if abs(step) <= LOCATED * abs(value):
-            return value
-        value -= step
-        if not low <= value <= high:
-            break
-    return locate(scan, crossing, LOCATED)
+    return Scan(leading, axis.log, inside=lambda value: np.asarray(column.eigenvalues(place(value).condition)))
+
+
+def _located(scan: Scan, crossing: Crossing) -> tuple[float, complex]:
+    """Value and eigenvalue of a crossing."""
+    value = locate(scan, crossing, LOCATED)
+    return value, complex(scan.within(value).eigenvalues[crossing.index])
+
+
+def _corrected(column, place, spectrum, crossing: Crossing, value: float, expected: complex) -> tuple[float, complex]:
+    """An onset of a small model where the full matrices have it; searched for by these where corrections fail."""
+    correct = OnsetCorrection(column, lambda other: place(other).condition, spectrum)
+    found, frequency, left = correct(value, abs(expected.imag) / (2 * np.pi))
+    if np.isfinite(left):
+        return found, 2j * np.pi * frequency
+    full = Scan(spectrum)
+    full.samples.update({sample.value: sample for sample in (crossing.low, crossing.high)})
+    return _located(full, crossing)
 
 
 def _without(case: Case, scan: Scan) -> str:

@@ -16,10 +16,10 @@ from eigen.column import MISSING
 from ...case.axis import Axis
 from ...errors import CaseError, SolveError
 from ..case import Case
+from ..stability.correction import OnsetCorrection
 from ..stability.crossings import Sample, Scan, locate
 from ..stability.place import Place, is_surrounding
 from ..stability.walk import StabilityWalk
-from .correction import OnsetCorrection
 
 #: What is kept of each cell.
 CELLS = ("growth_rate", "frequency", "second", "unstable", "counted", "certified", "how")

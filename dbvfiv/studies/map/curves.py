@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..stability.correction import ACCURATE
 from .column import MapColumn, MapPlan
-from .correction import ACCURATE
 from .web import Web
 
 

@@ -42,16 +42,14 @@ class Onset:
         return self.spectrum.mode(self.index)
 
 
-def onset_at(walk: StabilityWalk, place: Place, value: float, expected: complex, spectrum=None) -> Onset | None:
+def onset_at(walk: StabilityWalk, place: Place, value: float, expected: complex) -> Onset | None:
     """The onset at a place where an eigenvalue is known to be neutral; None if that does not oscillate.
-
-    `spectrum`, if given, is that of `MODES` leading modes there.
 
     Raises
     ------
     SolveError
     """
-    spectrum = walk.spectrum(place, MODES) if spectrum is None else spectrum
+    spectrum = walk.spectrum(place, MODES)
     index = int(np.argmin(np.abs(spectrum.eigenvalues - expected)))
     onset = Onset(value, place, spectrum, index)
     return onset if onset.eigenvalue.imag > 1e-3 * abs(onset.eigenvalue) else None
