@@ -46,6 +46,8 @@ class Column:
         A numpy type, or ``TEXT``.
     shown : Shown, optional
         How it is printed; not at all without.
+    earlier : float, optional
+        What its rows are in files of earlier versions, which do not have it.
     """
 
     name: str
@@ -53,10 +55,11 @@ class Column:
     description: str
     dtype: str = "f8"
     shown: Shown | None = None
+    earlier: float | None = None
 
     def __reduce__(self) -> tuple:
         """For pickle; how it is printed is no data and stays behind."""
-        return Column, (self.name, self.units, self.description, self.dtype)
+        return Column, (self.name, self.units, self.description, self.dtype, None, self.earlier)
 
     def mark(self, dataset: h5py.Dataset) -> None:
         """Write units and description beside a dataset."""

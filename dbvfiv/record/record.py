@@ -264,7 +264,8 @@ class StoredRecord(Record):
             for table in self.tables.values():
                 if table.name in self._absent:
                     continue
-                missing = [c.name for c in table.columns if c.name not in file["tables"][table.name]]
+                group = file["tables"][table.name]
+                missing = [c.name for c in table.columns if c.name not in group and c.earlier is None]
                 if missing:
                     raise KeyError(f"{table.name}/{missing[0]}")
             self._count = {name: 0 if name in self._absent else read_rows(file["tables"][name]) for name in self.tables}
@@ -296,7 +297,10 @@ class StoredRecord(Record):
             spec = self.tables[table]
             return np.empty((0, *spec.shape(column)), spec.dtype(column))[rows]
         with reading(self.path) as file:
-            return read_column(file["tables"][table], column, rows)
+            group = file["tables"][table]
+            if column.name not in group:
+                return np.full(self._count[table], column.earlier, self.tables[table].dtype(column))[rows]
+            return read_column(group, column, rows)
 
     @property
     def log(self) -> list[dict[str, Any]]:

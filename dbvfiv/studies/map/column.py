@@ -22,7 +22,7 @@ from ..stability.place import Place, is_surrounding
 from ..stability.walk import StabilityWalk
 
 #: What is kept of each cell.
-CELLS = ("growth_rate", "frequency", "second", "unstable", "counted", "certified", "how")
+CELLS = ("growth_rate", "frequency", "second", "unstable", "runaway", "counted", "certified", "how")
 #: Relative accuracy of onsets along a column.
 LOCATED = 1e-10
 
@@ -159,6 +159,7 @@ class MapColumn:
         cells = {name: np.full(shape, np.nan) for name in CELLS[:3]}
         cells |= {
             "unstable": np.full(shape, -1),
+            "runaway": np.zeros(shape, int),
             "counted": np.full(shape, -1),
             "certified": np.zeros(shape, bool),
             "how": np.full(shape, MISSING),

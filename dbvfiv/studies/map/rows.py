@@ -45,6 +45,7 @@ _CELLS = (
         "unstable", "", "Unstable eigenvalues by the spectrum, conjugates counted apart; -1 where there is none", "i8"
     ),
     Column("counted", "", "The same by the argument principle; -1 where nobody asked", "i8"),
+    Column("runaway", "", "Of the unstable ones, those in which the wall runs away by itself", "i8", earlier=0),
     Column(
         "certified",
         "",

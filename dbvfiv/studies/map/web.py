@@ -238,13 +238,14 @@ class Web:
         return abs(self.place[i] - self.place[i - side]) * (left - 0.4 * EDGE) / abs(run)
 
     def _is_hidden(self, i: int) -> bool:
-        """Whether the cells at the lower edge change between two columns otherwise than the ends of curves there
-        say.
+        """Whether the modes at the lower edge change between two columns otherwise than the ends of curves there
+        say; what runs away of the wall by itself has no curve.
         """
-        cells = [self.columns[j].cells.get("unstable") for j in (i, i + 1)]
-        if any(table is None or table[self.law, 0] < 0 for table in cells):
+        cells = [self.columns[j].cells for j in (i, i + 1)]
+        if any(not table or table["unstable"][self.law, 0] < 0 for table in cells):
             return False
-        change = float(cells[1][self.law, 0] - cells[0][self.law, 0])
+        modes = [float(table["unstable"][self.law, 0] - table["runaway"][self.law, 0]) for table in cells]
+        change = modes[1] - modes[0]
         for column, side, sign in ((i, 1, 1.0), (i + 1, -1, -1.0)):
             for k in self.loose(column, side):
                 onset = self.onsets[column][k]

@@ -3,7 +3,8 @@
 The k-th largest growth rate g_k is a continuous function of the parameter wherever the spectrum is, so crossings are
 its zeros. Between the values of a scan they are bracketed by the number of unstable modes; where the parabola through
 three values of g_k reaches zero between them although no number changes, the scan is refined, so that narrow tongues of
-instability or stability are not stepped over.
+instability or stability are not stepped over; and where one mode ceases to be unstable while another becomes so, which
+changes no number either.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, linear_sum_assignment
 
 from ...errors import SolveError
 
@@ -120,17 +121,22 @@ class Scan:
         for value in sorted(map(float, values)):
             self.at(value)
         for _ in range(HALVINGS):
-            wanted = self._suspects()
+            wanted = {*self._tongues(), *self._exchanges()}
             if not wanted:
                 break
-            for value in wanted:
+            for value in sorted(wanted):
                 self.at(value)
         return self.crossings()
 
     def _coordinate(self, values: np.ndarray) -> np.ndarray:
         return np.log(values) if self.log and np.all(values > 0) else values
 
-    def _suspects(self) -> list[float]:
+    def _exchanges(self) -> list[float]:
+        """Middles of intervals within which modes take each other's place on the unstable side."""
+        values = sorted(self.samples)
+        return [self.middle(a, b) for a, b in zip(values, values[1:]) if _exchanged(self.samples[a], self.samples[b])]
+
+    def _tongues(self) -> list[float]:
         """Middles of intervals within which a growth rate may reach zero and turn back."""
         values = np.array(sorted(self.samples))
         if len(values) < 3:
@@ -151,7 +157,7 @@ class Scan:
                 reach = max(abs(g[0]), abs(g[2])) - abs(g[1])
                 if vertex * g[1] <= 0 or abs(vertex) < MARGIN * reach:
                     wanted.update((self.middle(values[i - 1], values[i]), self.middle(values[i], values[i + 1])))
-        return sorted(wanted)
+        return list(wanted)
 
     def certified(self, value: float) -> bool:
         """Whether the sample at a value of the scan may be claimed."""
@@ -177,6 +183,18 @@ class Scan:
                 continue
             found += [Crossing(k, low, high) for k in range(few, min(many, WATCHED))]
         return found
+
+
+def _exchanged(low: Sample, high: Sample) -> bool:
+    """Whether one mode ceases to be unstable between two samples and another becomes so: each is where the other sample
+    has its nearest, all of them together.
+    """
+    if not (low.unstable and high.unstable):
+        return False
+    here, there = low.eigenvalues, high.eigenvalues
+    pairs = linear_sum_assignment(np.abs(here[:, None] - there))
+    before, after = here[pairs[0]].real > 0, there[pairs[1]].real > 0
+    return bool((before & ~after).any() and (after & ~before).any())
 
 
 def locate(scan: Scan, crossing: Crossing, tolerance: float) -> float:

@@ -138,6 +138,16 @@ def test_an_interrupted_map_resumes_to_the_same_numbers(case, whole, tmp_path):
     assert run(["resume", str(path)]) == 2  # nothing left to do
 
 
+def test_a_map_of_an_earlier_version_is_read(case, tmp_path):
+    path = tmp_path / "map.h5"
+    few = case.replace({"map.x": "pressure=3000:8000:2", "map.y": "density=10:1000:3:log", "map.curve": False})
+    found = Valve(few, "valve").map(output=path)
+    with h5py.File(path, "a") as file:
+        del file["tables/cells/runaway"]
+    again = load_result(path)
+    assert np.array_equal(again.grid("unstable"), found.grid("unstable")) and not again.grid("runaway").any()
+
+
 def test_json_and_figures(case, tmp_path, capsys):
     arguments = [
         f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()

@@ -6,6 +6,7 @@ import pytest
 from dbvfiv.studies.map.column import MapColumn, MapPlan
 from dbvfiv.studies.map.curves import linked
 from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.map.web import Web
 from dbvfiv.studies.stability.walk import StabilityWalk
 
 
@@ -32,6 +33,17 @@ def test_linked_tongue_is_one_curve(case):
     (curve,) = linked(plan, tuple(columns))
     assert len(curve.x) == 7 and curve.points()[0] == curve.points()[-1], "a tongue is closed"
     assert not curve.exact and "not known between" in curve.reason
+
+
+@pytest.mark.parametrize("away", [0, 1])
+def test_a_wall_that_runs_away_calls_for_no_columns(case, away):
+    """A change of the number of unstable modes at the lower edge does, where no curve ends there."""
+    plan = MapPlan.of(case)
+    columns = []
+    for value, number in ((1000.0, 0), (2000.0, 1)):
+        cells = {"unstable": np.full((1, 3), number), "runaway": np.full((1, 3), number * away)}
+        columns.append(MapColumn(value, 0, cells, np.zeros((0, 5)), 0.0))
+    assert bool(Web.of(plan, columns, 0).wanted()) == (not away)
 
 
 @pytest.fixture(scope="module")

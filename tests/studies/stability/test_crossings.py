@@ -43,6 +43,18 @@ def test_a_second_mode_that_becomes_unstable_counts_too():
     assert [locate(scan, c, 1e-12) for c in crossings] == pytest.approx([1.0, 2.0])
 
 
+@pytest.mark.parametrize("on, off", [(1.48, 1.52), (1.52, 1.48)])
+def test_modes_that_take_each_other_s_place_between_two_values_are_told_apart(on, off):
+    scan = Scan(modes(lambda x: off - x, lambda x: x - on))
+    crossings = scan.run([0.0, 1.0, 2.0, 3.0])
+    assert [locate(scan, c, 1e-12) for c in crossings] == pytest.approx(sorted((on, off)))
+
+
+def test_modes_that_change_their_order_while_unstable_cost_no_samples():
+    scan = Scan(modes(lambda x: 3.0 - x, lambda x: x))
+    assert scan.run([0.5, 1.0, 2.0, 2.5]) == [] and len(scan.samples) == 4
+
+
 def test_missing_states_are_kept_as_sentences():
     def spectrum(x):
         if 1.4 < x < 1.6:
