@@ -36,10 +36,13 @@ class StructureMatrices:
     data : (parts, entries) array
         M, C, K and what relaxes on it.
     relaxation : Relaxation or None
+    idle : list
+        Solvers of symmetric sums that nobody uses, for `eigen.inertia`.
     """
 
     def __init__(self, pencil: CoupledPencil):
         parts = _parts(pencil)
+        self.idle: list = []
         self._sources = None
         self.shape = pencil.M.shape
         pattern = sum(sp.csr_matrix((np.ones(p.nnz), p.indices, p.indptr), p.shape) for p in parts)
@@ -115,6 +118,14 @@ class StructureMatrices:
         # in compressed columns a symmetric pattern has its rows again
         return places, self._transpose[2][places], indptr.astype(np.int32), self.indices[places]
 
+    @cached_property
+    def mirrored(self) -> np.ndarray:
+        """For each entry of the pattern its place, or that of its mirror image, in the upper half."""
+        places, images, _, _ = self.upper
+        out = np.empty(self.indices.size, np.int64)
+        out[places] = out[images] = np.arange(places.size)
+        return out
+
 
 class MumpsFactorization:
     """LU by MUMPS through PETSc, with the symbolic analysis kept between refactorisations.
@@ -124,6 +135,9 @@ class MumpsFactorization:
     structure : StructureMatrices
         Only the pattern is taken; call `refactor` before solving.
     """
+
+    #: PETSc's name of the factorisation, and MUMPS's control parameters.
+    kind, controls = "lu", {14: 50}
 
     def __init__(self, structure: StructureMatrices):
         from petsc4py import PETSc
@@ -142,7 +156,7 @@ class MumpsFactorization:
         self._solver.setType("preonly")
         self._solver.setOperators(self._matrix)
         pc = self._solver.getPC()
-        pc.setType("lu")
+        pc.setType(self.kind)
         pc.setFactorSolverType("mumps")
         self._factor = None
         self._rhs_array = np.zeros(n, self.dtype)
@@ -169,7 +183,8 @@ class MumpsFactorization:
             pc.setFactorSetUpSolverType()
             self._factor = pc.getFactorMatrix()
             self._held.append(self._factor)
-            self._factor.setMumpsIcntl(14, 50)
+            for number, value in self.controls.items():
+                self._factor.setMumpsIcntl(number, value)
         self._solver.setOperators(self._matrix)
         self._solver.setUp()
         failure = self._factor.getMumpsInfog(1)
@@ -182,7 +197,7 @@ class MumpsFactorization:
         self._solver.reset()
         self._solver.setOperators(self._matrix)
         pc = self._solver.getPC()
-        pc.setType("lu")
+        pc.setType(self.kind)
         pc.setFactorSolverType("mumps")
         self._factor = None
 

@@ -1,18 +1,19 @@
 """How many eigenvalues of symmetric sums of a structure's matrices are negative, without computing any (Sylvester).
 
-The sums share one pattern. MUMPS factors its upper half as L D L^T and counts the signs of D; where PETSc computes with
-complex numbers, SuperLU does with pivots from the diagonal.
+The sums share one pattern, whose symbolic analysis is kept. MUMPS factors them as L D L^T and counts the signs of D;
+where PETSc computes with complex numbers, SuperLU does with pivots from the diagonal.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from .factorization import SingularShiftError, StructureMatrices, petsc_is_complex
+from .factorization import MumpsFactorization, SingularShiftError, StructureMatrices, petsc_is_complex
 
 
 class SymmetricLU:
@@ -53,78 +54,27 @@ class SymmetricLU:
         return self._scale * self._lu.solve(self._scale * b)
 
 
-class SymmetricFactor:
-    """L D L^T of a symmetric matrix by MUMPS through PETSc; a context manager, at whose end PETSc lets go of it.
+class SymmetricFactor(MumpsFactorization):
+    """L D L^T of symmetric matrices of one pattern by MUMPS through PETSc."""
 
-    Parameters
-    ----------
-    upper : (n, n) sparse matrix in compressed rows
-        Its upper half, diagonal included, with sorted indices.
+    # without the second one the signs of the last front are not counted
+    kind, controls = "cholesky", {14: 50, 13: 1}
 
-    Attributes
-    ----------
-    negative : int
-        Number of negative eigenvalues.
+    def refactor(self, values: np.ndarray) -> None:
+        """Factor the matrix with these entries, both halves, on the pattern.
 
-    Raises
-    ------
-    SingularShiftError
-        If a pivot is zero.
-    """
+        Raises
+        ------
+        SingularShiftError
+            If MUMPS meets a zero pivot.
+        """
+        self._matrix.setOption(self._petsc.Mat.Option.SYMMETRIC, True)
+        super().refactor(values)
 
-    def __init__(self, upper: sp.csr_matrix):
-        from petsc4py import PETSc
-
-        indices = (upper.indptr.astype(PETSc.IntType), upper.indices.astype(PETSc.IntType))
-        self._size = upper.shape[0]
-        matrix = PETSc.Mat().createSBAIJ(upper.shape, 1, csr=(*indices, upper.data), comm=PETSc.COMM_SELF)
-        matrix.assemble()
-        solver = PETSc.KSP().create(comm=PETSc.COMM_SELF)
-        solver.setType("preonly")
-        solver.setOperators(matrix)
-        pc = solver.getPC()
-        pc.setType("cholesky")
-        pc.setFactorSolverType("mumps")
-        pc.setFactorSetUpSolverType()
-        self._factor = pc.getFactorMatrix()
-        self._factor.setMumpsIcntl(13, 1)  # without this the signs of the last front are not counted
-        self._factor.setMumpsIcntl(14, 50)
-        solver.setUp()
-        vectors = (PETSc.Vec().createWithArray(np.zeros(self._size), comm=PETSc.COMM_SELF) for _ in range(2))
-        self._right, self._out = vectors
-        self._held = [self._right, self._out, self._factor, pc, solver, matrix]
-        failure = self._factor.getMumpsInfog(1)
-        if failure < 0:
-            self.__exit__()
-            raise SingularShiftError(f"MUMPS could not factor the symmetric matrix (INFOG(1) = {failure}).")
-        self.negative = self._factor.getMumpsInfog(12)
-
-    def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solution for one right-hand side, shape (n,)."""
-        self._right.array[:] = b
-        self._factor.solve(self._right, self._out)
-        return self._out.array.copy()
-
-    def __enter__(self) -> SymmetricFactor:
-        return self
-
-    def __exit__(self, *_error) -> None:
-        for item in self._held:
-            item.destroy()
-        self._held = []
-
-
-class _DiagonalFactor(SymmetricLU):
-    """The same by SuperLU."""
-
-    def __init__(self, upper: sp.csr_matrix):
-        super().__init__(_mirrored(upper))
-
-    def __enter__(self) -> _DiagonalFactor:
-        return self
-
-    def __exit__(self, *_error) -> None:
-        pass
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues."""
+        return self._factor.getMumpsInfog(12)
 
 
 class SymmetricStructure:
@@ -145,6 +95,7 @@ class SymmetricStructure:
     """
 
     def __init__(self, matrices: StructureMatrices):
+        self._matrices = matrices
         upper, mirrored, self._indptr, self._indices = matrices.upper
         self.size, self.relaxation = matrices.shape[0], matrices.relaxation
         self._data = 0.5 * (matrices.data[:, upper] + matrices.data[:, mirrored])
@@ -170,14 +121,24 @@ class SymmetricStructure:
         """A sum."""
         return _mirrored(self.upper(weights)).tocsr()
 
-    def factored(self, weights: np.ndarray) -> SymmetricFactor | _DiagonalFactor:
-        """A sum, factored.
+    @contextmanager
+    def factored(self, weights: np.ndarray) -> Iterator[SymmetricFactor | SymmetricLU]:
+        """A sum, factored; the factor is valid in the context only.
 
         Raises
         ------
         SingularShiftError
         """
-        return (_DiagonalFactor if petsc_is_complex() else SymmetricFactor)(self.upper(weights))
+        if petsc_is_complex():
+            yield SymmetricLU(_mirrored(self.upper(weights)))
+            return
+        idle = self._matrices.idle
+        factor = idle.pop() if idle else SymmetricFactor(self._matrices)
+        factor.refactor((weights @ self._data)[self._matrices.mirrored])
+        try:
+            yield factor
+        finally:
+            idle.append(factor)
 
     def acting(self, weights: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """A sum as a function of vectors, shape (n,) or (n, k)."""

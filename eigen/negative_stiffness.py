@@ -15,6 +15,9 @@ mean of the partial sums K + N_1 + ... + N_j: where all of these are positive de
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse.linalg as spla
@@ -104,13 +107,12 @@ class _Search:
             full, mass = (structure.times(w, np.eye(n)) for w in (weights, structure.mass))
             return la.eigh(full, mass, subset_by_index=(0, min(number, MOST) - 1))[1]
         number = min(number, MOST, n - 1)
-        positive, factor = self._positive(weights)
-        product, other, inverse = (
-            spla.LinearOperator((n, n), matvec=lambda x, act=act: act(np.ravel(x)))
-            for act in (structure.acting(weights), structure.acting(positive), factor.solve)
-        )
         start = np.random.default_rng(5).standard_normal(n)
-        with factor:
+        with self._positive(weights) as (positive, factor):
+            product, other, inverse = (
+                spla.LinearOperator((n, n), matvec=lambda x, act=act: act(np.ravel(x)))
+                for act in (structure.acting(weights), structure.acting(positive), factor.solve)
+            )
             for tolerance in TOLERANCES:
                 size = min(n, max(2 * number + 1, 10))
                 _, motions = spla.eigsh(
@@ -120,19 +122,21 @@ class _Search:
                     break
         return motions
 
-    def _positive(self, weights: np.ndarray):
+    @contextmanager
+    def _positive(self, weights: np.ndarray) -> Iterator[tuple]:
         """A positive sum close to one that is not, and its factor: inertia and damping of that one, the slow stiffness,
         and inertia as much as it takes beyond.
         """
         mass, positive = self.structure.mass, self.structure.slow.copy()
         positive[:2] = weights[:2]
         while True:
-            factor = self.structure.factored(positive + self._added * mass)
-            if not factor.negative:
-                return positive + self._added * mass, factor
-            with factor:
-                diagonal = (abs(self.structure.upper(w).diagonal()) for w in (positive, mass))
-                self._added = 8.0 * self._added or 1e-6 * float(np.divide(*(np.median(d) for d in diagonal)))
+            total = positive + self._added * mass
+            with self.structure.factored(total) as factor:
+                if not factor.negative:
+                    yield total, factor
+                    return
+            diagonal = (abs(self.structure.upper(w).diagonal()) for w in (positive, mass))
+            self._added = 8.0 * self._added or 1e-6 * float(np.divide(*(np.median(d) for d in diagonal)))
 
 
 def _completed(search: _Search, motions: np.ndarray, rough: bool) -> np.ndarray:

@@ -23,8 +23,8 @@ from ..stability.walk import StabilityWalk
 
 #: What is kept of each cell.
 CELLS = ("growth_rate", "frequency", "second", "unstable", "runaway", "counted", "certified", "how")
-#: Relative accuracy of onsets along a column.
-LOCATED = 1e-10
+#: Relative accuracy of onsets along a column, and of those that the full matrices correct.
+LOCATED, ROUGH = 1e-10, 1e-6
 
 
 class ColumnTask(NamedTuple):
@@ -229,7 +229,7 @@ def _law(
     )
     # what the cells know need not be found again
     scan.samples.update(_known(along, column))
-    found = _onsets(scan, along)
+    found = _onsets(scan, along, LOCATED if column.corrected is None else ROUGH)
     if column.corrected is None:
         return column, found
 
@@ -267,14 +267,14 @@ def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):
 
     scan = Scan(lambda other: cell(other).leading[0], plan.along.log, lambda other: bool(cell(other).certified[0]))
     scan.samples.update(_known(plan.along, column))
-    return column, _onsets(scan, plan.along)
+    return column, _onsets(scan, plan.along, LOCATED)
 
 
-def _onsets(scan: Scan, along: Axis) -> list[tuple[float, float, float, float]]:
+def _onsets(scan: Scan, along: Axis, accuracy: float) -> list[tuple[float, float, float, float]]:
     """Value, frequency, direction, and what is left of the growth rate over the size of the eigenvalue."""
     found = []
     for crossing in scan.run(along.values):
-        value = locate(scan, crossing, LOCATED)
+        value = locate(scan, crossing, accuracy)
         eigenvalue = complex(scan.within(value).eigenvalues[crossing.index])
         direction = 1.0 if crossing.high.unstable > crossing.low.unstable else -1.0
         left = abs(eigenvalue.real) / max(abs(eigenvalue), 1.0)
