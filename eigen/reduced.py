@@ -236,15 +236,29 @@ class ReducedFamily:
             out[cells, : found.shape[1]] = found
         return out
 
+    def several_pairs(self, conditions, most: int = 8, share: float = 1.0) -> list[Pairs]:
+        """`pairs` of several conditions; those that relax at once."""
+        relaxing = [c for c in conditions if self.family.relaxation(c.loss) is not None]
+
+        def chosen(condition, values):
+            reach = self.family.reach(condition)
+            return np.array([v for v in reach.leading(values) if v.real > share * reach.floor][:most])
+
+        found = iter(self.small.leading_pairs(relaxing, chosen) if relaxing else ())
+        return [
+            self._linear_pairs(c, most, share)
+            if self.family.relaxation(c.loss) is None
+            else self.of_rational(next(found))
+            for c in conditions
+        ]
+
     def pairs(self, condition: Condition, most: int = 8, share: float = 1.0) -> Pairs:
         """Leading eigenpairs in the reach of a condition, lifted to the full unknowns; down to a share of its floor."""
+        return self.several_pairs([condition], most, share)[0]
+
+    def _linear_pairs(self, condition: Condition, most: int, share: float) -> Pairs:
+        """The same of a condition where nothing relaxes."""
         reach = self.family.reach(condition)
-        if self.family.relaxation(condition.loss) is not None:
-            lowest = share * reach.floor
-            found = self.small.leading_pairs(
-                condition, lambda values: np.array([v for v in reach.leading(values) if v.real > lowest][:most])
-            )
-            return self.of_rational(found)
         floor, band = reach.floor, reach.band
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
         keep = np.flatnonzero((values.imag >= 0) & (values.imag <= band) & (values.real > share * floor))

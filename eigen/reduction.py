@@ -8,6 +8,8 @@ are made with the stiffness that a typical motion sees.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +39,37 @@ CORRECTIONS = 2
 LOWEST = 24
 #: Relative distance from an eigenvalue at which its vector is corrected.
 BESIDE = 1e-3
+
+
+@dataclass(frozen=True)
+class _Products:
+    """What a residual needs of structural vectors, whatever their eigenvalues: their images under M, K, the damping of
+    the material (None without), what relaxes, and the coupling.
+    """
+
+    mass: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray | None
+    relaxing: list[np.ndarray]
+    coupled: np.ndarray
+
+    def __getitem__(self, own: slice) -> _Products:
+        damping = None if self.damping is None else self.damping[:, own]
+        relaxing = [image[:, own] for image in self.relaxing]
+        return _Products(self.mass[:, own], self.stiffness[:, own], damping, relaxing, self.coupled[:, own])
+
+
+class _Block:
+    """Eigenpairs of several conditions side by side; `columns` says which are whose."""
+
+    def __init__(self, several: list[Pairs], conditions):
+        self.several, self.conditions = several, conditions
+        sizes = [len(pairs.values) for pairs in several]
+        ends = np.cumsum(sizes)
+        self.columns = [slice(end - size, end) for size, end in zip(sizes, ends)]
+        self.values = np.concatenate([pairs.values for pairs in several])
+        self.beta = np.repeat([c.beta for c in conditions], sizes)
+        self.q, self.w = np.hstack([pairs.q for pairs in several]), np.hstack([pairs.w for pairs in several])
 
 
 class FamilyReduction:
@@ -114,29 +147,27 @@ class FamilyReduction:
 
     def residual(self, values, q, u, condition: Condition, left: bool = False):
         """T(lambda) x of pairs, or T^H w of left vectors: force part (n, k) and inner part (b, k)."""
-        return self._residual(self._products(q, condition, left), values, u, condition, left)
+        return self._residual(self._products(q, condition.beta, condition.loss, left), values, u, condition, left)
 
-    def _products(self, q, condition: Condition, left: bool = False):
-        """What a residual needs of structural vectors, whatever their eigenvalues."""
-        family, relaxation = self.family, self.family.relaxation(condition.loss)
+    def _products(self, q, beta: float, loss: float, left: bool = False) -> _Products:
+        family, relaxation = self.family, self.family.relaxation(loss)
         turn = (lambda a: a.T) if left else (lambda a: a)
         q = np.asarray(q, complex)
-        return (
+        return _Products(
             real_apply(family.mass, q),
             real_apply(turn(family.stiffness), q),
-            real_apply(turn(family.damping), q) if condition.beta else None,
+            real_apply(turn(family.damping), q) if beta else None,
             [] if relaxation is None else [real_apply(turn(matrix), q) for matrix in relaxation.matrices],
             real_apply(family.forces.T if left else family.slope, q),
         )
 
-    def _residual(self, products, values, u, condition: Condition, left: bool = False):
-        family, s = self.family, np.conj(values) if left else values
-        mq, kq, dq, relaxing, y = products
-        force = mq * (s * s + condition.alpha * s) + kq
-        if dq is not None:
-            force += dq * (condition.beta * s)
-        if relaxing:
-            for factor, image in zip(family.relaxation(condition.loss).factors(s), relaxing):
+    def _residual(self, products: _Products, values, u, condition: Condition, left: bool = False):
+        family, s, y = self.family, np.conj(values) if left else values, products.coupled
+        force = products.mass * (s * s + condition.alpha * s) + products.stiffness
+        if products.damping is not None:
+            force += products.damping * (condition.beta * s)
+        if products.relaxing:
+            for factor, image in zip(family.relaxation(condition.loss).factors(s), products.relaxing):
                 force += image * factor
         inner = np.zeros((u.shape[0], len(values)), complex)
         pressure = np.zeros_like(y)
@@ -153,41 +184,60 @@ class FamilyReduction:
 
     def corrected(self, pairs: Pairs, condition: Condition) -> tuple[np.ndarray, np.ndarray]:
         """Right and left structural vectors after one correction of what the space leaves out, (n, k) each."""
-        force, _ = self.residual(pairs.values, pairs.q, pairs.u, condition)
-        back, _ = self.residual(pairs.values, pairs.w, pairs.c, condition, left=True)
-        if self.family.relaxation(condition.loss) is not None:
-            return self._corrected_stiffly(pairs, condition, force, back)
-        # far from the leading modes T is nearly (1 + lambda beta) K
-        scale = 1.0 / (1.0 + pairs.values * condition.beta)
-        return pairs.q - self.solver.solve(force) * scale, pairs.w - self.solver.solve_transposed(back) * np.conj(scale)
+        return self._all_corrected([pairs], [condition])[0]
 
-    def _corrected_stiffly(self, pairs: Pairs, condition: Condition, force, back):
-        """The same where parts of the stiffness relax: with the stiffness that a typical motion sees, and repeated for
-        what that differs from one mode and one part to another.
-        """
-        relaxation, small = self.family.relaxation(condition.loss), self.coarse.small
-        typical = relaxation.factors(1j * small.frequency).real
-        if self._loss != condition.loss:
-            parts = zip(typical, relaxation.matrices)
-            self._stiffened.factor(self.family, sum((x * part for x, part in parts), self.family.stiffness).tocsr())
-            self._loss = condition.loss
-        solver, share = self._stiffened, small.stiff_shares
-        scale = 1.0 + share @ typical
-        scale = scale / (1.0 + pairs.values * condition.beta + share @ relaxation.factors(pairs.values))
-        q, w = pairs.q, pairs.w
-        for repeat in range(CORRECTIONS):
-            if repeat:
-                force, _ = self.residual(pairs.values, q, pairs.u, condition)
-                back, _ = self.residual(pairs.values, w, pairs.c, condition, left=True)
+    def _all_corrected(self, several: list[Pairs], conditions) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The same of several conditions, those of one factor on the loss factors in one block."""
+        found = {}
+        for loss in dict.fromkeys(c.loss for c in conditions):
+            members = [i for i, c in enumerate(conditions) if c.loss == loss]
+            block = _Block([several[i] for i in members], [conditions[i] for i in members])
+            found |= zip(members, self._block_corrected(block, loss))
+        return [found[i] for i in range(len(conditions))]
+
+    def _block_corrected(self, block: _Block, loss: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        relaxation, values = self.family.relaxation(loss), block.values
+        # far from the leading modes T is nearly (1 + lambda beta) K
+        solver, passes, scale = self.solver, 1, 1.0 / (1.0 + values * block.beta)
+        if relaxation is not None:
+            # with the stiffness that a typical motion sees, and repeated for what that differs from one mode and one
+            # part to another
+            small = self.coarse.small
+            typical, share = relaxation.factors(1j * small.frequency).real, small.stiff_shares
+            solver, passes = self._stiffened_by(typical, loss), CORRECTIONS
+            scale = (1.0 + share @ typical) / (1.0 + values * block.beta + share @ relaxation.factors(values))
+        q, w = block.q, block.w
+        for _ in range(passes):
+            force, back = self._forces(block, q, loss), self._forces(block, w, loss, left=True)
             q, w = q - solver.solve(force) * scale, w - solver.solve_transposed(back) * np.conj(scale)
-        return q, w
+        return ((q[:, own], w[:, own]) for own in block.columns)
+
+    def _forces(self, block: _Block, vectors: np.ndarray, loss: float, left: bool = False) -> np.ndarray:
+        """Force parts of the residuals of a block with other structural vectors, (n, k)."""
+        products = self._products(vectors, block.beta.max(initial=0.0), loss, left)
+        return np.hstack(
+            [
+                self._residual(products[own], pairs.values, pairs.c if left else pairs.u, condition, left)[0]
+                for own, pairs, condition in zip(block.columns, block.several, block.conditions)
+            ]
+        )
+
+    def _stiffened_by(self, factors: np.ndarray, loss: float) -> StaticSolver:
+        """Solver of the stiffness with its relaxing parts as stiff as factors say; that of the last one is kept."""
+        if self._loss != loss:
+            parts = zip(factors, self.family.relaxation(loss).matrices)
+            self._stiffened.factor(self.family, sum((x * part for x, part in parts), self.family.stiffness).tocsr())
+            self._loss = loss
+        return self._stiffened
 
     def fine(self, first: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:
         """Second stage: a space made of the corrected leading vectors of a first one at some conditions."""
-        columns = []
-        for condition in conditions:
-            right, left = self.corrected(first.pairs(condition, most, SNAPSHOT), condition)
-            columns += [right.real, right.imag, left.real, left.imag]
+        several = first.several_pairs(conditions, most, SNAPSHOT)
+        columns = [
+            part
+            for right, left in self._all_corrected(several, conditions)
+            for part in (right.real, right.imag, left.real, left.imag)
+        ]
         if not sum(part.shape[1] for part in columns):
             return first  # nothing leads anywhere: there is nothing to be found better
         return ReducedFamily(self.family, np.hstack(columns), 3e-7)
@@ -221,7 +271,7 @@ class FamilyReduction:
         return self._newton(pairs, *self.corrected(pairs, condition), condition)
 
     def _newton(self, pairs: Pairs, right, left, condition: Condition) -> np.ndarray:
-        products = self._products(right, condition)
+        products = self._products(right, condition.beta, condition.loss)
         force, inner = self._residual(products, pairs.values, pairs.u, condition)
         top = np.einsum("ij,ij->j", left.conj(), force) + np.einsum("ij,ij->j", pairs.c.conj(), inner)
         # T' by a difference quotient, good enough for the size of a correction

@@ -84,19 +84,24 @@ class SmallSpectra:
             line[: values.size] = values
         return out
 
-    def leading_pairs(self, condition: Condition, chosen) -> Refined:
-        """Leading eigenpairs of one pencil; `chosen` picks among the eigenvalues of the upper half-plane."""
-        rows, vectors = self._found([condition])
-        values = chosen(np.array(rows[0], complex))
-        known = [vectors.get((0, complex(value))) for value in values]
-        lacking = [i for i, pair in enumerate(known) if pair is None]
-        if lacking:
-            found = self.pairs(condition, values[lacking])
-            for place, i in enumerate(lacking):
-                known[i] = found.right[place], found.left[place]
-        size = self.reduced.size + len(self.reduced.coupling(condition.law)["S0"])
-        right, left = (np.array([pair[side] for pair in known]).reshape(len(values), size) for side in (0, 1))
-        return Refined(values, right, left, None)
+    def leading_pairs(self, conditions: list[Condition], chosen) -> list[Refined]:
+        """Leading eigenpairs of each pencil; `chosen` picks among the eigenvalues of a condition in the upper
+        half-plane.
+        """
+        rows, vectors = self._found(conditions)
+        out = []
+        for i, (condition, row) in enumerate(zip(conditions, rows)):
+            values = chosen(condition, np.array(row, complex))
+            known = [vectors.get((i, complex(value))) for value in values]
+            lacking = [k for k, pair in enumerate(known) if pair is None]
+            if lacking:
+                found = self.pairs(condition, values[lacking])
+                for place, k in enumerate(lacking):
+                    known[k] = found.right[place], found.left[place]
+            size = self.reduced.size + len(self.reduced.coupling(condition.law)["S0"])
+            right, left = (np.array([pair[side] for pair in known]).reshape(len(values), size) for side in (0, 1))
+            out.append(Refined(values, right, left, None))
+        return out
 
     def _found(self, conditions: list[Condition]) -> tuple[list[list[complex]], dict]:
         """Leading eigenvalues of each cell in the upper half-plane; and right and left vectors, where they came along,
@@ -131,7 +136,9 @@ class SmallSpectra:
         for i, value in zip(*real_roots(problem, max(limits), self._top)):
             _joined(rows[i], complex(value))
         for i in np.flatnonzero(doubtful):
-            rows[i] = list(self._exactly(conditions[i]))
+            # modes of a doubtful cell go on in the next one
+            row = self._followed(problem, i, rows[i - 1], rows[i]) if i and doubtful[i - 1] else None
+            rows[i] = list(self._exactly(conditions[i])) if row is None else row
         for i, rates in enumerate(map(self.reduced.rates, conditions)):
             if rates.size:  # what runs away of the structure by itself is no mode
                 band = self.reduced.family.reach(conditions[i]).band
@@ -144,6 +151,19 @@ class SmallSpectra:
         values = np.asarray(values, complex)
         problem, cells = self.problem([condition]), np.zeros(len(values), int)
         return refined(problem, cells, started(problem, None, cells, values))
+
+    def _followed(self, problem: RationalCells, cell: int, before: list[complex], known: list[complex]):
+        """Eigenvalues of a cell that those of the cell before lead to, and those known; None where two of them meet or
+        one is lost.
+        """
+        starts = np.array(sorted(before, key=lambda value: -value.real)[:TAKEN], complex)
+        cells = np.full(starts.size, cell)
+        found, row = refined(problem, cells, started(problem, None, cells, starts)), []
+        if not (found.settled.all() and all(_joined(row, complex(value)) for value in found.values)):
+            return None
+        for value in known:
+            _joined(row, value)
+        return row
 
     def _exactly(self, condition: Condition) -> np.ndarray:
         """Leading eigenvalues by the exact linear form."""
