@@ -82,7 +82,7 @@ OTHERS = (13.49, 18.63, 23.96, 30.81, 39.70)
 def test_isotropic_valve():
     """Five lowest frequencies on 28 x 48 beside those of other codes on 112 x 192: within 0.6 %, of which 0.3 % is the
     mesh (56 x 96: 13.51, 18.66, 24.03, 30.85, 39.73; 112 x 192: 13.50, 18.65, 24.01, 30.83, 39.71, and with even rows
-    and columns and the plain element 13.49, 18.64, 24.00, 30.82, 39.70). Half of it and more is left by the consistent
+    and columns and the plain element 13.49, 18.64, 24.00, 30.82, 39.70). Much of it is left by the consistent
     mass: with the averaged one all but the first are nearer on 14 x 24 than these here.
     """
     own = frequencies(28, 48, 5 / 6, 5)
