@@ -15,7 +15,6 @@ import numpy as np
 
 from ..flow import FlowMotion
 from ..flow.derivatives import along
-from ..shell.mass import mass_integrals
 from ..shell.reference import SHAPE, SLOPE
 from ..shell.rotation import director
 from .outside_forms import OutsideForms
@@ -56,7 +55,7 @@ class AnalyticResidual:
             "free": jnp.asarray(np.flatnonzero(shell.dofs.free)),
             "directors": jnp.asarray(shell.mesh.directors),
             "frames": jnp.asarray(shell.mesh.frames),
-            "mass": jnp.asarray(mass_integrals(shell.geometry, shell.section)),
+            "mass": jnp.asarray(shell._integrals),
             "stations": jnp.asarray(model.station_of_node),
             "loaded": jnp.asarray(model.loaded),
             "rows": jnp.asarray(model.mesh.rows),

@@ -47,7 +47,8 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
     )
     section = section or build_section(case)
     zones = layer_zones(case, mesh) if fillers else None
-    return mesh, Shell(surface, section, free_unknowns(mesh), case.shell.metric, case.mesh.element, zones)
+    choices = (case.shell.metric, case.mesh.element, zones, case.shell.mass)
+    return mesh, Shell(surface, section, free_unknowns(mesh), *choices)
 
 
 def layer_zones(case: Case, mesh: ValveMesh) -> Zones:

@@ -1,4 +1,7 @@
-"""Consistent mass: translation, rotation of the wall and, for unequal layers, the coupling of the two."""
+"""Mass: translation, rotation of the wall and, for unequal layers, the coupling of the two.
+
+Consistent, or the mean of consistent and lumped. Equation (T.30) of docs/theory.md.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,39 @@ import numpy as np
 
 from .reference import SHAPE, ReferenceGeometry
 from .section import Section
+from .zones import WallParts
+
+CONSISTENT, AVERAGED = "consistent", "averaged"
+MASSES = (CONSISTENT, AVERAGED)
 
 
-def mass_integrals(geometry: ReferenceGeometry, section: Section) -> np.ndarray:
-    """(ne, 3, 4, 4): integrals of rho t^k N_a N_b over each element, k = 0, 1, 2."""
+def mass_integrals(geometry: ReferenceGeometry, section: Section | WallParts, mass: str = CONSISTENT) -> np.ndarray:
+    """Integrals of rho t^k N_a N_b over each element, k = 0, 1, 2, from which all inertia of a shell follows.
+
+    Parameters
+    ----------
+    geometry : ReferenceGeometry
+    section : Section or WallParts
+    mass : "consistent" or "averaged"
+        The integrals, or the mean of them and of their sums over b on the diagonal: the higher-order mass of Goudreau
+        and Taylor (1973, Computer Methods in Applied Mechanics and Engineering 2, 69-97).
+
+    Returns
+    -------
+    (ne, 3, 4, 4) array
+        kg, kg m and kg m2.
+
+    Raises
+    ------
+    ValueError
+        If there is no mass of that name.
+    """
+    if mass not in MASSES:
+        raise ValueError(f"The mass is {mass!r}, but only {' and '.join(map(repr, MASSES))} exist.")
     h = geometry.thickness
     shape = np.einsum("ep,pa,pb->eab", geometry.area, SHAPE, SHAPE)
+    if mass == AVERAGED:
+        shape = 0.5 * (shape + shape.sum(axis=2)[:, :, None] * np.eye(4))
     moments = np.atleast_2d(section.inertia) * h[:, None] ** np.arange(1, 4)
     return moments[:, :, None, None] * shape[:, None]
 

@@ -10,7 +10,7 @@ import numpy as np
 from .assumed_strain import ENHANCED, inplane_map, local_map, rest_products
 from .energy import FIRST_ORDER, EnergyFunctions
 from .kernel import shell_force, shell_tangent
-from .mass import assemble_mass, convective_inertia, mass_integrals
+from .mass import CONSISTENT, assemble_mass, convective_inertia, mass_integrals
 from .mesh import ShellMesh
 from .reference import reference_geometry, shear_map, thickness_over_radius
 from .relaxed_forms import relaxed_force_form
@@ -61,6 +61,8 @@ class Shell:
         What is assumed about the in-plane strains, see `dbvfiv.shell.assumed_strain`.
     zones : Zones, optional
         Where which layers of the section are; all are everywhere by default.
+    mass_kind : "consistent" or "averaged"
+        See `dbvfiv.shell.mass`.
 
     All states are vectors of the free unknowns (n,): displacements in m, rotations in rad. Forces are in N and N m.
     """
@@ -73,6 +75,7 @@ class Shell:
         metric: str = FIRST_ORDER,
         element: str = ENHANCED,
         zones: Zones | None = None,
+        mass_kind: str = CONSISTENT,
     ):
         self.mesh = mesh
         self.section = section
@@ -83,6 +86,7 @@ class Shell:
         g = self.geometry
         self.element = element
         self.zones = zones
+        self.mass_kind = mass_kind
         self.at_rest = section if zones is None else WallParts(section, zones)
         self._inplane = inplane_map(mesh, g, self.at_rest, element)
         self._products = rest_products(mesh.nodes[mesh.quads], mesh.directors[mesh.quads])
@@ -95,8 +99,12 @@ class Shell:
                 _Part(own, mesh.quads[own], tuple(array[own] for array in reference)) for own in self.at_rest.elements
             )
         self.wall = self.wall_of()
-        self._integrals = mass_integrals(g, self.at_rest)
+        self._integrals = mass_integrals(g, self.at_rest, mass_kind)
         self._frames = np.ascontiguousarray(mesh.frames)
+
+    def with_free(self, free=None) -> Shell:
+        """The same shell with other free unknowns (nn, 5); all by default."""
+        return Shell(self.mesh, self.section, free, self.metric, self.element, self.zones, self.mass_kind)
 
     def wall_of(self, factors: np.ndarray | None = None) -> tuple:
         """What the compiled loops take of the wall, zone by zone; `factors` (nl,) on the stress of each layer."""
@@ -185,7 +193,7 @@ class Shell:
         return found
 
     def mass(self, q: np.ndarray | None = None) -> np.ndarray:
-        """Values (nnz,) of the consistent mass matrix at a state (at rest by default), kg and kg m2."""
+        """Values (nnz,) of the mass matrix at a state (at rest by default), kg and kg m2."""
         q = np.zeros(self.size) if q is None else q
         _, d1, _ = self.directors(self.dofs.expand(q))
         data = np.zeros(len(self.dofs.pattern[1]))

@@ -209,6 +209,15 @@ def test_the_true_metric_by_its_word_or_as_truth(tmp_path):
         load_case(None, ["shell.metric=false"])
 
 
+def test_a_mass_that_does_not_exist(one_sentence):
+    assert load_case(None, ["shell.mass=averaged"]).shell.mass == "averaged"
+    with pytest.raises(
+        CaseError, match='shell.mass is given as .*lumped.*; it must be "consistent" or "averaged"'
+    ) as caught:
+        load_case(None, ["shell.mass=lumped"])
+    assert one_sentence(str(caught.value))
+
+
 @pytest.mark.parametrize("name", ["a" * 5000, "nowhere.h5", "bad\x00name"])
 def test_a_start_file_that_cannot_be(name, one_sentence):
     """A name longer than the system allows ended in a traceback."""

@@ -23,6 +23,7 @@ LAWS = {
     "line": {"upstream.length": 2.0, "upstream.diameter": 0.3, "upstream.friction": 0.02},
     "gas": {"fluid.continuity": "storage", "fluid.sound_speed": 340.0},
     "loss factors": LOSSY,
+    "averaged mass": {"shell.mass": "averaged"},
 }
 
 
@@ -97,9 +98,10 @@ def test_faces_that_touch_in_a_part_of_the_cycle():
     assert np.linalg.norm(found[:, : model.size] - difference) < 1e-4 * np.linalg.norm(difference)
 
 
-def test_residual_is_that_of_the_equations_of_motion():
+@pytest.mark.parametrize("name", ["storage", "averaged mass"])
+def test_residual_is_that_of_the_equations_of_motion(name):
     """At every sample, with rates of stiffness damping taken by its tangent."""
-    model, mu, system = valve_of("storage")
+    model, mu, system = valve_of(name)
     motion = motion_of(model, mu)
     fine = PeriodicMotion(Harmonics(2, 41), motion.coefficients, motion.omega)
     found = system.residual(fine, mu)

@@ -7,6 +7,7 @@ import pytest
 
 from dbvfiv.materials import IsotropicElastic
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
+from dbvfiv.shell.mass import AVERAGED, MASSES
 from tests.shell.structures import random_state, rectangle, rigid_motion, rotation_about, rotations_to
 
 TURNS = [((0, 0, 1), 0.5), ((1, 0, 0), 1.5), ((1, 2, -1), 2.5), ((-1, 0.3, 0.2), 3.0)]
@@ -100,12 +101,16 @@ def rates(shell: Shell, nodal, velocity, spin):
     return out
 
 
+@pytest.mark.parametrize("mass_kind", MASSES)
 @pytest.mark.parametrize("turn", [np.eye(3), rotation_about((1, 2, 3), 2.0)])
-def test_kinetic_energy_of_a_rigid_plate(turn):
-    """Against the exact mass and inertia of a layered box, rotary inertia included."""
+def test_kinetic_energy_of_a_rigid_plate(turn, mass_kind):
+    """Against the exact mass and inertia of a layered box, rotary inertia included; lumped masses, which stand at the
+    ends of an element of length a, have a^2/4 for its a^2/12, so the mean of both adds a^2/12 to the second moment.
+    """
     length, width = 0.5, 0.3
     patch = rectangle(5, 3, length, width)
-    shell = Shell(ShellMesh.build(patch.nodes, patch.quads, 0.04, material_axis=(1, 0, 0)), layered())
+    surface = ShellMesh.build(patch.nodes, patch.quads, 0.04, material_axis=(1, 0, 0))
+    shell = Shell(surface, layered(), mass_kind=mass_kind)
     nodal = rigid_motion(shell.mesh, turn, (0.2, 0.1, -0.3))
     velocity, spin = np.array([1.0, -2.0, 0.5]), np.array([3.0, 1.0, -2.0])
     rate = shell.dofs.restrict(rates(shell, nodal, velocity, spin))
@@ -128,6 +133,8 @@ def test_kinetic_energy_of_a_rigid_plate(turn):
         ]
     )
     total = area * m0
+    if mass_kind == AVERAGED:
+        second += np.diag([(length / 5) ** 2, (width / 3) ** 2, 0.0]) * total / 12
     shift = np.array([0.2, 0.1, -0.3])
     first, second = turn @ first, turn @ second @ turn.T
     second = second + np.outer(first, shift) + np.outer(shift, first) + total * np.outer(shift, shift)
@@ -137,21 +144,33 @@ def test_kinetic_energy_of_a_rigid_plate(turn):
     assert kinetic == pytest.approx(exact, rel=1e-12)
 
 
-def test_total_mass(mixed_shell):
-    shell = mixed_shell
+def of_mass(shell: Shell, mass_kind: str) -> Shell:
+    """The same shell with another mass."""
+    return Shell(shell.mesh, shell.section, shell.dofs.free, mass_kind=mass_kind)
+
+
+@pytest.mark.parametrize("mass_kind", MASSES)
+def test_total_mass(mixed_shell, mass_kind):
+    """That of the wall, and its first moment about the origin that of its mid-surface."""
+    shell = of_mass(mixed_shell, mass_kind)
     section, mesh = shell.section, shell.mesh
     density = sum(layer.law.density * share for layer, share in zip(section.layers, section.fractions))
-    volume = float(np.sum(shell.geometry.area * mesh.thickness[:, None]))
+    by_point = density * shell.geometry.area * mesh.thickness[:, None]
     mass = shell.dofs.matrix(shell.mass())
+    place = np.zeros((mesh.node_count, 5))
+    place[:, :3] = mesh.nodes
     for axis in range(3):
         unit = np.zeros((mesh.node_count, 5))
         unit[:, axis] = 1.0
         unit = shell.dofs.restrict(unit)
-        assert unit @ (mass @ unit) == pytest.approx(density * volume, rel=1e-13)
+        assert unit @ (mass @ unit) == pytest.approx(by_point.sum(), rel=1e-13)
+        moment = np.sum(by_point * shell.geometry.position[..., axis])
+        assert unit @ (mass @ shell.dofs.restrict(place)) == pytest.approx(moment, rel=1e-12, abs=1e-14)
 
 
-def test_mass_is_symmetric_and_positive(mixed_shell):
-    shell = mixed_shell
+@pytest.mark.parametrize("mass_kind", MASSES)
+def test_mass_is_symmetric_and_positive(mixed_shell, mass_kind):
+    shell = of_mass(mixed_shell, mass_kind)
     q = shell.dofs.restrict(random_state(shell.mesh, 8))
     mass = shell.dofs.matrix(shell.mass(q)).toarray()
     assert np.abs(mass - mass.T).max() <= 1e-15 * np.abs(mass).max()
@@ -159,9 +178,10 @@ def test_mass_is_symmetric_and_positive(mixed_shell):
     assert np.linalg.eigvalsh(mass * scale[:, None] * scale).min() > 1e-3
 
 
-def test_convective_inertia_is_that_of_lagranges_equations(saddle_shell):
+@pytest.mark.parametrize("mass_kind", MASSES)
+def test_convective_inertia_is_that_of_lagranges_equations(saddle_shell, mass_kind):
     """d/dt (M v) - d/dq (v M v / 2) = M a + convective inertia, by differences."""
-    shell = saddle_shell
+    shell = of_mass(saddle_shell, mass_kind)
     q = shell.dofs.restrict(random_state(shell.mesh, 9, 0.05, 0.8, rigid=0.0))
     v = shell.dofs.restrict(
         np.random.default_rng(10).standard_normal((shell.mesh.node_count, 5)) * np.array([0.1] * 3 + [1] * 2)

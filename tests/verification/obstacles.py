@@ -57,10 +57,8 @@ def edge_load(patch: Grid, line: np.ndarray, direction: int, total: float) -> np
     return load
 
 
-def straight_beam(element: str, shape: str, nx: int = 6, ny: int = 1, load: int = 1) -> float:
-    """6 x 0.2 x 0.1 cantilever, end force in its plane (load 1) or across (2); rectangles, trapezoids or parallelograms
-    of 45 degrees.
-    """
+def beam_patch(shape: str, nx: int = 6, ny: int = 1) -> Grid:
+    """6 x 0.2 strip of rectangles, trapezoids or parallelograms of 45 degrees between upright ends."""
 
     def place(u, v):
         x, y = 6.0 * u, 0.2 * v
@@ -68,12 +66,21 @@ def straight_beam(element: str, shape: str, nx: int = 6, ny: int = 1, load: int 
         lean = {"rectangles": 0 * u, "parallelograms": 0 * u + 1, "trapezoids": (-1.0) ** np.round(u * nx)}[shape]
         return x + np.where(inner, lean * (y - 0.1), 0.0), y, 0 * u
 
-    patch = grid(nx, ny, place)
+    return grid(nx, ny, place)
+
+
+#: Young's modulus, Poisson's ratio and thickness of the straight beam, and its deflection in its plane and across.
+BEAM, BEAM_DEFLECTION = (1e7, 0.3, 0.1), {1: 0.1081, 2: 0.4321}
+
+
+def straight_beam(element: str, shape: str, nx: int = 6, ny: int = 1, load: int = 1) -> float:
+    """6 x 0.2 x 0.1 cantilever, end force in its plane (load 1) or across (2)."""
+    patch = beam_patch(shape, nx, ny)
     free = all_free(patch)
     free[patch.index[0]] = False
-    shell = build(patch, isotropic_section(1e7, 0.3, 0.1), free, element, h=0.1, material_axis=(1.0, 0, 0))
+    shell = build(patch, isotropic_section(*BEAM), free, element, h=BEAM[2], material_axis=(1.0, 0, 0))
     tip = solved(shell, edge_load(patch, patch.index[-1], load, 1.0))[patch.index[-1], load].mean()
-    return tip / {1: 0.1081, 2: 0.4321}[load]
+    return tip / BEAM_DEFLECTION[load]
 
 
 def bending_energy(element: str, lean: tuple[float, float]) -> float:

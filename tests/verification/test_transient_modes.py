@@ -149,6 +149,17 @@ def test_three_routes(law, pressure, density, sign):
     assert off[1] < 0.3 * off[0]
 
 
+def test_three_routes_with_the_averaged_mass():
+    """The mass is one and the same in spectra and in time; it moves the eigenvalue by more than these differ."""
+    law, pressure, density, _ = STATES[0]
+    found = three_routes(law, pressure, density, further={"shell.mass": "averaged"})
+    check_three_routes(found, "averaged mass")
+    changes = {"mesh.around": 8, "mesh.along": 12, "damping.alpha": 0.0, "damping.beta": BETA}
+    valve = dbvfiv.load(changes=changes | {"fluid.density": density, "drive.pressure": pressure})
+    consistent = next(m for m in valve.modes(count=8).modes if m.frequency > 0)
+    assert abs(found["full"].imag) / (2 * np.pi) < 0.99 * consistent.frequency
+
+
 @pytest.mark.slow
 def test_three_routes_on_the_valve():
     rows = [(state, three_routes(*state[:3], mesh=(28, 48))) for state in STATES]

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model.pressed_shell import PressedShell
-from ...shell import Shell
 
 
 @dataclass(frozen=True)
@@ -34,9 +33,9 @@ class ForceBalance:
 
 def force_balance(pressed: PressedShell, q: np.ndarray, pressure: float) -> ForceBalance:
     """Resultants at a state: the supports give what the internal forces at held displacements ask for."""
-    mesh, dofs = pressed.mesh, pressed.shell.dofs
+    dofs = pressed.shell.dofs
     nodal = pressed.nodal(q)
-    loose = Shell(mesh, pressed.shell.section, metric=pressed.shell.metric, zones=pressed.shell.zones)
+    loose = pressed.shell.with_free()
     internal = loose.force(nodal.ravel()).reshape(nodal.shape)
     load = pressed.nodal_pressure_force(nodal, pressure)
     contact = np.zeros_like(nodal)

@@ -87,7 +87,7 @@ def closure_model(case: Case, supports: str | None = None, contact_depth: float 
         held = duckbill
         free = free_unknowns(mesh)
         free[mesh.rows[duckbill].ravel(), 1] = False
-        shell = Shell(shell.mesh, shell.section, free, shell.metric, zones=shell.zones)
+        shell = shell.with_free(free)
     area, half_wall = tributary_area(shell), 0.5 * nodal_thickness(shell)
     every = np.arange(shell.mesh.node_count)
     face = PlaneContact(shell, every, half_wall, area, law, axis=1, least_gap=case.valve.initial_gap)

@@ -72,6 +72,15 @@ def test_states_are_equilibria_without_penetration(pressed):
         )
 
 
+def test_another_element_stays_whatever_is_held(case):
+    """Held lips and the balance of forces took the default element."""
+    plain = case.replace({"mesh.element": "MITC4"})
+    models = [closure_model(plain, supports) for supports in ("contact", "held-lips")]
+    assert [model.shell.element for model in models] == ["MITC4", "MITC4"]
+    state = closure(plain, [1e3]).states[0]
+    assert state.residual <= 1e-8 and state.force_balance < 1e-8
+
+
 def test_the_contact_carries_the_pressure_on_the_lips(pressed):
     """In the middle of the duckbill's faces, away from its ends, the mean contact pressure is the pressure outside."""
     model, state = pressed.model, pressed.states[-1]
