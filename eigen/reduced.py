@@ -103,6 +103,8 @@ class ReducedFamily:
         other.V, other.G, other.J = self.V[:, skip:], self.G[skip:], self.J[:, skip:]
         other.K, other.D, other.M = (part[skip:, skip:] for part in (self.K, self.D, self.M))
         other._coupled, other.responses = {}, {}
+        for name in ("small", "reference"):
+            other.__dict__.pop(name, None)
         return other
 
     @property
