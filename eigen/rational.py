@@ -149,7 +149,7 @@ class Surrogate:
         return cls(factors.real, factors.imag / frequency)
 
 
-def started(problem: RationalCells, surrogate: Surrogate | None, cells, values) -> Refined:
+def started(problem: RationalCells, surrogate: Surrogate | None, cells, values, steps: int = 1) -> Refined:
     """Eigenvectors of surrogates, or of the pencils themselves without one, and their rational Rayleigh quotients.
 
     Parameters
@@ -159,6 +159,8 @@ def started(problem: RationalCells, surrogate: Surrogate | None, cells, values) 
     cells : (p,) int array
     values : (p,) complex array
         Eigenvalues of the surrogates, or of the pencils.
+    steps : int
+        Inverse iterations; more than one where values are only near those of the pencils.
     """
     cells, values = np.asarray(cells, int), np.asarray(values, complex)
     n = problem.size
@@ -171,6 +173,10 @@ def started(problem: RationalCells, surrogate: Surrogate | None, cells, values) 
         factors = None if surrogate is None else surrogate.level[i] + surrogate.slope[i] * s[:, None]
         matrix = problem.at(i, s, factors)
         found = _solved_both(matrix, *(np.broadcast_to(own, (len(i), n)) for own in probe))
+        for _ in range(steps - 1):
+            slope = problem.slope(i, s)
+            further = np.matmul(slope, found[0][..., None])[..., 0], np.matmul(found[1].conj()[:, None], slope)[:, 0]
+            found = _solved_both(matrix, further[0], further[1].conj())
         x, y = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in found)
         out.right[some], out.left[some] = x, y
         out.values[some] = _quotient(problem, i, values[some], x, y)

@@ -18,6 +18,8 @@ from .runaway import NEAR, Runaway
 
 #: Length over that of a motion above which what it has outside the modes is taken in.
 DISTINCT = 1e-6
+#: Inverse iterations at the rates of the structure alone.
+STARTED = 3
 #: Size, over that of the largest, of what motions under several dampings differ by up to which they are one.
 APART = 0.2
 
@@ -66,7 +68,7 @@ class RunawayCells:
         cells = np.repeat(np.arange(len(conditions)), [own.size for own in rates])
         if cells.size:
             problem, starts = self.space.small.problem(conditions), np.concatenate(rates)
-            found = refined(problem, cells, started(problem, None, cells, starts))
+            found = refined(problem, cells, started(problem, None, cells, starts, steps=STARTED))
             near = found.settled & (np.abs(found.values - starts) <= NEAR * starts)
             for i, value in zip(cells[near], found.values[near]):
                 value = complex(value.real, abs(value.imag))
