@@ -121,24 +121,27 @@ def _core(structure: SymmetricStructure, motions: np.ndarray) -> np.ndarray:
 
 
 def _refined(structure: SymmetricStructure, rate: float, motion: np.ndarray) -> tuple[float, np.ndarray]:
-    """An eigenvalue near a place, and its motion, by inverse iteration with the full matrices."""
+    """An eigenvalue near a place, and its motion, by inverse iteration with the full matrices; NaN where that has not
+    settled.
+    """
     for _ in range(STEPS):
         before = rate
         with structure.factored(structure.at(rate)) as factor:
             motion = factor.solve(structure.times(structure.slope(rate), motion))
         motion = motion / np.sqrt(motion @ structure.times(structure.mass, motion))
         parts = structure.on_space(motion[:, None])[:, 0, 0]
-        rate = _zero_near(structure, parts, rate)
-        if abs(rate - before) <= SETTLED * before:
-            break
-    return rate, motion
+        rate, found = _zero_near(structure, parts, rate)
+        if found and abs(rate - before) <= SETTLED * before:
+            return rate, motion
+    return np.nan, motion
 
 
-def _zero_near(structure: SymmetricStructure, parts: np.ndarray, rate: float, steps: int = 8) -> float:
-    """Zero of x^T D(s) x near a place, from the parts on one motion."""
+def _zero_near(structure: SymmetricStructure, parts: np.ndarray, rate: float, steps: int = 8) -> tuple[float, bool]:
+    """Zero of x^T D(s) x near a place, from the parts on one motion, and whether it was reached."""
+    change = np.inf
     for _ in range(steps):
         change = (structure.at(rate) @ parts) / (structure.slope(rate) @ parts)
         if not abs(change) < 0.5 * rate:
             break
         rate = rate - change
-    return float(rate)
+    return float(rate), bool(abs(change) <= SETTLED * rate)

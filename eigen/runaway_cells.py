@@ -51,10 +51,11 @@ class RunawayCells:
         motions = np.hstack([found.motions for found in alone.values()])
         if not motions.shape[1]:
             return cls(modes, modes, modes.V, alone)
-        base = ReducedFamily(modes.family, motions, DISTINCT)
-        rates = {damping: found.rates for damping, found in alone.items()}
-        both = ReducedFamily(modes.family, modes.V, DISTINCT, base=base, rates=rates)
         core, _ = orthonormal(modes.family.mass, np.hstack([found.core for found in alone.values()]), APART)
+        rates = {damping: found.rates for damping, found in alone.items()}
+        # what a motion's two vectors differ by swings, and belongs to the modes
+        base = ReducedFamily(modes.family, core, DISTINCT)
+        both = ReducedFamily(modes.family, np.hstack([motions, modes.V]), DISTINCT, base=base, rates=rates)
         return cls(both, both, np.hstack([modes.V, core]), alone)
 
     def wider(self, vectors: np.ndarray) -> RunawayCells:

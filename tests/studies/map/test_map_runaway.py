@@ -8,6 +8,7 @@ import pytest
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.map.runaway import runs_away
+from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import certified_spectrum
 
@@ -60,3 +61,19 @@ def test_columns_over_loss_factors_hold_what_runs_away():
     for i in (0, 1):
         agrees_with_modes(found, 0, 1, i)
         agrees_with_modes(found, 0, 5, i)
+
+
+@pytest.mark.parametrize(
+    ("pressure", "densities"), [(14.06e3, (50.0, 406.0)), (19.3e3, (165.0,)), (22.628e3, (1.0, 6.0))]
+)
+def test_no_mode_is_lost_beside_what_runs_away(pressure, densities):
+    """The leading one swings in part as the wall runs away; without that part it is far off."""
+    case = load_case(None, [*COARSE, "damping.loss_factor=2", "fluid.continuity=storage"])
+    walk, base = StabilityWalk(case), Place.of(case).at(pressure=pressure, storage=1.0)
+    values = np.sort([*np.geomspace(1.0, 1000.0, 12), *densities])
+    column = walk.column([base.at(density=density) for density in values])
+    assert (column.runaway == 2).all() and column.certified.all()
+    for i in np.searchsorted(values, densities):
+        modes = walk.spectrum(base.at(density=float(values[i]))).eigenvalues
+        modes = modes[modes.imag > 1.0]
+        assert column.leading[i][0] == pytest.approx(modes[np.argmax(modes.real)], rel=1e-5)
