@@ -136,7 +136,9 @@ class SmallSpectra:
         for i, value in zip(*real_roots(problem, max(limits), self._top)):
             _joined(rows[i], complex(value))
         for i in np.flatnonzero(doubtful):
-            rows[i] = list(self._exactly(conditions[i]))
+            # modes of a doubtful cell go on in the next one
+            row = self._followed(problem, i, rows[i - 1], rows[i]) if i and doubtful[i - 1] else None
+            rows[i] = list(self._exactly(conditions[i])) if row is None else row
         for i, rates in enumerate(map(self.reduced.rates, conditions)):
             if rates.size:  # what runs away of the structure by itself is no mode
                 band = self.reduced.family.reach(conditions[i]).band
@@ -149,6 +151,19 @@ class SmallSpectra:
         values = np.asarray(values, complex)
         problem, cells = self.problem([condition]), np.zeros(len(values), int)
         return refined(problem, cells, started(problem, None, cells, values))
+
+    def _followed(self, problem: RationalCells, cell: int, before: list[complex], known: list[complex]):
+        """Eigenvalues of a cell that those of the cell before lead to, and those known; None where two of them meet or
+        one is lost.
+        """
+        starts = np.array(sorted(before, key=lambda value: -value.real)[:TAKEN], complex)
+        cells = np.full(starts.size, cell)
+        found, row = refined(problem, cells, started(problem, None, cells, starts)), []
+        if not (found.settled.all() and all(_joined(row, complex(value)) for value in found.values)):
+            return None
+        for value in known:
+            _joined(row, value)
+        return row
 
     def _exactly(self, condition: Condition) -> np.ndarray:
         """Leading eigenvalues by the exact linear form."""
