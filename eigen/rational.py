@@ -174,9 +174,7 @@ def started(problem: RationalCells, surrogate: Surrogate | None, cells, values, 
         matrix = problem.at(i, s, factors)
         found = _solved_both(matrix, *(np.broadcast_to(own, (len(i), n)) for own in probe))
         for _ in range(steps - 1):
-            slope = problem.slope(i, s)
-            further = np.matmul(slope, found[0][..., None])[..., 0], np.matmul(found[1].conj()[:, None], slope)[:, 0]
-            found = _solved_both(matrix, further[0], further[1].conj())
+            found = _solved_both(matrix, *_images(problem.slope(i, s), *found))
         x, y = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in found)
         out.right[some], out.left[some] = x, y
         out.values[some] = _quotient(problem, i, values[some], x, y)
@@ -225,8 +223,7 @@ def _stepped(problem: RationalCells, cells, found: Refined, active) -> np.ndarra
     s = found.values[active]
     s = np.where(np.abs(s) > 0, s, 1e-12)
     matrix, slope = problem.at(cells[active], s), problem.slope(cells[active], s)
-    right = np.matmul(slope, found.right[active][..., None])[..., 0]
-    left = np.matmul(found.left[active].conj()[:, None], slope)[:, 0].conj()
+    right, left = _images(slope, found.right[active], found.left[active])
     try:
         x, y = _solved_both(matrix, right, left)
     except np.linalg.LinAlgError:  # an exact eigenvalue: a little beside it
@@ -244,6 +241,11 @@ def _stepped(problem: RationalCells, cells, found: Refined, active) -> np.ndarra
     done = ~lost & (np.abs(change) <= SETTLED * np.abs(s))
     found.settled[active] = done
     return done | lost
+
+
+def _images(matrices: np.ndarray, right: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """T right and T^H left of matrices (p, n, n); vectors are (p, n)."""
+    return np.matmul(matrices, right[..., None])[..., 0], np.matmul(left.conj()[:, None], matrices)[:, 0].conj()
 
 
 def _solved_both(matrices: np.ndarray, right: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
