@@ -50,8 +50,8 @@ class ReducedFamily:
         Of the same family: its space is kept as it is, and made wider by what `space` has outside it; directions below
         `compression` of a vector's length are left out then.
     rates : mapping, optional
-        From a damping to the rates, 1/s, at which the structure runs away by itself then, in motions that are the space
-        of the base.
+        From a damping to the rates, 1/s, at which the structure runs away by itself then. The space of the base is as
+        few motions as have them.
     """
 
     def __init__(
