@@ -21,19 +21,14 @@ import numpy as np
 
 from .family import bordered
 from .pencil import fluid_zeros, stable_fluid
+from .phase import CERTAIN, LARGEST_STEP, LATE, grid, middle, principal, wide
 from .reduced import ReducedFamily
 from .structure_response import NEAR, RelaxingResponse, Response, response
 
-#: Largest accepted step of the phase between neighbours, rad.
-LARGEST_STEP = np.pi / 3
 #: Determinants evaluated at once, so that they stay in the processor's cache.
 CHUNK = 96
 #: Share of its distance from the axis by which a place beside an eigenvalue may be moved, so that cells share it.
 PLAY = 0.6
-#: Distance of the last phase from its limit that calls for higher frequencies, rad.
-LATE = 0.1
-#: Distance from a whole number up to which a count is certain.
-CERTAIN = 0.1
 
 
 @dataclass(frozen=True)
@@ -152,8 +147,7 @@ class _Walk:
             self.phase[i] = np.concatenate([self.phase[i], angles[mine]])[first]
 
     def start(self, hints):
-        scale = self.response.scale
-        base = [0.0, *np.geomspace(0.1 * scale, self.response.top, 17), *self.response.beside]
+        base = grid(self.response.scale, self.response.top, self.response.beside)
         cells, omega = [], []
         for i, hint in enumerate(hints):
             own = [*base, *self._laden[i]]
@@ -181,25 +175,24 @@ class _Walk:
             late = [i for i, phase in enumerate(self.phase) if abs(self._gap(i)) > LATE]
             self._add(late, [4.0 * self.omega[i][-1] for i in late])
         for _ in range(40):
-            cells, middle = [], []
+            cells, places = [], []
             for i, (omega, phase) in enumerate(zip(self.omega, self.phase)):
                 if self._cut[i]:
                     continue
-                wide = np.flatnonzero(np.abs(principal(np.diff(phase))) > LARGEST_STEP)
-                wide = wide[np.diff(omega)[wide] > 1e-10 * omega[wide + 1]]
-                if len(omega) + len(wide) > most_points:
+                far = wide(omega, phase)
+                if len(omega) + len(far) > most_points:
                     self._cut[i] = True
                     continue
-                a, b = omega[wide], omega[wide + 1]
-                cells += [i] * len(wide)
-                middle += list(np.where((a > 0) & (b > 4 * a), np.sqrt(a * b), 0.5 * (a + b)))
+                cells += [i] * len(far)
+                places += list(middle(omega[far], omega[far + 1]))
             if not cells:
                 return
-            self._add(cells, middle)
+            self._add(cells, places)
 
     def _gap(self, cell: int) -> float:
         """Distance from the limit at infinity: a multiple of pi, and a quarter turn more for each inner unknown."""
-        return float(principal(2 * (self.phase[cell][-1] - 0.5 * np.pi * self.order[cell])) / 2)
+        last = self.phase[cell][-1] + self.response.turned
+        return float(principal(2 * (last - 0.5 * np.pi * self.order[cell])) / 2)
 
     def counts(self):
         number, certain = [], []
@@ -207,7 +200,7 @@ class _Walk:
             steps = principal(np.diff(phase))
             turned = steps.sum()
             gap = self._gap(i)
-            found = 0.5 * self.order[i] - (turned - gap) / np.pi + self.response.unstable
+            found = 0.5 * self.order[i] - (turned + self.response.turned - gap) / np.pi + self.response.unstable
             number.append(int(round(found)))
             certain.append(
                 bool(
@@ -215,6 +208,7 @@ class _Walk:
                     and abs(gap) < 2 * LATE
                     and np.abs(steps).max() <= LARGEST_STEP + 1e-9
                     and not self._cut[i]
+                    and self.response.certain
                 )
             )
         return np.array(number), np.array(certain)
@@ -232,8 +226,3 @@ def _shared(omega: float, play: float) -> float:
     """A frequency near one given, from a grid that neighbouring cells share, so that they share responses too."""
     step = 2.0 ** np.floor(np.log2(play))
     return float(np.round(omega / step) * step)
-
-
-def principal(angle):
-    """Angles brought to -pi..pi."""
-    return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi

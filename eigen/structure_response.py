@@ -3,7 +3,8 @@
 A structure that does not relax is known by its poles. For one that does they are too many: h(i omega) is solved for at
 frequencies that neighbouring cells share, and its phase is put relative to that of oscillators that relax alike, one
 for each mode. All their numbers are positive, so they are passive and have no zero right of the axis, and the zeros of
-the structure itself are counted along.
+the structure itself are counted along. Far above its lower modes, where a coupling hardly changes the phase, what the
+structure itself turns it by is followed once for all cells.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 import scipy.linalg as la
 
 from .oscillators import Oscillators
+from .phase import LARGEST_STEP, LATE, grid, middle, principal, thinned, wide
 from .systems import solved
 
 if TYPE_CHECKING:
@@ -28,6 +30,14 @@ SAMPLED = (0.0, 0.9, 2.0, 5.0, 20.0, 100.0, 1e3)
 BESIDE = 30
 #: Decay over angular frequency up to which a structure answers fast beside a frequency of its own.
 NEAR = 0.2
+#: Distance of places beside them, over their decay rates: the phase turns by less than a radian over that.
+APART = 1.0
+#: Frequency, over the highest of these, up to which the structure's own phase is followed in every cell.
+EDGE = 1.1
+#: Halvings in which the phase of a structure is followed, and places at most.
+HALVINGS, MOST = 40, 2000
+#: Decay over angular frequency below which zeros are too narrow to be met by chance.
+LIGHT = 0.03
 #: Share of the largest stiffness that the reference has at least.
 SOFTEST = 1e-9
 #: Responses kept of a reduced family.
@@ -52,7 +62,13 @@ class Response:
         Frequencies at which the structure answers fast.
     unstable : int
         Unstable poles of the structure that the phase does not count.
+    turned : float
+        Angle, rad, by which the phase turns beyond the frequencies that are followed for each cell.
+    certain : bool
+        Whether that is known.
     """
+
+    turned, certain = 0.0, True
 
     def __init__(self, reduced: ReducedFamily, alpha: float, beta: float):
         k = reduced.size
@@ -113,14 +129,39 @@ class RelaxingResponse:
         frequencies = reference.frequencies
         self.scale = float(frequencies[0])
         zeros = self._oscillators.zeros(self._relaxation)
-        near = np.abs(zeros.imag[np.abs(zeros.real) < NEAR * zeros.imag])
-        self.beside = np.sort(near)[:BESIDE]
+        near = zeros[np.abs(zeros.real) < NEAR * zeros.imag]
+        near = near[np.argsort(near.imag)]
+        near, high = near[:BESIDE], near[BESIDE:]
+        self._edge = EDGE * float(max(near.imag.max(initial=0.0), self.scale))
+        self.beside = np.array(thinned(near.imag, np.abs(near.real), APART))
         stiffest = frequencies[-1] * np.sqrt(1.0 + self._relaxation.strengths.sum(axis=1).max(initial=0.0))
         self.top = 30.0 * float(max(stiffest, beta * stiffest**2, alpha))
         motion, force = reduced.J.astype(complex), reduced.G.astype(complex)
         omega = self.scale * np.array(SAMPLED)
         self.P, self.Q = _both_patterns(motion @ solved(self._at(omega), force)[0])
         self._out, self._in = self.P.T @ motion, force @ self.Q
+        self._phase_there, self.turned, self.certain = self._beyond(high[np.abs(high.real) < LIGHT * high.imag])
+
+    def _beyond(self, zeros: np.ndarray) -> tuple[float, float, bool]:
+        """Phase of the structure at the edge, its turn from there on, and whether that could be followed; looks at
+        zeros of the passive structure.
+        """
+        omega, phase = np.zeros(0), np.zeros(0)
+        places = np.array([self._edge, *(w for w in grid(self.scale, self.top, zeros.imag) if w > self._edge)])
+        for _ in range(HALVINGS):
+            omega, first = np.unique(np.concatenate([omega, places]), return_index=True)
+            phase = np.concatenate([phase, self._own(places)])[first]
+            far = wide(omega, phase)
+            if not far.size or omega.size > MOST:
+                break
+            places = middle(omega[far], omega[far + 1])
+        steps, gap = principal(np.diff(phase)), float(principal(phase[-1]))  # far up both are all inertia
+        return phase[0], float(steps.sum()) - gap, bool(np.abs(steps).max() <= LARGEST_STEP + 1e-9 and abs(gap) < LATE)
+
+    def _own(self, omega: np.ndarray) -> np.ndarray:
+        """Phase of the structure's determinant over that of the oscillators."""
+        own = solved(self._at(omega), np.zeros((self._shape[0], 0)))[1].imag
+        return own - np.angle(self._oscillators.values(self._relaxation, 1j * omega)).sum(axis=1)
 
     def _at(self, omega: np.ndarray) -> np.ndarray:
         """Dynamic stiffness at i omega, (len(omega), k, k)."""
@@ -135,16 +176,17 @@ class RelaxingResponse:
         return out
 
     def inverse(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Inverses of h(i omega), and the phases of its determinant times that of the structure over the reference's;
-        kept for the next call.
+        """Inverses of h(i omega), and the phases of its determinant times that of the structure over the reference's,
+        which beyond the edge stays what it is there; kept for the next call.
         """
         new = np.array([w for w in omega if w not in self._known], float)
         if new.size:
             response, own = solved(self._at(new), self._in)
             h = self._out @ response
             passive = np.angle(self._oscillators.values(self._relaxation, 1j * new)).sum(axis=1)
-            phase = np.angle(np.linalg.slogdet(h)[0] * np.exp(1j * (own.imag - passive)))
-            self._known.update(zip(new, zip(np.linalg.inv(h), phase)))
+            relative = np.where(new < self._edge, own.imag - passive, self._phase_there)
+            inverses, logarithms = solved(h, np.eye(h.shape[1]))
+            self._known.update(zip(new, zip(inverses, principal(logarithms.imag + relative))))
         inverses, phases = zip(*(self._known[w] for w in omega))
         return np.array(inverses), np.array(phases)
 

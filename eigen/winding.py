@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .pencil import CoupledPencil, fluid_zeros
+from .phase import middle, principal, thinned
 from .response import Determinant
 
 MAX_PHASE = np.pi / 4  # largest accepted phase increment between neighbours
@@ -169,7 +170,7 @@ class _Walk:
             widths += [width for omega in beside if omega > 0]
         if self.f.pencil.relaxation is not None:
             own = len(places) - len(widths)
-            places[own:] = _thinned(places[own:], widths)
+            places[own:] = thinned(places[own:], widths, CLOSE)
         self._add(*places[: self.max_points // 2])
         top = max(self.values)
         settled = 0
@@ -188,10 +189,10 @@ class _Walk:
         phase = self.values[top].imag
         if np.isfinite(self.turn):
             target = self.f.leading_phase if self.f.degree is not None else np.pi * round(phase / np.pi)
-            return _principal(target - phase)
+            return principal(target - phase)
         if self.f.degree is None:
             return (phase + np.pi / 4) % (np.pi / 2) - np.pi / 4
-        return _principal(self.f.leading_phase + 0.5 * np.pi * self.f.degree - phase)
+        return principal(self.f.leading_phase + 0.5 * np.pi * self.f.degree - phase)
 
     def refine(self):
         """Bisect until neither an interval nor its neighbours point to a hidden zero."""
@@ -210,12 +211,11 @@ class _Walk:
                 if len(self.values) + len(middles) >= self.max_points:
                     self.notes.append(f"{self.max_points} points did not resolve the phase near {where}.")
                     return
-                # bisect in proportion over a wide interval, in length over a narrow one
-                middles.append(float(np.sqrt(a * b) if a > 0 and b > 4 * a else 0.5 * (a + b)))
+                middles.append(float(middle(a, b)))
             self._add(*middles)
-            for middle in middles:
-                if middle not in self.values:
-                    self._complain(f"The phase could not be resolved near {middle / (2 * np.pi):.6g} Hz.")
+            for place in middles:
+                if place not in self.values:
+                    self._complain(f"The phase could not be resolved near {place / (2 * np.pi):.6g} Hz.")
                     return
 
     def _suspects(self, omegas):
@@ -242,7 +242,7 @@ class _Walk:
     def count(self) -> Count:
         omegas = np.array(sorted(self.values))
         raw = np.array([self.values[w] for w in omegas])
-        steps = np.array([_principal(d) for d in np.diff(raw.imag)])
+        steps = np.array([principal(d) for d in np.diff(raw.imag)])
         phase = raw[0].imag + np.concatenate([[0.0], np.cumsum(steps)])
         tail = self._tail(omegas[-1])
         # to the right of a band the path ends at the real axis, where a power has no phase
@@ -278,20 +278,6 @@ class _Walk:
             evaluations=self.f.evaluations,
             notes=tuple(self.notes),
         )
-
-
-def _thinned(places, widths):
-    """Places that lie apart by a good part of their widths: zeros that are all well damped share theirs."""
-    kept: list[float] = []
-    for i in np.argsort(widths):
-        at = bisect_left(kept, places[i])
-        if all(abs(places[i] - w) > CLOSE * widths[i] for w in kept[max(0, at - 1) : at + 1]):
-            kept.insert(at, places[i])
-    return kept
-
-
-def _principal(angle: float) -> float:
-    return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
 def _typical_frequency(pencil) -> float:
