@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import chains
 from .creep import OVERDAMPED
 from .family import bordered
 from .rational import SAME, RationalCells, Refined, Surrogate, real_roots, refined, started
@@ -26,6 +27,8 @@ ROOM = 1.1
 WATCHED = 2
 #: Lowest motions of the structure from which it is read how much of the stiffness relaxes.
 TYPICAL = 8
+#: Relative distance by which a mode may lie from half-way between its neighbours.
+MOVED = 0.1
 #: Real eigenvalues are looked for up to this many times the highest frequency of typical motions.
 TOP = 3.0
 
@@ -107,6 +110,54 @@ class SmallSpectra:
         """Leading eigenvalues of each cell in the upper half-plane; and right and left vectors, where they came along,
         by cell and eigenvalue.
         """
+        solved = chains.solved_cells(conditions)
+        if len(solved) == len(conditions):
+            return self._each(conditions)
+        rows: list[list[complex]] = [[] for _ in conditions]
+        vectors = {}
+
+        def enter(cells, found):
+            for i, row in zip(cells, found[0]):
+                rows[i] = row
+            vectors.update({(cells[i], value): pair for (i, value), pair in found[1].items()})
+
+        enter(solved, self._each([conditions[i] for i in solved]))
+        known = {i: [chains.Mode(v, *vectors[i, v]) for v in rows[i] if (i, v) in vectors] for i in solved}
+        between = np.setdiff1d(np.arange(len(conditions)), solved)
+        next_one = np.searchsorted(solved, between)
+        starts = [
+            chains.in_between(known[a], known[b], (i - a) / (b - a))
+            for i, a, b in zip(between, solved[next_one - 1], solved[next_one])
+        ]
+        *found, doubtful = self._from([conditions[i] for i in between], starts)
+        enter(between, found)
+        if doubtful.any():
+            enter(between[doubtful], self._each([conditions[i] for i in between[doubtful]]))
+        return rows, vectors
+
+    def _from(self, conditions: list[Condition], starts) -> tuple[list[list[complex]], dict, np.ndarray]:
+        """The same from modes near those of each cell; and in which cells one of them was lost."""
+        problem = self.problem(conditions)
+        cells = np.repeat(np.arange(len(conditions)), [len(own) for own in starts])
+        rows: list[list[complex]] = [[] for _ in conditions]
+        vectors = {}
+        doubtful = np.array([not own for own in starts])
+        if cells.size:
+            values, right, left = (np.array(part) for part in zip(*(mode for own in starts for mode in own)))
+            found = refined(problem, cells, Refined(values, right, left, None))
+            kept = found.settled & (np.abs(found.values - values) <= MOVED * np.abs(values))
+            for j, i in enumerate(cells):
+                value = complex(found.values[j])
+                if kept[j] and _joined(rows[i], value):
+                    vectors[i, value] = found.right[j], found.left[j]
+                else:
+                    doubtful[i] = True
+        self._add_real(problem, conditions, rows)
+        self._keep_modes(conditions, rows)
+        return rows, vectors, doubtful
+
+    def _each(self, conditions: list[Condition]) -> tuple[list[list[complex]], dict]:
+        """The same, every cell from nothing."""
         problem = self.problem(conditions)
         rows: list[list[complex]] = [[] for _ in conditions]
         vectors = {}
@@ -132,19 +183,27 @@ class SmallSpectra:
             # one after another as long as all that were found are unstable
             wanted = np.array([bool(row) and min(v.real for v in row) > 0 for row in rows])
             first += TAKEN
-        limits = [self.reduced.family.reach(c).creep for c in conditions]
-        for i, value in zip(*real_roots(problem, max(limits), self._top)):
-            _joined(rows[i], complex(value))
+        self._add_real(problem, conditions, rows)
         for i in np.flatnonzero(doubtful):
             # modes of a doubtful cell go on in the next one
             row = self._followed(problem, i, rows[i - 1], rows[i]) if i and doubtful[i - 1] else None
             rows[i] = list(self._exactly(conditions[i])) if row is None else row
+        self._keep_modes(conditions, rows)
+        return rows, vectors
+
+    def _add_real(self, problem: RationalCells, conditions, rows) -> None:
+        """Put real eigenvalues to those of each cell."""
+        limits = [self.reduced.family.reach(c).creep for c in conditions]
+        for i, value in zip(*real_roots(problem, max(limits), self._top)):
+            _joined(rows[i], complex(value))
+
+    def _keep_modes(self, conditions, rows) -> None:
+        """Leave out of each cell what runs away of the structure by itself, which is no mode."""
         for i, rates in enumerate(map(self.reduced.rates, conditions)):
-            if rates.size:  # what runs away of the structure by itself is no mode
+            if rates.size:
                 band = self.reduced.family.reach(conditions[i]).band
                 known = is_near(rows[i], rates)
                 rows[i] = [value for value, own in zip(rows[i], known) if not own and value.imag <= ROOM * band]
-        return rows, vectors
 
     def pairs(self, condition: Condition, values) -> Refined:
         """Eigenpairs of one pencil at eigenvalues, or near places close to them."""
@@ -184,8 +243,10 @@ class SmallSpectra:
             conditions, (surrogate.level @ flat).reshape(shape), (surrogate.slope @ flat).reshape(shape)
         )
         values = np.linalg.eigvals(matrices)
-        # what creeps is no start, and the real axis is searched on its own
-        swings = (values.imag > OVERDAMPED * np.abs(values)) | ((values.imag >= 0) & (values.real > 0))
+        # what creeps is no start, and the real axis is searched on its own; beside motions that run away, what is real
+        # and unstable here are their remnants, which lead back to them
+        swings = values.imag > OVERDAMPED * np.abs(values)
+        swings |= (values.real > 0) & ((values.imag > 0) | ((values.imag == 0) & (reduced is self.reduced)))
         growth = np.where(swings, self._estimates(problem, surrogate, np.where(swings, values, 1.0)).real, -np.inf)
         band = np.array([self.reduced.family.reach(c).band for c in conditions])
         # beside motions that run away, what is unstable beyond the band are single elements held by halves
