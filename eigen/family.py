@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Hashable, Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from .options import SearchOptions
 from .pencil import CoupledPencil
 from .relaxation import Relaxation
 from .shifts import SLOPE
+
+if TYPE_CHECKING:
+    from .reduction import FamilyReduction
 
 
 class Condition(NamedTuple):
@@ -56,9 +59,12 @@ class PencilFamily(ABC):
     added : int
         Number of coupling forces, the last ones, that are inertia alone: the structure swings with that mass, not with
         its own.
+    model : callable
+        The `FamilyReduction` made last of it, None when nobody holds that any more.
     """
 
     added: int = 0
+    model: Callable[[], FamilyReduction | None] = staticmethod(lambda: None)
     mass: object
     damping: object
     stiffness: object
@@ -82,6 +88,11 @@ class PencilFamily(ABC):
         same object for the same factor; None where nothing does.
         """
         return None
+
+    def lowest(self, count: int) -> np.ndarray:
+        """Lowest frequencies of the undamped structure, Hz, ascending; none without a small model that has them."""
+        model = self.model()
+        return np.zeros(0) if model is None else model.lowest_frequencies(count)
 
     def coupling_at(self, s: complex, condition: Condition):
         """A, B, R, S (s) with the inner unknowns scaled."""

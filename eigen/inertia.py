@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from .factorization import MumpsFactorization, SingularShiftError, StructureMatrices, petsc_is_complex
+from .relaxation import Relaxation
 
 
 class SymmetricLU:
@@ -87,6 +89,8 @@ class SymmetricStructure:
 
     Attributes
     ----------
+    matrices : StructureMatrices
+        As given, loaded until another structure is.
     relaxation : Relaxation
     size : int
         Number n of unknowns.
@@ -95,11 +99,17 @@ class SymmetricStructure:
     """
 
     def __init__(self, matrices: StructureMatrices):
-        self._matrices = matrices
+        self.matrices = matrices
         upper, mirrored, self._indptr, self._indices = matrices.upper
         self.size, self.relaxation = matrices.shape[0], matrices.relaxation
-        self._data = 0.5 * (matrices.data[:, upper] + matrices.data[:, mirrored])
+        self._data = np.array([0.5 * (part[upper] + part[mirrored]) for part in matrices.data])
         self.mass, _, self.slow = np.eye(3, len(self._data))
+
+    def relaxing_as(self, relaxation: Relaxation) -> SymmetricStructure:
+        """The same matrices under other strengths and times."""
+        other = copy(self)
+        other.relaxation = relaxation
+        return other
 
     def at(self, s: float) -> np.ndarray:
         """Weights of M, C, K and the K_g in D(s) = s^2 M + s C + K + sum phi_g(s) K_g."""
@@ -132,9 +142,9 @@ class SymmetricStructure:
         if petsc_is_complex():
             yield SymmetricLU(_mirrored(self.upper(weights)))
             return
-        idle = self._matrices.idle
-        factor = idle.pop() if idle else SymmetricFactor(self._matrices)
-        factor.refactor((weights @ self._data)[self._matrices.mirrored])
+        idle = self.matrices.idle
+        factor = idle.pop() if idle else SymmetricFactor(self.matrices)
+        factor.refactor((weights @ self._data)[self.matrices.mirrored])
         try:
             yield factor
         finally:

@@ -10,6 +10,9 @@ import scipy.sparse as sp
 
 from .relaxation import Relaxation
 
+#: Complex columns up to which a sparse product is faster one real column after another.
+FEW = 2
+
 FLUID_PARTS = ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")
 
 
@@ -246,6 +249,9 @@ def real_apply(matrix, x: np.ndarray) -> np.ndarray:
     if x.size == 0 or matrix.shape[0] == 0:
         return np.zeros((matrix.shape[0],) + x.shape[1:], complex)
     flat = np.ascontiguousarray(x).reshape(x.shape[0], -1)
+    if flat.shape[1] <= FEW and sp.issparse(matrix):
+        out = np.stack([matrix @ column.real + 1j * (matrix @ column.imag) for column in flat.T], axis=1)
+        return out.reshape((matrix.shape[0],) + x.shape[1:])
     out = matrix @ flat.view(float).reshape(flat.shape[0], -1)
     return np.ascontiguousarray(out).view(complex).reshape((matrix.shape[0],) + x.shape[1:])
 

@@ -8,6 +8,7 @@ are made with the stiffness that a typical motion sees.
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,6 +38,10 @@ MOTIONS = 20
 CORRECTIONS = 2
 #: Lowest motions of the structure taken where a band is searched.
 LOWEST = 24
+#: Further motions that the lowest ones are found with, and steps at most.
+GUARD, REFINED = 6, 8
+#: Relative change of their squares that ends them, a hundred times their error; and of a motion that has nothing new.
+SETTLED, SAME = 1e-6, 1e-10
 #: Relative distance from an eigenvalue at which its vector is corrected.
 BESIDE = 1e-3
 
@@ -103,6 +108,7 @@ class FamilyReduction:
         self.solver = solver or StaticSolver()
         self.solver.factor(family)
         self._stiffened, self._loss = stiffened or StaticSolver(), None
+        family.model = weakref.ref(self)
 
     @cached_property
     def coarse(self) -> ReducedFamily:
@@ -127,6 +133,30 @@ class FamilyReduction:
         lowest = TransferBasis(structure, modes=LOWEST).V
         return ReducedFamily(family, np.hstack([lowest, self.coarse.V]), COMPRESSION)
 
+    def lowest_frequencies(self, count: int) -> np.ndarray:
+        """Lowest frequencies of the undamped symmetric structure, Hz, ascending, as the function of that name has them;
+        none where the first stage does not lead to them.
+        """
+        family, coarse = self.family, self.coarse
+        squares, turn = la.eigh(0.5 * (coarse.K + coarse.K.T))
+        order = np.argsort(np.abs(squares))[: count + GUARD]  # those next to zero, as shift and invert finds them
+        X, squares = coarse.V @ turn[:, order], squares[order]
+        symmetric = ((family.stiffness + family.stiffness.T) * 0.5).tocsr()
+        KX, MX = symmetric @ X, family.mass @ X
+        for _ in range(REFINED):
+            known = squares[:count]
+            X = np.hstack([X, self.solver.solve((KX - MX * squares)[:, :count])])
+            X, MX = orthonormal(family.mass, X, SAME)
+            KX = symmetric @ X
+            squares, turn = la.eigh(X.T @ KX)
+            order = np.argsort(np.abs(squares))[: count + GUARD]
+            squares, turn = squares[order], turn[:, order]
+            X, KX, MX = X @ turn, KX @ turn, MX @ turn
+            found = squares[:count]
+            if known.size == found.size and (np.abs(found - known) <= SETTLED * np.abs(found)).all():
+                return np.sort(np.sqrt(np.maximum(found, 0.0))) / (2 * np.pi)
+        return np.zeros(0)
+
     def runaway(self, condition: Condition) -> Runaway:
         """What of the structure runs away by itself at the damping of a condition."""
         family, damping = self.family, condition.damping
@@ -138,11 +168,14 @@ class FamilyReduction:
 
     def _structure(self, condition: Condition) -> SymmetricStructure:
         """Of the damping of a condition; the last one is kept."""
-        if self._last is None or self._last[0] != condition.damping:
-            family, relaxation = self.family, self.family.relaxation(condition.loss)
-            damping = condition.alpha * family.mass + condition.beta * family.damping
-            structure = CoupledPencil(family.mass, damping, family.stiffness, relaxation=relaxation)
+        family, relaxation = self.family, self.family.relaxation(condition.loss)
+        *damping, loss = condition.damping
+        if self._last is None or list(self._last[0][:2]) != damping:
+            matrix = condition.alpha * family.mass + condition.beta * family.damping
+            structure = CoupledPencil(family.mass, matrix, family.stiffness, relaxation=relaxation)
             self._last = condition.damping, SymmetricStructure(self._workspace.structure(structure))
+        elif self._last[0][2] != loss:  # the same matrices
+            self._last = condition.damping, self._last[1].relaxing_as(relaxation)
         return self._last[1]
 
     def residual(self, values, q, u, condition: Condition, left: bool = False):
@@ -204,7 +237,7 @@ class FamilyReduction:
             # part to another
             small = self.coarse.small
             typical, share = relaxation.factors(1j * small.frequency).real, small.stiff_shares
-            solver, passes = self._stiffened_by(typical, loss), CORRECTIONS
+            solver, passes = self._stiffened_by(typical, block.conditions[0]), CORRECTIONS
             scale = (1.0 + share @ typical) / (1.0 + values * block.beta + share @ relaxation.factors(values))
         q, w = block.q, block.w
         for _ in range(passes):
@@ -222,12 +255,12 @@ class FamilyReduction:
             ]
         )
 
-    def _stiffened_by(self, factors: np.ndarray, loss: float) -> StaticSolver:
+    def _stiffened_by(self, factors: np.ndarray, condition: Condition) -> StaticSolver:
         """Solver of the stiffness with its relaxing parts as stiff as factors say; that of the last one is kept."""
-        if self._loss != loss:
-            parts = zip(factors, self.family.relaxation(loss).matrices)
-            self._stiffened.factor(self.family, sum((x * part for x, part in parts), self.family.stiffness).tocsr())
-            self._loss = loss
+        if self._loss != condition.loss:
+            structure = self._structure(condition) if self._last is None else self._last[1]
+            self._stiffened.factor_sum(structure.matrices, structure.stiffness(factors))
+            self._loss = condition.loss
         return self._stiffened
 
     def fine(self, first: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:

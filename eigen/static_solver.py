@@ -17,23 +17,38 @@ class StaticSolver:
         self._structure = None
         self._factor = None
 
-    def factor(self, family: PencilFamily, stiffness=None) -> None:
-        """Factor K of a family, or another stiffness; where it is singular a little inertia stands in.
+    def factor(self, family: PencilFamily) -> None:
+        """Factor K of a family; where it is singular a little inertia stands in.
 
         Raises
         ------
         SingularShiftError
         """
-        stiffness = family.stiffness if stiffness is None else stiffness
-        pencil = CoupledPencil(family.mass, sp.csr_matrix(family.mass.shape), stiffness)
+        pencil = CoupledPencil(family.mass, sp.csr_matrix(family.mass.shape), family.stiffness)
         if self._structure is not None and self._structure.fits(pencil):
             self._structure.load(pencil)
         else:
             self._structure = StructureMatrices(pencil)
             self._factor = MumpsFactorization(self._structure)
+        self._refactor(np.array([0.0, 0.0, 1.0]))
+
+    def factor_sum(self, matrices: StructureMatrices, weights: np.ndarray) -> None:
+        """Factor a sum of matrices of one pattern, weights as of its data; where it is singular a little inertia stands
+        in.
+
+        Raises
+        ------
+        SingularShiftError
+        """
+        if self._structure is not matrices:
+            self._structure, self._factor = matrices, MumpsFactorization(matrices)
+        self._refactor(weights)
+
+    def _refactor(self, weights: np.ndarray) -> None:
+        inertia = np.eye(len(weights))[0]
         for shift in (0.0, 20.0, 100.0):
             try:
-                return self._factor.refactor(self._structure.values(shift))
+                return self._factor.refactor((weights + shift**2 * inertia) @ self._structure.data)
             except SingularShiftError:
                 continue
         raise SingularShiftError("The stiffness of the family is singular.")

@@ -5,7 +5,16 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from eigen import ColumnSolver, Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions
+from eigen import (
+    ColumnSolver,
+    Condition,
+    CoupledPencil,
+    PencilFamily,
+    Relaxation,
+    SearchOptions,
+    lowest_frequencies,
+    structure_response,
+)
 from eigen.phase_count import phase_counts
 from eigen.reduced import POWERS, ReducedFamily
 from eigen.reduction import FamilyReduction
@@ -98,6 +107,61 @@ def test_growth_and_counts_are_those_of_the_exact_linear_form(seed):
         else:
             assert unstable > 4
     assert len({int((row.real > 0).sum()) for row in found}) > 1
+
+
+class Unstable(RelaxingFamily):
+    """With a structure that is unstable by itself: it swings under a circulatory force, or buckles, or runs away by a
+    part that relaxes and pushes.
+    """
+
+    def __init__(self, seed: int):
+        super().__init__(seed)
+        rng = np.random.default_rng(100 + seed)
+        pair, size = np.linalg.qr(rng.standard_normal((SIZE, 2)))[0], np.abs(self.stiffness.diagonal()).mean()
+        kind = seed % 3
+        if kind == 0:
+            self.stiffness = self.stiffness + sp.csr_matrix(size * (pair @ [[0.0, 1.0], [-1.0, 0.0]] @ pair.T))
+        elif kind == 1:
+            self.stiffness = self.stiffness - sp.csr_matrix(3.0 * size * np.outer(pair[:, 0], pair[:, 0]))
+        else:
+            self.relaxing[0] = self.relaxing[0] - sp.csr_matrix(30.0 * size * np.outer(pair[:, 0], pair[:, 0]))
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("followed", [30, 10])
+def test_counts_where_the_structure_is_unstable_by_itself(seed, followed, monkeypatch):
+    """Also where its own phase is followed once for all cells from the lower modes on."""
+    monkeypatch.setattr(structure_response, "BESIDE", followed)
+    family, conditions = Unstable(seed), random_conditions(seed, 12)
+    reduced = ReducedFamily(family, np.eye(SIZE))
+    values = [dense(family, c) for c in conditions]
+    hints = [v[(v.imag >= 0) & (v.real > -0.05 * np.abs(v))] for v in values]
+    counts = phase_counts(reduced, conditions, hints)
+    assert counts.certain.all()
+    assert counts.number.tolist() == [int((v.real > 0).sum()) for v in values]
+    assert sum(counts.number) > 0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_cells_of_a_line_are_those_solved_one_by_one(seed):
+    """Though every other one starts from its neighbours."""
+    family = RelaxingFamily(seed, coupling=0.3)
+    reduced = ReducedFamily(family, np.eye(SIZE))
+    line = [Condition(x, 0.05, 0.0, float(seed % 2), 0.6) for x in np.geomspace(0.01, 3.0, 41)]
+    together = reduced.eigenvalues(line)
+    for condition, row in zip(line, together):
+        alone, row = (family.reach(condition).leading(r)[:4] for r in (reduced.eigenvalues([condition])[0], row))
+        assert row == pytest.approx(alone, rel=1e-9)
+
+
+def test_lowest_frequencies_of_a_small_model():
+    family = RelaxingFamily(4)
+    assert not family.lowest(3).size  # nobody has made one
+    reduction = FamilyReduction(family)
+    elastic = CoupledPencil(family.mass, 0.0 * family.mass, family.stiffness)
+    assert family.lowest(3) == pytest.approx(lowest_frequencies(elastic, 3), rel=1e-9)
+    del reduction
+    assert not family.lowest(3).size
 
 
 def test_columns_carry_certificates_whatever_relaxes():

@@ -52,6 +52,8 @@ class ValveFamily(PencilFamily):
     def _lowest(self, count: int, workspace: Workspace | None = None) -> np.ndarray:
         """Structural frequencies of the state."""
         if len(self._frequencies) < count:
+            self._frequencies = self.lowest(count)
+        if len(self._frequencies) < count:
             structure = CoupledPencil(self.mass, 0.0 * self.mass, self.stiffness)
             self._frequencies = lowest_frequencies(structure, count, workspace)
         return self._frequencies[:count]
