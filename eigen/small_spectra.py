@@ -122,11 +122,15 @@ class SmallSpectra:
             vectors.update({(cells[i], value): pair for (i, value), pair in found[1].items()})
 
         enter(solved, self._each([conditions[i] for i in solved]))
-        known = {i: [chains.Mode(v, *vectors[i, v]) for v in rows[i] if (i, v) in vectors] for i in solved}
+        known = {
+            i: [chains.Mode(v, *vectors[i, v]) for v in rows[i] if v.imag > 0 and (i, v) in vectors] for i in solved
+        }
         between = np.setdiff1d(np.arange(len(conditions)), solved)
         next_one = np.searchsorted(solved, between)
+        # beside one solved by the exact linear form, which brings no vectors, none can be started
+        whole = {i: len(known[i]) == sum(value.imag > 0 for value in rows[i]) for i in solved}
         starts = [
-            chains.in_between(known[a], known[b], (i - a) / (b - a))
+            chains.in_between(known[a], known[b], (i - a) / (b - a)) if whole[a] and whole[b] else []
             for i, a, b in zip(between, solved[next_one - 1], solved[next_one])
         ]
         *found, doubtful = self._from([conditions[i] for i in between], starts)
@@ -198,12 +202,17 @@ class SmallSpectra:
             _joined(rows[i], complex(value))
 
     def _keep_modes(self, conditions, rows) -> None:
-        """Leave out of each cell what runs away of the structure by itself, which is no mode."""
-        for i, rates in enumerate(map(self.reduced.rates, conditions)):
-            if rates.size:
-                band = self.reduced.family.reach(conditions[i]).band
-                known = is_near(rows[i], rates)
-                rows[i] = [value for value, own in zip(rows[i], known) if not own and value.imag <= ROOM * band]
+        """Leave out of each cell what is no mode."""
+        for i, condition in enumerate(conditions):
+            rows[i] = self._modes(condition, rows[i])
+
+    def _modes(self, condition: Condition, values) -> list[complex]:
+        """Those of some eigenvalues that are modes: what runs away of the structure by itself is none."""
+        rates = self.reduced.rates(condition)
+        if not rates.size:
+            return list(values)
+        band = self.reduced.family.reach(condition).band
+        return [v for v, own in zip(values, is_near(values, rates)) if not own and v.imag <= ROOM * band]
 
     def pairs(self, condition: Condition, values) -> Refined:
         """Eigenpairs of one pencil at eigenvalues, or near places close to them."""
@@ -230,6 +239,7 @@ class SmallSpectra:
         values = np.linalg.eigvals(np.linalg.solve(E, F))
         reach = self.reduced.family.reach(condition)
         values = values[(values.imag >= 0) & reach.is_mode(values)]
+        values = np.array(self._modes(condition, values), complex)
         values = values[np.argsort(-values.real)]
         return values[: max(TAKEN, int(np.sum(values.real > 0)) + 1)]
 
