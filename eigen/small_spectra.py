@@ -166,7 +166,8 @@ class SmallSpectra:
         rows: list[list[complex]] = [[] for _ in conditions]
         vectors = {}
         doubtful = np.zeros(len(conditions), bool)
-        cells, start = self._starts(conditions, problem)
+        holding = self.reduced.holding  # the surrogate is far off where the structure runs away
+        cells, start = self._starts(conditions, problem, holding)
         place = _places(cells, start.values.real)  # rank in its cell, by growth rate
         first, wanted = 0, np.ones(len(conditions), bool)
         while wanted.any():
@@ -187,6 +188,15 @@ class SmallSpectra:
             # one after another as long as all that were found are unstable
             wanted = np.array([bool(row) and min(v.real for v in row) > 0 for row in rows])
             first += TAKEN
+        if holding is not self.reduced:
+            # modes that swing with what runs away are none without it
+            cells, start = self._starts(conditions, problem, self.reduced)
+            taken = np.flatnonzero(_places(cells, start.values.real) < TAKEN)
+            found = refined(problem, cells[taken], start[taken])
+            for j in np.flatnonzero(found.settled):
+                i, value = cells[taken[j]], complex(found.values[j])
+                if value.imag > 0 and _joined(rows[i], value):
+                    vectors[i, value] = found.right[j], found.left[j]
         self._add_real(problem, conditions, rows)
         for i in np.flatnonzero(doubtful):
             # modes of a doubtful cell go on in the next one
@@ -243,10 +253,9 @@ class SmallSpectra:
         values = values[np.argsort(-values.real)]
         return values[: max(TAKEN, int(np.sum(values.real > 0)) + 1)]
 
-    def _starts(self, conditions, problem: RationalCells) -> tuple[np.ndarray, Refined]:
-        """Cells, and pairs to start from in the upper half-plane."""
-        surrogate = Surrogate.at(problem, self.frequency)
-        reduced = self.reduced.holding  # the surrogate is far off where the structure runs away
+    def _starts(self, conditions, problem: RationalCells, reduced: ReducedFamily) -> tuple[np.ndarray, Refined]:
+        """Cells, and pairs to start from in the upper half-plane, from surrogates on a space or a part of it."""
+        surrogate, holds = Surrogate.at(problem, self.frequency), self.reduced.holding is self.reduced
         flat = reduced.relaxing.reshape(len(reduced.relaxing), -1)
         shape = (-1, reduced.size, reduced.size)
         matrices = reduced.first_order(
@@ -256,11 +265,11 @@ class SmallSpectra:
         # what creeps is no start, and the real axis is searched on its own; beside motions that run away, what is real
         # and unstable here are their remnants, which lead back to them
         swings = values.imag > OVERDAMPED * np.abs(values)
-        swings |= (values.real > 0) & ((values.imag > 0) | ((values.imag == 0) & (reduced is self.reduced)))
+        swings |= (values.real > 0) & ((values.imag > 0) | ((values.imag == 0) & holds))
         growth = np.where(swings, self._estimates(problem, surrogate, np.where(swings, values, 1.0)).real, -np.inf)
         band = np.array([self.reduced.family.reach(c).band for c in conditions])
         # beside motions that run away, what is unstable beyond the band are single elements held by halves
-        beyond = (values.real > 0) & (reduced is self.reduced)
+        beyond = (values.real > 0) & holds
         growth = np.where((values.imag <= ROOM * band[:, None]) | beyond, growth, -np.inf)
         order = np.argsort(-growth, axis=1)[:, :STARTED]
         cells = np.repeat(np.arange(len(conditions)), order.shape[1])
