@@ -122,13 +122,11 @@ class SmallSpectra:
             vectors.update({(cells[i], value): pair for (i, value), pair in found[1].items()})
 
         enter(solved, self._each([conditions[i] for i in solved]))
-        known = {
-            i: [chains.Mode(v, *vectors[i, v]) for v in rows[i] if v.imag > 0 and (i, v) in vectors] for i in solved
-        }
+        known = {i: [chains.Mode(v, *vectors[i, v]) for v in rows[i] if (i, v) in vectors] for i in solved}
         between = np.setdiff1d(np.arange(len(conditions)), solved)
         next_one = np.searchsorted(solved, between)
         # beside one solved by the exact linear form, which brings no vectors, none can be started
-        whole = {i: len(known[i]) == sum(value.imag > 0 for value in rows[i]) for i in solved}
+        whole = {i: all((i, v) in vectors for v in rows[i] if v.imag > 0) for i in solved}
         starts = [
             chains.in_between(known[a], known[b], (i - a) / (b - a)) if whole[a] and whole[b] else []
             for i, a, b in zip(between, solved[next_one - 1], solved[next_one])
