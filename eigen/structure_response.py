@@ -40,6 +40,8 @@ HALVINGS, MOST = 40, 2000
 LIGHT = 0.03
 #: Share of the largest stiffness that the reference has at least.
 SOFTEST = 1e-9
+#: Negative eigenvalues that rounding leaves of a positive matrix, over its largest.
+ROUNDING = 1e-10
 #: Responses kept of a reduced family.
 KEPT = 8
 
@@ -140,7 +142,9 @@ class RelaxingResponse:
         omega = self.scale * np.array(SAMPLED)
         self.P, self.Q = _both_patterns(motion @ solved(self._at(omega), force)[0])
         self._out, self._in = self.P.T @ motion, force @ self.Q
-        self._phase_there, self.turned, self.certain = self._beyond(high[np.abs(high.real) < LIGHT * high.imag])
+        # what is passive but for the load that follows it turns its phase nowhere up there
+        narrow = high[(np.abs(high.real) < LIGHT * high.imag) & (not reference.is_own)]
+        self._phase_there, self.turned, self.certain = self._beyond(narrow)
 
     def _beyond(self, zeros: np.ndarray) -> tuple[float, float, bool]:
         """Phase of the structure at the edge, its turn from there on, and whether that could be followed; looks at
@@ -193,27 +197,32 @@ class RelaxingResponse:
 
 @dataclass(frozen=True)
 class Reference:
-    """Positive matrices near those of a reduced family, and the angular frequencies they have."""
+    """Positive matrices near those of a reduced family, the angular frequencies they have, and whether the symmetric
+    parts of the family are positive themselves.
+    """
 
     stiffness: np.ndarray
     damping: np.ndarray
     relaxing: np.ndarray
     frequencies: np.ndarray
+    is_own: bool
 
     @classmethod
     def of(cls, M, K, D, relaxing) -> Reference:
         """From matrices on a space."""
-        root = np.linalg.cholesky(M)
+        root, own = np.linalg.cholesky(M), []
 
         def positive(matrix, least):
             weight, turn = np.linalg.eigh(relative(matrix, root))
-            weight = np.maximum(weight, least * np.abs(weight).max(initial=0.0))
+            largest = np.abs(weight).max(initial=0.0)
+            own.append(bool((weight >= -ROUNDING * largest).all()))
+            weight = np.maximum(weight, least * largest)
             turn = root @ turn
             return (turn * weight) @ turn.T, np.sqrt(weight)
 
         stiffness, frequencies = positive(K, SOFTEST)
         parts = np.array([positive(part, 0.0)[0] for part in relaxing]).reshape(relaxing.shape)
-        return cls(stiffness, positive(D, 0.0)[0], parts, frequencies)
+        return cls(stiffness, positive(D, 0.0)[0], parts, frequencies, all(own))
 
 
 def relative(matrix: np.ndarray, root: np.ndarray) -> np.ndarray:
