@@ -10,8 +10,6 @@ import numpy as np
 LARGEST_STEP = np.pi / 3
 #: Distance of the last phase from its limit that calls for higher frequencies, rad.
 LATE = 0.1
-#: Distance from a whole number up to which a count is certain.
-CERTAIN = 0.1
 #: Places between far below and far above the frequencies of a structure that every walk looks at.
 GRID = 17
 
@@ -27,9 +25,9 @@ def grid(scale: float, top: float, beside) -> list[float]:
 
 
 def middle(a, b) -> np.ndarray:
-    """Where intervals of the positive axis are parted: in proportion where they are wide, else in length."""
+    """Where intervals are parted: on the positive axis in proportion where they are wide, else in length."""
     a, b = np.asarray(a, float), np.asarray(b, float)
-    return np.where((a > 0) & (b > 4 * a), np.sqrt(a * b), 0.5 * (a + b))
+    return np.where((a > 0) & (b > 4 * a), np.sqrt(np.abs(a * b)), 0.5 * (a + b))
 
 
 def wide(omega: np.ndarray, phase: np.ndarray) -> np.ndarray:

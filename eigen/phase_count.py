@@ -21,7 +21,7 @@ import numpy as np
 
 from .family import bordered
 from .pencil import fluid_zeros, stable_fluid
-from .phase import CERTAIN, LARGEST_STEP, LATE, grid, middle, principal, wide
+from .phase import LARGEST_STEP, LATE, grid, middle, principal, wide
 from .reduced import ReducedFamily
 from .structure_response import NEAR, RelaxingResponse, Response, response
 
@@ -29,6 +29,8 @@ from .structure_response import NEAR, RelaxingResponse, Response, response
 CHUNK = 96
 #: Share of its distance from the axis by which a place beside an eigenvalue may be moved, so that cells share it.
 PLAY = 0.6
+#: Distance from a whole number up to which a count is certain.
+CERTAIN = 0.1
 
 
 @dataclass(frozen=True)

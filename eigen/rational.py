@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
+from .phase import middle
+
 #: Pairs of a cell and a place evaluated at once, so that they stay in the processor's cache.
 CHUNK = 128
 #: Steps of an iteration at most.
@@ -288,7 +290,7 @@ def real_roots(problem: RationalCells, low: float, top: float) -> tuple[np.ndarr
     rows, gaps = np.nonzero(signs[:, :-1] * signs[:, 1:] < 0)
     a, b, sign, rows = grid[gaps], grid[gaps + 1], signs[rows, gaps], odd[rows]
     for _ in range(HALVINGS if rows.size else 0):
-        middle = np.where((a > 0) & (b > 4 * a), np.sqrt(np.abs(a * b)), 0.5 * (a + b))
-        same = problem.signs(rows, middle) == sign
-        a, b = np.where(same, middle, a), np.where(same, b, middle)
+        place = middle(a, b)
+        same = problem.signs(rows, place) == sign
+        a, b = np.where(same, place, a), np.where(same, b, place)
     return rows, 0.5 * (a + b)

@@ -169,12 +169,11 @@ class FamilyReduction:
     def _structure(self, condition: Condition) -> SymmetricStructure:
         """Of the damping of a condition; the last one is kept."""
         family, relaxation = self.family, self.family.relaxation(condition.loss)
-        *damping, loss = condition.damping
-        if self._last is None or list(self._last[0][:2]) != damping:
+        if self._last is None or self._last[0][:2] != condition.damping[:2]:
             matrix = condition.alpha * family.mass + condition.beta * family.damping
             structure = CoupledPencil(family.mass, matrix, family.stiffness, relaxation=relaxation)
             self._last = condition.damping, SymmetricStructure(self._workspace.structure(structure))
-        elif self._last[0][2] != loss:  # the same matrices
+        elif self._last[0] != condition.damping:  # the same matrices
             self._last = condition.damping, self._last[1].relaxing_as(relaxation)
         return self._last[1]
 

@@ -147,13 +147,8 @@ class SmallSpectra:
         if cells.size:
             values, right, left = (np.array(part) for part in zip(*(mode for own in starts for mode in own)))
             found = refined(problem, cells, Refined(values, right, left, None))
-            kept = found.settled & (np.abs(found.values - values) <= MOVED * np.abs(values))
-            for j, i in enumerate(cells):
-                value = complex(found.values[j])
-                if kept[j] and _joined(rows[i], value):
-                    vectors[i, value] = found.right[j], found.left[j]
-                else:
-                    doubtful[i] = True
+            near = np.abs(found.values - values) <= MOVED * np.abs(values)
+            doubtful[cells[~_entered(found, found.settled & near, cells, rows, vectors)]] = True
         self._add_real(problem, conditions, rows)
         self._keep_modes(conditions, rows)
         return rows, vectors, doubtful
@@ -173,14 +168,8 @@ class SmallSpectra:
             if not taken.size:
                 break
             found = refined(problem, cells[taken], start[taken])
-            lost = []
-            for j, i in enumerate(cells[taken]):
-                value = complex(found.values[j])
-                if found.settled[j] and _joined(rows[i], value):
-                    vectors[i, value] = found.right[j], found.left[j]
-                else:
-                    lost.append((i, start.values[taken[j]].real))
-            for i, growth in lost:
+            lost = taken[~_entered(found, found.settled, cells[taken], rows, vectors)]
+            for i, growth in zip(cells[lost], start.values[lost].real):
                 watched = sorted((v.real for v in rows[i]), reverse=True)[:WATCHED]
                 doubtful[i] |= len(watched) < WATCHED or growth > watched[-1]
             # one after another as long as all that were found are unstable
@@ -191,10 +180,7 @@ class SmallSpectra:
             cells, start = self._starts(conditions, problem, self.reduced)
             taken = np.flatnonzero(_places(cells, start.values.real) < TAKEN)
             found = refined(problem, cells[taken], start[taken])
-            for j in np.flatnonzero(found.settled):
-                i, value = cells[taken[j]], complex(found.values[j])
-                if value.imag > 0 and _joined(rows[i], value):
-                    vectors[i, value] = found.right[j], found.left[j]
+            _entered(found, found.settled & (found.values.imag > 0), cells[taken], rows, vectors)
         self._add_real(problem, conditions, rows)
         for i in np.flatnonzero(doubtful):
             # modes of a doubtful cell go on in the next one
@@ -305,6 +291,19 @@ def _places(cells: np.ndarray, growth: np.ndarray) -> np.ndarray:
     out = np.empty(len(cells), int)
     out[order] = np.arange(len(cells)) - begins
     return out
+
+
+def _entered(
+    found: Refined, kept: np.ndarray, cells: np.ndarray, rows: list[list[complex]], vectors: dict
+) -> np.ndarray:
+    """Put those kept among the eigenvalues and vectors of their cells; which of all were new there."""
+    new = np.zeros(len(cells), bool)
+    for j in np.flatnonzero(kept):
+        i, value = cells[j], complex(found.values[j])
+        if _joined(rows[i], value):
+            vectors[i, value] = found.right[j], found.left[j]
+            new[j] = True
+    return new
 
 
 def _joined(row: list[complex], value: complex) -> bool:

@@ -164,8 +164,11 @@ class RelaxingResponse:
 
     def _own(self, omega: np.ndarray) -> np.ndarray:
         """Phase of the structure's determinant over that of the oscillators."""
-        own = solved(self._at(omega), np.zeros((self._shape[0], 0)))[1].imag
-        return own - np.angle(self._oscillators.values(self._relaxation, 1j * omega)).sum(axis=1)
+        return solved(self._at(omega), np.zeros((self._shape[0], 0)))[1].imag - self._passive(omega)
+
+    def _passive(self, omega: np.ndarray) -> np.ndarray:
+        """Phase of the oscillators."""
+        return np.angle(self._oscillators.values(self._relaxation, 1j * omega)).sum(axis=1)
 
     def _at(self, omega: np.ndarray) -> np.ndarray:
         """Dynamic stiffness at i omega, (len(omega), k, k)."""
@@ -187,8 +190,7 @@ class RelaxingResponse:
         if new.size:
             response, own = solved(self._at(new), self._in)
             h = self._out @ response
-            passive = np.angle(self._oscillators.values(self._relaxation, 1j * new)).sum(axis=1)
-            relative = np.where(new < self._edge, own.imag - passive, self._phase_there)
+            relative = np.where(new < self._edge, own.imag - self._passive(new), self._phase_there)
             inverses, logarithms = solved(h, np.eye(h.shape[1]))
             self._known.update(zip(new, zip(inverses, principal(logarithms.imag + relative))))
         inverses, phases = zip(*(self._known[w] for w in omega))

@@ -242,7 +242,7 @@ class _Walk:
     def count(self) -> Count:
         omegas = np.array(sorted(self.values))
         raw = np.array([self.values[w] for w in omegas])
-        steps = np.array([principal(d) for d in np.diff(raw.imag)])
+        steps = principal(np.diff(raw.imag))
         phase = raw[0].imag + np.concatenate([[0.0], np.cumsum(steps)])
         tail = self._tail(omegas[-1])
         # to the right of a band the path ends at the real axis, where a power has no phase

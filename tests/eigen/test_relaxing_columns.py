@@ -12,6 +12,7 @@ from eigen import (
     PencilFamily,
     Relaxation,
     SearchOptions,
+    chains,
     lowest_frequencies,
     structure_response,
 )
@@ -142,12 +143,14 @@ def test_counts_where_the_structure_is_unstable_by_itself(seed, followed, monkey
     assert sum(counts.number) > 0
 
 
+@pytest.mark.parametrize("cells", [41, 61])
 @pytest.mark.parametrize("seed", range(8))
-def test_cells_of_a_line_are_those_solved_one_by_one(seed):
-    """Though every other one starts from its neighbours."""
+def test_cells_of_a_line_are_those_solved_one_by_one(seed, cells):
+    """Though every other one, or two of three on the closer line, start from their neighbours."""
     family = RelaxingFamily(seed, coupling=0.3)
     reduced = ReducedFamily(family, np.eye(SIZE))
-    line = [Condition(x, 0.05, 0.0, float(seed % 2), 0.6) for x in np.geomspace(0.01, 3.0, 41)]
+    line = [Condition(x, 0.05, 0.0, float(seed % 2), 0.6) for x in np.geomspace(0.01, 3.0, cells)]
+    assert len(chains.solved_cells(line)) == 21
     together = reduced.eigenvalues(line)
     for condition, row in zip(line, together):
         alone, row = (family.reach(condition).leading(r)[:4] for r in (reduced.eigenvalues([condition])[0], row))
