@@ -22,10 +22,11 @@ class Mesh(Section):
     along: StrictInt = key(48, "Elements along the axis, from lip to flange, in all.", ge=6, le=2000)
     grading: Number = key(0.5, "Length of the element at the side edge over that at the centre.", ge=0.05, le=2.0)
     layer_points: StrictInt = key(2, "Gauss points through the thickness of each layer.", ge=1, le=10)
-    element: Literal["MITC4+EAS", "MITC4+", "MITC4"] = key(
+    element: Literal["MITC4+EAS", "MITC4+", "MITC4", "MITC4+drilling"] = key(
         "MITC4+EAS",
         "What is assumed about the in-plane strains: as the shape gives them (MITC4), bending of warped elements "
-        "without stretching (MITC4+), and with that free bending in the plane of the element (MITC4+EAS).",
+        "without stretching (MITC4+), and with that free bending in the plane of the element (MITC4+EAS). With a "
+        "sixth unknown of each node, by which edges bow, trapezoids bend freely in their plane, too (MITC4+drilling).",
     )
     rows: Literal["graded", "breaks", "uniform"] = key(
         "graded",

@@ -145,7 +145,7 @@ class Valve(Section):
         1.0,
         "Multiplies every length of this section, wall and gap included, and the positions in mesh.breaks and "
         "mesh.row_positions and in key_points; layers keep their shares of the wall. Lengths of other sections stay.",
-        gt=0,
+        ge=1e-3,
         le=1000,
     )
     _following: frozenset[str] = PrivateAttr(frozenset())

@@ -97,7 +97,7 @@ class PlaneContact:
         return self.lift > 0
 
     def gap(self, nodal: np.ndarray, directors: np.ndarray) -> np.ndarray:
-        """Gaps (k,), m, of nodal unknowns (nn, 5) with directors (nn, 3)."""
+        """Gaps (k,), m, of nodal unknowns (nn, c) with directors (nn, 3)."""
         n, a = self.nodes, self.axis
         return self.shell.mesh.nodes[n, a] + nodal[n, a] - self.depth * directors[n, a] + self.lift
 

@@ -13,7 +13,7 @@ from .plane import PlaneContact
 def contact_form(
     contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, *directions: np.ndarray
 ) -> np.ndarray:
-    """Derivative (nn, 5) of the contact force at nodal unknowns (nn, 5) along any number of directions (nn, 5).
+    """Derivative (nn, c) of the contact force at nodal unknowns (nn, c) along any number of directions (nn, c).
 
     The law is made of pieces; at their joints the derivatives are those of one side.
     """

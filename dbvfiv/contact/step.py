@@ -67,7 +67,7 @@ class ContactStep:
     Parameters
     ----------
     plane : PlaneContact
-    nodal : (nn, 5) array
+    nodal : (nn, c) array
         Where the step starts.
     h : float, s
     rebound : Rebound
@@ -88,7 +88,7 @@ class ContactStep:
         return factor * mean, factor * slope + bend * mean / self.h
 
     def force(self, nodal: np.ndarray) -> np.ndarray:
-        """Internal force (n,) over a step that ends at nodal unknowns (nn, 5).
+        """Internal force (n,) over a step that ends at nodal unknowns (nn, c).
 
         Gaps bend with the rotations; their slope is that in the middle, so that the work of the force misses pressure
         times the change of the gap by the third power of a director's turn.
@@ -115,5 +115,5 @@ class ContactStep:
         plane.add_blocks(data, weight * block)
 
     def stored(self, nodal: np.ndarray) -> float:
-        """Energy gained by the contact up to nodal unknowns (nn, 5), J."""
+        """Energy gained by the contact up to nodal unknowns (nn, c), J."""
         return self._stored(self.plane.gap(nodal, self.plane.shell.directors(nodal)[0])) - self._energy

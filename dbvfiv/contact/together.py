@@ -26,7 +26,7 @@ def together_blocks(contact: PlaneContact, nodal, directors, first, multiplier) 
 
     Parameters
     ----------
-    nodal, directors, first : (nn, 5), (nn, 3), (nn, 2, 3) arrays
+    nodal, directors, first : (nn, c), (nn, 3), (nn, 2, 3) arrays
         Nodal unknowns, directors and their derivatives.
     multiplier : (k,) array, Pa
     """
@@ -48,7 +48,7 @@ def class_stiffness(
     Parameters
     ----------
     contact : PlaneContact
-    nodal : (nn, 5) array
+    nodal : (nn, c) array
         Nodal unknowns of the state.
     multiplier : (k,) array, Pa
     shell : Shell

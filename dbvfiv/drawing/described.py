@@ -64,7 +64,7 @@ def _title(model: ValveModel) -> str:
 def _in_space(axes, mesh: MeshData, scale: Normalize) -> None:
     """Both faces of the whole valve, coloured by the thickness of the wall."""
     skin = ValveSkin.of(mesh)
-    corners = skin.corners(np.zeros((len(mesh.nodes), 5)))[:, :, [2, 0, 1]] * 1e3
+    corners = skin.corners(np.zeros(mesh.nodal_shape))[:, :, [2, 0, 1]] * 1e3
     cells = len(skin.valve.quads)
     values = np.concatenate([1e3 * mesh.thickness[skin.valve.cell]] * 2)
     rim = len(skin.quads) - 2 * cells

@@ -27,7 +27,7 @@ def faces(mesh: MeshData, nodal: np.ndarray | None = None) -> tuple[np.ndarray, 
     Parameters
     ----------
     mesh : MeshData
-    nodal : (nn, 5) array, optional
+    nodal : (nn, c) array, optional
         Displacements, m, and rotations of the nodes; at rest without it.
 
     Returns
@@ -94,7 +94,7 @@ class ValveSkin:
         return np.concatenate([quads, quads + count, np.hstack([rim, rim[:, ::-1] + count])])
 
     def points(self, nodal: np.ndarray) -> np.ndarray:
-        """(2 np, 3) m, the outer face first, from nodal unknowns (nn, 5) of the part."""
+        """(2 np, 3) m, the outer face first, from nodal unknowns (nn, c) of the part."""
         inner, outer = faces(self.mesh, nodal)
         return np.concatenate([self.valve.vectors(outer), self.valve.vectors(inner)])
 
@@ -103,7 +103,7 @@ class ValveSkin:
         return self.points(nodal)[self.quads]
 
     def moving_corners(self, steady: np.ndarray, motion: np.ndarray, parity: np.ndarray) -> np.ndarray:
-        """(n, 4, 3) m, corners of a motion (nn, 5) about a symmetric state (nn, 5); `parity` (np,) are its factors at
+        """(n, 4, 3) m, corners of a motion (nn, c) about a symmetric state (nn, c); `parity` (np,) are its factors at
         the points of mirrored images.
         """
         points = self.points(steady + motion)

@@ -33,7 +33,7 @@ class WallFaces:
 
     @classmethod
     def of(cls, mesh: MeshData, nodal: np.ndarray) -> WallFaces:
-        """Faces of the deformed wall from nodal unknowns (nn, 5).
+        """Faces of the deformed wall from nodal unknowns (nn, c).
 
         Raises
         ------

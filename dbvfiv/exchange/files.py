@@ -37,7 +37,7 @@ def write_shapes(
     Parameters
     ----------
     mesh : MeshData
-    nodal : (nn, 5) array
+    nodal : (nn, c) array
         Displacements, m, and rotations of the nodes.
     folder : path
     name : str

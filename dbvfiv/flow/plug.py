@@ -60,7 +60,7 @@ def centroid_slope(points: np.ndarray, axis: int, floor: float = 0.0) -> np.ndar
 
 def centroid_matrix(slope: np.ndarray, rows: np.ndarray, index: np.ndarray) -> sp.csr_matrix:
     """(m, n) matrix from free unknowns to the displacements of the centroids; `slope` as `centroid_slope` gives it, for
-    the nodes `rows` (m, c) with unknowns numbered by `index` (nn, 5).
+    the nodes `rows` (m, c) with unknowns numbered by `index` (nn, c).
     """
     columns = index[rows][:, :, :2]
     stations = np.broadcast_to(np.arange(len(rows))[:, None, None], columns.shape)

@@ -17,7 +17,7 @@ class RowAreas:
     Parameters
     ----------
     mesh : ValveMesh
-    index : (nn, 5) int array
+    index : (nn, c) int array
         Numbers of the free unknowns, -1 where constrained.
     """
 
@@ -42,7 +42,7 @@ class RowAreas:
         return len(self.rows)
 
     def areas(self, nodal: np.ndarray) -> np.ndarray:
-        """Flow areas (rows,) in m2 of the part, from nodal unknowns (nn, 5); may be negative when the lips cross."""
+        """Flow areas (rows,) in m2 of the part, from nodal unknowns (nn, c); may be negative when the lips cross."""
         return _polygon(self._rest + nodal[self.rows][:, :, :2]) + self.offset
 
     def jacobian(self, nodal: np.ndarray) -> sp.csr_matrix:
@@ -55,7 +55,7 @@ class RowAreas:
         return sp.csr_matrix((values, self._indices, self._indptr), shape=(self.count, self.size), copy=False)
 
     def second(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Second directional derivative (rows,) of the areas along nodal fields a and b (nn, 5); the areas are
+        """Second directional derivative (rows,) of the areas along nodal fields a and b (nn, c); the areas are
         quadratic.
         """
         slope = _polygon_slope(a[self.rows][:, :, :2])

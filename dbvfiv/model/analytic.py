@@ -17,6 +17,7 @@ from ..flow import FlowMotion
 from ..flow.derivatives import along
 from ..shell.reference import SHAPE, SLOPE
 from ..shell.rotation import director
+from ..shell.supports import UNKNOWNS_PER_NODE
 from .outside_forms import OutsideForms
 from .valve import ValveModel
 
@@ -55,7 +56,9 @@ class AnalyticResidual:
             "free": jnp.asarray(np.flatnonzero(shell.dofs.free)),
             "directors": jnp.asarray(shell.mesh.directors),
             "frames": jnp.asarray(shell.mesh.frames),
-            "mass": jnp.asarray(shell._integrals),
+            "mass": jnp.asarray(shell.inertia_integrals),
+            "drilling": jnp.asarray(shell.drilling_inertia.reshape(shell.dofs.free[:, UNKNOWNS_PER_NODE:].shape)),
+            "still": jnp.zeros(shell.dofs.free.shape),
             "stations": jnp.asarray(model.station_of_node),
             "loaded": jnp.asarray(model.loaded),
             "rows": jnp.asarray(model.mesh.rows),
@@ -174,21 +177,16 @@ def _form(form, q, *directions):
 
 
 def _expand(values, arrays):
-    count = arrays["nodes"].shape[0]
-    return jnp.zeros(5 * count).at[arrays["free"]].set(values).reshape(count, 5)
-
-
-def _collect(element_forces, arrays):
-    """Sum element forces (ne, 4, 5) at the nodes."""
-    return jnp.zeros((arrays["nodes"].shape[0], 5)).at[arrays["quads"]].add(element_forces)
+    still = arrays["still"]
+    return still.ravel().at[arrays["free"]].set(values).reshape(still.shape)
 
 
 def _directors(nodal, arrays):
-    return jax.vmap(director)(nodal[:, 3:], arrays["directors"], arrays["frames"])
+    return jax.vmap(director)(nodal[:, 3:5], arrays["directors"], arrays["frames"])
 
 
 def _inertia(nodal, rate, acceleration, alpha, arrays):
-    """Inertia and mass-proportional damping forces (nn, 5)."""
+    """Inertia and mass-proportional damping forces (nn, c)."""
     spin = lambda x, v: jax.jvp(lambda y: _directors(y, arrays), (x,), (v,))[1]  # noqa: E731
     turning = spin(nodal, rate)
     turned = jax.jvp(spin, (nodal, rate), (rate, acceleration))[1] + alpha * turning
@@ -199,7 +197,10 @@ def _inertia(nodal, rate, acceleration, alpha, arrays):
     force = jnp.zeros((count, 3)).at[quads].add(weighted(0, moved) + weighted(1, turned))
     moment = jnp.zeros((count, 3)).at[quads].add(weighted(1, moved) + weighted(2, turned))
     _, pull = jax.vjp(lambda y: _directors(y, arrays), nodal)
-    return pull(moment)[0].at[:, :3].add(force)
+    inertia = pull(moment)[0].at[:, :3].add(force)
+    return inertia.at[:, UNKNOWNS_PER_NODE:].add(
+        arrays["drilling"] * (acceleration + alpha * rate)[:, UNKNOWNS_PER_NODE:]
+    )
 
 
 def _pressure_force(nodal, nodal_pressure, arrays):
@@ -207,7 +208,7 @@ def _pressure_force(nodal, nodal_pressure, arrays):
     basis = jnp.einsum("pac,eai->epci", SLOPE, x)
     p = jnp.einsum("pa,ea->ep", SHAPE, nodal_pressure[arrays["quads"]]) * arrays["loaded"][:, None]
     force = jnp.einsum("pa,ep,epi->eai", SHAPE, p, jnp.cross(basis[:, :, 0], basis[:, :, 1]))
-    return _collect(jnp.pad(force, ((0, 0), (0, 0), (0, 2))), arrays)
+    return arrays["still"].at[arrays["quads"], :3].add(force)
 
 
 def _areas(nodal, arrays):

@@ -161,7 +161,7 @@ class LinearisedState:
         return {"A0": self.model.flow.steady_operator(self.area, self.inlet)[1]}
 
     def nodal(self, q: np.ndarray) -> np.ndarray:
-        """Nodal displacements and rotations (nn, 5) of unknowns (n,)."""
+        """Nodal displacements and rotations (nn, c) of unknowns (n,)."""
         return self.model.nodal(q)
 
     def relaxation(self, loss_factor: float) -> Relaxation | None:

@@ -47,7 +47,7 @@ class FaceContact:
         return np.zeros(self.plane.count)
 
     def nodal(self, q: np.ndarray) -> np.ndarray:
-        """Nodal displacements and rotations (nn, 5) of unknowns (n,)."""
+        """Nodal displacements and rotations (nn, c) of unknowns (n,)."""
         return self.shell.dofs.expand(q)
 
     def state(self, q: np.ndarray) -> ContactState:

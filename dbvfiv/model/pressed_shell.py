@@ -71,7 +71,7 @@ class PressedShell:
         return np.zeros(self.size)
 
     def nodal(self, q: np.ndarray) -> np.ndarray:
-        """Nodal displacements and rotations (nn, 5)."""
+        """Nodal displacements and rotations (nn, c)."""
         return self.shell.dofs.expand(q)
 
     # -- statics
@@ -118,13 +118,13 @@ class PressedShell:
         return self.shell.dofs.restrict(self.nodal_pressure_force(nodal, pressure))
 
     def nodal_pressure_force(self, nodal: np.ndarray, pressure: float) -> np.ndarray:
-        """Force (nn, 5) of the pressure on all nodes, held or not."""
+        """Force (nn, c) of the pressure on all nodes, held or not."""
         out = np.zeros_like(nodal)
         pressure_force(self.mesh.quads, self.mesh.nodes, nodal, self._uniform(pressure), self.loaded, out)
         return out
 
     def pressure_force_second(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Second directional derivative (n,) of the force of unit pressure along nodal fields a and b (nn, 5); it is
+        """Second directional derivative (n,) of the force of unit pressure along nodal fields a and b (nn, c); it is
         quadratic in the positions.
         """
 

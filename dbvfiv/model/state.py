@@ -41,8 +41,8 @@ class SteadyState:
         referred to the level of the lips.
     q : (n,) array
         Free displacements (m) and rotations (rad).
-    nodal : (nn, 5) array
-        Displacements and rotations of all nodes.
+    nodal : (nn, c) array
+        Displacements and rotations of all nodes, c = 5; with drilling rotations c = 6.
     mass_flow : float, kg/s
     volume_flow : float, m3/s
     outlet_area : float, m2

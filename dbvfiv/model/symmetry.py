@@ -129,23 +129,23 @@ class ClassDofs(DofMap):
 
     Attributes
     ----------
-    base : (nn, 5) array
+    base : (nn, c) array
         Displacements and rotations of the state.
     """
 
     base: np.ndarray
 
     def expand(self, q: np.ndarray) -> np.ndarray:
-        """Nodal array (nn, 5) of the state and what the unknowns (n,) add to it."""
+        """Nodal array (nn, c) of the state and what the unknowns (n,) add to it."""
         return self.base + super().expand(q)
 
     def small(self, q: np.ndarray) -> np.ndarray:
-        """Nodal array (nn, 5) of the unknowns (n,) alone."""
+        """Nodal array (nn, c) of the unknowns (n,) alone."""
         return super().expand(q)
 
     def at(self, base: np.ndarray) -> ClassDofs:
         """The same unknowns counted from another state; numbering and sparsity are shared."""
-        for name in ("index", "element_index", "pattern", "slots"):
+        for name in ("index", "element_index", "pattern", "slots", "drilling_slots"):
             getattr(self, name)  # found once, so that the copy has them
         other = object.__new__(ClassDofs)
         other.__dict__.update(self.__dict__, base=base)

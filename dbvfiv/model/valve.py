@@ -125,7 +125,7 @@ class ValveModel:
         return np.zeros(self.size)
 
     def nodal(self, q: np.ndarray) -> np.ndarray:
-        """Nodal displacements and rotations (nn, 5)."""
+        """Nodal displacements and rotations (nn, c)."""
         return self.shell.dofs.expand(q)
 
     # -- statics

@@ -5,18 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from ..model import ValveModel
-from .kernels import kinetic_energy, strain_energy
+from .kernels import strain_energy
 
 
 def wall_energies(model: ValveModel, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
     """Kinetic energy and strain energy at positions and velocities (n,), J of the part."""
     shell = model.shell
     nodal = model.nodal(q)
-    d, d1, _ = shell.directors(nodal)
-    kinetic = kinetic_energy(shell.mesh.quads, shell._integrals, d1, model.nodal(v))
+    d = shell.directors(nodal)[0]
     if shell.metric == "first-order":
         parts = zip(shell.parts, shell.wall)
         strain = sum(strain_energy(p.quads, shell.mesh.nodes, nodal, d, p.reference, wall) for p, wall in parts)
     else:
         strain = shell.energy(q)
-    return float(kinetic), float(strain)
+    return shell.kinetic_energy(q, v), float(strain)

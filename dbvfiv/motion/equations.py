@@ -21,7 +21,7 @@ from ..model.linear import CoupledFactor
 from ..shell import Memory, StepWall, WallMemory
 from .contact import FaceStep, MassSolver
 from .energies import wall_energies
-from .kernels import inertia_force, row_motion
+from .kernels import row_motion
 from .outside import MovingOutside, OutsideCorrection
 from .terms import Load, Step, Weights
 
@@ -59,8 +59,6 @@ class ValveMotion:
         self.resolution = float(np.finfo(float).eps * np.abs(model.shell.mesh.nodes).max())
         self.stations = model.stations
         shell = model.shell
-        self._quads = shell.mesh.quads
-        self._integrals = shell._integrals
         self._factor: CoupledFactor | None = None
         self._correction: OutsideCorrection | None = None
         self._masses: MassSolver | None = None
@@ -72,7 +70,7 @@ class ValveMotion:
         if model.outside is not None:
             density = model.case.outside.density(self.conditions.density)
             self.outside = MovingOutside(model, density, self.length)
-        self._rotations = np.flatnonzero(np.broadcast_to(np.arange(5) >= 3, free.shape)[free])
+        self._rotations = np.flatnonzero(np.broadcast_to(np.arange(free.shape[1]) >= 3, free.shape)[free])
 
     def _waves(self) -> LineWaves | None:
         if not isinstance(self.fluid, LineFluid):
@@ -95,12 +93,7 @@ class ValveMotion:
 
     def inertia(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """M(q) a + h(q, v), (n,)."""
-        model = self.model
-        nodal = model.nodal(q)
-        _, d1, d2 = model.shell.directors(nodal)
-        out = np.zeros_like(nodal)
-        inertia_force(self._quads, self._integrals, d1, d2, model.nodal(v), model.nodal(a), out)
-        return model.shell.dofs.restrict(out)
+        return self.model.shell.inertia(q, v, a)
 
     def momentum(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """M(q) v, (n,)."""

@@ -1,4 +1,4 @@
-"""Compiled element loops of a time step: inertia, kinetic and strain energy without assembling a matrix."""
+"""Compiled loops of a time step: areas under the rows and the strain energy of the wall."""
 
 from __future__ import annotations
 
@@ -8,71 +8,6 @@ import numpy as np
 from ..shell.kernel_rubber import FAST
 from ..shell.kernel_section import linear_response, point_strain
 from ..shell.kernel_strain import numbers_of, strains_at
-
-
-@numba.njit(cache=True, fastmath=FAST)
-def inertia_force(quads, integrals, director1, director2, rate, acceleration, out):
-    """Add M a + h to out (nn, 5): inertia at nodal velocities and accelerations (nn, 5), h the part quadratic in the
-    velocities.
-    """
-    count = director1.shape[0]
-    turn = np.empty((count, 3))
-    for n in range(count):
-        r0 = rate[n, 3]
-        r1 = rate[n, 4]
-        a0 = acceleration[n, 3]
-        a1 = acceleration[n, 4]
-        for i in range(3):
-            turn[n, i] = (
-                director1[n, 0, i] * a0
-                + director1[n, 1, i] * a1
-                + director2[n, 0, i] * r0 * r0
-                + director2[n, 1, i] * r1 * r1
-                + 2 * director2[n, 2, i] * r0 * r1
-            )
-    moment = np.empty(3)
-    for el in range(quads.shape[0]):
-        for a in range(4):
-            na = quads[el, a]
-            for i in range(3):
-                push = 0.0
-                twist = 0.0
-                for b in range(4):
-                    nb = quads[el, b]
-                    m1 = integrals[el, 1, a, b]
-                    push += integrals[el, 0, a, b] * acceleration[nb, i] + m1 * turn[nb, i]
-                    twist += m1 * acceleration[nb, i] + integrals[el, 2, a, b] * turn[nb, i]
-                out[na, i] += push
-                moment[i] = twist
-            for r in range(2):
-                out[na, 3 + r] += (
-                    director1[na, r, 0] * moment[0] + director1[na, r, 1] * moment[1] + director1[na, r, 2] * moment[2]
-                )
-
-
-@numba.njit(cache=True, fastmath=FAST)
-def kinetic_energy(quads, integrals, director1, rate):
-    """Kinetic energy, J, at nodal velocities (nn, 5)."""
-    count = director1.shape[0]
-    turn = np.empty((count, 3))
-    for n in range(count):
-        for i in range(3):
-            turn[n, i] = director1[n, 0, i] * rate[n, 3] + director1[n, 1, i] * rate[n, 4]
-    total = 0.0
-    for el in range(quads.shape[0]):
-        for a in range(4):
-            na = quads[el, a]
-            for b in range(4):
-                nb = quads[el, b]
-                uu = 0.0
-                ut = 0.0
-                tt = 0.0
-                for i in range(3):
-                    uu += rate[na, i] * rate[nb, i]
-                    ut += rate[na, i] * turn[nb, i]
-                    tt += turn[na, i] * turn[nb, i]
-                total += integrals[el, 0, a, b] * uu + 2 * integrals[el, 1, a, b] * ut + integrals[el, 2, a, b] * tt
-    return 0.5 * total
 
 
 @numba.njit(cache=True)
@@ -123,13 +58,13 @@ def strain_energy(
     wall,
 ):
     """Strain energy, J; arguments as `dbvfiv.shell.kernel.shell_force` has them."""
-    area, thickness = reference[4:]
+    area, thickness, own = reference[4], reference[5], reference[7]
     stiffness, points, constants, scales = wall
     x = np.empty((4, 3))
     d = np.empty((4, 3))
     u = np.empty((3, 3))
     v = np.empty((3, 3))
-    z = np.empty(16)
+    z = np.empty(20)
     strain = np.empty(8)
     stress = np.empty(8)
     e = np.empty(5)
@@ -148,4 +83,7 @@ def strain_energy(
                 c = constants[l]
                 density += points[l, 1] * h * _rubber_energy(c[0], c[1], c[2], c[3], c[4], e)
             total += area[el, point] * density
+        for a in range(own.shape[1]):
+            for b in range(own.shape[1]):
+                total += 0.5 * own[el, a, b] * z[16 + a] * z[16 + b]
     return total

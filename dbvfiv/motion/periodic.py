@@ -24,7 +24,6 @@ from eigen.pencil import FLUID_PARTS
 from ..errors import SolveError
 from ..flow import FlowMotion
 from ..model import ValveModel
-from .kernels import inertia_force
 from .periodic_memory import MemoryTerm, PeriodicMemory
 from .periodic_wall import WallSlopes
 
@@ -112,7 +111,7 @@ class PeriodicValve:
             nodal = model.nodal(q[i])
             if held is not None:
                 out[i] += memory.force(q[i], held[i])
-            out[i] += self._inertia(model, nodal, v[i], a[i] + mu["alpha"] * v[i])
+            out[i] += model.shell.inertia(q[i], v[i], a[i] + mu["alpha"] * v[i])
             out[i] -= model.pressure_force(nodal, p[i])
         return np.concatenate([out, self._weight * rest], axis=1)
 
@@ -122,13 +121,6 @@ class PeriodicValve:
         if known is None or known[0] is not model or not np.array_equal(known[1], q):
             self._known_forces = known = (model, q.copy(), np.stack([model.internal_force(x) for x in q]))
         return known[2]
-
-    @staticmethod
-    def _inertia(model: ValveModel, nodal: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        shell, out = model.shell, np.zeros_like(nodal)
-        _, d1, d2 = shell.directors(nodal)
-        inertia_force(shell.mesh.quads, shell._integrals, d1, d2, model.nodal(v), model.nodal(a), out)
-        return shell.dofs.restrict(out)
 
     def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float], rough: bool = False) -> PeriodicOperator:
         """Linearisation about a motion; its `average` is the pencil of the mean of all samples. A rough one has the

@@ -17,10 +17,10 @@ def inertia_slopes(shell: Shell, nodal: np.ndarray, rate: np.ndarray, accelerati
     Parameters
     ----------
     shell : Shell
-    nodal, rate, acceleration : (nn, 5) arrays
+    nodal, rate, acceleration : (nn, c) arrays
     """
     _, d1, d2 = shell.directors(nodal)
-    r, a = rate[:, 3:], acceleration[:, 3:]
+    r, a = rate[:, 3:5], acceleration[:, 3:5]
     mixed = np.stack([d2[:, [0, 2]], d2[:, [2, 1]]], axis=1)  # (nn, 2, 2, 3)
     turn = np.einsum("nri,nr->ni", d1, a) + _twice(d2, r)
     by_rate = 2.0 * np.einsum("nrsi,ns->nri", mixed, r)
@@ -32,7 +32,7 @@ def inertia_slopes(shell: Shell, nodal: np.ndarray, rate: np.ndarray, accelerati
         by_angle[:, s] += (_twice(shell.directors(ahead)[2], r) - _twice(shell.directors(behind)[2], r)) / (2 * _STEP)
     size = len(shell.dofs.pattern[1])
     position, velocity = np.zeros(size), np.zeros(size)
-    fixed = (shell.mesh.quads, shell._integrals, d1, mixed, turn, acceleration, by_angle, by_rate)
+    fixed = (shell.mesh.quads, shell.inertia_integrals, d1, mixed, turn, acceleration, by_angle, by_rate)
     _assemble(*fixed, shell.dofs.slots, position, velocity)
     return position, velocity
 

@@ -79,10 +79,10 @@ def _moved(steps: Sequence[Step], valve: WholeValve, deformed: bool) -> Iterator
 
 
 def motion(mesh: MeshData, valve: WholeValve, nodal: np.ndarray) -> dict[str, np.ndarray]:
-    """Displacement, rotation vector and director at the points from nodal unknowns (nn, 5)."""
+    """Displacement, rotation vector and director at the points from nodal unknowns (nn, c)."""
     directors, towards = (
         valve.vectors(mesh.directors),
-        valve.vectors(np.einsum("na,nai->ni", nodal[:, 3:], mesh.frames)),
+        valve.vectors(np.einsum("na,nai->ni", nodal[:, 3:5], mesh.frames)),
     )
     angle = np.linalg.norm(towards, axis=1, keepdims=True)
     return {

@@ -63,8 +63,8 @@ class MeshData:
     z : (m,) m
     directors : (nn, 3)
     frames : (nn, 2, 3)
-    free : (nn, 5) bool
-        Unknowns that no support holds.
+    free : (nn, c) bool
+        Unknowns that no support holds: displacements, rotations and, of elements that have them, drilling rotations.
     thickness : (ne,) m
     layer_names : (nl,) tuple of str, inside to outside
     layer_angles : (nl,) degrees
@@ -151,8 +151,13 @@ class MeshData:
         """Elements around and along."""
         return self.rows.shape[1] - 1, self.rows.shape[0] - 1
 
+    @property
+    def nodal_shape(self) -> tuple[int, int]:
+        """(nn, c): nodes and unknowns of each."""
+        return self.free.shape
+
     def restrict(self, nodal: np.ndarray) -> np.ndarray:
-        """Free unknowns (n,) of nodal ones (nn, 5)."""
+        """Free unknowns (n,) of nodal ones (nn, c)."""
         return nodal[self.free]
 
     def layer_titles(self) -> tuple[str, ...]:

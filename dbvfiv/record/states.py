@@ -148,7 +148,7 @@ def state_table(name: str, mesh: MeshData, further: Iterable[Column] = (), shape
         | dict.fromkeys((c.name for c in FIELDS), (len(mesh.z),))
         | {
             "max_displacement_position": (3,),
-            "nodal": (len(mesh.nodes), 5),
+            "nodal": mesh.nodal_shape,
         }
     )
     return TableSpec(name, (*STATE_COLUMNS, *LAYERS, *further), row_shapes | (shapes or {}))

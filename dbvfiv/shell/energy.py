@@ -26,7 +26,7 @@ import numpy as np
 
 from ..materials.incompressible import rubber_energy
 from ..materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, linear_elastic_energy
-from .assumed_strain import FACTORS, PAIRS, VECTORS
+from .assumed_strain import FACTORS, PAIRS, VECTORS, AssumedStrains
 from .reference import (
     SHEAR_EDGES,
     SHEAR_WEIGHTS,
@@ -55,11 +55,9 @@ def section_arrays(section: Section, geometry: ReferenceGeometry, metric: str) -
     return {key: jnp.asarray(value) for key, value in data.items()}
 
 
-def element_arrays(
-    mesh, geometry: ReferenceGeometry, points: np.ndarray, metric: str, inplane: np.ndarray, products: np.ndarray
-) -> dict:
+def element_arrays(mesh, geometry: ReferenceGeometry, points: np.ndarray, metric: str, assumed: AssumedStrains) -> dict:
     """Arrays with a leading element axis that `element_energy` is mapped over; `points` (np, 2) or, of zones, (ne, np,
-    2); `inplane` and `products` as `assumed_strain` has them.
+    2).
     """
     data = {
         "x": mesh.nodes[mesh.quads],
@@ -67,8 +65,9 @@ def element_arrays(
         "frame": mesh.frames[mesh.quads],
         "h": geometry.thickness,
         "area": geometry.area,
-        "inplane": inplane,
-        "products": products,
+        "inplane": assumed.inplane,
+        "products": assumed.products,
+        "drilling": assumed.drilling,
         "s0": geometry.shear0,
     }
     if points.ndim > 2:
@@ -109,20 +108,22 @@ def local_strains(unknowns, element, layers, metric):
 
     Parameters
     ----------
-    unknowns : (4, 5) displacements and rotations of the nodes
+    unknowns : (4, c) displacements, rotations and, of elements that have them, drilling rotations of the nodes
     """
-    return strains_of_shape(*shape(unknowns, element), element, layers, metric)
+    return strains_of_shape(shape(unknowns, element), element, layers, metric)
 
 
 def shape(unknowns, element):
-    """Positions and directors (4, 3) of the nodes."""
-    d = jax.vmap(director)(unknowns[:, 3:], element["director"], element["frame"])
-    return element["x"] + unknowns[:, :3], d
+    """Positions and directors (4, 3) of the nodes, drilling rotations (4,) or (0,), and one."""
+    d = jax.vmap(director)(unknowns[:, 3:5], element["director"], element["frame"])
+    return element["x"] + unknowns[:, :3], d, unknowns[:, 5:].ravel(), jnp.ones((), d.dtype)
 
 
-def strains_of_shape(x, d, element, layers, metric):
-    """`local_strains` from positions and directors (4, 3) of the nodes; but for a constant a quadratic form of them."""
-    covariant = jnp.einsum("pij,j->pi", element["inplane"], inplane_products(x, d) - element["products"])
+def strains_of_shape(place, element, layers, metric):
+    """`local_strains` from a `shape`; but for a constant a quadratic form of it, by its last number too."""
+    x, d, drilling, one = place
+    numbers = jnp.concatenate([inplane_products(x, d) - element["products"], one * drilling])
+    covariant = jnp.einsum("pij,j->pi", element["inplane"], numbers)
     c0, c1 = covariant[:, :3], covariant[:, 3:]
     edge = 0.25 * jnp.sum(
         (x[SHEAR_EDGES[:, 1]] - x[SHEAR_EDGES[:, 0]]) * (d[SHEAR_EDGES[:, 1]] + d[SHEAR_EDGES[:, 0]]), axis=1
@@ -201,11 +202,13 @@ def element_energy(kinds, metric, unknowns, element, layers):
     kinds : tuple of int, static
         Law of each layer point.
     metric : str, static
-    unknowns : (4, 5)
+    unknowns : (4, c)
     element, layers : dict of arrays, see `element_arrays` and `section_arrays`
     """
     strains = material_strains(local_strains(unknowns, element, layers, metric), layers)
-    return jnp.sum(point_volumes(metric, element, layers) * point_energies(kinds, layers["parameters"], strains))
+    strained = jnp.sum(point_volumes(metric, element, layers) * point_energies(kinds, layers["parameters"], strains))
+    drilling = unknowns[:, 5:].ravel()
+    return strained + 0.5 * drilling @ element["drilling"] @ drilling
 
 
 def point_volumes(metric, element, layers):
@@ -215,13 +218,13 @@ def point_volumes(metric, element, layers):
 
 
 def material_part(kinds, metric, unknowns, element, layers):
-    """Part (20, 20) of the Hessian of `element_energy` by which strains change stresses, without that by which stresses
+    """Part (4 c, 4 c) of the Hessian of `element_energy` by which strains change stresses, not that by which stresses
     turn.
     """
     strains, back = jax.linearize(
         lambda u: material_strains(local_strains(u, element, layers, metric), layers), unknowns
     )
-    slope = jax.vmap(back)(jnp.eye(20).reshape(20, 4, 5))
+    slope = jax.vmap(back)(jnp.eye(unknowns.size).reshape(-1, *unknowns.shape))
     weight = point_volumes(metric, element, layers)
 
     def stress(e):
@@ -239,30 +242,30 @@ class EnergyFunctions:
     """
 
     def __init__(
-        self, mesh, geometry: ReferenceGeometry, section: Section, metric: str, inplane, products, points=None
+        self, mesh, geometry: ReferenceGeometry, section: Section, metric: str, assumed: AssumedStrains, points=None
     ):
         if metric not in METRICS:
             raise ValueError(f"The shell metric is '{metric}', but only {', '.join(map(repr, METRICS))} exist.")
         self.metric = metric
         self.kinds = tuple(int(kind) for kind in section.kinds)
         points = section.points if points is None else points
-        self.elements = element_arrays(mesh, geometry, points, metric, inplane, products)
+        self.elements = element_arrays(mesh, geometry, points, metric, assumed)
         self.layers = section_arrays(section, geometry, metric)
 
     def energy(self, unknowns):
-        """(ne,) energies from unknowns (ne, 4, 5)."""
+        """(ne,) energies from unknowns (ne, 4, c)."""
         return _energies(self.kinds, self.metric, unknowns, self.elements, self.layers)
 
     def force(self, unknowns):
-        """(ne, 20) gradients."""
+        """(ne, 4 c) gradients."""
         return _gradients(self.kinds, self.metric, unknowns, self.elements, self.layers)
 
     def tangent(self, unknowns):
-        """(ne, 20, 20) Hessians."""
+        """(ne, 4 c, 4 c) Hessians."""
         return _hessians(self.kinds, self.metric, unknowns, self.elements, self.layers)
 
     def material_tangent(self, unknowns, share):
-        """(ne, 20, 20): material part of the Hessians, each layer's by a factor; share (nl,)."""
+        """(ne, 4 c, 4 c): material part of the Hessians, each layer's by a factor; share (nl,)."""
         factor = jnp.repeat(jnp.asarray(share), len(self.kinds) // len(share))
         elements, layers = self.elements, self.layers | {"weight": self.layers["weight"] * factor}
         if "weight" in elements:
@@ -270,11 +273,11 @@ class EnergyFunctions:
         return _materials(self.kinds, self.metric, unknowns, elements, layers)
 
     def second(self, unknowns, a, b):
-        """(ne, 20): second directional derivative of the force along a and b (ne, 4, 5)."""
+        """(ne, 4 c): second directional derivative of the force along a and b (ne, 4, c)."""
         return _second(self.kinds, self.metric, unknowns, a, b, self.elements, self.layers)
 
     def third(self, unknowns, a, b, c):
-        """(ne, 20): third directional derivative of the force."""
+        """(ne, 4 c): third directional derivative of the force."""
         return _third(self.kinds, self.metric, unknowns, a, b, c, self.elements, self.layers)
 
     def strains(self, unknowns):
@@ -307,9 +310,11 @@ def _along(function, *directions):
 
 
 _energies = _mapped(element_energy)
-_gradients = _mapped(lambda k, m, u, e, l: _force(k, m, u, e, l).reshape(20))
-_hessians = _mapped(lambda k, m, u, e, l: jax.jacfwd(lambda v: _force(k, m, v, e, l).reshape(20))(u).reshape(20, 20))
+_gradients = _mapped(lambda k, m, u, e, l: _force(k, m, u, e, l).ravel())
+_hessians = _mapped(
+    lambda k, m, u, e, l: jax.jacfwd(lambda v: _force(k, m, v, e, l).ravel())(u).reshape(u.size, u.size)
+)
 _materials = _mapped(material_part)
-_second = _mapped(lambda k, m, u, a, b, e, l: _along(lambda v: _force(k, m, v, e, l).reshape(20), a, b)(u))
-_third = _mapped(lambda k, m, u, a, b, c, e, l: _along(lambda v: _force(k, m, v, e, l).reshape(20), a, b, c)(u))
+_second = _mapped(lambda k, m, u, a, b, e, l: _along(lambda v: _force(k, m, v, e, l).ravel(), a, b)(u))
+_third = _mapped(lambda k, m, u, a, b, c, e, l: _along(lambda v: _force(k, m, v, e, l).ravel(), a, b, c)(u))
 _strains = _mapped(lambda k, m, u, e, l: material_strains(local_strains(u, e, l, m), l))

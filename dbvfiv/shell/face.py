@@ -33,7 +33,7 @@ class OuterFace:
         self.half_wall = 0.5 * total / weight
 
     def points(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (nn, 3), m, and directors (nn, 3) of the face's nodes for nodal unknowns (nn, 5)."""
+        """Places (nn, 3), m, and directors (nn, 3) of the face's nodes for nodal unknowns (nn, c)."""
         directors = self.shell.directors(nodal)[0]
         return self.shell.mesh.nodes + nodal[:, :3] + self.half_wall[:, None] * directors, directors
 

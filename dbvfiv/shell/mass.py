@@ -8,6 +8,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from .kernel_rubber import FAST
 from .reference import SHAPE, ReferenceGeometry
 from .section import Section
 from .zones import WallParts
@@ -78,31 +79,70 @@ def assemble_mass(quads, integrals, director1, slots, data):
                     data[where] += k[i, j]
 
 
-@numba.njit(cache=True)
-def convective_inertia(quads, integrals, director1, director2, rate, out):
-    """Add the inertia forces quadratic in the velocities, M_dot-type terms of turning directors, to out (nn, 5).
-
-    The kinetic energy depends on the rotations through the directors; with velocities `rate` (nn, 5) the acceleration
-    of a director at zero rotational acceleration is d2 applied to the rotation rates twice.
+@numba.njit(cache=True, fastmath=FAST)
+def inertia_force(quads, integrals, drilling, director1, director2, rate, acceleration, out):
+    """Add M a + h to out (nn, c): inertia at nodal velocities and accelerations (nn, c), h the part quadratic in the
+    velocities; drilling (nn,), or (0,) without drilling rotations.
     """
-    turn = np.empty((4, 3))
+    for n in range(drilling.shape[0]):
+        out[n, 5] += drilling[n] * acceleration[n, 5]
+    count = director1.shape[0]
+    turn = np.empty((count, 3))
+    for n in range(count):
+        r0 = rate[n, 3]
+        r1 = rate[n, 4]
+        a0 = acceleration[n, 3]
+        a1 = acceleration[n, 4]
+        for i in range(3):
+            turn[n, i] = (
+                director1[n, 0, i] * a0
+                + director1[n, 1, i] * a1
+                + director2[n, 0, i] * r0 * r0
+                + director2[n, 1, i] * r1 * r1
+                + 2 * director2[n, 2, i] * r0 * r1
+            )
+    moment = np.empty(3)
     for el in range(quads.shape[0]):
-        for b in range(4):
-            n = quads[el, b]
-            r0 = rate[n, 3]
-            r1 = rate[n, 4]
-            for i in range(3):
-                turn[b, i] = (
-                    director2[n, 0, i] * r0 * r0 + director2[n, 1, i] * r1 * r1 + 2 * director2[n, 2, i] * r0 * r1
-                )
         for a in range(4):
             na = quads[el, a]
             for i in range(3):
-                first = 0.0
-                second = 0.0
+                push = 0.0
+                twist = 0.0
                 for b in range(4):
-                    first += integrals[el, 1, a, b] * turn[b, i]
-                    second += integrals[el, 2, a, b] * turn[b, i]
-                out[na, i] += first
-                for r in range(2):
-                    out[na, 3 + r] += director1[na, r, i] * second
+                    nb = quads[el, b]
+                    m1 = integrals[el, 1, a, b]
+                    push += integrals[el, 0, a, b] * acceleration[nb, i] + m1 * turn[nb, i]
+                    twist += m1 * acceleration[nb, i] + integrals[el, 2, a, b] * turn[nb, i]
+                out[na, i] += push
+                moment[i] = twist
+            for r in range(2):
+                out[na, 3 + r] += (
+                    director1[na, r, 0] * moment[0] + director1[na, r, 1] * moment[1] + director1[na, r, 2] * moment[2]
+                )
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def kinetic_energy(quads, integrals, drilling, director1, rate):
+    """Kinetic energy, J, at nodal velocities (nn, c)."""
+    count = director1.shape[0]
+    turn = np.empty((count, 3))
+    for n in range(count):
+        for i in range(3):
+            turn[n, i] = director1[n, 0, i] * rate[n, 3] + director1[n, 1, i] * rate[n, 4]
+    total = 0.0
+    for n in range(drilling.shape[0]):
+        total += drilling[n] * rate[n, 5] ** 2
+    for el in range(quads.shape[0]):
+        for a in range(4):
+            na = quads[el, a]
+            for b in range(4):
+                nb = quads[el, b]
+                uu = 0.0
+                ut = 0.0
+                tt = 0.0
+                for i in range(3):
+                    uu += rate[na, i] * rate[nb, i]
+                    ut += rate[na, i] * turn[nb, i]
+                    tt += turn[na, i] * turn[nb, i]
+                total += integrals[el, 0, a, b] * uu + 2 * integrals[el, 1, a, b] * ut + integrals[el, 2, a, b] * tt
+    return 0.5 * total

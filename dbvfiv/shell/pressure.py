@@ -24,7 +24,7 @@ def _vectors(quad, nodes, q, point, g1, g2):
 
 @numba.njit(cache=True)
 def pressure_force(quads, nodes, q, nodal, loaded, out):
-    """Add the force of nodal pressures (nn,) to out (nn, 5); positive along the outward normal.
+    """Add the force of nodal pressures (nn,) to out (nn, c); positive along the outward normal.
 
     `loaded` (ne,) is the share of each element that carries pressure.
     """

@@ -24,14 +24,14 @@ from .energy import (
 
 
 def relaxed_force_form(energies: EnergyFunctions, unknowns, directions, factors) -> np.ndarray:
-    """Derivative (ne, 20), complex, of the internal force along k directions.
+    """Derivative (ne, 4 c), complex, of the internal force along k directions.
 
     Parameters
     ----------
     energies : EnergyFunctions
-    unknowns : (ne, 4, 5) array
+    unknowns : (ne, 4, c) array
         The state about which it is taken.
-    directions : sequence of k complex (ne, 4, 5) arrays
+    directions : sequence of k complex (ne, 4, c) arrays
     factors : (2**k, nl) complex array
         On the stress of each layer, for each set of directions: bit i of the row's number says whether direction i is
         one of the set. Row 0 is that of the steady stress.
@@ -63,7 +63,7 @@ def _element_form(kinds, metric, fields, share, element, layers):
     weight = point_volumes(metric, element, layers)
 
     def strains(place):
-        return material_strains(strains_of_shape(*place, element, layers, metric), layers)
+        return material_strains(strains_of_shape(place, element, layers, metric), layers)
 
     def stress(e):
         energy = lambda x: jnp.sum(weight * point_energies(kinds, layers["parameters"], x))  # noqa: E731
@@ -71,7 +71,7 @@ def _element_form(kinds, metric, fields, share, element, layers):
 
     def force(parts):
         unknowns, pull = parts
-        return jax.vjp(lambda u: shape(u, element), unknowns)[1](pull)[0].reshape(20)
+        return jax.vjp(lambda u: shape(u, element), unknowns)[1](pull)[0].ravel()
 
     single = {1 << i: field for i, field in enumerate(fields[1:])} | {0: fields[0]}
     unknowns = tuple(single.get(i, jnp.zeros_like(fields[0])) for i in range(1 << count))

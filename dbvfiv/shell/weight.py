@@ -44,8 +44,8 @@ class Weight:
         def at_nodes(values):
             return np.bincount(shell.mesh.quads.ravel(), weights=values.ravel(), minlength=count)
 
-        push = at_nodes(shell._integrals[:, 0].sum(axis=2) - displaced * volume)
-        moment = at_nodes(shell._integrals[:, 1].sum(axis=2))
+        push = at_nodes(shell.inertia_integrals[:, 0].sum(axis=2) - displaced * volume)
+        moment = at_nodes(shell.inertia_integrals[:, 1].sum(axis=2))
         self.push, self.moment = push[:, None] * gravity, moment[:, None] * gravity
 
     def energy(self, shell: Shell, q: np.ndarray) -> float:
@@ -57,9 +57,9 @@ class Weight:
     def force(self, shell: Shell, q: np.ndarray) -> np.ndarray:
         """Derivative (n,) of the potential: what the wall has to carry with the sign of an internal force."""
         nodal = shell.dofs.expand(q)
-        out = np.empty_like(nodal)
+        out = np.zeros_like(nodal)
         out[:, :3] = -self.push
-        out[:, 3:] = -np.einsum("ni,nri->nr", self.moment, shell.directors(nodal)[1])
+        out[:, 3:5] = -np.einsum("ni,nri->nr", self.moment, shell.directors(nodal)[1])
         return shell.dofs.restrict(out)
 
     def add_tangent(self, shell: Shell, q: np.ndarray, data: np.ndarray, share: float = 1.0) -> None:
@@ -70,10 +70,10 @@ class Weight:
 
     def form(self, shell: Shell, q: np.ndarray, *directions: np.ndarray) -> np.ndarray:
         """Derivative (n,) of `force` along one, two or three directions (n,)."""
-        turns = tuple(shell.dofs.expand(x)[:, 3:] for x in directions)
+        turns = tuple(shell.dofs.expand(x)[:, 3:5] for x in directions)
         out = np.zeros((shell.mesh.node_count, 5))
         out[:, 3:] = _moment_form(
-            shell.dofs.expand(q)[:, 3:], turns, self.moment, shell.mesh.directors, shell.mesh.frames
+            shell.dofs.expand(q)[:, 3:5], turns, self.moment, shell.mesh.directors, shell.mesh.frames
         )
         return shell.dofs.restrict(out)
 

@@ -43,7 +43,7 @@ def test_a_case_says_what_was_given(tmp_path):
 def test_rules_speak_of_what_was_given():
     with pytest.raises(CaseError, match="ends at 0.5 m; it must reach the valve's length of 0.56 m"):
         Case().replace({"valve.scale": 7, "valve.wall_map": [{"to": 0.5, "thickness": 0.01}]})
-    with pytest.raises(CaseError, match=r"valve.scale is given as 0\b.*greater than 0"):
+    with pytest.raises(CaseError, match=r"valve.scale is given as 0\b.*at least 0.001"):
         Case().replace({"valve.scale": 0})
     with pytest.raises(CaseError, match="a list with 0.6 m; a row lies between the lip, 0 m, and the flange, 0.56 m"):
         Case().replace({"valve.scale": 2, "mesh.breaks": [0.6]})

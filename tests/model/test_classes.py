@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from dbvfiv.model import Conditions
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.symmetry import SYMMETRIES
+from dbvfiv.motion.start import steady_positions
 from tests.model.test_relaxing_wall import relaxing_valve
 from tests.small_valves import find_open_state, make_valve
 from tests.systems.whole_valve import whole_valve
@@ -17,15 +18,15 @@ from tests.systems.whole_valve import whole_valve
 PRESSURE = 12e3
 
 
-@pytest.fixture(scope="module")
-def model():
-    return make_valve()
+@pytest.fixture(scope="module", params=["MITC4+EAS", "MITC4+drilling"])
+def model(request):
+    return make_valve({"mesh.element": request.param})
 
 
 @pytest.fixture(scope="module")
 def state(model):
     """A strongly deformed state; some of its stops are made to touch."""
-    q = find_open_state().copy()
+    q = steady_positions(model, PRESSURE).copy()
     q[model.stops.unknowns[::2]] = -1e-7
     return q
 

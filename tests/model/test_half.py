@@ -17,6 +17,7 @@ from dbvfiv.model.symmetry import HALF_SYMMETRIES, SYMMETRIES
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.whole_valve import WholeValve
+from dbvfiv.shell.supports import free_in_columns
 from eigen.search import leading_modes
 from tests.model.test_analytic_forms import difference as mixed_difference
 from tests.model.test_analytic_forms import motions
@@ -26,8 +27,8 @@ from tests.small_valves import find_open_state, make_valve
 PRESSURE = 12e3
 #: Classes of the quarter that a class of the half is made of.
 UNION = {"S": ("SS", "AS"), "A": ("SA", "AA")}
-#: What a vector and the two rotations do in a mirror image at x = 0; the second frame vector is a cross product.
-MIRRORED = np.array([-1.0, 1.0, 1.0, 1.0, -1.0])
+#: What a vector and the rotations do in a mirror image at x = 0; the second frame vector is a cross product.
+MIRRORED = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
 
 
 @pytest.fixture(scope="module")
@@ -49,23 +50,28 @@ def state(quarter, half):
 
 
 def lifted(quarter, half, nodal, parity=1.0):
-    """Nodal unknowns of the half from those (nn, 5) of the quarter, as they are and as their mirror image."""
-    out = np.zeros((len(half.mesh.nodes), 5))
+    """Nodal unknowns of the half from those (nn, c) of the quarter, as they are and as their mirror image."""
+    out = np.zeros(half.shell.dofs.free.shape)
     centre = half.mesh.part.centre(half.mesh.rows.shape[1])
     at = nodal[quarter.mesh.rows]
-    out[half.mesh.rows[:, : centre + 1]] = parity * MIRRORED * at[:, ::-1]
+    out[half.mesh.rows[:, : centre + 1]] = parity * MIRRORED[: nodal.shape[1]] * at[:, ::-1]
     out[half.mesh.rows[:, centre:]] = at
     return out
 
 
+def class_of(model, symmetry):
+    """(nn, c) free unknowns of a class, drilling rotations among them where the model has them."""
+    return free_in_columns(symmetry.free_unknowns(model.mesh), model.shell.dofs.columns)
+
+
 def basis(quarter, half, symmetry, of_half):
     """(n, k) motions of a class of the half from the unknowns of a class of the quarter."""
-    free = symmetry.free_unknowns(quarter.mesh)
+    free, of_half = (class_of(x, own) for x, own in ((quarter, symmetry), (half, of_half)))
     columns = []
     for node, which in zip(*np.nonzero(free)):
         nodal = np.zeros(free.shape)
         nodal[node, which] = 1.0
-        columns.append(lifted(quarter, half, nodal, symmetry.signs[0])[of_half.free_unknowns(half.mesh)])
+        columns.append(lifted(quarter, half, nodal, symmetry.signs[0])[of_half])
     return sp.csr_matrix(np.array(columns).T)
 
 

@@ -45,6 +45,24 @@ def rectangle(nx: int, ny: int, length: float, width: float) -> Grid:
     return grid(nx, ny, lambda u, v: (length * u, width * v, 0 * u))
 
 
+#: A quadrilateral without any symmetry.
+CORNERS = np.array([[0.0, 0.0], [1.1, 0.1], [1.3, 0.9], [0.2, 0.7]])
+
+
+def single_element(corners=CORNERS) -> ShellMesh:
+    """One flat element."""
+    nodes = np.column_stack([corners, np.zeros(4)])
+    return ShellMesh.build(nodes, np.array([[0, 1, 2, 3]]), 0.01, material_axis=(1.0, 0.3, 0.0))
+
+
+def distorted_plate() -> tuple[ShellMesh, np.ndarray]:
+    """Flat patch of 4 x 3 distorted elements and the nodes that lie inside."""
+    patch = rectangle(4, 3, 1.0, 0.6)
+    inner = patch.index[1:-1, 1:-1].ravel()
+    patch.nodes[inner, :2] += np.random.default_rng(3).uniform(-0.06, 0.06, (len(inner), 2))
+    return ShellMesh.build(patch.nodes, patch.quads, 0.01, material_axis=(1.0, 0, 0)), inner
+
+
 def isotropic_section(e: float, nu: float, h: float, density: float = 1.0, shear: float = 5 / 6) -> Section:
     """One isotropic layer; two Gauss points integrate the linear law exactly."""
     return Section((Layer(IsotropicElastic(e, nu, density), h, shear_correction=shear),))
@@ -105,6 +123,13 @@ def random_state(mesh: ShellMesh, seed: int, stretch: float = 0.1, turn: float =
     nodal[:, :3] += stretch * size * generator.uniform(-1, 1, (mesh.node_count, 3))
     nodal[:, 3:] += turn * generator.uniform(-1, 1, (mesh.node_count, 2))
     return nodal
+
+
+def random_unknowns(shell: Shell, seed: int, stretch: float, turn: float, drilling: float = 0.05) -> np.ndarray:
+    """(n,) unknowns of a `random_state`, with random drilling rotations, rad, where the shell has them."""
+    q, turned = shell.dofs.restrict(random_state(shell.mesh, seed, stretch, turn)), shell.dofs.index[:, 5:].ravel()
+    q[turned] = drilling * np.random.default_rng(seed + 1).uniform(-1, 1, len(turned))
+    return q
 
 
 @dataclass(frozen=True)

@@ -6,24 +6,25 @@ import numpy as np
 import pytest
 
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
-from dbvfiv.shell.assumed_strain import ELEMENTS, ENHANCED, MITC4_PLUS
+from dbvfiv.shell.assumed_strain import DRILLING, ELEMENTS, ENHANCED, MITC4_PLUS
 from tests.shell.structures import (
+    CORNERS,
+    distorted_plate,
     grid,
     isotropic_section,
     mixed_section,
-    random_state,
+    random_unknowns,
     rectangle,
     rigid_motion,
     rotation_about,
+    single_element,
 )
 from tests.shell.test_element_loop import assembled, difference, unit_direction
 
-CORNERS = np.array([[0.0, 0.0], [1.1, 0.1], [1.3, 0.9], [0.2, 0.7]])
 
-
-def textbook_stiffness(corners, plane, enhanced: bool) -> np.ndarray:
-    """(8, 8) stiffness of a bilinear plane element, unknowns x then y of each node, with the four enhanced modes of
-    Simo & Rifai (1990) condensed.
+def textbook_stiffness(corners, plane, enhanced: int) -> np.ndarray:
+    """(8, 8) stiffness of a bilinear plane element, unknowns x then y of each node, with the first of the four enhanced
+    modes of Simo & Rifai (1990) condensed.
     """
     g = 1 / np.sqrt(3)
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -36,7 +37,7 @@ def textbook_stiffness(corners, plane, enhanced: bool) -> np.ndarray:
     (a, b), (c, d) = np.linalg.inv(centre)
     # strains [11, 22, 2 12] in space from covariant ones, with the rows of J^-1 at the centre
     turn = np.array([[a * a, b * b, a * b], [c * c, d * d, c * d], [2 * a * c, 2 * b * d, a * d + b * c]])
-    k, coupling, inner = np.zeros((8, 8)), np.zeros((4, 8)), np.zeros((4, 4))
+    k, coupling, inner = np.zeros((8, 8)), np.zeros((enhanced, 8)), np.zeros((enhanced, enhanced))
     for r, s in g * signs:
         slope, jac = jacobian(r, s)
         det = np.linalg.det(jac)
@@ -45,6 +46,7 @@ def textbook_stiffness(corners, plane, enhanced: bool) -> np.ndarray:
         strain[0, 0::2], strain[1, 1::2] = by_xy[0], by_xy[1]
         strain[2, 0::2], strain[2, 1::2] = by_xy[1], by_xy[0]
         modes = np.linalg.det(centre) / det * turn @ np.array([[r, 0, 0, 0], [0, s, 0, 0], [0, 0, r, s]])
+        modes = modes[:, :enhanced]
         k += det * strain.T @ plane @ strain
         coupling += det * modes.T @ plane @ strain
         inner += det * modes.T @ plane @ modes
@@ -54,20 +56,19 @@ def textbook_stiffness(corners, plane, enhanced: bool) -> np.ndarray:
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_flat_element_is_the_textbook_one(element):
     """In its plane a flat quadrilateral is the bilinear element, or the one of Simo and Rifai."""
-    nodes = np.column_stack([CORNERS, np.zeros(4)])
-    mesh = ShellMesh.build(nodes, np.array([[0, 1, 2, 3]]), 0.01, material_axis=(1.0, 0.3, 0.0))
-    shell = Shell(mesh, isotropic_section(1e6, 0.3, 0.01), element=element)
-    stiffness = shell.dofs.matrix(shell.force_and_tangent(np.zeros(20))[1]).toarray()
-    own = stiffness.reshape(4, 5, 4, 5)[:, :2, :, :2].reshape(8, 8)
+    shell = Shell(single_element(), isotropic_section(1e6, 0.3, 0.01), element=element)
+    stiffness = shell.dofs.matrix(shell.force_and_tangent(np.zeros(shell.size))[1]).toarray()
+    nodal = (4, shell.dofs.columns)
+    own = stiffness.reshape(*nodal, *nodal)[:, :2, :, :2].reshape(8, 8)
     plane = 1e6 / (1 - 0.09) * np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])
-    expected = 0.01 * textbook_stiffness(CORNERS, plane, element == ENHANCED)
+    expected = 0.01 * textbook_stiffness(CORNERS, plane, {ENHANCED: 4, DRILLING: 2}.get(element, 0))
     assert np.abs(own - expected).max() < 1e-12 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_loop_is_the_energy(mesh, element):
     shell = Shell(mesh, mixed_section(), element=element)
-    q = shell.dofs.restrict(random_state(shell.mesh, 31, 0.02, 0.1))
+    q = random_unknowns(shell, 31, 0.02, 0.1)
     expected_force, expected_tangent = assembled(shell, q)
     force, data = shell.force_and_tangent(q)
     assert np.abs(force - expected_force).max() < 1e-12 * np.abs(expected_force).max()
@@ -82,21 +83,20 @@ def test_rigid_motion_is_free_of_strain(mesh, element):
     shell = Shell(mesh, mixed_section(), element=element)
     q = shell.dofs.restrict(rigid_motion(mesh, rotation_about((1, 2, -1), 2.5), (0.1, -0.2, 0.3)))
     assert np.abs(shell.strains(q)).max() < 2e-14
+    q[shell.dofs.index[:, 5:]] = 0.3  # drilling rotations count from the element's own, so even ones strain nothing
+    assert np.abs(shell.strains(q)).max() < 2e-14
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_homogeneous_strains_of_any_size(element):
     """Stretched and sheared by half and turned: the strains of a distorted plate are those of the deformation."""
-    patch = rectangle(4, 3, 1.0, 0.6)
-    inner = patch.index[1:-1, 1:-1].ravel()
-    patch.nodes[inner, :2] += np.random.default_rng(3).uniform(-0.06, 0.06, (len(inner), 2))
-    mesh = ShellMesh.build(patch.nodes, patch.quads, 0.01, material_axis=(1.0, 0, 0))
+    mesh, _ = distorted_plate()
     shell = Shell(mesh, Section((Layer(mixed_section().layers[0].law, 0.01),)), element=element)
     gradient = np.array([[1.5, 0.4], [-0.1, 0.8]])
     nodal = np.zeros((mesh.node_count, 5))
     nodal[:, :2] = mesh.nodes[:, :2] @ (gradient - np.eye(2)).T
     green = 0.5 * (gradient.T @ gradient - np.eye(2))
-    strain = shell.strains(nodal.ravel())[..., :3]
+    strain = shell.strains(shell.dofs.restrict(nodal))[..., :3]
     assert np.abs(strain - [green[0, 0], green[1, 1], 2 * green[0, 1]]).max() < 1e-13
 
 
@@ -123,7 +123,7 @@ def test_enhancement_only_takes_stiffness_away():
     assert taken[-1] > 1e-3 * np.abs(k[0]).max()
 
 
-@pytest.mark.parametrize("element", [MITC4_PLUS, ENHANCED])
+@pytest.mark.parametrize("element", [MITC4_PLUS, ENHANCED, DRILLING])
 def test_no_buckling_by_itself_under_pressure_along_short_sides(element):
     """Slender elements pressed by 20 % along their short sides, held in their plane, stay stable (Sussman & Bathe 2014
     show that enhanced elements with the squared hourglass strain do not).
@@ -139,7 +139,7 @@ def test_no_buckling_by_itself_under_pressure_along_short_sides(element):
     nodal[:, 0] = -0.2 * mesh.nodes[:, 0]
     held = Shell(mesh, section, element=element)
     data = held.force_and_tangent(held.dofs.restrict(nodal))[1]
-    keep = free.ravel()
+    keep = np.hstack([free, np.ones((len(free), held.dofs.columns - 5), bool)]).ravel()
     matrix = held.dofs.matrix(data).toarray()[np.ix_(keep, keep)]
     # the strip as a beam of stiffness EI = E h w^3 / 12 buckles at 4 pi^2 EI / L^2 between ends that do not turn:
     # 4 pi^2 / 12 w^2 = 0.82 of E h w, far above 0.2

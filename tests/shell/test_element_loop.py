@@ -13,10 +13,10 @@ from tests.shell.structures import random_state
 def assembled(shell, q):
     """Force and dense tangent from the automatically differentiated energy."""
     unknowns = shell.dofs.expand(q)[shell.mesh.quads]
-    force = np.zeros((shell.mesh.node_count, 5))
-    np.add.at(force, shell.mesh.quads, np.asarray(shell.energies.force(unknowns)).reshape(-1, 4, 5))
-    tangent = np.zeros((5 * shell.mesh.node_count,) * 2)
-    dofs = (5 * shell.mesh.quads[:, :, None] + np.arange(5)).reshape(-1, 20)
+    force, columns = np.zeros(shell.dofs.free.shape), shell.dofs.columns
+    np.add.at(force, shell.mesh.quads, np.asarray(shell.energies.force(unknowns)).reshape(-1, 4, columns))
+    tangent = np.zeros((force.size,) * 2)
+    dofs = (columns * shell.mesh.quads[:, :, None] + np.arange(columns)).reshape(-1, 4 * columns)
     for index, block in zip(dofs, np.asarray(shell.energies.tangent(unknowns))):
         tangent[np.ix_(index, index)] += block
     free = shell.dofs.free.ravel()

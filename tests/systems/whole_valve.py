@@ -12,12 +12,13 @@ from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.whole_valve import WholeValve
 from dbvfiv.shell import Section, Shell, ShellMesh
 from dbvfiv.shell.pressure import pressure_stiffness
+from dbvfiv.shell.supports import free_in_columns
 
 
 @dataclass(frozen=True)
 class Whole:
     """Matrices (n, n) of the whole valve: mass, structure, structure less follower stiffness, and what relaxes; what
-    its points come from; numbers (np, 5) of its unknowns.
+    its points come from; numbers (np, c) of its unknowns.
     """
 
     mass: sp.csr_matrix
@@ -29,6 +30,7 @@ class Whole:
 
     def basis(self, free: np.ndarray, signs: tuple[int, int]) -> sp.csr_matrix:
         """(n, k) motions of the whole valve from unknowns of a quarter that are free (nn, 5), mirrored with signs."""
+        free = free_in_columns(free, self.index.shape[1])
         number = np.full(free.shape, -1)
         number[free] = np.arange(np.count_nonzero(free))
         mirror = self.valve.sign
@@ -36,7 +38,8 @@ class Whole:
         columns, rows = number[self.valve.node], self.index
         values = np.ones(rows.shape) * parity[:, None]
         values[:, :3] *= mirror
-        values[:, 4] *= mirror[:, 0] * mirror[:, 1]  # the second frame vector is a cross product
+        # the second frame vector is a cross product, and a mirror image turns the other way
+        values[:, 4:] *= mirror[:, :1] * mirror[:, 1:2]
         keep = (rows >= 0) & (columns >= 0)
         return sp.csr_matrix((values[keep], (rows[keep], columns[keep])), shape=(self.mass.shape[0], free.sum()))
 
@@ -53,7 +56,7 @@ def whole_valve(model: ValveModel, q: np.ndarray, inlet: float) -> Whole:
     handed = np.prod(valve.sign[:, :2], axis=1)
     full = nodal[valve.node]
     full[:, :3] *= valve.sign
-    full[:, 4] *= handed
+    full[:, 4:] *= handed[:, None]
     free = np.ones(full.shape, bool)
     free[np.isin(valve.node, mesh.rows[-1])] = False
     count = len(quarter.quads)
@@ -70,7 +73,7 @@ def whole_valve(model: ValveModel, q: np.ndarray, inlet: float) -> Whole:
             quarter.thickness[valve.cell[own]],
             directors=quarter.directors[valve.node] * valve.sign,
         )
-        shell = Shell(surface, wall, free, model.shell.metric)
+        shell = Shell(surface, wall, free, model.shell.metric, model.shell.element)
         state, dofs = shell.dofs.restrict(full), shell.dofs
         mass = mass + dofs.matrix(shell.mass(state))
         structure = structure + dofs.matrix(shell.force_and_tangent(state)[1])

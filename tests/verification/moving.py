@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from dbvfiv.model.linear import CoupledFactor
 from dbvfiv.model.relaxing import WallRelaxation
-from dbvfiv.motion.kernels import inertia_force, kinetic_energy, strain_energy
+from dbvfiv.motion.kernels import strain_energy
 from dbvfiv.motion.terms import Load
 from dbvfiv.shell import Shell, WallMemory
 from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
@@ -112,12 +112,7 @@ class ShellMotion(Motion):
         return self.shell.dofs.restrict(out)
 
     def inertia(self, q, v, a):
-        shell = self.shell
-        nodal = shell.dofs.expand(q)
-        _, d1, d2 = shell.directors(nodal)
-        out = np.zeros_like(nodal)
-        inertia_force(shell.mesh.quads, shell._integrals, d1, d2, shell.dofs.expand(v), shell.dofs.expand(a), out)
-        return shell.dofs.restrict(out)
+        return self.shell.inertia(q, v, a)
 
     def _refactor(self, values):
         none = np.zeros(0)
@@ -153,9 +148,7 @@ class ShellMotion(Motion):
         """Kinetic and strain energy, J."""
         shell = self.shell
         nodal = shell.dofs.expand(q)
-        d, d1, _ = shell.directors(nodal)
-        kinetic = kinetic_energy(shell.mesh.quads, shell._integrals, d1, shell.dofs.expand(v))
-        return float(
-            kinetic
-            + strain_energy(shell.mesh.quads, shell.mesh.nodes, nodal, d, shell.parts[0].reference, shell.wall[0])
+        d = shell.directors(nodal)[0]
+        return shell.kinetic_energy(q, v) + float(
+            strain_energy(shell.mesh.quads, shell.mesh.nodes, nodal, d, shell.parts[0].reference, shell.wall[0])
         )

@@ -38,13 +38,13 @@ def build(patch: Grid, wall, free, element, **options) -> Shell:
 
 
 def solved(shell: Shell, load: np.ndarray) -> np.ndarray:
-    """Nodal unknowns (nn, 5) of the linear answer to nodal forces (nn, 5)."""
+    """Nodal unknowns (nn, c) of the linear answer to nodal forces (nn, 5)."""
     data = shell.force_and_tangent(np.zeros(shell.size))[1]
     return shell.dofs.expand(spsolve(shell.dofs.matrix(data).tocsc(), shell.dofs.restrict(load)))
 
 
-def all_free(patch: Grid) -> np.ndarray:
-    return np.ones((len(patch.nodes), 5), bool)
+def all_free(patch: Grid, columns: int = 5) -> np.ndarray:
+    return np.ones((len(patch.nodes), columns), bool)
 
 
 def edge_load(patch: Grid, line: np.ndarray, direction: int, total: float) -> np.ndarray:
@@ -111,9 +111,9 @@ def cook(element: str, n: int, angle: float = 0.0) -> float:
         return 48.0 * u, low + v * (high - low), 0 * u
 
     patch = grid(n, n, place)
-    free = all_free(patch)
+    free = all_free(patch, 6)
     free[patch.index[0]] = False
-    free[:, 2:] = False
+    free[:, 2:5] = False
     shell = build(patch, isotropic_section(1.0, 1 / 3, 1.0), free, element, h=1.0, material_axis=(1.0, angle, 0))
     return solved(shell, edge_load(patch, patch.index[-1], 1, 1.0))[patch.index[-1, n // 2], 1] / 23.965
 

@@ -40,7 +40,7 @@ class PressedSystem(SystemBase):
         self._scale = pressed.force_scale(pressed.rest(), pressure_scale)
         self._mass = pressed.shell.dofs.matrix(pressed.mass(pressed.rest()))
         # One unit of the state is a mean displacement of one wall thickness, or a mean rotation of one radian.
-        weights = np.ones((pressed.mesh.node_count, 5)) / pressed.mesh.node_count
+        weights = np.ones(pressed.shell.dofs.free.shape) / pressed.mesh.node_count
         weights[:, :3] /= np.mean(pressed.mesh.thickness) ** 2
         self.state_weights = pressed.shell.dofs.restrict(weights)
 

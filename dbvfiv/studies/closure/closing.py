@@ -163,7 +163,7 @@ def closing_valve(case: Case) -> ContactValve:
 
 def shut_below(model: ContactValve) -> float:
     """Passage of the whole valve, m2, that counts as shut."""
-    rest = measure(model.mesh, model.shell, model.face, np.zeros((len(model.mesh.nodes), 5)))
+    rest = measure(model.mesh, model.shell, model.face, np.zeros(model.shell.dofs.free.shape))
     return model.mesh.part.copies * model.case.closure.shut_fraction * rest.reference
 
 

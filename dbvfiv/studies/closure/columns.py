@@ -188,19 +188,19 @@ def _walk_tables(prefix: str, mesh: MeshData) -> tuple[TableSpec, ...]:
     nodes = len(mesh.nodes)
     shapes = layer_shapes(mesh) | {
         "max_displacement_position": (3,),
-        "nodal": (nodes, 5),
+        "nodal": mesh.nodal_shape,
         "opening": (len(mesh.z),),
         "contact_pressure": (nodes,),
         "gap": (nodes,),
         "stiffness_eigenvalues": (MOST_EIGENVALUES,),
-        "way/slope": (nodes, 5),
+        "way/slope": mesh.nodal_shape,
         "way/multiplier": (nodes,),
         "way/energy": (6,),
     }
     return (
         TableSpec(prefix + STATES, (*SUMMARY, *FIELDS, *LAYERS, *RESTART), shapes),
         TableSpec(prefix + PATH, POINT),
-        TableSpec(prefix + BUCKLING, BUCKLED, {"nodal": (nodes, 5), "shape": (nodes, 5)}),
+        TableSpec(prefix + BUCKLING, BUCKLED, dict.fromkeys(("nodal", "shape"), mesh.nodal_shape)),
     )
 
 

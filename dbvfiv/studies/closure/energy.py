@@ -17,6 +17,8 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 _DEEPEST, _STUBBORN = 16, 5
 #: Most iterations for an equilibrium in between.
 _ITERATIONS = 25
+#: Unknowns, in sizes of the mesh, beyond which an iteration has lost its way.
+_ASTRAY = 10.0
 
 
 @dataclass(frozen=True)
@@ -205,10 +207,12 @@ class EnergyLedger:
         return _Place(s, q, rate, self._own.shell.energy(q), self._own.contact_energy(q))
 
     def _between(self, loads: _Loads, a: _Place, b: _Place) -> _Place | None:
-        guess = 0.5 * (a.q + b.q)
+        straight = 0.5 * (a.q + b.q)
+        curved = straight
         if a.rate is not None and b.rate is not None:
-            guess += 0.125 * (b.s - a.s) * (a.rate - b.rate)
-        return self._solved(loads, 0.5 * (a.s + b.s), guess)
+            curved = straight + 0.125 * (b.s - a.s) * (a.rate - b.rate)
+        starts = (curved, straight, a.q, b.q)  # where contact comes and goes a straight way may serve better
+        return next((found for q in starts if (found := self._solved(loads, 0.5 * (a.s + b.s), q))), None)
 
     def _solved(self, loads: _Loads, s: float, q: np.ndarray) -> _Place | None:
         """Equilibrium under the loads at s by Newton's method, with its tangent; None if it was not found."""
@@ -227,6 +231,8 @@ class EnergyLedger:
                 if found:
                     break
                 q, last = q - self._factor.solve(tangent.residual), residual
+                if np.linalg.norm(q) > _ASTRAY * np.linalg.norm(own.mesh.nodes):  # where rounding excuses any residual
+                    return None
         except (SingularMatrix, ArithmeticError):
             return None
         if not found:

@@ -78,7 +78,7 @@ def opening(model: ClosureModel, q: np.ndarray) -> Opening:
 def measure(
     mesh: ValveMesh, shell: Shell, face: PlaneContact, nodal: np.ndarray, held: np.ndarray | None = None
 ) -> Opening:
-    """Opening for nodal unknowns (nn, 5); `held` (rows,) are rows shut by their supports."""
+    """Opening for nodal unknowns (nn, c); `held` (rows,) are rows shut by their supports."""
     rows = mesh.rows
     gap, reach = _gaps(shell, face, nodal, shell.directors(nodal)[0])
     at_rest, rest_reach = _gaps(shell, face, np.zeros_like(nodal), shell.mesh.directors)

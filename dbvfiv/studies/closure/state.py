@@ -71,8 +71,8 @@ class ClosureState:
         Relative errors, see `balance`.
     converged, iterations, load_steps, multiplier_updates, residual, rounding, reason
         How it was found.
-    nodal : (nn, 5) array, m and rad
-        Displacements and rotations of all nodes.
+    nodal : (nn, c) array, m and rad
+        Displacements and rotations of all nodes, c = 5; with drilling rotations c = 6.
     opening : (rows,) array, m2
         Passage of the computed part at each row.
     contact_pressure, gap : (nn,) arrays, Pa, m
@@ -186,7 +186,7 @@ def describe_closure(
 
 
 def face_overlap(model: ClosureModel, nodal: np.ndarray) -> float:
-    """Deepest overlap of the inner faces, m, for nodal unknowns (nn, 5); rows held shut by supports are left out."""
+    """Deepest overlap of the inner faces, m, for nodal unknowns (nn, c); rows held shut by supports are left out."""
     face = model.face
     gap = face.gap(nodal, model.shell.directors(nodal)[0])
     movable = np.ones(len(nodal), bool)

@@ -185,7 +185,7 @@ class ClosureWalk:
         counts = {"way/path": self.record.rows(self.points), "way/buckling": self.record.rows(self.buckling)}
         return counts | {
             "way/step": np.nan,
-            "way/slope": np.full((nodes, 5), np.nan),
+            "way/slope": np.full(self.model.shell.dofs.free.shape, np.nan),
             "way/multiplier": np.full(nodes, np.nan),
             "way/energy": np.full(6, np.nan),
         }

@@ -16,7 +16,7 @@ from .curves import lacking, plain_rows, state_at
 
 
 class Deformed(Protocol):
-    """A state with a pressure, Pa, and nodal unknowns (nn, 5)."""
+    """A state with a pressure, Pa, and nodal unknowns (nn, c)."""
 
     pressure: float
     nodal: np.ndarray

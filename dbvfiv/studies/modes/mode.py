@@ -52,8 +52,9 @@ class ModeShape:
     angular_frequency : float, rad/s
     residual, backward_error : float
         See `eigen.Spectrum`.
-    shape : (nn, 5) complex
-        Displacements and rotations of the nodes, the largest displacement being 1 and real.
+    shape : (nn, c) complex
+        Displacements and rotations of the nodes, c = 5 or with drilling rotations 6; the largest displacement is 1 and
+        real.
     area : (m,) complex, m2 per m
     pressure : (m,) complex, Pa per m
         NaN in vacuo.
@@ -100,7 +101,7 @@ class ModeShape:
         return np.sqrt(0.5 * (square + np.abs(turning)))
 
     def at_phase(self, phase: float) -> np.ndarray:
-        """(nn, 5) displacements and rotations at a phase of the cycle, rad; growth or decay left out."""
+        """(nn, c) displacements and rotations at a phase of the cycle, rad; growth or decay left out."""
         return (self.shape * np.exp(1j * phase)).real
 
     def drawn_amplitude(self, state: State) -> float:

@@ -38,7 +38,7 @@ HEAD = (
 def tables_of(mesh: MeshData) -> tuple[TableSpec, TableSpec, TableSpec]:
     """Tables of a result on a mesh: the state, its modes, and the curve of the independent count."""
     stations = len(mesh.z)
-    row_shapes = {"shape": (len(mesh.nodes), 5), "area": (stations,), "pressure": (stations,)}
+    row_shapes = {"shape": mesh.nodal_shape, "area": (stations,), "pressure": (stations,)}
     return state_table(STATE, mesh), TableSpec(MODES, MODE, row_shapes, chunk=8), TableSpec(COUNT, CURVE)
 
 

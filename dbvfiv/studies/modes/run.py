@@ -76,7 +76,7 @@ class FoundModes:
     in_vacuo : bool
     certified : CertifiedSpectrum
         Eigenvalues, vectors, residuals and both counts of the unstable ones.
-    shapes : (k, nn, 5) complex
+    shapes : (k, nn, c) complex
         Displacements and rotations of the nodes, the largest displacement being 1 and real.
     areas, pressures : (k, m) complex
         Changes of the row areas (m2, of the part) and station pressures (Pa) for a largest displacement of 1 m; no
@@ -229,7 +229,7 @@ def _described(
         conditions,
         in_vacuo,
         certified,
-        shapes=np.array(shapes, complex).reshape(len(spectrum), len(model.mesh.nodes), 5),
+        shapes=np.array(shapes, complex).reshape(len(spectrum), *model.shell.dofs.free.shape),
         areas=(change / scale).T,
         pressures=(pressure / scale).T,
         inlet_velocities=velocity / scale,

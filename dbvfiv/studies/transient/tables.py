@@ -157,7 +157,7 @@ FACE_BOOKS = (
 
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     """Tables of a transient run on a mesh."""
-    stations, nodes, unknowns = len(mesh.z), len(mesh.nodes), int(mesh.free.sum())
+    stations, unknowns = len(mesh.z), int(mesh.free.sum())
     by_row = {"station_pressure": (stations,), "station_area": (stations,)}
     motion = dict.fromkeys(("q", "v", "a", "force", "force_rate", "load"), (unknowns,))
     motion |= dict.fromkeys(("psi", "psi_rate"), (stations,)) | {"control": (4,), "eigenvalue": (2,)}
@@ -179,7 +179,7 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     restart += FACE_BOOKS if len(mesh.face_nodes) else ()
     return (
         TableSpec(HISTORY, history, by_row | by_group | {"centre_line": (stations,)}, chunk=512),
-        TableSpec(STATES, STATE_COLUMNS, by_row | {"nodal": (nodes, 5), "nodal_rate": (nodes, 5)}),
+        TableSpec(STATES, STATE_COLUMNS, by_row | dict.fromkeys(("nodal", "nodal_rate"), mesh.nodal_shape)),
         TableSpec(RESTART, restart, motion | by_group),
     )
 
