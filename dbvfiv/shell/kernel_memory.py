@@ -64,8 +64,9 @@ def slow_resultants(
                 add_point_stress(points[l], constants[l], scales[l], h, strain, slow[member[l]], e, s)
 
 
-# a function of its own without fast arithmetic, so that it has the same digits wherever it is called
-@numba.njit
+# a function of its own without fast arithmetic, so that it has the same digits wherever it is called; said in so many
+# words, as it would take over the arithmetic of whichever caller is compiled first
+@numba.njit(fastmath=False)
 def _hold(branches, slow, kept, gained, out):
     for i in range(8):
         out[i] = 0.0
