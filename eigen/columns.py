@@ -71,22 +71,8 @@ class ColumnSolver:
         reduction = self.reduction(family)
         if len(conditions) < 3:
             return self._directly(reduction, conditions)
-        losses = [c.loss for c in conditions]
-        mixed = len(set(losses)) > 1
-        least = max(snapshots, LOSSES) if mixed else snapshots
         alone = reduction.runaways(conditions)
-        # more vectors are far cheaper than every cell with the full pencil
-        for number in (least, 2 * least + 1, 4 * least + 3):
-            places = spread(conditions, number)
-            banded = any(_is_banded(family, conditions[i]) for i in places)
-            first = reduction.wide if banded else reduction.coarse
-            fine = reduction.fine(first, [conditions[i] for i in places], MOST_IN_BAND if banded else MOST)
-            own = RunawayCells.beside(fine, alone)
-            # vectors corrected in a few steps are worst where most relaxes
-            checked = [*between(places), int(np.argmax(losses))] if mixed else between(places)
-            error = _error(reduction, own.modes, conditions, checked)
-            if error <= TOLERANCE:
-                break
+        first, own, error = _accurate(reduction, conditions, snapshots, alone)
         own, far = corrected_cells(reduction, own, conditions, TOLERANCE)
         error, fine = max(error, far), own.modes
         column = self._on(first, own, conditions, error, edges)
@@ -234,6 +220,31 @@ class ColumnSolver:
                 _enter(column, i, found.spectrum, alone[conditions[i].damping].rates)
                 _vouch(column, i, found.certificate)
         return column
+
+
+def _accurate(reduction: FamilyReduction, conditions, snapshots: int, alone):
+    """First small model, modes and what runs away on the second, and the error of its leading eigenvalues: with vectors
+    corrected again and more of them as far as it takes, which is far cheaper than every cell with the full pencil.
+    """
+    family, losses = reduction.family, [c.loss for c in conditions]
+    mixed = len(set(losses)) > 1
+    least = max(snapshots, LOSSES) if mixed else snapshots
+    for number in (least, 2 * least + 1, 4 * least + 3):
+        places = spread(conditions, number)
+        taken = [conditions[i] for i in places]
+        banded = any(_is_banded(family, c) for c in taken)
+        first, most = (reduction.wide, MOST_IN_BAND) if banded else (reduction.coarse, MOST)
+        # vectors corrected in a few steps are worst where most relaxes
+        checked = [*between(places), int(np.argmax(losses))] if mixed else between(places)
+        fine = reduction.fine(first, taken, most)
+        own = RunawayCells.beside(fine, alone)
+        error = _error(reduction, own.modes, conditions, checked)
+        if error > TOLERANCE:
+            own = RunawayCells.beside(reduction.deeper(fine, own.modes, taken, most), alone)
+            error = _error(reduction, own.modes, conditions, checked)
+        if error <= TOLERANCE:
+            break
+    return first, own, error
 
 
 def _is_banded(family: PencilFamily, condition: Condition) -> bool:

@@ -2,8 +2,8 @@
 
 Two stages. The first space holds what coupling forces and motions do statically, K^-1 G and K^-T J^T, and what its own
 inertia does, K^-1 M X. The second holds the leading eigenvectors of the first at a few conditions after one correction
-with the full matrices, so that eigenvalues of forty vectors carry seven digits. Where a stiffness relaxes, corrections
-are made with the stiffness that a typical motion sees.
+with the full matrices, so that eigenvalues of forty vectors carry seven digits; where they do not, its own are
+corrected once more. Where a stiffness relaxes, corrections are made with the stiffness that a typical motion sees.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ from .transfer import TransferBasis
 COMPRESSION = 1e-4
 #: Share of the floor down to which vectors are taken into the second space.
 SNAPSHOT = 0.75
+#: Share of a vector corrected again that the second space lacks, below which it is left out.
+DEEPER = 1e-5
 #: Low motions that inertia corrections are made for.
 MOTIONS = 20
 #: Corrections of a vector where parts of the stiffness relax: one leaves 1e-6 of an eigenvalue, two 1e-8, and more do
@@ -264,15 +266,32 @@ class FamilyReduction:
 
     def fine(self, first: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:
         """Second stage: a space made of the corrected leading vectors of a first one at some conditions."""
-        several = first.several_pairs(conditions, most, SNAPSHOT)
-        columns = [
+        columns = self._corrected_leading(first, conditions, most)
+        if not columns.shape[1]:
+            return first  # nothing leads anywhere: there is nothing to be found better
+        return ReducedFamily(self.family, columns, 3e-7)
+
+    def deeper(self, fine: ReducedFamily, modes: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:
+        """A second stage made wider by its own leading vectors, corrected once more; `modes` holds them, and motions
+        that run away beside them.
+
+        What the first space has by too little is corrected by too little at once: an error of 1e-2 of its vectors
+        leaves 1e-5 of an eigenvalue however many conditions they come from.
+        """
+        columns = self._corrected_leading(modes, conditions, most)
+        return ReducedFamily(self.family, columns, DEEPER, base=fine) if columns.shape[1] else fine
+
+    def _corrected_leading(self, model: ReducedFamily, conditions, most: int) -> np.ndarray:
+        """Right and left leading vectors of a small model at some conditions, corrected by the full matrices, real and
+        imaginary parts side by side.
+        """
+        several = model.several_pairs(conditions, most, SNAPSHOT)
+        parts = [
             part
             for right, left in self._all_corrected(several, conditions)
             for part in (right.real, right.imag, left.real, left.imag)
         ]
-        if not sum(part.shape[1] for part in columns):
-            return first  # nothing leads anywhere: there is nothing to be found better
-        return ReducedFamily(self.family, np.hstack(columns), 3e-7)
+        return np.hstack(parts)
 
     def runaways(self, conditions) -> dict[tuple[float, float, float], Runaway]:
         """The same at the dampings of all conditions."""

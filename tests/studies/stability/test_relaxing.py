@@ -57,6 +57,18 @@ def test_cells_agree_with_the_full_pencil(lossy_case, lossy_walk, parameter, val
         assert column.unstable[i] == column.counted[i] == full.unstable_count
 
 
+def test_cells_of_dense_fluids_over_the_loss_factor_need_no_full_pencil(lossy_case, lossy_walk):
+    """Vectors corrected once left 1e-5 of the leading eigenvalue there, and every cell to the full pencil."""
+    base = Place.of(lossy_case).at(storage=0.0, density=1000.0)
+    places = [base.at(loss_factor=value) for value in np.geomspace(0.25, 1.5, 12)]
+    column = lossy_walk.column(places)
+    assert column.certified.all() and (column.how == 0).all() and column.error < 1e-6
+    for i in (0, 5, 11):
+        full = lossy_walk.spectrum(places[i])
+        found = complex(column.growth_rate[i], 2 * np.pi * column.frequency[i])
+        assert abs(found - full.eigenvalues[0]) < 1e-6 * abs(full.eigenvalues[0])
+
+
 def test_an_elastic_wall_is_one_without_loss_factors(lossy_case, lossy_walk):
     """At a factor of zero on them, beside cells that relax."""
     base = Place.of(lossy_case)
