@@ -193,7 +193,8 @@ def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, fi
                 basis = basis.enlarged(distant.q)
                 model = basis.reduced(pencil)
             winding = counted()
-    if winding.number != listed_unstable(spectrum, winding) and np.isfinite(spectrum.band):
+    settled = winding.certain and winding.number == listed_unstable(spectrum, winding)
+    if not settled and np.isfinite(spectrum.band):
         # the spectrum, and the basis, speak for a band only; count in the same
         winding = counted(band=0.999 * spectrum.band)
         none_stable = not len(spectrum) or spectrum.growth_rate[-1] > winding.line

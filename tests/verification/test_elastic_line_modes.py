@@ -78,6 +78,25 @@ def test_balances_of_line_and_valve(law, speed):
     assert max(off) < 1e-6
 
 
+def certified(model: ValveModel, conditions: Conditions, pencil, basis: TransferBasis):
+    """Spectrum and count in the band that waves in the line are resolved in."""
+    resolved = model.flow.resolved(conditions.of_line)
+    search = select_search(SearchOptions(), conditions, lambda n: basis.structural_frequencies[:n], 6, resolved)
+    return certified_spectrum(pencil, 6, search.options, basis=basis)
+
+
+def test_a_line_of_more_waves_than_a_count_follows_is_counted_in_its_band():
+    """Of 110 m and little damping; over all frequencies a thousand points leave the count open."""
+    keys = {"mesh.around": 8, "mesh.along": 14, "fluid.density": 360.0, "damping.alpha": 0.0, "damping.beta": 4e-3}
+    line = {"upstream.length": 110.0, "upstream.diameter": "504 mm", "upstream.wave_speed": 693.0, "drive.at": "line"}
+    model = ValveModel(Case().replace(keys | line | {"drive.pressure": 463.0}))
+    linear, conditions = linearise(model, LoadPath(model).go_to(463.0).q, 463.0), Conditions.of(model.case)
+    pencil = linear.pencil(conditions, storage=1.0)
+    found = certified(model, conditions, pencil, TransferBasis(pencil))
+    print(f"\n{found.statement} {found.count.evaluations} points")
+    assert found.agrees and found.stable and np.isfinite(found.count.band)
+
+
 def installations(number: int, seed: int, states: int = 3) -> list[str]:
     """Random lines, rigid and elastic, fed by reservoirs and pumps, before walls of both kinds of damping, `states`
     conditions each, at 8 x 14; sentences of those that are left open. Every one of them must say so itself.
@@ -110,10 +129,7 @@ def installations(number: int, seed: int, states: int = 3) -> list[str]:
                 conditions = replace(own, alpha=float(rng.choice([0.0, 5.0])), beta=beta)
             pencil = linear.pencil(conditions, storage=float(rng.choice([0.0, 1.0, rng.random()])))
             basis = TransferBasis(pencil) if basis is None or case.damping.relaxes else basis
-            lowest = basis.structural_frequencies
-            resolved = model.flow.resolved(conditions.of_line)
-            search = select_search(SearchOptions(), conditions, lambda n, known=lowest: known[:n], 6, resolved)
-            found = certified_spectrum(pencil, 6, search.options, basis=basis)
+            found = certified(model, conditions, pencil, basis)
             unstable += bool(found.unstable_count)
             done += 1
             if not found.agrees:
@@ -131,4 +147,4 @@ def installations(number: int, seed: int, states: int = 3) -> list[str]:
 @pytest.mark.slow
 def test_three_hundred_random_lines():
     """None fails, and spectrum and independent count agree, or it is said."""
-    assert len(installations(300, seed=21)) <= 9
+    assert len(installations(300, seed=21)) <= 3
