@@ -176,6 +176,9 @@ def kinks(surface: Surface) -> np.ndarray:
     s, found = np.linspace(surface.part.begin, 1.0, 32 * surface.part.quarters + 1), []
     for before, joint, after in zip(surface.breaks[:-2], surface.breaks[1:-1], surface.breaks[2:]):
         step = 1e-6 * min(joint - before, after - joint)
+        if joint + step == joint or joint - step == joint:  # a piece too short to have a direction
+            found.append(0.0)
+            continue
         sides = [(surface.section(joint, s) - surface.section(joint - step, s)) / step]
         sides.append((surface.section(joint + step, s) - surface.section(joint, s)) / step)
         a, b = (side / np.linalg.norm(side, axis=1, keepdims=True) for side in sides)

@@ -106,7 +106,8 @@ def relaxing_states(states: list[LinearisedState], number: int, seed: int) -> It
         kind, factor = rng.random(), rng.uniform(0, 3)
         wanted = 0.0 if kind < 0.05 else 1.0 if kind < 0.35 else factor
         at = np.geomspace(1e-4, 1e6, 400)
-        factor = min(wanted, LARGEST_LOSS / max(group.series.loss_factor(at).max() for group in groups))
+        highest = max(group.series.loss_factor(at).max() for group in groups)
+        factor = min(wanted, LARGEST_LOSS / highest) if highest > 0 else wanted
         relaxation = WallRelaxation(groups).stiffness(factor, lambda: state.linear.relaxing)
         conditions = replace(state.conditions, beta=0.0, loss_factor=factor)
         yield replace(state, conditions=conditions, relaxation=relaxation)
