@@ -13,7 +13,7 @@ from .creep import edge_of
 from .options import SearchOptions
 from .pencil import CoupledPencil
 from .relaxation import Relaxation
-from .shifts import SLOPE
+from .shifts import LOWEST, SLOPE
 
 if TYPE_CHECKING:
     from .reduction import FamilyReduction
@@ -115,8 +115,8 @@ class PencilFamily(ABC):
 class Reach(NamedTuple):
     """Growth rates above `floor` (1/s) and angular frequencies up to `band` (rad/s).
 
-    Left of `creep` (1/s), which is minus infinity where nothing relaxes, what hardly oscillates does not count; see
-    `eigen.creep` and `eigen.shifts`.
+    Left of `creep` (1/s), which is minus infinity where nothing relaxes, what oscillates hardly or slowly does not
+    count; see `eigen.creep` and `eigen.shifts`.
     """
 
     floor: float
@@ -124,9 +124,13 @@ class Reach(NamedTuple):
     creep: float = -np.inf
 
     def is_mode(self, values: np.ndarray) -> np.ndarray:
-        """Which eigenvalues are no creep: right of it, or decaying no faster than a search for modes reaches."""
+        """Which eigenvalues are no creep: right of it, or decaying no faster, and oscillating no slower, than a search
+        for modes reaches.
+        """
         values = np.asarray(values)
-        return (values.real > self.creep) | (-values.real <= SLOPE * np.abs(values.imag))
+        lowest = LOWEST * self.band if np.isfinite(self.band) else 0.0
+        high = np.abs(values.imag)
+        return (values.real > self.creep) | ((-values.real <= SLOPE * high) & (high >= lowest))
 
     def leading(self, values: np.ndarray) -> np.ndarray:
         """Eigenvalues of the upper half-plane in reach, sorted by growth rate.

@@ -268,7 +268,7 @@ def _solved_both(matrices: np.ndarray, right: np.ndarray, left: np.ndarray) -> t
     return x, y
 
 
-def real_roots(problem: RationalCells, low: float, top: float) -> tuple[np.ndarray, np.ndarray]:
+def real_roots(problem: RationalCells, low: np.ndarray, top: float) -> tuple[np.ndarray, np.ndarray]:
     """Real eigenvalues between `low` and `top`: cells and values.
 
     They are looked for where the determinant has other signs at the two ends; of an even number of them only those
@@ -276,19 +276,20 @@ def real_roots(problem: RationalCells, low: float, top: float) -> tuple[np.ndarr
 
     Parameters
     ----------
-    low : float
-        Not positive.
+    low : (cells,) array
+        Of each cell, not positive: the edge of its own creep.
     top : float
         Positive.
     """
-    ends = [problem.signs(np.arange(problem.number), np.full(problem.number, end)) for end in (low, top)]
-    odd = np.flatnonzero(ends[0] * ends[1] < 0)
+    every = np.arange(problem.number)
+    odd = np.flatnonzero(problem.signs(every, low) * problem.signs(every, np.full(problem.number, top)) < 0)
     slowest = 1.0 / problem.times.max()
-    grid = np.concatenate([[low, 0.1 * low] if low < 0 else [], [0.0], np.geomspace(0.1 * slowest, top, REAL)])
-    cells, places = np.repeat(odd, len(grid)), np.tile(grid, len(odd))
-    signs = problem.signs(cells, places).reshape(len(odd), len(grid))
+    below = low[odd, None] * [1.0, 0.1]
+    above = np.concatenate([[0.0], np.geomspace(0.1 * slowest, top, REAL)])
+    grid = np.hstack([below, np.broadcast_to(above, (len(odd), len(above)))])
+    signs = problem.signs(np.repeat(odd, grid.shape[1]), grid.ravel()).reshape(grid.shape)
     rows, gaps = np.nonzero(signs[:, :-1] * signs[:, 1:] < 0)
-    a, b, sign, rows = grid[gaps], grid[gaps + 1], signs[rows, gaps], odd[rows]
+    a, b, sign, rows = grid[rows, gaps], grid[rows, gaps + 1], signs[rows, gaps], odd[rows]
     for _ in range(HALVINGS if rows.size else 0):
         place = middle(a, b)
         same = problem.signs(rows, place) == sign

@@ -191,8 +191,8 @@ class SmallSpectra:
 
     def _add_real(self, problem: RationalCells, conditions, rows) -> None:
         """Put real eigenvalues to those of each cell."""
-        limits = [self.reduced.family.reach(c).creep for c in conditions]
-        for i, value in zip(*real_roots(problem, max(limits), self._top)):
+        edges = np.array([self.reduced.family.reach(c).creep for c in conditions])
+        for i, value in zip(*real_roots(problem, edges, self._top)):
             _joined(rows[i], complex(value))
 
     def _keep_modes(self, conditions, rows) -> None:

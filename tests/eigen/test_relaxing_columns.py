@@ -110,6 +110,26 @@ def test_growth_and_counts_are_those_of_the_exact_linear_form(seed):
     assert len({int((row.real > 0).sum()) for row in found}) > 1
 
 
+def test_a_slow_real_eigenvalue_is_found_beside_cells_that_creep_nearer_to_zero():
+    """All damped by mass, one too soft to swing; heavier losses move the edge of creep past it."""
+    family = RelaxingFamily(0, coupling=0.0)
+    family.times, family.strengths = np.array([0.05, 0.2, 1.0]), np.full((GROUPS, TIMES), 0.4)
+    soft = np.linalg.eigh(family.mass.toarray())[1][:, -1]
+    weight = float(soft @ family.mass @ soft)
+    hold = np.eye(SIZE) - np.outer(family.mass @ soft, soft) / weight  # what is left of forces on the others
+    family.relaxing = [sp.csr_matrix(hold @ part @ hold.T) for part in family.relaxing]
+    others = sum(family.relaxing) + 200.0 * hold @ family.mass @ hold.T
+    family.stiffness = sp.csr_matrix(others + 6.0 * np.outer(family.mass @ soft, family.mass @ soft) / weight)
+    conditions = [Condition(1.0, 10.0, 0.0, 0.0, loss) for loss in (0.1, 0.8, 2.0)]
+    reaches = [family.reach(c) for c in conditions]
+    true = -5.0 + np.sqrt(25.0 - 6.0)  # s^2 + 10 s + 6 = 0
+    assert reaches[0].creep < true < reaches[1].creep
+    rows = ReducedFamily(family, np.eye(SIZE)).eigenvalues(conditions)
+    found = [reach.leading(row) for reach, row in zip(reaches, rows)]
+    assert abs(found[0][0] - true) < 1e-9
+    assert all(np.abs(row - true).min() > 1e-3 for row in found[1:])
+
+
 class Unstable(RelaxingFamily):
     """With a structure that is unstable by itself: it swings under a circulatory force, or buckles, or runs away by a
     part that relaxes and pushes.
