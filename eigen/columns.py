@@ -234,8 +234,9 @@ def _accurate(reduction: FamilyReduction, conditions, snapshots: int, alone):
         taken = [conditions[i] for i in places]
         banded = any(_is_banded(family, c) for c in taken)
         first, most = (reduction.wide, MOST_IN_BAND) if banded else (reduction.coarse, MOST)
-        # vectors corrected in a few steps are worst where most relaxes
-        checked = [*between(places), int(np.argmax(losses))] if mixed else between(places)
+        checked = between(places)
+        if mixed:  # few corrections leave most where most relaxes, and of the quick modes that lead where least does
+            checked += [int(np.argmax(losses)), int(np.argmin(losses))]
         fine = reduction.fine(first, taken, most)
         own = RunawayCells.beside(fine, alone)
         error = _error(reduction, own.modes, conditions, checked)
