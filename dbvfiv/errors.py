@@ -1,4 +1,4 @@
-"""The two kinds of failure a user can meet, each told in one sentence.
+"""Kinds of failure a user can meet, each told in one sentence.
 
 ``CaseError`` means the question was wrong (exit status 2), ``SolveError`` that
 the question was fine and no answer was found (exit status 1).
@@ -37,3 +37,7 @@ class SolveError(RuntimeError):
 
     def __init__(self, sentence: str):
         super().__init__(" ".join(str(sentence).split()))
+
+
+class NotValidError(SolveError):
+    """A state that the constants of its rubber do not describe, so that nothing is said of its vibration."""

@@ -11,7 +11,6 @@ from .agreement import Certificate
 from .condensation import Workspace, condensed_matrix
 from .distant import distant_pairs, joined
 from .factorization import StructureMatrices, SuperluFactorization
-from .negative_stiffness import negative_motions
 from .options import SearchOptions
 from .pencil import CoupledPencil, real_apply
 from .response import Determinant
@@ -122,7 +121,7 @@ def certified_spectrum(
     workspace = workspace or Workspace()
     spectrum = leading_modes(pencil, count, options, workspace=workspace)
     if pencil.n > Determinant.dense_below:
-        basis = _with_own(basis or TransferBasis(pencil), pencil)
+        basis = basis or TransferBasis(pencil)
     else:
         basis = None
     asked = pencil, options, workspace, exact, check_points
@@ -139,12 +138,6 @@ def certified_spectrum(
             break
         found, basis = _judged(*asked, found.spectrum, basis, finer)
     return found
-
-
-def _with_own(basis: TransferBasis, pencil: CoupledPencil) -> TransferBasis:
-    """The basis, and what of the structure may run away by itself and is foreign to low modes."""
-    motions = negative_motions(pencil)
-    return basis.enlarged(motions) if motions.shape[1] else basis
 
 
 def _finer(pencil, basis, found, finer, number) -> TransferBasis:
@@ -184,7 +177,7 @@ def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, fi
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
     if (model is not pencil or basis is None) and winding.number > listed_unstable(spectrum, winding):
-        space = basis or _with_own(TransferBasis(pencil), pencil)  # a small pencil is counted as it is
+        space = basis or TransferBasis(pencil)  # a small pencil is counted as it is
         reduced = space.reduced(pencil)
         distant = distant_pairs(pencil, spectrum, reduced, space, winding.line, options or SearchOptions())
         if distant is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -23,13 +23,11 @@ class Column:
     Attributes
     ----------
     growth_rate, frequency : (cells,) arrays, 1/s, Hz
-        Of the leading mode, what of the structure runs away by itself included; NaN if none was found.
+        Of the leading mode; NaN if none was found.
     second : (cells,) array, 1/s
         Growth rate of the next mode.
     unstable : (cells,) int array
         Eigenvalues right of `line` up to `band`, conjugates counted apart, by the spectrum.
-    runaway : (cells,) int array
-        Those of them in which the structure runs away by itself, without any fluid; see `eigen.runaway`.
     counted : (cells,) int array
         As many as `unstable`, by the argument principle; -1 where nobody asked.
     certain : (cells,) bool array
@@ -49,14 +47,13 @@ class Column:
     cell : callable or None
         From any further condition at the same state to a column of this one cell.
     leading : list of arrays
-        Leading eigenvalues of the cells without what runs away.
+        Leading eigenvalues of the cells.
     """
 
     growth_rate: np.ndarray
     frequency: np.ndarray
     second: np.ndarray
     unstable: np.ndarray
-    runaway: np.ndarray
     counted: np.ndarray
     certain: np.ndarray
     error: float
@@ -70,12 +67,33 @@ class Column:
     leading: list[np.ndarray] = field(default_factory=list)
 
     @classmethod
+    def blank(cls, cells: int) -> Column:
+        """Cells that nobody solved."""
+        nothing = (np.full(cells, np.nan) for _ in range(3))
+        none, unsure = np.full(cells, -1), np.zeros(cells, bool)
+        region = np.zeros(cells), np.full(cells, np.inf)
+        empty = [np.zeros(0, complex)] * cells
+        return cls(*nothing, none, none.copy(), unsure, 0.0, np.full(cells, MISSING), *region, leading=empty)
+
+    @classmethod
     def joined(cls, parts: Sequence[Column]) -> Column:
         """Cells of several columns as one, which has no small model."""
         own = [field.name for field in fields(cls) if isinstance(getattr(parts[0], field.name), np.ndarray)]
         cells = {name: np.concatenate([getattr(part, name) for part in parts]) for name in own}
         leading = [row for part in parts for row in part.leading]
         return cls(**cells, error=max(part.error for part in parts), leading=leading)
+
+    def spread(self, cells: Sequence[int], number: int) -> Column:
+        """The same cells at places among so many, the others blank: neither listed nor counted."""
+        out = Column.blank(number)
+        for own in fields(self):
+            values = getattr(self, own.name)
+            if isinstance(values, np.ndarray):
+                getattr(out, own.name)[list(cells)] = values
+        for i, row in zip(cells, self.leading):
+            out.leading[i] = row
+        small = {name: getattr(self, name) for name in ("eigenvalues", "nearest", "corrected", "cell")}
+        return replace(out, error=self.error, **small)
 
     @property
     def certified(self) -> np.ndarray:

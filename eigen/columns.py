@@ -10,13 +10,10 @@ from .cell_counts import CellCounts, count_unstable, uncounted
 from .certificate import certified_spectrum
 from .column import DIRECT, REDUCED, TOLERANCE, Column
 from .condensation import Workspace
-from .distant import brought, joined
 from .factorization import SingularShiftError
 from .family import Condition, PencilFamily
 from .reduced import ReducedFamily
 from .reduction import FamilyReduction
-from .runaway import is_near
-from .runaway_cells import RunawayCells, corrected_cells
 from .search import leading_modes
 from .snapshots import between, spread
 from .static_solver import StaticSolver
@@ -38,7 +35,7 @@ class ColumnSolver:
         self._static, self._stiffened = StaticSolver(), StaticSolver()
         self._workspace, self._structures = Workspace(), Workspace()
         self._last: FamilyReduction | None = None
-        self._counter: tuple[ReducedFamily, RunawayCells, ReducedFamily] | None = None
+        self._counter: tuple[ReducedFamily, ReducedFamily, ReducedFamily] | None = None
 
     def reduction(self, family: PencilFamily) -> FamilyReduction:
         """Small models of a family; the last one is kept."""
@@ -46,7 +43,9 @@ class ColumnSolver:
             self._last = FamilyReduction(family, self._static, self._stiffened, self._structures)
         return self._last
 
-    def solve(self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False) -> Column:
+    def solve(
+        self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False, spectra=None
+    ) -> Column:
         """All conditions at one state.
 
         Parameters
@@ -59,6 +58,8 @@ class ColumnSolver:
         edges : bool
             Count only beside changes of the number of unstable eigenvalues along the list; no other cell gets a
             certificate.
+        spectra : sequence of Spectrum, optional
+            Of the full pencils of fewer than three conditions, where they are known.
 
         Raises
         ------
@@ -70,12 +71,9 @@ class ColumnSolver:
             return self._uncoupled(family, conditions)
         reduction = self.reduction(family)
         if len(conditions) < 3:
-            return self._directly(reduction, conditions)
-        alone = reduction.runaways(conditions)
-        first, own, error = _accurate(reduction, conditions, snapshots, alone)
-        own, far = corrected_cells(reduction, own, conditions, TOLERANCE)
-        error, fine = max(error, far), own.modes
-        column = self._on(first, own, conditions, error, edges)
+            return self._directly(reduction, conditions, spectra)
+        first, fine, error = _accurate(reduction, conditions, snapshots)
+        column = self._on(first, fine, conditions, error, edges)
 
         def eigenvalues(condition):
             condition = Condition(*condition)
@@ -89,50 +87,47 @@ class ColumnSolver:
             return complex(reduction.correction(fine.near(condition, eigenvalue), condition)[0])
 
         def cell(condition):
-            asked = [Condition(*condition)]
-            return self._on(first, replace(own, alone=reduction.runaways(asked)), asked, error)
+            return self._on(first, fine, [Condition(*condition)], error)
 
         return replace(column, eigenvalues=eigenvalues, nearest=nearest, corrected=corrected, cell=cell)
 
-    def _on(self, first: ReducedFamily, own: RunawayCells, conditions, error: float, edges: bool = False) -> Column:
+    def _on(self, first: ReducedFamily, fine: ReducedFamily, conditions, error: float, edges: bool = False) -> Column:
         """Cells on a small model, counted on that of the first stage; those without a certificate directly."""
         family = first.family
-        values, away = own.modes.eigenvalues(conditions), own.eigenvalues(conditions)
+        values = fine.eigenvalues(conditions)
         leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
         counted = _beside_changes(leading) if edges else np.arange(len(conditions))
         counts = uncounted(family, conditions)
-        hints = [np.concatenate(pair) for pair in zip(away, leading)]
 
         def count(counter, cells, within_band=False):
-            asked = [conditions[i] for i in cells], [hints[i] for i in cells]
+            asked = [conditions[i] for i in cells], [leading[i] for i in cells]
             return count_unstable(counter, *asked, within_band=within_band)
 
         joint = error <= TOLERANCE and any(conditions[i].loss for i in counted)
-        counter = self._joint(first, own) if joint else first
+        counter = self._joint(first, fine) if joint else first
         if len(counted):
             counts.enter(counted, count(counter, counted))
-        column = _column(leading, away, values, counts, error)
+        column = _column(leading, values, counts, error)
         doubtful = counted[~column.certified[counted]]
-        if len(doubtful) and joint and self._counter[1] is not own:
-            counts.enter(doubtful, count(self._joint(first, own, anew=True), doubtful))
+        if len(doubtful) and joint and self._counter[1] is not fine:
+            counts.enter(doubtful, count(self._joint(first, fine, anew=True), doubtful))
             doubtful = doubtful[~column.certified[doubtful]]
         if len(doubtful) and joint:
-            # a mode that is all but neutral has to be met to a fraction of its growth rate; what else a finer space has
-            # are single elements by halves, far beyond the band
-            found = count(ReducedFamily(family, own.core, CLOSE, base=first), doubtful, within_band=True)
-            listed = [_listed(values[i], away[i], *region) for i, *region in zip(doubtful, found.line, found.band)]
+            # a mode that is all but neutral has to be met to a fraction of its growth rate
+            found = count(ReducedFamily(family, fine.V, CLOSE, base=first), doubtful, within_band=True)
+            listed = [_listed(values[i], *region) for i, *region in zip(doubtful, found.line, found.band)]
             agree = found.certain & (found.number == listed) & np.isfinite(column.growth_rate[doubtful])
             counts.enter(doubtful[agree], found.select(agree))
             column.unstable[doubtful[agree]] = np.array(listed)[agree]
             doubtful = doubtful[~column.certified[doubtful]]
-        return self._repaired(column, family, conditions, doubtful, own)
+        return self._repaired(column, family, conditions, doubtful)
 
-    def _joint(self, first: ReducedFamily, own: RunawayCells, anew: bool = False) -> ReducedFamily:
+    def _joint(self, first: ReducedFamily, fine: ReducedFamily, anew: bool = False) -> ReducedFamily:
         """Space of a count where stiffness relaxes: static responses alone say little of that; with the vectors that a
         list rests on, of this column or of the one before at the same state, they are enough.
         """
         if anew or self._counter is None or self._counter[0] is not first:
-            self._counter = first, own, ReducedFamily(first.family, own.core, JOINT, base=first)
+            self._counter = first, fine, ReducedFamily(first.family, fine.V, JOINT, base=first)
         return self._counter[2]
 
     def direct(self, family: PencilFamily, condition, count: int = 6):
@@ -145,68 +140,47 @@ class ColumnSolver:
         """
         condition = Condition(*condition)
         found = leading_modes(family.pencil(condition), count, family.search(condition), workspace=self._workspace)
-        if condition.loss == 0:
-            return found
-        return found.select(np.flatnonzero(family.reach(condition).is_mode(found.eigenvalues)))
+        return _modes_of(family, condition, found)
 
-    def whole(self, family: PencilFamily, condition, count: int = 6):
-        """The same together with what of the structure runs away by itself.
-
-        Raises
-        ------
-        SingularShiftError
-            If no usable shift was found.
-        """
-        condition = Condition(*condition)
-        modes, alone = self.direct(family, condition, count), self.reduction(family).runaway(condition)
-        if not alone.rates.size:
-            return modes
-        pencil = family.pencil(condition)
-        starts = [(rate, motion, np.zeros(pencil.b)) for rate, motion in zip(alone.rates, alone.motions.T)]
-        found = brought(pencil, starts, modes, 0.0, family.search(condition), self._workspace)
-        return modes if found is None else joined(modes, found, 0.0)
-
-    def _directly(self, reduction: FamilyReduction, conditions) -> Column:
-        family, cells = reduction.family, len(conditions)
-        alone = reduction.runaways(conditions)
-        spectra = [self.whole(family, c) for c in conditions]
+    def _directly(self, reduction: FamilyReduction, conditions, spectra=None) -> Column:
+        family = reduction.family
+        if spectra:
+            spectra = [_modes_of(family, c, found) for c, found in zip(conditions, spectra)]
+        else:
+            spectra = [self.direct(family, c) for c in conditions]
         banded = any(_is_banded(family, c) for c in conditions)
         first = reduction.wide if banded else reduction.coarse
         counts = count_unstable(first, conditions, [s.eigenvalues[:1] for s in spectra])
-        column = _blank(cells, counts)
+        column = _counted(counts)
         for i, spectrum in enumerate(spectra):
-            _enter(column, i, spectrum, alone[conditions[i].damping].rates)
-        return self._recounted(column, family, conditions, np.flatnonzero(~column.certified), alone)
+            _enter(column, i, spectrum)
+        return self._recounted(column, family, conditions, np.flatnonzero(~column.certified))
 
     def _uncoupled(self, family: PencilFamily, conditions) -> Column:
         """A structure that nothing couples: its full spectra and counts, each once for every damping."""
-        column, known = _blank(len(conditions), uncounted(family, conditions)), {}
+        column, known = _counted(uncounted(family, conditions)), {}
         for i, condition in enumerate(conditions):
             key = condition.damping
             if key not in known:
                 asked = family.pencil(condition), 6, family.search(condition)
                 known[key] = certified_spectrum(*asked, workspace=self._workspace)
             found = known[key]
-            modes = found.spectrum
-            if condition.loss:
-                modes = modes.select(np.flatnonzero(family.reach(condition).is_mode(modes.eigenvalues)))
-            real = modes.eigenvalues[(modes.eigenvalues.imag == 0) & (modes.eigenvalues.real > 0)].real
-            _enter(column, i, modes, real if condition.loss else real[:0])
+            _enter(column, i, _modes_of(family, condition, found.spectrum))
             _vouch(column, i, found.certificate)
         return column
 
-    def _repaired(self, column: Column, family, conditions, cells, own: RunawayCells) -> Column:
+    def _repaired(self, column: Column, family, conditions, cells) -> Column:
         for i in cells:
             try:
-                spectrum = self.whole(family, conditions[i])
+                spectrum = self.direct(family, conditions[i])
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue  # stays without a certificate
             if len(spectrum):
-                _enter(column, i, spectrum, own.alone[conditions[i].damping].rates)
+                _enter(column, i, spectrum)
         open_cells = [i for i in cells if not column.certificate(i).agrees]
-        return self._recounted(column, family, conditions, open_cells, own.alone)
+        return self._recounted(column, family, conditions, open_cells)
 
-    def _recounted(self, column: Column, family, conditions, cells, alone) -> Column:
+    def _recounted(self, column: Column, family, conditions, cells) -> Column:
         """Cells that still lack agreement, with a count of their own on a basis of structural modes, made finer as far
         as it takes.
         """
@@ -217,14 +191,21 @@ class ColumnSolver:
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue
             if len(found.spectrum):
-                _enter(column, i, found.spectrum, alone[conditions[i].damping].rates)
+                _enter(column, i, found.spectrum)
                 _vouch(column, i, found.certificate)
         return column
 
 
-def _accurate(reduction: FamilyReduction, conditions, snapshots: int, alone):
-    """First small model, modes and what runs away on the second, and the error of its leading eigenvalues: with vectors
-    corrected again and more of them as far as it takes, which is far cheaper than every cell with the full pencil.
+def _modes_of(family: PencilFamily, condition: Condition, spectrum):
+    """The modes of a spectrum, without relaxations of the stiffness."""
+    if condition.loss == 0:
+        return spectrum
+    return spectrum.select(np.flatnonzero(family.reach(condition).is_mode(spectrum.eigenvalues)))
+
+
+def _accurate(reduction: FamilyReduction, conditions, snapshots: int):
+    """Both small models, and the error of leading eigenvalues on the second: with vectors corrected again and more of
+    them as far as it takes, which is far cheaper than every cell with the full pencil.
     """
     family, losses = reduction.family, [c.loss for c in conditions]
     mixed = len(set(losses)) > 1
@@ -238,14 +219,13 @@ def _accurate(reduction: FamilyReduction, conditions, snapshots: int, alone):
         if mixed:  # few corrections leave most where most relaxes, and of the quick modes that lead where least does
             checked += [int(np.argmax(losses)), int(np.argmin(losses))]
         fine = reduction.fine(first, taken, most)
-        own = RunawayCells.beside(fine, alone)
-        error = _error(reduction, own.modes, conditions, checked)
+        error = _error(reduction, fine, conditions, checked)
         if error > TOLERANCE:
-            own = RunawayCells.beside(reduction.deeper(fine, own.modes, taken, most), alone)
-            error = _error(reduction, own.modes, conditions, checked)
+            fine = reduction.deeper(fine, taken, most)
+            error = _error(reduction, fine, conditions, checked)
         if error <= TOLERANCE:
             break
-    return first, own, error
+    return first, fine, error
 
 
 def _is_banded(family: PencilFamily, condition: Condition) -> bool:
@@ -273,17 +253,15 @@ def _error(reduction: FamilyReduction, fine: ReducedFamily, conditions, places) 
     return worst
 
 
-def _enter(column: Column, cell: int, spectrum, rates: np.ndarray) -> None:
-    """Put a direct spectrum into a cell; `rates` are those at which the structure runs away by itself."""
+def _enter(column: Column, cell: int, spectrum) -> None:
+    """Put a direct spectrum into a cell."""
     column.how[cell] = DIRECT
     if not len(spectrum):
         return
     column.growth_rate[cell], column.frequency[cell] = spectrum.growth_rate[0], spectrum.frequency[0]
     column.second[cell] = spectrum.growth_rate[1] if len(spectrum) > 1 else np.nan
     inside = np.flatnonzero(spectrum.frequency <= column.band[cell])
-    away = is_near(spectrum.eigenvalues, rates)
-    column.leading[cell] = spectrum.eigenvalues[~away][:KEPT]
-    column.runaway[cell] = _conjugates(spectrum.eigenvalues[away])
+    column.leading[cell] = spectrum.eigenvalues[:KEPT]
     column.unstable[cell] = spectrum.select(inside).count_right_of(column.line[cell])
 
 
@@ -293,41 +271,26 @@ def _vouch(column: Column, cell: int, own) -> None:
     column.line[cell], column.band[cell] = own.line, own.band
 
 
-def _blank(cells: int, counts: CellCounts) -> Column:
-    nothing = [np.full(cells, np.nan) for _ in range(3)]
-    return Column(
-        *nothing,
-        np.zeros(cells, int),
-        np.zeros(cells, int),
-        counts.number,
-        counts.certain,
-        0.0,
-        np.full(cells, DIRECT),
-        counts.line,
-        counts.band,
-        leading=[np.zeros(0, complex)] * cells,
-    )
+def _counted(counts: CellCounts) -> Column:
+    """Cells of which nothing but the counts is known."""
+    blank = Column.blank(len(counts.number))
+    how = np.full(len(counts.number), DIRECT)
+    known = {"counted": counts.number, "certain": counts.certain, "line": counts.line, "band": counts.band}
+    return replace(blank, unstable=np.zeros(len(how), int), how=how, **known)
 
 
-def _conjugates(values: np.ndarray) -> int:
-    """Number of eigenvalues of which a conjugate pair is given once."""
-    return int(values.size + np.sum(values.imag > 0))
+def _listed(values: np.ndarray, line: float, band: float) -> int:
+    """Number of unstable eigenvalues of a cell."""
+    return int(((values.real > line) & (np.abs(values.imag) <= 2 * np.pi * band)).sum())
 
 
-def _listed(values: np.ndarray, away: np.ndarray, line: float, band: float) -> int:
-    """Number of unstable eigenvalues of a cell: all others, and one of each pair of what runs away."""
-    return int(((values.real > line) & (np.abs(values.imag) <= 2 * np.pi * band)).sum()) + _conjugates(away)
-
-
-def _column(leading, away, values, counts: CellCounts, error: float) -> Column:
-    rows = [np.concatenate(pair) for pair in zip(away, leading)]
-    first = [row[0] if len(row) else complex(np.nan, np.nan) for row in rows]
+def _column(leading, values, counts: CellCounts, error: float) -> Column:
+    first = [row[0] if len(row) else complex(np.nan, np.nan) for row in leading]
     return Column(
         growth_rate=np.array([value.real for value in first]),
         frequency=np.array([value.imag / (2 * np.pi) for value in first]),
-        second=np.array([row[1].real if len(row) > 1 else np.nan for row in rows]),
-        unstable=np.array([_listed(*row) for row in zip(values, away, counts.line, counts.band)]),
-        runaway=np.array([_conjugates(row) for row in away]),
+        second=np.array([row[1].real if len(row) > 1 else np.nan for row in leading]),
+        unstable=np.array([_listed(*row) for row in zip(values, counts.line, counts.band)]),
         counted=counts.number,
         certain=counts.certain,
         error=error,

@@ -18,10 +18,10 @@ from .spectrum import Spectrum
 from .transfer import TransferBasis
 
 #: Pairs beyond the band that are looked for at most, and real ones.
-MOST, MOST_REAL = 4, 60
+MOST = 4
 #: Relative distance that a pair may move from the reduced pencil to the full one.
 MOVED = 0.05
-#: Newton steps: motions of single elements are known roughly.
+#: Newton steps at most; what lies beyond the band is known roughly.
 STEPS = 8
 
 
@@ -54,19 +54,11 @@ def distant_pairs(
     values, q, u, _, _ = all_pairs(reduced, left=False)
     unstable = np.flatnonzero(values.real > line)
     unstable = unstable[np.argsort(-values.real[unstable])]
-    chosen = list(unstable[values.imag[unstable] == 0][:MOST_REAL])
+    chosen = list(unstable[values.imag[unstable] == 0][:MOST])
     if options.max_frequency is None:
         chosen += list(unstable[values.imag[unstable] > 2 * np.pi * spectrum.band][:MOST])
     starts = [(values[i], basis.lift(q[:, i]), u[:, i]) for i in chosen]
-    return brought(pencil, starts, spectrum, line, options, Workspace())
-
-
-def brought(
-    pencil: CoupledPencil, starts, spectrum: Spectrum, line: float, options: SearchOptions, workspace: Workspace
-) -> Found | None:
-    """Unstable pairs of a pencil near places to start from, each an eigenvalue, structural part and inner unknowns,
-    that a spectrum does not list; None where there is none.
-    """
+    workspace = Workspace()
     pairs = []
     for start in starts:
         pair = newton(pencil, *start, workspace=workspace, tolerance=options.tolerance, steps=STEPS)

@@ -36,13 +36,10 @@ class StructureMatrices:
     data : (parts, entries) array
         M, C, K and what relaxes on it.
     relaxation : Relaxation or None
-    idle : list
-        Solvers of symmetric sums that nobody uses, for `eigen.inertia`.
     """
 
     def __init__(self, pencil: CoupledPencil):
         parts = _parts(pencil)
-        self.idle: list = []
         self._sources = None
         self.shape = pencil.M.shape
         pattern = sum(sp.csr_matrix((np.ones(p.nnz), p.indices, p.indptr), p.shape) for p in parts)
@@ -109,23 +106,6 @@ class StructureMatrices:
         order = sp.csr_matrix((places, self.indices, self.indptr), self.shape).tocsc()
         return order.indptr, order.indices, order.data.astype(np.int64)
 
-    @cached_property
-    def upper(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Places of the upper half of the pattern and of its mirror image, and that half in compressed rows."""
-        rows = np.repeat(np.arange(self.shape[0]), np.diff(self.indptr))
-        places = np.flatnonzero(rows <= self.indices)
-        indptr = np.concatenate([[0], np.cumsum(np.bincount(rows[places], minlength=self.shape[0]))])
-        # in compressed columns a symmetric pattern has its rows again
-        return places, self._transpose[2][places], indptr.astype(np.int32), self.indices[places]
-
-    @cached_property
-    def mirrored(self) -> np.ndarray:
-        """For each entry of the pattern its place, or that of its mirror image, in the upper half."""
-        places, images, _, _ = self.upper
-        out = np.empty(self.indices.size, np.int64)
-        out[places] = out[images] = np.arange(places.size)
-        return out
-
 
 class MumpsFactorization:
     """LU by MUMPS through PETSc, with the symbolic analysis kept between refactorisations.
@@ -135,9 +115,6 @@ class MumpsFactorization:
     structure : StructureMatrices
         Only the pattern is taken; call `refactor` before solving.
     """
-
-    #: PETSc's name of the factorisation, and MUMPS's control parameters.
-    kind, controls = "lu", {14: 50}
 
     def __init__(self, structure: StructureMatrices):
         from petsc4py import PETSc
@@ -156,7 +133,7 @@ class MumpsFactorization:
         self._solver.setType("preonly")
         self._solver.setOperators(self._matrix)
         pc = self._solver.getPC()
-        pc.setType(self.kind)
+        pc.setType("lu")
         pc.setFactorSolverType("mumps")
         self._factor = None
         self._rhs_array = np.zeros(n, self.dtype)
@@ -183,8 +160,7 @@ class MumpsFactorization:
             pc.setFactorSetUpSolverType()
             self._factor = pc.getFactorMatrix()
             self._held.append(self._factor)
-            for number, value in self.controls.items():
-                self._factor.setMumpsIcntl(number, value)
+            self._factor.setMumpsIcntl(14, 50)  # room, in per cent, for what pivoting takes beyond the estimate
         self._solver.setOperators(self._matrix)
         self._solver.setUp()
         failure = self._factor.getMumpsInfog(1)
@@ -197,7 +173,7 @@ class MumpsFactorization:
         self._solver.reset()
         self._solver.setOperators(self._matrix)
         pc = self._solver.getPC()
-        pc.setType(self.kind)
+        pc.setType("lu")
         pc.setFactorSolverType("mumps")
         self._factor = None
 

@@ -7,8 +7,6 @@ what is rational then.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -49,9 +47,6 @@ class ReducedFamily:
     base : ReducedFamily, optional
         Of the same family: its space is kept as it is, and made wider by what `space` has outside it; directions below
         `compression` of a vector's length are left out then.
-    rates : mapping, optional
-        From a damping to the rates, 1/s, at which the structure runs away by itself then. The space of the base is as
-        few motions as have them.
     """
 
     def __init__(
@@ -60,9 +55,8 @@ class ReducedFamily:
         space: np.ndarray,
         compression: float = 1e-9,
         base: ReducedFamily | None = None,
-        rates: Mapping[tuple[float, float, float], np.ndarray] | None = None,
     ):
-        self.family, self._base, self._rates = family, base, rates
+        self.family, self._base = family, base
         if base is None:
             self._own, _ = orthonormal(family.mass, space, compression)
             self.V = self._own
@@ -88,24 +82,6 @@ class ReducedFamily:
         first, before = self._base.V, self._base._images.get(name)
         back = (first.T @ (matrix.T @ self._own)).T if before is None else self._own.T @ before
         return np.block([[known, first.T @ image], [back, self._own.T @ image]])
-
-    def rates(self, condition: Condition) -> np.ndarray:
-        """Rates at which the structure runs away by itself, 1/s."""
-        return np.zeros(0) if self._rates is None else self._rates.get(condition.damping, np.zeros(0))
-
-    @cached_property
-    def holding(self) -> ReducedFamily:
-        """The same without the motions that run away."""
-        if self._rates is None:
-            return self
-        other, skip = copy(self), self._base.size
-        other._rates, other.relaxing = None, self.relaxing[:, skip:, skip:]
-        other.V, other.G, other.J = self.V[:, skip:], self.G[skip:], self.J[:, skip:]
-        other.K, other.D, other.M = (part[skip:, skip:] for part in (self.K, self.D, self.M))
-        other._coupled, other.responses = {}, {}
-        for name in ("small", "reference"):
-            other.__dict__.pop(name, None)
-        return other
 
     @property
     def size(self) -> int:

@@ -18,12 +18,11 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from .condensation import Workspace
+from .factorization import StructureMatrices
 from .family import Condition, PencilFamily
-from .inertia import SymmetricStructure
 from .mass_basis import orthonormal
 from .pencil import CoupledPencil, real_apply
 from .reduced import Pairs, ReducedFamily
-from .runaway import Runaway
 from .static_solver import StaticSolver
 from .transfer import TransferBasis
 
@@ -44,8 +43,6 @@ LOWEST = 24
 GUARD, REFINED = 6, 8
 #: Relative change of their squares that ends them, a hundred times their error; and of a motion that has nothing new.
 SETTLED, SAME = 1e-6, 1e-10
-#: Relative distance from an eigenvalue at which its vector is corrected.
-BESIDE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -105,8 +102,7 @@ class FamilyReduction:
         workspace: Workspace | None = None,
     ):
         self.family, self._workspace = family, workspace or Workspace()
-        self._runaways: dict[tuple[float, float, float], Runaway] = {}
-        self._last: tuple[tuple[float, float, float], SymmetricStructure] | None = None
+        self._matrices: StructureMatrices | None = None
         self.solver = solver or StaticSolver()
         self.solver.factor(family)
         self._stiffened, self._loss = stiffened or StaticSolver(), None
@@ -158,26 +154,6 @@ class FamilyReduction:
             if known.size == found.size and (np.abs(found - known) <= SETTLED * np.abs(found)).all():
                 return np.sort(np.sqrt(np.maximum(found, 0.0))) / (2 * np.pi)
         return np.zeros(0)
-
-    def runaway(self, condition: Condition) -> Runaway:
-        """What of the structure runs away by itself at the damping of a condition."""
-        family, damping = self.family, condition.damping
-        if family.relaxation(condition.loss) is None:
-            return Runaway.none(family.mass.shape[0])
-        if damping not in self._runaways:
-            self._runaways[damping] = Runaway.of(self._structure(condition))
-        return self._runaways[damping]
-
-    def _structure(self, condition: Condition) -> SymmetricStructure:
-        """Of the damping of a condition; the last one is kept."""
-        family, relaxation = self.family, self.family.relaxation(condition.loss)
-        if self._last is None or self._last[0][:2] != condition.damping[:2]:
-            matrix = condition.alpha * family.mass + condition.beta * family.damping
-            structure = CoupledPencil(family.mass, matrix, family.stiffness, relaxation=relaxation)
-            self._last = condition.damping, SymmetricStructure(self._workspace.structure(structure))
-        elif self._last[0] != condition.damping:  # the same matrices
-            self._last = condition.damping, self._last[1].relaxing_as(relaxation)
-        return self._last[1]
 
     def residual(self, values, q, u, condition: Condition, left: bool = False):
         """T(lambda) x of pairs, or T^H w of left vectors: force part (n, k) and inner part (b, k)."""
@@ -259,8 +235,11 @@ class FamilyReduction:
     def _stiffened_by(self, factors: np.ndarray, condition: Condition) -> StaticSolver:
         """Solver of the stiffness with its relaxing parts as stiff as factors say; that of the last one is kept."""
         if self._loss != condition.loss:
-            structure = self._structure(condition) if self._last is None else self._last[1]
-            self._stiffened.factor_sum(structure.matrices, structure.stiffness(factors))
+            if self._matrices is None:
+                mass, relaxation = self.family.mass, self.family.relaxation(condition.loss)
+                pencil = CoupledPencil(mass, sp.csr_matrix(mass.shape), self.family.stiffness, relaxation=relaxation)
+                self._matrices = self._workspace.structure(pencil)
+            self._stiffened.factor_sum(self._matrices, np.array([0.0, 0.0, 1.0, *factors]))
             self._loss = condition.loss
         return self._stiffened
 
@@ -271,14 +250,13 @@ class FamilyReduction:
             return first  # nothing leads anywhere: there is nothing to be found better
         return ReducedFamily(self.family, columns, 3e-7)
 
-    def deeper(self, fine: ReducedFamily, modes: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:
-        """A second stage made wider by its own leading vectors, corrected once more; `modes` holds them, and motions
-        that run away beside them.
+    def deeper(self, fine: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:
+        """A second stage made wider by its own leading vectors, corrected once more.
 
         What the first space has by too little is corrected by too little at once: an error of 1e-2 of its vectors
         leaves 1e-5 of an eigenvalue however many conditions they come from.
         """
-        columns = self._corrected_leading(modes, conditions, most)
+        columns = self._corrected_leading(fine, conditions, most)
         return ReducedFamily(self.family, columns, DEEPER, base=fine) if columns.shape[1] else fine
 
     def _corrected_leading(self, model: ReducedFamily, conditions, most: int) -> np.ndarray:
@@ -292,27 +270,6 @@ class FamilyReduction:
             for part in (right.real, right.imag, left.real, left.imag)
         ]
         return np.hstack(parts)
-
-    def runaways(self, conditions) -> dict[tuple[float, float, float], Runaway]:
-        """The same at the dampings of all conditions."""
-        return {damping: self.runaway(c) for damping, c in {c.damping: c for c in conditions}.items()}
-
-    def runaway_correction(self, pairs: Pairs, condition: Condition) -> tuple[float, np.ndarray]:
-        """Largest relative correction by the full matrices of eigenvalues of the structure by itself, and vectors that
-        hold it, right and left, (n, 2k); each corrected at its place.
-        """
-        if not pairs.values.size:
-            return 0.0, pairs.q.real
-        structure = self._structure(condition)
-        force, _ = self.residual(pairs.values, pairs.q, pairs.u, condition)
-        back, _ = self.residual(pairs.values, pairs.w, pairs.c, condition, left=True)
-        right, left = pairs.q.copy(), pairs.w.copy()
-        for i, value in enumerate(pairs.values.real):
-            with structure.factored(structure.at(value * (1.0 + BESIDE))) as factor:
-                right[:, i] -= factor.solve(force[:, i].real)
-                left[:, i] -= factor.solve(back[:, i].real)
-        change = self._newton(pairs, right, left, condition)
-        return float((np.abs(change) / np.abs(pairs.values)).max()), np.hstack([right.real, left.real])
 
     def correction(self, pairs: Pairs, condition: Condition) -> np.ndarray:
         """Newton's correction of eigenvalues by the full matrices, -w^H T x / (w^H T' x), complex (k,).

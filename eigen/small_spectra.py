@@ -10,7 +10,6 @@ from . import chains
 from .creep import OVERDAMPED
 from .family import bordered
 from .rational import SAME, RationalCells, Refined, Surrogate, real_roots, refined, started
-from .runaway import is_near
 from .structure_response import relative
 
 if TYPE_CHECKING:
@@ -150,7 +149,6 @@ class SmallSpectra:
             near = np.abs(found.values - values) <= MOVED * np.abs(values)
             doubtful[cells[~_entered(found, found.settled & near, cells, rows, vectors)]] = True
         self._add_real(problem, conditions, rows)
-        self._keep_modes(conditions, rows)
         return rows, vectors, doubtful
 
     def _each(self, conditions: list[Condition]) -> tuple[list[list[complex]], dict]:
@@ -159,8 +157,7 @@ class SmallSpectra:
         rows: list[list[complex]] = [[] for _ in conditions]
         vectors = {}
         doubtful = np.zeros(len(conditions), bool)
-        holding = self.reduced.holding  # the surrogate is far off where the structure runs away
-        cells, start = self._starts(conditions, problem, holding)
+        cells, start = self._starts(conditions, problem)
         place = _places(cells, start.values.real)  # rank in its cell, by growth rate
         first, wanted = 0, np.ones(len(conditions), bool)
         while wanted.any():
@@ -175,18 +172,11 @@ class SmallSpectra:
             # one after another as long as all that were found are unstable
             wanted = np.array([bool(row) and min(v.real for v in row) > 0 for row in rows])
             first += TAKEN
-        if holding is not self.reduced:
-            # modes that swing with what runs away are none without it
-            cells, start = self._starts(conditions, problem, self.reduced)
-            taken = np.flatnonzero(_places(cells, start.values.real) < TAKEN)
-            found = refined(problem, cells[taken], start[taken])
-            _entered(found, found.settled & (found.values.imag > 0), cells[taken], rows, vectors)
         self._add_real(problem, conditions, rows)
         for i in np.flatnonzero(doubtful):
             # modes of a doubtful cell go on in the next one
             row = self._followed(problem, i, rows[i - 1], rows[i]) if i and doubtful[i - 1] else None
             rows[i] = list(self._exactly(conditions[i])) if row is None else row
-        self._keep_modes(conditions, rows)
         return rows, vectors
 
     def _add_real(self, problem: RationalCells, conditions, rows) -> None:
@@ -194,19 +184,6 @@ class SmallSpectra:
         edges = np.array([self.reduced.family.reach(c).creep for c in conditions])
         for i, value in zip(*real_roots(problem, edges, self._top)):
             _joined(rows[i], complex(value))
-
-    def _keep_modes(self, conditions, rows) -> None:
-        """Leave out of each cell what is no mode."""
-        for i, condition in enumerate(conditions):
-            rows[i] = self._modes(condition, rows[i])
-
-    def _modes(self, condition: Condition, values) -> list[complex]:
-        """Those of some eigenvalues that are modes: what runs away of the structure by itself is none."""
-        rates = self.reduced.rates(condition)
-        if not rates.size:
-            return list(values)
-        band = self.reduced.family.reach(condition).band
-        return [v for v, own in zip(values, is_near(values, rates)) if not own and v.imag <= ROOM * band]
 
     def pairs(self, condition: Condition, values) -> Refined:
         """Eigenpairs of one pencil at eigenvalues, or near places close to them."""
@@ -233,38 +210,29 @@ class SmallSpectra:
         values = np.linalg.eigvals(np.linalg.solve(E, F))
         reach = self.reduced.family.reach(condition)
         values = values[(values.imag >= 0) & reach.is_mode(values)]
-        values = np.array(self._modes(condition, values), complex)
         values = values[np.argsort(-values.real)]
         return values[: max(TAKEN, int(np.sum(values.real > 0)) + 1)]
 
-    def _starts(self, conditions, problem: RationalCells, reduced: ReducedFamily) -> tuple[np.ndarray, Refined]:
-        """Cells, and pairs to start from in the upper half-plane, from surrogates on a space or a part of it."""
-        surrogate, holds = Surrogate.at(problem, self.frequency), self.reduced.holding is self.reduced
+    def _starts(self, conditions, problem: RationalCells) -> tuple[np.ndarray, Refined]:
+        """Cells, and pairs to start from in the upper half-plane, from surrogates."""
+        reduced = self.reduced
+        surrogate = Surrogate.at(problem, self.frequency)
         flat = reduced.relaxing.reshape(len(reduced.relaxing), -1)
         shape = (-1, reduced.size, reduced.size)
         matrices = reduced.first_order(
             conditions, (surrogate.level @ flat).reshape(shape), (surrogate.slope @ flat).reshape(shape)
         )
         values = np.linalg.eigvals(matrices)
-        # what creeps is no start, and the real axis is searched on its own; beside motions that run away, what is real
-        # and unstable here are their remnants, which lead back to them
-        swings = values.imag > OVERDAMPED * np.abs(values)
-        swings |= (values.real > 0) & ((values.imag > 0) | ((values.imag == 0) & holds))
+        # relaxation is no start, and the real axis is searched on its own
+        swings = (values.imag > OVERDAMPED * np.abs(values)) | ((values.real > 0) & (values.imag >= 0))
         growth = np.where(swings, self._estimates(problem, surrogate, np.where(swings, values, 1.0)).real, -np.inf)
         band = np.array([self.reduced.family.reach(c).band for c in conditions])
-        # beside motions that run away, what is unstable beyond the band are single elements held by halves
-        beyond = (values.real > 0) & holds
-        growth = np.where((values.imag <= ROOM * band[:, None]) | beyond, growth, -np.inf)
+        growth = np.where((values.imag <= ROOM * band[:, None]) | (values.real > 0), growth, -np.inf)
         order = np.argsort(-growth, axis=1)[:, :STARTED]
         cells = np.repeat(np.arange(len(conditions)), order.shape[1])
         kept = np.isfinite(np.take_along_axis(growth, order, 1)).ravel()
         cells, picked = cells[kept], np.take_along_axis(values, order, 1).ravel()[kept]
-        if reduced is self.reduced:
-            return cells, started(problem, surrogate, cells, picked)
-        found = started(reduced.small.problem(conditions), surrogate, cells, picked)
-        still = np.zeros((len(cells), self.reduced.size - reduced.size))
-        right, left = (np.hstack([still, vectors]) for vectors in (found.right, found.left))
-        return cells, Refined(found.values, right, left, None)
+        return cells, started(problem, surrogate, cells, picked)
 
     def _estimates(self, problem, surrogate, values) -> np.ndarray:
         """Eigenvalues of surrogates corrected by the share that relaxes of typical motions."""

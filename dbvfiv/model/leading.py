@@ -43,12 +43,16 @@ class LeadingSearch:
         Structural frequencies in vacuo that a band of the origin STRUCTURE holds.
     creeps : bool
         Whether materials relax, so that creep has to be told from modes.
+    claimed : float, Hz
+        Frequency up to which a search speaks for a state: the band, or without one what holds as many structural
+        frequencies as modes are wanted. Models of few vectors resolve no modes above it, whatever they count.
     """
 
     options: SearchOptions
     origin: BandOrigin
     frequencies: int = 0
     creeps: bool = False
+    claimed: float = np.inf
 
     @property
     def band(self) -> float:
@@ -117,7 +121,7 @@ def select_search(
         Of which only the stiffness damping and the factor on the loss factors matter.
     structural_frequencies : callable
         From a number to that many lowest frequencies of the undamped structure in vacuo at the state, Hz, ascending;
-        fewer where there are no more. Called only where they decide. `eigen.lowest_frequencies` computes them.
+        fewer where there are no more; not called where a band was asked for. `eigen.lowest_frequencies` computes them.
     count : int
         Modes wanted, a conjugate pair being one.
     resolved : float
@@ -136,9 +140,9 @@ def select_search(
     -333.3333333333333
     """
     found = _select(options, conditions, structural_frequencies, count)
-    if found.band <= resolved:
-        return found
-    return replace(found, options=replace(found.options, max_frequency=resolved), origin=BandOrigin.LINE)
+    if found.band > resolved:
+        found = replace(found, options=replace(found.options, max_frequency=resolved), origin=BandOrigin.LINE)
+    return replace(found, claimed=min(found.claimed, found.band, resolved))
 
 
 def _select(options: SearchOptions, conditions: Conditions, structural_frequencies, count: int) -> LeadingSearch:
@@ -146,12 +150,14 @@ def _select(options: SearchOptions, conditions: Conditions, structural_frequenci
     asked = BandOrigin.NONE if options.max_frequency is None else BandOrigin.ASKED
     creeps = conditions.loss_factor > 0
     limit = None if creeps else limit_point(conditions.beta)
-    if limit is not None:
-        return LeadingSearch(replace(options, limit_point=limit), asked)
     if asked is BandOrigin.ASKED:
+        options = options if limit is None else replace(options, limit_point=limit)
         return LeadingSearch(options, asked, creeps=creeps)
     known = np.asarray(structural_frequencies(count), float)[:count]
     highest = float(known.max(initial=0.0))
+    if limit is not None:
+        claimed = ROOM * highest if highest > 0 else np.inf
+        return LeadingSearch(replace(options, limit_point=limit), asked, claimed=claimed)
     if not highest > 0:
         return LeadingSearch(options, asked, creeps=creeps)  # nothing oscillates: any band would be arbitrary
     return LeadingSearch(replace(options, max_frequency=ROOM * highest), BandOrigin.STRUCTURE, len(known), creeps)

@@ -47,7 +47,7 @@ def test_set_and_options_say_the_same(command_line):
 def test_table_file_figures_and_what_reads_them(command_line, tmp_path):
     file = tmp_path / "m.h5"
     outcome = command_line("modes", *COARSE, "-p", "6 kPa", "--density", 10, "-n", 2, "-o", file)
-    assert outcome.status == 0 and "growth rate" in outcome.out and "Unstable" in outcome.out and "m.h5" in outcome.out
+    assert outcome.status == 0 and "growth rate" in outcome.out and "Flutters" in outcome.out and "m.h5" in outcome.out
     found = dbvfiv.load_result(file)
     assert f"{found.modes[0].growth_rate:.4f}" in outcome.out
     info = command_line("info", file)

@@ -45,7 +45,7 @@ def test_every_part_is_there(made):
     text = made[1].read_text()
     for name in ("valve", "steady", "modes", "classes", "damping", "onset", "map", "closure", "strains", "case"):
         assert f'<section id="{name}">' in text
-    assert "Unstable under quasi-steady continuity" in text
+    assert "Flutters under quasi-steady continuity" in text
     assert "It was left out." in text
     assert "this installation" in text
 

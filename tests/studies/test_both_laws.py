@@ -40,7 +40,7 @@ def test_modes_under_both_laws_are_those_of_each(command_line):
 
 def test_they_are_printed_side_by_side_and_kept(command_line, tmp_path):
     out = command_line("modes", *OPTIONS, "--law=both", "--count=3", "-o", tmp_path / "both.h5").out
-    assert "Unstable under quasi-steady continuity: " in out and "Stable under storage continuity: " in out
+    assert "Flutters under quasi-steady continuity: " in out and "Stable under storage continuity: " in out
     assert out.count("growth rate") == 0 and "disagree" in out
     read = dbvfiv.load_result(tmp_path / "both.h5")
     assert read.other_law.continuity == "storage" and len(read.other_law.modes) == 3

@@ -14,6 +14,8 @@ from .missing import not_there, said_by
 def modes(found: Gathered) -> Part:
     """Modes at the driving pressure, and what both laws of continuity say."""
     result, title = found.modes, "Vibration at this pressure"
+    if result is not None and not result.verdict.holds:
+        return Part("modes", title, stability(found), (), (), said_by(result))
     if result is None or result.certificate is None:
         return not_there(found, "modes", title)
     pictures = pictures_of(result, {"eigenvalues": _EIGENVALUES, "mode-shapes": "Shapes of the leading modes."})
@@ -23,10 +25,12 @@ def modes(found: Gathered) -> Part:
 def classes(found: Gathered) -> Part:
     """The same in motions that are not symmetric about both planes."""
     result, title = found.classes, "Motions of all classes"
+    if result is not None and not result.verdict.holds:
+        return Part("classes", title, (result.sentence,), (), (), said_by(result))
     if result is None or result.certificate is None:
         return not_there(found, "classes", title)
     words = ", ".join(f"{name}: {symmetry_named(name).words}" for name in result.certificates)
-    return Part("classes", title, (result.verdict, f"{words}."), (_modes(result),), (), _certified(result))
+    return Part("classes", title, (result.sentence, f"{words}."), (_modes(result),), (), _certified(result))
 
 
 def _modes(result) -> Table:
@@ -56,10 +60,10 @@ _LAW = "<p>Under {} continuity:</p>"
 def stability(found: Gathered) -> tuple[str, ...]:
     """The verdict, under both laws."""
     result = found.modes
-    if result is None or result.certificate is None:
+    if result is None:
         return ()
     other = result.other_law
-    return (result.verdict,) if other is None else (result.verdict, other.verdict, result.comparison)
+    return (result.sentence,) if other is None else (result.sentence, other.sentence, result.comparison)
 
 
 def onset(found: Gathered) -> Part:

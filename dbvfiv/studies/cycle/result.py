@@ -19,9 +19,10 @@ from ...record.whole_valve import WholeValve
 from ..orbits.orbit import Orbit
 from ..result import StudyResult
 from ..stability.place import Place, describe_fixed, fixed_conditions, rebuilder
+from ..stability.verdict import Verdict
 from . import figures
 from .fatigue import LayerRanges, layer_ranges
-from .rows import COLUMNS, CYCLES, ENDED, SPECIAL, read_motion
+from .rows import COLUMNS, CYCLES, ENDED, SPECIAL, VERDICT, read_motion
 
 #: Steps of a period for ParaView.
 STEPS = 24
@@ -120,6 +121,12 @@ class CycleResult(StudyResult):
         return {name: notes[-1][name] for name in ("value", "frequency")} if notes else None
 
     @property
+    def verdict(self) -> Verdict:
+        """Stability of the steady state of the case itself."""
+        notes = self.record.notes(VERDICT)
+        return Verdict.read(notes[-1]) if notes else Verdict.undecided("The run ended before it was looked at.")
+
+    @property
     def reason(self) -> str:
         """Why the branch ended."""
         reasons = [note["reason"] for note in self.record.notes(ENDED)]
@@ -150,6 +157,7 @@ class CycleResult(StudyResult):
             "points": [point.summary() for point in self.points],
             "special_points": self.special_points,
             "onset": self.onset,
+            "verdict": self.verdict.summary(),
             "reason": self.reason,
             "fixed": fixed_conditions(self.case, self.parameter),
             "failures": list(self.failures),

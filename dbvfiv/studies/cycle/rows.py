@@ -18,7 +18,7 @@ from ...record.record import Record
 from ...record.table import TableSpec
 from ..orbits.orbit import Orbit
 
-CYCLES, SERIES, SPECIAL, ENDED = "cycles", "series", "special", "ended"
+CYCLES, SERIES, SPECIAL, ENDED, VERDICT = "cycles", "series", "special", "ended", "verdict"
 #: Floquet exponents kept of each cycle.
 KEPT = 20
 

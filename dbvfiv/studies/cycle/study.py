@@ -18,7 +18,8 @@ from ..case import Case
 from ..orbits.follower import Follower
 from ..orbits.onset import MODES
 from ..session import Session
-from ..stability.place import check_scan
+from ..stability.place import Place, check_scan
+from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..study import Study
 from .given import given_motion
@@ -29,6 +30,7 @@ from .rows import (
     ENDED,
     SERIES,
     SPECIAL,
+    VERDICT,
     cycle_row,
     read_points,
     series_rows,
@@ -64,6 +66,12 @@ def run(session: Session, record: GrowingRecord) -> None:
         _from_file(case, walk, record)
     else:
         _from_onset(case, walk, record)
+    record.progress("verdict on the steady state")
+    try:
+        verdict = walk.verdict(Place.of(case))
+    except SolveError as error:
+        verdict = Verdict.undecided(str(error))
+    record.note(VERDICT, **verdict.summary())
 
 
 def _from_onset(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:

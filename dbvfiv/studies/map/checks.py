@@ -57,7 +57,7 @@ def check_cells(plan: MapPlan, columns: tuple[MapColumn, ...], walk: StabilityWa
 
 def _check(plan: MapPlan, column: MapColumn, j: int, law: int, walk: StabilityWalk) -> Check:
     along = plan.along.values[j]
-    spectrum = walk.spectrum(plan.place(column.value, along, plan.laws[law]), 4, runaway=True)
+    spectrum = walk.spectrum(plan.place(column.value, along, plan.laws[law]), 4)
     kept = complex(column.cells["growth_rate"][law, j], 2 * np.pi * column.cells["frequency"][law, j])
     true = complex(spectrum.eigenvalues[0]) if len(spectrum) else complex(np.nan)
     error = abs(kept - true) / max(abs(true), 1.0)

@@ -14,15 +14,19 @@ from eigen import Column
 from eigen.column import MISSING
 
 from ...case.axis import Axis
-from ...errors import CaseError, SolveError
+from ...errors import CaseError, NotValidError, SolveError
 from ..case import Case
 from ..stability.correction import OnsetCorrection
 from ..stability.crossings import Sample, Scan, locate
 from ..stability.place import Place, is_surrounding
+from ..stability.verdict import NOT_VALID, OUTCOMES, UNDECIDED, Verdict, describe_counts
 from ..stability.walk import StabilityWalk
 
 #: What is kept of each cell.
-CELLS = ("growth_rate", "frequency", "second", "unstable", "runaway", "counted", "certified", "how")
+CELLS = (
+    *("growth_rate", "frequency", "second", "oscillating_rate", "oscillating_frequency", "damping_ratio"),
+    *("unstable", "counted", "certified", "how", "outcome"),
+)
 #: Relative accuracy of onsets along a column, and of those that the full matrices correct.
 LOCATED, ROUGH = 1e-10, 1e-6
 
@@ -140,7 +144,9 @@ class MapColumn:
     seconds : float
         Processor time.
     band : float
-        Hz; modes were searched for up to it, infinite for all.
+        Hz; verdicts hold up to it, infinite for all frequencies.
+    why_not_valid : str
+        Why the constants of the rubber do not hold in some or all of the cells; empty where they do.
     """
 
     value: float
@@ -151,18 +157,19 @@ class MapColumn:
     failure: str = ""
     seconds: float = 0.0
     band: float = math.inf
+    why_not_valid: str = ""
 
     @classmethod
     def missing(cls, plan: MapPlan, task: ColumnTask, sentence: str, seconds: float = 0.0) -> MapColumn:
         """A marked gap."""
         shape = (len(plan.laws), len(plan.along.values))
-        cells = {name: np.full(shape, np.nan) for name in CELLS[:3]}
+        cells = {name: np.full(shape, np.nan) for name in CELLS[:6]}
         cells |= {
             "unstable": np.full(shape, -1),
-            "runaway": np.zeros(shape, int),
             "counted": np.full(shape, -1),
             "certified": np.zeros(shape, bool),
             "how": np.full(shape, MISSING),
+            "outcome": np.full(shape, OUTCOMES.index(UNDECIDED)),
         }
         return cls(task.value, task.level, cells, np.zeros((0, 5)), np.nan, sentence, seconds)
 
@@ -170,6 +177,19 @@ class MapColumn:
         """Whether it was solved under a continuity law."""
         how = self.cells.get("how")
         return not self.failure and (how is None or bool((how[law] != MISSING).any()))
+
+    def verdict(self, law: int, cell: int) -> Verdict:
+        """Verdict on a cell."""
+        own = {name: values[law, cell] for name, values in self.cells.items()}
+        outcome = OUTCOMES[int(own["outcome"])]
+        if outcome == NOT_VALID:
+            return Verdict.not_valid(self.why_not_valid)
+        if self.failure:
+            return Verdict.undecided(self.failure)
+        unstable, counted, certified = int(own["unstable"]), int(own["counted"]), bool(own["certified"])
+        numbers = (float(own[name]) for name in ("oscillating_rate", "oscillating_frequency", "damping_ratio"))
+        reason = describe_counts(unstable, counted, certified, 0.0, self.band)
+        return Verdict(outcome, reason, *numbers, certain=certified, band=self.band)
 
 
 def grid_of(plan: MapPlan, found, name: str) -> np.ndarray:
@@ -189,37 +209,48 @@ def solve_column(plan: MapPlan, walk: StabilityWalk, task: ColumnTask) -> MapCol
     started = time.process_time()
     value, level, laws = task
     columns, onsets = [], []
+    cells = MapColumn.missing(plan, task, "").cells
     try:
         for number in laws:
-            column, found = _law(plan, walk, value, plan.laws[number], level > 0)
-            columns.append(column)
+            column, verdicts, found = _law(plan, walk, value, plan.laws[number], level > 0)
+            columns.append((column, verdicts))
             onsets += [(number, *onset) for onset in found]
+    except NotValidError as error:
+        cells["outcome"][list(laws)] = OUTCOMES.index(NOT_VALID)
+        seconds = time.process_time() - started
+        return MapColumn(value, level, cells, np.zeros((0, 5)), 0.0, "", seconds, why_not_valid=str(error))
     except (SolveError, CaseError) as error:
         return MapColumn.missing(plan, task, str(error), time.process_time() - started)
-    cells = MapColumn.missing(plan, task, "").cells
-    for number, column in zip(laws, columns):
-        for name in CELLS:
+    for number, (column, verdicts) in zip(laws, columns):
+        for name in set(CELLS) & vars(column).keys():
             cells[name][number] = getattr(column, name)
+        cells["certified"][number] = column.certified
+        cells["oscillating_rate"][number] = [verdict.growth_rate for verdict in verdicts]
+        cells["oscillating_frequency"][number] = [verdict.frequency for verdict in verdicts]
+        cells["damping_ratio"][number] = [verdict.damping_ratio for verdict in verdicts]
+        cells["outcome"][number] = [OUTCOMES.index(verdict.outcome) for verdict in verdicts]
     return MapColumn(
         value,
         level,
         cells,
         np.array(onsets, float).reshape(-1, 5),
-        max(column.error for column in columns),
+        max(column.error for column, _ in columns),
         "",
         time.process_time() - started,
-        min(float(column.band.min()) for column in columns),
+        min((v.band for _, verdicts in columns for v in verdicts if np.isfinite(v.band)), default=math.inf),
+        next((v.reason for _, verdicts in columns for v in verdicts if v.outcome == NOT_VALID), ""),
     )
 
 
 def _law(
     plan: MapPlan, walk: StabilityWalk, value: float, law: float, edges: bool
-) -> tuple[Column, list[tuple[float, ...]]]:
+) -> tuple[Column, list[Verdict], list[tuple[float, ...]]]:
     along = plan.along
     places = [plan.place(value, other, law) for other in along.values]
     if not is_surrounding(plan.case, along.parameter):
         return _state_by_state(plan, walk.apart(), places)
     column = walk.column(places, edges=edges)
+    verdicts = walk.verdicts(places, column)
     sample = column.eigenvalues or (lambda condition: walk.column([places[0].under(condition)]).leading[0])
     cell = column.cell or (lambda condition: walk.column([places[0].under(condition)]))
     scan = Scan(
@@ -228,10 +259,10 @@ def _law(
         lambda other: bool(cell(plan.place(value, other, law).condition).certified[0]),
     )
     # what the cells know need not be found again
-    scan.samples.update(_known(along, column))
+    _enter_known(scan, along, column)
     found = _onsets(scan, along, LOCATED if column.corrected is None else ROUGH)
     if column.corrected is None:
-        return column, found
+        return column, verdicts, found
 
     correct = OnsetCorrection(
         column,
@@ -242,7 +273,7 @@ def _law(
     for other, frequency, direction, _ in found:
         other, frequency, left = correct(other, frequency)
         onsets.append((other, frequency, direction, left))
-    return column, onsets
+    return column, verdicts, onsets
 
 
 def shared_place(plan: MapPlan, value: float) -> Place | None:
@@ -252,22 +283,38 @@ def shared_place(plan: MapPlan, value: float) -> Place | None:
     return plan.place(value, plan.along.values[0], plan.laws[0])
 
 
-def _known(along: Axis, column: Column) -> dict[float, Sample]:
-    sure = [bool(s) if counted >= 0 else None for s, counted in zip(column.certified, column.counted)]
-    return {float(v): Sample(float(v), row, s) for v, row, s in zip(along.values, column.leading, sure)}
+def _enter_known(scan: Scan, along: Axis, column: Column) -> None:
+    """Put what the cells know into a scan: samples, and values at which there is none."""
+    for value, row, certified, counted, how in zip(
+        map(float, along.values), column.leading, column.certified, column.counted, column.how
+    ):
+        if how == MISSING:
+            scan.failures[value] = "the constants of the rubber do not hold"
+        else:
+            scan.samples[value] = Sample(value, row, bool(certified) if counted >= 0 else None)
 
 
 def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):
     """Both axes change the steady state: every cell has its own, solved directly, whatever columns came before."""
-    column = Column.joined([walk.column([place]) for place in places])
+    parts = [_cell_or_blank(walk, place) for place in places]
+    column = Column.joined(parts)
+    verdicts = walk.verdicts(places, column)
     parameter = plan.along.parameter
 
     def cell(other: float) -> Column:
         return walk.column([places[0].at(**{parameter: other})])
 
     scan = Scan(lambda other: cell(other).leading[0], plan.along.log, lambda other: bool(cell(other).certified[0]))
-    scan.samples.update(_known(plan.along, column))
-    return column, _onsets(scan, plan.along, LOCATED)
+    _enter_known(scan, plan.along, column)
+    return column, verdicts, _onsets(scan, plan.along, LOCATED)
+
+
+def _cell_or_blank(walk: StabilityWalk, place: Place) -> Column:
+    """Column of one place; blank where the constants of the rubber do not hold."""
+    try:
+        return walk.column([place])
+    except NotValidError:
+        return Column.blank(1)
 
 
 def _onsets(scan: Scan, along: Axis, accuracy: float) -> list[tuple[float, float, float, float]]:

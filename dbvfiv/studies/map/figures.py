@@ -15,7 +15,7 @@ from ...case.parameters import PARAMETERS
 from ...drawing.axes import HALO, colour_bar, headline, limits, log_axis
 from ...drawing.style import MAGNITUDE, MOTION, SIGNED, new_figure, parameter_label
 from ..stability.place import describe_fixed
-from .runaway import runs_away
+from ..stability.verdict import NOT_VALID, OUTCOMES
 
 if TYPE_CHECKING:
     from .result import MapResult
@@ -38,7 +38,7 @@ def draw(result: MapResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
 def stability_map(result: MapResult) -> Figure:
     """The headline: where the valve flutters. Cells that no independent count certifies are hatched."""
     growth = np.where(certified_cells(result), result.grid("growth_rate"), np.nan)
-    levels = growth_levels(np.where(_of_the_wall(result), np.nan, growth))
+    levels = growth_levels(growth)
     norm = BoundaryNorm(levels, 256)
     figure, panels = _panels(result)
     for law, axes in enumerate(panels):
@@ -96,9 +96,9 @@ def certified_cells(result: MapResult) -> np.ndarray:
     return result.grid("certified").astype(bool) & (result.grid("unstable") >= 0)
 
 
-def _of_the_wall(result: MapResult) -> np.ndarray:
-    """(laws, rows, columns) where the wall runs away by itself."""
-    return runs_away(result.plan, result.grid("growth_rate"), result.grid("frequency"))
+def invalid_cells(result: MapResult) -> np.ndarray:
+    """(laws, rows, columns) where the constants of the rubber do not hold."""
+    return result.grid("outcome") == OUTCOMES.index(NOT_VALID)
 
 
 def growth_levels(growth: np.ndarray) -> np.ndarray:
@@ -143,6 +143,8 @@ def _vouched(result: MapResult) -> str:
     text = f"{int(certified.sum())} of {int(found.sum())} cells certified by two counts"
     if not certified_cells(result).all():
         text += ", the others hatched"
+    if invalid_cells(result).any():
+        text += " (not valid: the constants of the rubber are unstable there)"
     return text + (f", {len(result.checks)} solved again in full" if result.checks else "")
 
 
@@ -223,10 +225,10 @@ def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:
 def label_regions(axes, result: MapResult, law: int) -> None:
     """Words, on a ground of their own, in the middle of the largest stable and unstable regions."""
     unstable = result.grid("unstable")[law]
-    sure, wall = certified_cells(result)[law], _of_the_wall(result)[law]
+    sure, invalid = certified_cells(result)[law], invalid_cells(result)[law]
     cells = [_drawn_cells(axis) for axis in (result.plan.x, result.plan.y)]
-    regions = {"unstable": (unstable > 0) & ~wall, "wall runs away": wall, "stable": unstable == 0}
-    for word, mask in ((word, sure & mask) for word, mask in regions.items()):
+    regions = {"unstable": sure & (unstable > 0), "not valid": invalid, "stable": sure & (unstable == 0)}
+    for word, mask in regions.items():
         parts, count = label(mask[np.ix_(cells[1], cells[0])])
         sizes = np.bincount(parts.ravel(), minlength=count + 1)[1:]
         for number in np.flatnonzero((sizes >= 0.05 * parts.size) | (sizes == sizes.max(initial=-1))) + 1:

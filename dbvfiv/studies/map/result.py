@@ -10,10 +10,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from eigen.column import DIRECT, MISSING
+
 from ...model.symmetry import equilibria_of
 from ..result import StudyResult
 from ..stability.classes import NOTE as CLASS_NOTE
 from ..stability.place import describe_fixed, fixed_conditions
+from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, Verdict
 from . import classes, cycles, figures
 from .checks import Check
 from .column import MapColumn, MapPlan, grid_of
@@ -113,6 +116,7 @@ class MapResult(StudyResult):
                 "unstable_count": self.grid("unstable")[law].tolist(),
                 "unstable_count_independent": self.grid("counted")[law].tolist(),
                 "certified": self.grid("certified")[law].astype(bool).tolist(),
+                "verdict": self._verdicts(law),
                 "onset_curves": [curve.points() for curve in mine],
                 "onset_frequencies": [curve.frequency.tolist() for curve in mine],
                 "onset_curves_exact": [bool(curve.exact) for curve in mine],
@@ -146,18 +150,30 @@ class MapResult(StudyResult):
         return lines
 
     def _cells_line(self, law: int) -> str:
-        unstable, certified, how = (self.grid(name)[law] for name in ("unstable", "certified", "how"))
-        certified = certified.astype(bool)
-        gaps, direct = int((unstable < 0).sum()), int((how == 1).sum())
+        certified, how, outcome = (self.grid(name)[law] for name in ("certified", "how", "outcome"))
+        number = {name: int((outcome == i).sum()) for i, name in enumerate(OUTCOMES)}
+        unstable, invalid = number[FLUTTERS] + number[DIVERGES], number[NOT_VALID]
+        gaps, direct = int((how == MISSING).sum()) - invalid, int((how == DIRECT).sum())
         name = LAWS.get(self.plan.laws[law], f"blend {self.plan.laws[law]:g}")
         return (
-            f"{name}: {unstable.shape[1]} x {unstable.shape[0]} cells, "
-            f"{int(((unstable > 0) & certified).sum())} unstable, {int(((unstable == 0) & certified).sum())} "
-            f"stable, {int(certified.sum())} of {unstable.size} certified"
+            f"{name}: {how.shape[1]} x {how.shape[0]} cells, {unstable} unstable, {number[STABLE]} stable, "
+            f"{int(certified.sum())} of {how.size} certified"
+            + (f", {number[DIVERGES]} of the unstable ones diverge" if number[DIVERGES] else "")
+            + (f", {invalid} not valid" if invalid else "")
             + (f", {direct} solved directly" if direct else "")
             + (f", {gaps} in gaps" if gaps else "")
             + "."
         )
+
+    def _verdicts(self, law: int) -> list[list[dict[str, Any]]]:
+        """Verdicts on the cells of the grid, (y, x)."""
+        found = {column.value: column for column in self.columns if column.level == 0}
+        gap = Verdict.undecided("The column of this cell was not solved.").summary()
+        table = [
+            [found[across].verdict(law, i).summary() if across in found else gap for across in self.plan.across.values]
+            for i in range(len(self.plan.along.values))
+        ]
+        return [list(row) for row in zip(*table)] if self.plan.transposed else table
 
     @staticmethod
     def _class_line(note: dict[str, Any]) -> str:

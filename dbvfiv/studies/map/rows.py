@@ -14,6 +14,7 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import TableSpec
 from ..case import Case
+from ..stability.verdict import FLUTTERS, OUTCOMES, STABLE, UNDECIDED
 from ..study import nothing_to_resume
 from .checks import Check
 from .column import CELLS, MapColumn, MapPlan
@@ -31,7 +32,7 @@ _COLUMNS = (
     Column("first_onset", "", "First of its rows in the table of onsets", "i8"),
     Column("onset_count", "", "Onsets along this column", "i8"),
     Column("error", "", "Largest estimated relative error of a leading eigenvalue"),
-    Column("band", "Hz", "Modes were searched for up to it; infinite for all"),
+    Column("band", "Hz", "Verdicts hold up to it; infinite for all frequencies"),
     Column("seconds", "s", "Processor time"),
 )
 _CELLS = (
@@ -45,7 +46,6 @@ _CELLS = (
         "unstable", "", "Unstable eigenvalues by the spectrum, conjugates counted apart; -1 where there is none", "i8"
     ),
     Column("counted", "", "The same by the argument principle; -1 where nobody asked", "i8"),
-    Column("runaway", "", "Of the unstable ones, those in which the wall runs away by itself", "i8", earlier=0),
     Column(
         "certified",
         "",
@@ -53,6 +53,10 @@ _CELLS = (
         "bool",
     ),
     Column("how", "", "0 on the small model, 1 with the full pencil, 2 a gap", "i8"),
+    Column("oscillating_rate", "1/s", "Of the leading oscillating mode", earlier=np.nan),
+    Column("oscillating_frequency", "Hz", "Of the leading oscillating mode", earlier=np.nan),
+    Column("damping_ratio", "", "Of the least damped mode listed", earlier=np.nan),
+    Column("outcome", "", f"Verdict: {', '.join(f'{i} {name}' for i, name in enumerate(OUTCOMES))}", "i8", earlier=-1),
 )
 _ONSETS = (
     Column("across", "SI", "Column it lies on"),
@@ -62,7 +66,7 @@ _ONSETS = (
     Column("direction", "", "+1 where the mode becomes unstable along the column, -1 where it ceases to be", "i8"),
     Column("residual", "", "Growth rate over the size of the eigenvalue that the full matrices leave there"),
 )
-_GAP, _CURVES, _CHECKS = "gap", "curves", "checks"
+_GAP, _CURVES, _CHECKS, _NOT_VALID = "gap", "curves", "checks", "not valid"
 #: Columns of the table of onsets in the order of `MapColumn.onsets`.
 _OF_ONSET = ("law", "along", "frequency", "direction", "residual")
 
@@ -120,6 +124,8 @@ def keep_column(record: GrowingRecord, plan: MapPlan, column: MapColumn) -> None
     if len(column.onsets):
         onsets = dict(zip(_OF_ONSET, column.onsets.T))
         record.extend(ONSETS, {"across": np.full(len(column.onsets), column.value)} | onsets)
+    if column.why_not_valid:
+        record.note(_NOT_VALID, value=column.value, level=column.level, text=column.why_not_valid)
     if column.failure:
         record.note(_GAP, value=column.value, level=column.level, text=column.failure)
     record.append(COLUMNS, row)
@@ -128,9 +134,11 @@ def keep_column(record: GrowingRecord, plan: MapPlan, column: MapColumn) -> None
 def read_columns(record: Record, plan: MapPlan) -> list[MapColumn]:
     """Finished columns in the order they were finished in."""
     reasons = {(note["value"], note["level"]): note["text"] for note in record.notes(_GAP)}
+    unsound = {(note["value"], note["level"]): note["text"] for note in record.notes(_NOT_VALID)}
     shape = (len(plan.laws), len(plan.along.values))
     size = shape[0] * shape[1]
     cells = {name: record.column(CELL_ROWS, name) for name in CELLS}
+    _fill_earlier(cells)
     onsets = np.column_stack([record.column(ONSETS, name).astype(float) for name in _OF_ONSET])
     rows = {c.name: record.column(COLUMNS, c.name).tolist() for c in _COLUMNS}
     found = []
@@ -147,9 +155,18 @@ def read_columns(record: Record, plan: MapPlan) -> list[MapColumn]:
                 "" if row["solved"] else reasons[row["value"], row["level"]],
                 row["seconds"],
                 row["band"],
+                unsound.get((row["value"], row["level"]), ""),
             )
         )
     return found
+
+
+def _fill_earlier(cells: dict[str, np.ndarray]) -> None:
+    """Outcomes of the cells of files of earlier versions, from their counts."""
+    lacking = cells["outcome"] < 0
+    known = np.where(cells["unstable"] > 0, OUTCOMES.index(FLUTTERS), OUTCOMES.index(STABLE))
+    own = np.where(cells["certified"].astype(bool), known, OUTCOMES.index(UNDECIDED))
+    cells["outcome"] = np.where(lacking, own, cells["outcome"])
 
 
 def rows_to_keep(known: Record, case: Case) -> dict[str, int]:

@@ -12,12 +12,12 @@ from ...materials import outside_band
 from ...observer import Observer
 from ..case import Case
 from ..stability.place import check_scan
+from ..stability.verdict import NOT_VALID, OUTCOMES
 from ..stability.walk import StabilityWalk
 from .checks import Check, check_cells
 from .column import ColumnTask, MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, doubts, linked
 from .pool import ColumnPool
-from .runaway import of_the_wall
 from .web import Web
 
 
@@ -168,7 +168,6 @@ def run_map(
                 warnings += doubts(plan, curves)
             warnings += _doubts(plan, ordered, checks)
             warnings += _outside(case, ordered)
-            warnings += of_the_wall(plan, ordered)
         except KeyboardInterrupt:
             interrupted = True
     for sentence in warnings:
@@ -189,8 +188,13 @@ def _outside(case: Case, ordered) -> list[str]:
 
 def _doubts(plan: MapPlan, ordered, checks) -> list[str]:
     """Sentences about cells that are not certified or fail a check."""
-    doubtful = sum(int((~c.cells["certified"]).sum()) for c in ordered if not c.failure and c.level == 0)
+    own = [c for c in ordered if not c.failure and c.level == 0]
+    unsound = [c.cells["outcome"] == OUTCOMES.index(NOT_VALID) for c in own]
+    doubtful = sum(int((~c.cells["certified"] & ~bad).sum()) for c, bad in zip(own, unsound))
     said = []
+    if any(bad.any() for bad in unsound):
+        number, first = sum(int(bad.sum()) for bad in unsound), next(c for c in own if c.why_not_valid)
+        said.append(f"{number} cells are not valid; the first at {first.value:.6g}: {first.why_not_valid}")
     if doubtful:
         said.append(
             f"{doubtful} cells are uncertain: spectrum and independent count disagree, or the count is not certain; "
@@ -199,7 +203,7 @@ def _doubts(plan: MapPlan, ordered, checks) -> list[str]:
     bands = [c.band for c in ordered if not c.failure and np.isfinite(c.band)]
     if bands:
         said.append(
-            f"Modes were searched for up to {min(bands):.4g} Hz"
+            f"Verdicts hold for modes up to {min(bands):.4g} Hz"
             + (f" to {max(bands):.4g} Hz, by the column" if max(bands) > min(bands) else "")
             + "; modes.max_frequency chooses another end."
         )

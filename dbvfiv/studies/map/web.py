@@ -239,12 +239,12 @@ class Web:
 
     def _is_hidden(self, i: int) -> bool:
         """Whether the modes at the lower edge change between two columns otherwise than the ends of curves there
-        say; what runs away of the wall by itself has no curve.
+        say.
         """
         cells = [self.columns[j].cells for j in (i, i + 1)]
         if any(not table or table["unstable"][self.law, 0] < 0 for table in cells):
             return False
-        modes = [float(table["unstable"][self.law, 0] - table["runaway"][self.law, 0]) for table in cells]
+        modes = [float(table["unstable"][self.law, 0]) for table in cells]
         change = modes[1] - modes[0]
         for column, side, sign in ((i, 1, 1.0), (i + 1, -1, -1.0)):
             for k in self.loose(column, side):

@@ -154,11 +154,6 @@ class Certificate:
             phase=each[0].phase,
         )
 
-    def verdict(self, conditions: str = "") -> str:
-        """One sentence for people, with the words behind "stable" that say under which conditions."""
-        word = {True: "Stable", False: "Unstable", None: "Undecided"}[self.stable]
-        return f"{word} {conditions}".rstrip() + f": {self.statement[0].lower()}{self.statement[1:]}"
-
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON, without the curve."""
         names = [name for name in _ATTRIBUTES if name not in ("unstable_count", "unstable_count_independent")]

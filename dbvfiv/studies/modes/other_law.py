@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..stability.verdict import Verdict
 from .certificate import Certificate
 from .mode import ModeShape, rows_of
 from .run import FoundModes
@@ -28,6 +29,7 @@ class OtherLaw:
         growth_rate, frequency, damping_ratio, residual, by falling growth rate.
     certificate : Certificate
         Without its curve.
+    verdict : Verdict
     outside : str
         What is outside the wall, in words.
     """
@@ -35,16 +37,17 @@ class OtherLaw:
     continuity: str
     modes: tuple[dict[str, Any], ...]
     certificate: Certificate
+    verdict: Verdict
     outside: str = ""
 
     @property
     def stable(self) -> bool | None:
-        return self.certificate.stable
+        return self.verdict.stable
 
     @property
-    def verdict(self) -> str:
-        """One sentence, which names the law."""
-        return self.certificate.verdict(f"under {self.continuity} continuity {self.outside}".rstrip())
+    def sentence(self) -> str:
+        """The verdict in a sentence, which names the law."""
+        return self.verdict.sentence(f"under {self.continuity} continuity {self.outside}".rstrip())
 
     def summary(self) -> dict[str, Any]:
         """Keys as those of the case's own law."""
@@ -54,6 +57,7 @@ class OtherLaw:
             "unstable_count": self.certificate.unstable_count,
             "unstable_count_independent": self.certificate.unstable_count_independent,
             "stable": self.stable,
+            "verdict": self.verdict.summary(),
             "certificate": self.certificate.summary(),
         }
 
@@ -61,7 +65,8 @@ class OtherLaw:
 def note_of(found: FoundModes, continuity: str) -> dict[str, Any]:
     """What a record keeps of modes under the other law."""
     modes = [{name: row[name] for name in _NUMBERS} for row in rows_of(found)]
-    return {"continuity": continuity, "modes": modes, "certificate": Certificate.of(found).note()}
+    certificate = Certificate.of(found).note()
+    return {"continuity": continuity, "modes": modes, "certificate": certificate, "verdict": found.verdict.summary()}
 
 
 def read(note: dict[str, Any], outside: str = "") -> OtherLaw:
@@ -69,7 +74,8 @@ def read(note: dict[str, Any], outside: str = "") -> OtherLaw:
     nothing = np.zeros(0)
     shapeless = {"backward_error": np.nan, "shape": nothing, "area": nothing, "pressure": nothing, "inlet_velocity": 0j}
     modes = (ModeShape(number=i + 1, **row, **shapeless).summary() for i, row in enumerate(note["modes"]))
-    return OtherLaw(note["continuity"], tuple(modes), Certificate.read(note["certificate"], nothing, nothing), outside)
+    certificate = Certificate.read(note["certificate"], nothing, nothing)
+    return OtherLaw(note["continuity"], tuple(modes), certificate, Verdict.read(note["verdict"]), outside)
 
 
 def side_by_side(own: str, modes: Sequence[dict[str, Any]], other: OtherLaw) -> list[str]:

@@ -19,6 +19,7 @@ from ...record.whole_valve import WholeValve
 from ..result import StudyResult
 from ..session import describe_surroundings
 from ..stability.laws import compare_states
+from ..stability.verdict import Verdict
 from ..state import State, states_of
 from . import centre_line, other_law, plane, shapes, winding
 from .animation import animate_mode
@@ -27,6 +28,8 @@ from .mode import MODE, ModeShape
 from .steps import cycle_steps, mode_steps
 
 STATE, MODES, COUNT = "state", "modes", "count"
+#: Kind of the note that says why the constants of the rubber do not hold at the state.
+REFUSAL = "not valid"
 #: What a note of a certificate says about the rows that belong to it, and the table they stand in.
 COUNTED = (("modes", MODES), ("points", COUNT))
 HEAD = (
@@ -100,14 +103,33 @@ class ModesResult(StudyResult):
     def notes(self) -> tuple[str, ...]:
         return tuple(note["text"] for note in self.record.notes("remark"))
 
-    @property
-    def stable(self) -> bool | None:
-        return None if self.certificate is None else self.certificate.stable
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Stability of the state in all symmetry classes that were searched."""
+        refusals = self.record.notes(REFUSAL)
+        if refusals:
+            return Verdict.not_valid(refusals[-1]["text"])
+        notes = {note.get("symmetry", EQUILIBRIA): note for note in self._certified}
+        if not notes:
+            return Verdict.undecided("The run ended before its modes were found.")
+        return Verdict.joined({name: self._verdict(note) for name, note in notes.items()})
+
+    def _verdict(self, note: dict[str, Any]) -> Verdict:
+        """That of one class; of files of earlier versions from what they hold."""
+        if "verdict" in note:
+            return Verdict.read(note["verdict"])
+        values = [complex(m.growth_rate, m.angular_frequency) for m in self.modes]
+        counts = note["unstable_count"], note["unstable_count_independent"]
+        return Verdict.of(values, *counts, note["certain"], line=note["line"], statement=note["statement"])
 
     @property
-    def verdict(self) -> str:
-        """One sentence for people, which names the continuity law and what is outside."""
-        return self.certificate.verdict(self.law)
+    def stable(self) -> bool | None:
+        return self.verdict.stable
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in a sentence for people, which names the continuity law and what is outside."""
+        return self.verdict.sentence(self.law)
 
     @property
     def law(self) -> str:
@@ -148,7 +170,16 @@ class ModesResult(StudyResult):
 
     def summary(self) -> dict[str, Any]:
         if self.certificate is None:
-            return {"state": None, "modes": [], "stable": None, "warnings": list(self.warnings)}
+            surroundings = describe_surroundings(self.case)
+            return {
+                "state": self.state.summary() | surroundings if self.record.rows(STATE) else None,
+                "modes": [],
+                "unstable_count": None,
+                "unstable_count_independent": None,
+                "stable": None,
+                "verdict": self.verdict.summary(),
+                "warnings": list(self.warnings),
+            }
         both = {"other_law": self.other_law.summary(), "comparison": self.comparison} if self.other_law else {}
         return {
             "state": self.state.summary() | describe_surroundings(self.case) | {"in_vacuo": self.case.modes.in_vacuo},
@@ -156,6 +187,7 @@ class ModesResult(StudyResult):
             "unstable_count": self.certificate.unstable_count,
             "unstable_count_independent": self.certificate.unstable_count_independent,
             "stable": self.stable,
+            "verdict": self.verdict.summary(),
             "certificate": self.certificate.summary(),
             "classes": [self._class_summary(name, found) for name, found in self.certificates.items()],
             "notes": list(self.notes),
@@ -175,7 +207,7 @@ class ModesResult(StudyResult):
 
     def lines(self) -> list[str]:
         if self.certificate is None:
-            return ["The run ended before its modes were found."]
+            return [self.sentence]
         rows = [
             f"{m.number:6d}{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:16.4f}{m.residual:11.1e}"
             for m in self.modes
@@ -188,9 +220,9 @@ class ModesResult(StudyResult):
             notes = [f"Classes: {words}.", *notes]
         other = self.other_law
         if other is None:
-            return [*head, *rows, "", self.verdict, *notes]
+            return [*head, *rows, "", self.sentence, *notes]
         table = other_law.side_by_side(self.case.fluid.continuity, [mode.summary() for mode in self.modes], other)
-        return [*table, "", self.verdict, other.verdict, self.comparison, *notes]
+        return [*table, "", self.sentence, other.sentence, self.comparison, *notes]
 
     def steps(self, valve: WholeValve, mode: int | None = None, phases: int = 24) -> Sequence[Step]:
         """The modes one after the other, or one cycle of one of them; see `dbvfiv.studies.modes.steps`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -15,18 +16,19 @@ from eigen import (
     TransferBasis,
     certified_spectrum,
 )
-from eigen.negative_stiffness import negative_motions
 
-from ...errors import CaseError
+from ...errors import CaseError, NotValidError
 from ...model import ValveModel
 from ...model.classes import linearise_class
 from ...model.dynamics import Conditions
 from ...model.equilibria import require_equilibrium
-from ...model.leading import select_search
+from ...model.material_stability import material_stability
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...observer import Observer
 from ..solving import solving
+from ..stability.family import ValveFamily
+from ..stability.verdict import STABLE, UNDECIDED, Verdict
 
 #: Structural modes in the basis behind the independent count.
 _BASIS = 24
@@ -76,6 +78,8 @@ class FoundModes:
     in_vacuo : bool
     certified : CertifiedSpectrum
         Eigenvalues, vectors, residuals and both counts of the unstable ones.
+    claimed : float, Hz
+        Frequency up to which the search speaks for the state.
     shapes : (k, nn, c) complex
         Displacements and rotations of the nodes, the largest displacement being 1 and real.
     areas, pressures : (k, m) complex
@@ -92,6 +96,7 @@ class FoundModes:
     conditions: Conditions
     in_vacuo: bool
     certified: CertifiedSpectrum
+    claimed: float
     shapes: np.ndarray
     areas: np.ndarray
     pressures: np.ndarray
@@ -108,15 +113,28 @@ class FoundModes:
         """(k,) complex, 1/s, sorted by growth rate."""
         return self.spectrum.eigenvalues
 
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Stability of the state in this symmetry class."""
+        found, count = self.certified, self.certified.count
+        verdict = Verdict.of(
+            self.eigenvalues,
+            found.unstable_count,
+            found.unstable_count_independent,
+            found.certificate.certain,
+            line=count.line,
+            band=min(count.band, self.claimed),
+            statement="" if found.agrees else found.statement,
+        )
+        if np.isinf(count.band) or verdict.outcome != STABLE:
+            return verdict
+        beyond = " Above that the count finds more: modes may be unstable there; modes.max_frequency moves the end."
+        return replace(verdict, outcome=UNDECIDED, reason=verdict.reason + beyond)
+
     @property
     def stable(self) -> bool | None:
-        """Whether all modes decay.
-
-        One unstable pair that satisfies the equations is proof that they do not. If none is listed and the independent
-        count does not confirm it, or only up to some frequency: None.
-        """
-        known = self.certified.stable
-        return known if known is False or np.isinf(self.certified.count.band) else None
+        """Whether all modes decay; None where that is not known."""
+        return self.verdict.stable
 
 
 def run_modes(
@@ -148,6 +166,8 @@ def run_modes(
     ------
     CaseError
         For a valve at rest with fluid in it: without a pressure its velocity is undetermined.
+    NotValidError
+        If the constants of a rubber with loss factors are unstable at this state.
     SolveError
         If the state is no equilibrium, or no shift was found at which the pencil can be factored.
     """
@@ -162,56 +182,36 @@ def run_modes(
             "of an ideal fluid is undetermined; "
             "modes.in_vacuo gives those of the structure at rest."
         )
+    if conditions.loss_factor:
+        rubber = material_stability(model, state.q, conditions.loss_factor)
+        if not rubber.holds:
+            raise NotValidError(rubber.sentence)
     observer.begin("modes", 1)
     observer.progress("linearising")
     linear = linearise_class(model, state.q, state.pressure, symmetry)
     pencil = linear.pencil(conditions, not without_fluid, storage)
     observer.progress("searching")
     with solving(state.pressure):
-        # without stiffness damping the band follows from the structural frequencies
-        basis = TransferBasis(pencil, modes=_BASIS if conditions.beta > 0 else max(_BASIS, options.count))
-        resolved = np.inf if without_fluid else model.flow.resolved(conditions.of_line)
-        lowest = lambda n: basis.structural_frequencies[:n]  # noqa: E731
-        search = select_search(options.search, conditions, lowest, options.count, resolved)
-        certified = certified_spectrum(pencil, options.count, search.options, basis=basis)
+        family = ValveFamily(linear, options.search.max_frequency, options.count)
+        search = family.leading_under(conditions, without_fluid)
+        asked = replace(search.options, shifts=options.search.shifts, tolerance=options.search.tolerance)
+        basis = TransferBasis(pencil, modes=max(_BASIS, options.count))
+        certified = certified_spectrum(pencil, options.count, asked, basis=basis)
     notes = search.notes
     certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))
-    if np.isfinite(certified.count.band):
-        notes = (
-            *notes,
-            (
-                f"The independent count ends at {certified.count.band:.4g} Hz with the search; without that "
-                f"end it differs, so that "
-                "modes of higher frequency may be unstable: modes.max_frequency moves the end."
-            ),
-        )
-    notes = (*notes, *certified.spectrum.notes, *of_the_wall(certified.spectrum, pencil))
+    notes = (*notes, *certified.spectrum.notes)
     if symmetry.of_equilibria and not (model.mesh.part.is_quarter or without_fluid):
         notes = (*notes, _NO_PLUG)
-    result = _described(model, state, conditions, without_fluid, certified, pencil, linear, notes, symmetry)
+    result = _described(model, state, conditions, without_fluid, certified, search, pencil, linear, notes, symmetry)
     observer.item(result)
     if result.stable is None:
-        observer.warn(certified.statement)
+        observer.warn(result.verdict.reason)
     observer.end(False)
     return result
 
 
-def of_the_wall(spectrum: Spectrum, pencil: CoupledPencil) -> list[str]:
-    """What to make of motions that run away without swinging where rubber has lost stability."""
-    values = spectrum.eigenvalues
-    count = int(np.sum((values.imag == 0) & (values.real > 0)))
-    if not count or not negative_motions(pencil).shape[1]:
-        return []
-    return [
-        f"The unstable eigenvalues without a frequency, {count} here, come with a wall that runs away by itself: loss "
-        "factors make rubber stiffer the faster it is strained, which is no hold where its constants have lost "
-        "stability. They say that the constants do not last to these strains (materials.strain_level, or a fit over a "
-        "wider range), not that the valve flutters."
-    ]
-
-
 def _described(
-    model, state, conditions, in_vacuo, certified: CertifiedSpectrum, pencil: CoupledPencil, linear, notes, symmetry
+    model, state, conditions, in_vacuo, certified: CertifiedSpectrum, search, pencil, linear, notes, symmetry
 ) -> FoundModes:
     """Shapes, areas and pressures of the eigenvectors, scaled to a largest displacement of 1."""
     spectrum = certified.spectrum
@@ -229,6 +229,7 @@ def _described(
         conditions,
         in_vacuo,
         certified,
+        search.claimed,
         shapes=np.array(shapes, complex).reshape(len(spectrum), *model.shell.dofs.free.shape),
         areas=(change / scale).T,
         pressures=(pressure / scale).T,

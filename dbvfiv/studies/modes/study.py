@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from ...errors import CaseError
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import CaseError, NotValidError, SolveError
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, Symmetry, asks_for_equilibria, chosen_symmetries
 from ...record.record import GrowingRecord
@@ -10,11 +14,15 @@ from ...record.states import state_row
 from ..case import Case
 from ..session import Session
 from ..stability.laws import STORAGE, other_law, require_two_laws
+from ..stability.margin import critical_damping_factor
+from ..stability.place import Place
+from ..stability.verdict import Verdict
+from ..stability.walk import StabilityWalk
 from ..study import Study
 from .certificate import CURVE, Certificate
 from .mode import rows_of
 from .other_law import NOTE, note_of
-from .result import COUNT, COUNTED, MODES, STATE, ModesResult, tables_of
+from .result import COUNT, COUNTED, MODES, REFUSAL, STATE, ModesResult, tables_of
 from .run import ModesOptions, run_modes
 
 
@@ -25,6 +33,8 @@ def run(session: Session, record: GrowingRecord) -> None:
     if both:
         require_two_laws(case, "modes", "modes.in_vacuo leaves the fluid out" if case.modes.in_vacuo else "")
         _require_one_class(case)
+    if record.notes(REFUSAL):
+        return
     done = {note.get("symmetry", EQUILIBRIA) for note in record.notes("certificate")}
     chosen = chosen_symmetries(case.modes.symmetry, case.part)
     missing = [symmetry for symmetry in chosen if symmetry.name not in done]
@@ -32,8 +42,14 @@ def run(session: Session, record: GrowingRecord) -> None:
     if not (missing or further):
         return
     state = session.equilibrium(record)
-    for symmetry in missing:
-        _keep(session, record, state, symmetry)
+    try:
+        for symmetry in missing:
+            _keep(session, record, state, symmetry)
+    except NotValidError as error:
+        if not record.rows(STATE):
+            record.append(STATE, state_row(session.model, state))
+        record.note(REFUSAL, text=str(error))
+        return
     if further:
         law = other_law(case)
         found = run_modes(
@@ -76,13 +92,29 @@ def _keep(session: Session, record: GrowingRecord, state: SteadyState, symmetry:
     certificate = Certificate.of(found)
     if record.rows(COUNT) == points:
         record.extend(COUNT, {column.name: getattr(certificate, column.name) for column in CURVE})
+    verdict = found.verdict
+    if symmetry.of_equilibria and not found.in_vacuo:
+        record.progress("critical damping factor")
+        verdict = replace(verdict, critical_damping_factor=_critical_factor(session, state, verdict))
     record.note(
         "certificate",
         **certificate.note(),
+        verdict=verdict.summary(),
         symmetry=symmetry.name,
         modes=len(rows),
         points=len(certificate.frequency),
     )
+
+
+def _critical_factor(session: Session, state: SteadyState, verdict: Verdict) -> float:
+    """Factor on the damping of the wall at which flutter begins; NaN where the search for it fails."""
+    place = Place.of(session.case)
+    walk = StabilityWalk(session.case, model=session.model)
+    walk.give(place, state.q)
+    try:
+        return critical_damping_factor(walk, place, verdict)
+    except SolveError:
+        return np.nan
 
 
 STUDY = Study("modes", tables_of, run, ModesResult)

@@ -39,7 +39,7 @@ def described(point: OnsetPoint, case: Case, walk: StabilityWalk, mode) -> Onset
 def system_of(case: Case, walk: StabilityWalk, place: Place) -> ValveSystem:
     """The valve as a System of `continuation` at a place."""
     model = walk.built(replace(place, design={})).model
-    return ValveSystem(model, rebuilder(case), walk.search(place))
+    return ValveSystem(model, rebuilder(case), walk.search(place).options)
 
 
 def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: str | None = None):

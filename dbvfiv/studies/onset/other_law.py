@@ -24,6 +24,7 @@ def note_of(found: FoundOnsets) -> dict[str, Any]:
             "growth_rate": found.growth_rates[:, 0].tolist(),
             "frequency": found.frequencies[:, 0].tolist(),
             "certified": found.certified.tolist(),
+            "verdict": [verdict.summary() for verdict in found.verdicts],
         },
         "stable": [list(stretch) for stretch in found.stable_intervals],
         "unstable": [list(stretch) for stretch in found.unstable_intervals],

@@ -10,9 +10,11 @@ import numpy as np
 
 from ..case import Case
 from ..stability.place import Place
+from ..stability.verdict import Verdict
 
 #: Meshes of a run: that of the case, and the coarser one for the uncertainty.
 FINE, COARSE = 0, 1
+NOTHING_KNOWN = Verdict.undecided("Nothing is known of this state.")
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,7 @@ class OnsetSample:
         Empty if there is a state.
     certified : bool
         An independent count of the unstable eigenvalues agrees with them.
+    verdict : Verdict
     """
 
     value: float
@@ -37,6 +40,7 @@ class OnsetSample:
     mesh: int = FINE
     failure: str = ""
     certified: bool = False
+    verdict: Verdict = NOTHING_KNOWN
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,16 @@ from ..stability.classes import NOTE as CLASS_NOTE
 from ..stability.crossings import WATCHED
 from ..stability.laws import compare_ranges
 from ..stability.place import describe_fixed, fixed_conditions
+from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict
 from . import classes, figures, other_law
 from .intervals import Interval, common_stretches, joined_stretches, known_intervals, uncertain_intervals
 from .point import FINE, OnsetSample
 from .rows import read_points, read_samples
+
+
+def _lowered(text: str) -> str:
+    return f"{text[:1].lower()}{text[1:]}"
+
 
 CRITICALITY = {"super": "supercritical", "sub": "subcritical"}
 
@@ -74,7 +80,8 @@ class OnsetResult(StudyResult):
     @cached_property
     def _scan(self) -> list[OnsetSample]:
         # the second mesh and values without a state belong to the run and not to its result
-        found = {s.value: s for s in read_samples(self.record) if s.mesh == FINE and not s.failure}
+        samples = read_samples(self.record)
+        found = {s.value: s for s in samples if s.mesh == FINE and not (s.failure and s.verdict.holds)}
         return [found[value] for value in sorted(found)]
 
     @cached_property
@@ -99,6 +106,11 @@ class OnsetResult(StudyResult):
     @cached_property
     def certified(self) -> np.ndarray:
         return np.array([sample.certified for sample in self._scan], bool)
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Verdicts on the values of the scan, in the symmetry class of the equilibria."""
+        return tuple(sample.verdict for sample in self._scan)
 
     @property
     def unstable_intervals(self) -> list[Interval]:
@@ -155,6 +167,7 @@ class OnsetResult(StudyResult):
                 "growth_rate": self.growth_rates[:, 0].tolist(),
                 "frequency": self.frequencies[:, 0].tolist(),
                 "certified": self.certified.tolist(),
+                "verdict": [verdict.summary() for verdict in self.verdicts],
             },
             "leading": self.leading,
             "classes": self.classes,
@@ -193,9 +206,9 @@ class OnsetResult(StudyResult):
         fixed = f"Under {other['continuity']} continuity:"
         if other["points"]:
             return self._table(fixed, other["points"])
-        growth = other["scan"]["growth_rate"]
-        sure = all(other["scan"]["certified"]) and growth
-        said = f"No onset: the valve is {'unstable' if growth and growth[0] > 0 else 'stable'} over the range."
+        outcomes = {verdict["outcome"] for verdict in other["scan"].get("verdict", ())}
+        sure = outcomes and (outcomes == {STABLE} or outcomes <= {FLUTTERS, DIVERGES})
+        said = f"No onset: the valve is {'stable' if outcomes == {STABLE} else 'unstable'} over the range."
         return [fixed, said if sure else "No onset was found, and none is ruled out: some values lack a certificate."]
 
     @property
@@ -209,13 +222,19 @@ class OnsetResult(StudyResult):
         scanned = f"from {low:.6g} to {high:.6g} {row.shown_unit}".rstrip()
         if not self.complete:
             return f"No onset has been located yet: the search ended early, after {len(self.values)} values {scanned}."
-        sure = sum(self.leading["certified"])
-        if not len(self.values) or not (self.certified.all() and all(self.leading["certified"])):
+        sure, outcomes = sum(self.leading["certified"]), [verdict.outcome for verdict in self.verdicts]
+        invalid = outcomes.count(NOT_VALID)
+        if outcomes and invalid == len(outcomes):
+            return f"Not valid {scanned}: {_lowered(self.verdicts[0].reason)}"
+        if not all(self.leading["certified"]) or len(set(outcomes)) != 1 or UNDECIDED in outcomes:
+            but = f" {invalid} of them are not valid: the constants of the rubber do not hold." if invalid else ""
             return (
                 f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values {scanned} carry a "
-                "certificate."
+                f"certificate.{but}"
             )
         state = "unstable" if self.leading["growth_rate"][0] > 0 else "stable"
+        band = min(verdict.band for verdict in self.verdicts)
+        scanned += f" for modes up to {band:.4g} Hz" if np.isfinite(band) else ""
         which = f" in classes {', '.join([self._own, *(c['symmetry'] for c in self.classes)])}" if self.classes else ""
         return f"No onset: the valve is {state} {scanned}{which}."
 

@@ -13,6 +13,7 @@ from ...record.record import GrowingRecord, Record
 from ...record.table import TableSpec
 from ..case import Case
 from ..stability.crossings import WATCHED
+from ..stability.verdict import Verdict
 from .point import OnsetPoint, OnsetSample
 
 SCAN = "scan"
@@ -24,7 +25,7 @@ _COLUMNS = (
     Column("solved", "", "Whether a state was found; a note says why not", "bool"),
     Column("certified", "", "Whether an independent count agrees with the unstable modes there", "bool"),
 )
-_POINT, _GAP = "point", "gap"
+_POINT, _GAP, _VERDICT = "point", "gap", "verdict"
 
 
 def tables_of(_mesh: MeshData) -> tuple[TableSpec]:
@@ -46,6 +47,7 @@ class KeepItems(Observer):
 
     def item(self, result: object) -> None:
         if isinstance(result, OnsetSample):
+            self.record.note(_VERDICT, value=result.value, mesh=result.mesh, **result.verdict.summary())
             if result.failure:  # before the row, which vouches for it
                 self.record.note(_GAP, value=result.value, mesh=result.mesh, text=result.failure)
             self.record.append(SCAN, _row(result))
@@ -56,6 +58,7 @@ class KeepItems(Observer):
 def read_samples(record: Record) -> list[OnsetSample]:
     """Samples in the order they were found in."""
     reasons = {(note["value"], note["mesh"]): note["text"] for note in record.notes(_GAP)}
+    verdicts = {(note["value"], note["mesh"]): Verdict.read(note) for note in record.notes(_VERDICT)}
     names = ("value", "mesh", "solved", "certified")
     rows = zip(*(record.column(SCAN, name).tolist() for name in names))
     modes = 1j * record.column(SCAN, "angular_frequencies")
@@ -63,8 +66,15 @@ def read_samples(record: Record) -> list[OnsetSample]:
     found = []
     for (value, mesh, solved, certified), eigenvalues in zip(rows, modes):
         kept = eigenvalues[np.isfinite(eigenvalues)]
-        found.append(OnsetSample(value, kept, mesh, "" if solved else reasons[value, mesh], certified))
+        verdict = verdicts.get((value, mesh)) or _earlier(kept, certified)
+        found.append(OnsetSample(value, kept, mesh, "" if solved else reasons[value, mesh], certified, verdict))
     return found
+
+
+def _earlier(eigenvalues: np.ndarray, certified: bool) -> Verdict:
+    """Verdict on a sample of a file of an earlier version, which has no counts."""
+    unstable = int(np.sum(np.where(eigenvalues.imag > 0, 2, 1)[eigenvalues.real > 0]))
+    return Verdict.of(eigenvalues, unstable, unstable, certified, proven=False)
 
 
 def read_points(record: Record) -> list[dict[str, Any]]:

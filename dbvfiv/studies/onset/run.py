@@ -13,6 +13,7 @@ from ...materials import outside_band
 from ...observer import Observer
 from ..case import Case
 from ..stability.place import check_scan
+from ..stability.verdict import Verdict, not_valid_at
 from ..stability.walk import StabilityWalk
 from .intervals import Interval, known_intervals
 from .point import OnsetPoint, OnsetSample
@@ -39,6 +40,7 @@ class FoundOnsets:
         not.
     failures, warnings : tuples of str
     interrupted : bool
+    verdicts : (s,) tuple of Verdict
     """
 
     case: Case
@@ -51,6 +53,7 @@ class FoundOnsets:
     failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     interrupted: bool = False
+    verdicts: tuple[Verdict, ...] = ()
 
     @cached_property
     def unstable_intervals(self) -> list[Interval]:
@@ -108,8 +111,11 @@ def run_onset(
     interrupted = False
     try:
         crossings = search.scan.run(options.values)
-        failures += search.scan.failures.values()
-        if not search.scan.samples:
+        unsound = {s.value: s.failure for s in search.asked if not s.verdict.holds}
+        failures += [why for value, why in search.scan.failures.items() if value not in unsound]
+        if unsound:
+            warnings.append(not_valid_at(options.parameter, unsound))
+        if not (search.scan.samples or unsound):
             raise SolveError(
                 f"No state of the scan over {options.parameter} was found: "
                 f"{failures[0] if failures else 'the range is empty.'}"
@@ -135,8 +141,8 @@ def run_onset(
     for sentence in warnings:
         observer.warn(sentence)
     observer.end(interrupted)
-    samples = [search.scan.samples[v] for v in sorted(search.scan.samples)]
-    table = np.full((len(samples), 4), np.nan + 0j)
+    samples = search.asked
+    table = np.full((len(samples), 4), complex(np.nan, np.nan))
     for row, sample in zip(table, samples):
         row[: len(sample.eigenvalues)] = sample.eigenvalues
     return FoundOnsets(
@@ -146,8 +152,9 @@ def run_onset(
         np.array([s.value for s in samples]),
         table.real,
         table.imag / (2 * np.pi),
-        np.array([bool(s.certified) for s in samples], bool),
+        np.array([s.certified for s in samples], bool),
         tuple(failures),
         tuple(warnings),
         interrupted,
+        tuple(sample.verdict for sample in samples),
     )

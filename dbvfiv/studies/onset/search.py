@@ -9,12 +9,13 @@ import numpy as np
 
 from eigen import Certificate
 
-from ...errors import CaseError, SolveError
+from ...errors import CaseError, NotValidError, SolveError
 from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...observer import Observer
 from ..case import Case
 from ..stability.crossings import WATCHED, Crossing, Sample, Scan, locate
 from ..stability.place import Place, is_surrounding
+from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from .normal_form import MISSING, described
 from .point import FINE, OnsetPoint, OnsetSample, Side
@@ -140,14 +141,19 @@ class OnsetSearch:
         place = self.place(value)
         try:
             cell = self._cell(place)
+            verdict = self.walk.verdicts([place], cell)[0]
+        except NotValidError as error:
+            refused = Verdict.not_valid(str(error))
+            return OnsetSample(value, np.zeros(0, complex), self.mesh, str(error), verdict=refused)
         except (SolveError, CaseError) as error:
             return OnsetSample(value, np.zeros(0, complex), self.mesh, str(error))
-        found, certificate = cell.leading[0], cell.certificate(0)
+        found = cell.leading[0]
         if len(found):
-            said = "" if certificate.agrees else ", uncertain"
+            said = "" if verdict.certain else ", uncertain"
             self.observer.progress(f"{self.options.parameter} = {value:.6g}: {found[0].real:.4g} 1/s{said}")
         # as many as the scan looks at, so that a file holds all that matters
-        return OnsetSample(value, np.asarray(found)[:WATCHED], self.mesh, certified=certificate.agrees)
+        certified = cell.certificate(0).agrees
+        return OnsetSample(value, np.asarray(found)[:WATCHED], self.mesh, certified=certified, verdict=verdict)
 
     def _cell(self, place: Place):
         """Leading eigenvalues and their certificate: on a small model where the steady state stays the same, with the
@@ -155,6 +161,7 @@ class OnsetSearch:
         """
         if not is_surrounding(self.case, self.options.parameter):
             return self.walk.column([place])
+        self.walk.require_valid(place)
         if self._column is None:
             ends = np.array(self.options.values)
             taken = ends[np.unique(np.linspace(0, len(ends) - 1, SNAPSHOTS).astype(int))]
@@ -178,10 +185,17 @@ class OnsetSearch:
                 f"Between {name} = {low:.6g} and {high:.6g} spectrum and independent count do not agree everywhere, so "
                 "nothing is claimed there."
             )
-        band = self.walk.search(self.place(self.options.values[0])).max_frequency
-        if band is not None:
-            said.append(f"Modes were searched for up to {band:.4g} Hz; modes.max_frequency chooses another end.")
+        bands = [s.verdict.band for s in self._samples.values() if np.isfinite(s.verdict.band)]
+        if bands:
+            said.append(f"Verdicts hold for modes up to {min(bands):.4g} Hz; modes.max_frequency chooses another end.")
         return said
+
+    @property
+    def asked(self) -> list[OnsetSample]:
+        """Samples of the scan in ascending order, with those at which the constants of the rubber do not hold."""
+        known = {s.value: s for s in self._samples.values() if not s.failure or not s.verdict.holds}
+        known = {value: s for value, s in known.items() if value in self.scan.samples or value in self.scan.failures}
+        return [known[value] for value in sorted(known)]
 
     # -- points
     # ----

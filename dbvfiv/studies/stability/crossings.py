@@ -168,7 +168,9 @@ class Scan:
         return bool(sample.certified)
 
     def crossings(self) -> list[Crossing]:
-        """Brackets of all crossings between neighbours of the scan that both have a certificate."""
+        """Brackets of all crossings between neighbours of the scan that both have a certificate, with no value between
+        them at which there is nothing.
+        """
         found = []
         self.uncertain = []
         values = sorted(self.samples)
@@ -176,6 +178,7 @@ class Scan:
             low, high = self.samples[a], self.samples[b]
             few, many = sorted((low.unstable, high.unstable))
             known = (low.certified is not False) and (high.certified is not False)
+            known = known and not any(a < value < b for value in self.failures)
             if known and few != many:
                 known = self.certified(a) and self.certified(b)
             if not known:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, Workspace, lowest_frequencies
 
 from ...model.dynamics import Conditions, LinearisedState
-from ...model.leading import select_search
+from ...model.leading import LeadingSearch, select_search
 
 #: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
 _KEPT = 256
@@ -46,28 +45,37 @@ class ValveFamily(PencilFamily):
         self.added = 0 if linear.added is None else linear.added.rank
         self._parts: dict[object, dict[str, np.ndarray]] = {}
         self._relaxations: dict[float, Relaxation | None] = {}
-        self._searches: dict[tuple[float, float], SearchOptions] = {}
+        self._searches: dict[tuple[float, float], LeadingSearch] = {}
         self._frequencies = np.zeros(0)
 
-    def _lowest(self, count: int, workspace: Workspace | None = None) -> np.ndarray:
+    def _lowest(self, count: int) -> np.ndarray:
         """Structural frequencies of the state."""
         if len(self._frequencies) < count:
             self._frequencies = self.lowest(count)
         if len(self._frequencies) < count:
             structure = CoupledPencil(self.mass, 0.0 * self.mass, self.stiffness)
-            self._frequencies = lowest_frequencies(structure, count, workspace)
+            self._frequencies = lowest_frequencies(structure, count, self._workspace)
         return self._frequencies[:count]
 
     def search(self, condition: Condition) -> SearchOptions:
         """What is searched in the spectrum: the rule that every study follows."""
+        return self.leading(condition).options
+
+    def leading(self, condition: Condition) -> LeadingSearch:
+        """The same, with the frequency up to which the search speaks for the state."""
         line = law_parts(condition.law)[1]
-        key = condition.beta, condition.loss, *line.values()  # nothing else decides
+        return self.leading_under(
+            Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss, **line)
+        )
+
+    def leading_under(self, conditions: Conditions, in_vacuo: bool = False) -> LeadingSearch:
+        """The same under conditions by their names, with the fluid or in vacuo."""
+        line = conditions.of_line
+        key = conditions.beta, conditions.loss_factor, in_vacuo, *line.values()  # nothing else decides
         if key not in self._searches:
-            conditions = Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss, **line)
             asked = SearchOptions(max_frequency=self.max_frequency)
-            lowest = partial(self._lowest, workspace=self._workspace) if condition.loss else self._lowest
-            resolved = self.linear.model.flow.resolved(line)
-            self._searches[key] = select_search(asked, conditions, lowest, self.modes, resolved).options
+            resolved = np.inf if in_vacuo else self.linear.model.flow.resolved(line)
+            self._searches[key] = select_search(asked, conditions, self._lowest, self.modes, resolved)
         return self._searches[key]
 
     def relaxation(self, loss: float) -> Relaxation | None:

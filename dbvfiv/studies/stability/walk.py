@@ -9,17 +9,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eigen import Column, ColumnSolver, SearchOptions, Workspace
+from eigen import Column, ColumnSolver, Workspace
+from eigen.column import DIRECT
 
-from ...errors import SolveError
+from ...errors import NotValidError, SolveError
 from ...model import ValveModel
 from ...model.classes import linearise_class
 from ...model.equilibria import LoadPath, SteadyOptions
+from ...model.leading import LeadingSearch
+from ...model.material_stability import material_stability
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...observer import Observer
 from ..case import Case
 from .family import ValveFamily
 from .place import Place, moving_surroundings, rebuilder
+from .verdict import Verdict
 
 #: Steps over the last one up to which a cubic is trusted ahead of it.
 REACH = 2.0
@@ -79,6 +83,7 @@ class StabilityWalk:
     ):
         self.case, self.symmetry = case, symmetry
         self._recalled: list[Place] = []
+        self._validity: dict[tuple, str] = {}
         self._workspace = Workspace()  # for structural frequencies
         self.observer = observer or Observer()
         self._rebuild = rebuilder(case)
@@ -182,29 +187,52 @@ class StabilityWalk:
             self._last = (key, ValveFamily(linear, modes.max_frequency, modes.count, self._workspace))
         return self._last[1]
 
-    def search(self, place: Place) -> SearchOptions:
-        """What is searched in the spectrum of a place.
+    def search(self, place: Place) -> LeadingSearch:
+        """What is searched in the spectrum of a place, and up to which frequency the search speaks for it.
 
         Raises
         ------
         SolveError
         """
-        return self.family(place).search(place.condition)
+        return self.family(place).leading(place.condition)
 
-    def spectrum(self, place: Place, count: int = 6, runaway: bool = False):
-        """Leading modes of the full pencil, an `eigen.Spectrum`; where asked with what of the wall runs away by itself.
+    def require_valid(self, place: Place) -> None:
+        """Refuse a place at which the constants of a rubber with loss factors are unstable.
 
         Raises
         ------
+        NotValidError
+            With the verdict on the place as its sentence.
+        SolveError
+            If there is no steady state.
+        """
+        loss = place.condition.loss
+        if not loss:
+            return
+        key = place.pressure, self._key(place), loss
+        if key not in self._validity:
+            if len(self._validity) > 4000:
+                self._validity.clear()
+            found = material_stability(self.built(place).model, self.equilibrium(place), loss)
+            self._validity[key] = "" if found.holds else found.sentence
+        if self._validity[key]:
+            raise NotValidError(self._validity[key])
+
+    def spectrum(self, place: Place, count: int = 6):
+        """Leading modes of the full pencil, an `eigen.Spectrum`.
+
+        Raises
+        ------
+        NotValidError
         SolveError
         """
+        self.require_valid(place)
         family = self.family(place)
         with _explained(place):
-            solver = self.built(place).solver
-            return (solver.whole if runaway else solver.direct)(family, place.condition, count)
+            return self.built(place).solver.direct(family, place.condition, count)
 
-    def column(self, places: list[Place], snapshots: int = 3, edges: bool = False) -> Column:
-        """Cells that share a steady state.
+    def column(self, places: list[Place], snapshots: int = 3, edges: bool = False, spectra=None) -> Column:
+        """Cells that share a steady state; those whose rubber has lost stability are left blank.
 
         Parameters
         ----------
@@ -213,14 +241,62 @@ class StabilityWalk:
             Of them, at which the vectors of the small model are made.
         edges : bool
             Certify only the places between which the number of unstable modes changes.
+        spectra : sequence of Spectrum, optional
+            Of one or two places, where they are known.
+
+        Raises
+        ------
+        NotValidError
+            If that is so at all of them.
+        SolveError
+        """
+        sound, refusal = [], None
+        for i, place in enumerate(places):
+            try:
+                self.require_valid(place)
+                sound.append(i)
+            except NotValidError as error:
+                refusal = error
+        if not sound:
+            raise refusal
+        family = self.family(places[0])
+        with _explained(places[0]):
+            conditions = [places[i].condition for i in sound]
+            column = self.built(places[0]).solver.solve(family, conditions, snapshots, edges, spectra)
+        return column if refusal is None else column.spread(sound, len(places))
+
+    def verdicts(self, places: list[Place], column: Column) -> list[Verdict]:
+        """Verdicts on places from the cells that `column` gave of them."""
+        return [self._verdict(place, column, i) for i, place in enumerate(places)]
+
+    def verdict(self, place: Place, spectrum=None) -> Verdict:
+        """Verdict on one place; its leading modes with the full pencil may be known.
 
         Raises
         ------
         SolveError
+            If there is no steady state, or its spectrum was not found.
         """
-        family = self.family(places[0])
-        with _explained(places[0]):
-            return self.built(places[0]).solver.solve(family, [p.condition for p in places], snapshots, edges)
+        try:
+            return self.verdicts([place], self.column([place], spectra=None if spectrum is None else [spectrum]))[0]
+        except NotValidError as error:
+            return Verdict.not_valid(str(error))
+
+    def _verdict(self, place: Place, column: Column, cell: int) -> Verdict:
+        try:
+            self.require_valid(place)
+        except NotValidError as error:
+            return Verdict.not_valid(str(error))
+        own = column.certificate(cell)
+        return Verdict.of(
+            column.leading[cell],
+            own.unstable,
+            own.counted,
+            own.certain,
+            proven=bool(column.how[cell] == DIRECT),
+            line=own.line,
+            band=min(own.band, self.search(place).claimed),
+        )
 
 
 @contextmanager

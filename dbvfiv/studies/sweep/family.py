@@ -17,25 +17,30 @@ from eigen import (
     certified_spectrum,
     leading_modes,
     listed_unstable,
-    lowest_frequencies,
     unstable_count,
 )
 from eigen.dense import all_eigenvalues
 from eigen.left import biorthogonalise, left_by_inverse_iteration
 
 from ...case.axis import Axis
+from ...errors import NotValidError
 from ...model import ValveModel
 from ...model.classes import linearise_class
 from ...model.dynamics import Conditions
 from ...model.equilibria import LoadPath, SteadyOptions
-from ...model.leading import LeadingSearch, select_search
+from ...model.leading import LeadingSearch
 from ...model.state import SteadyState
 from ...model.symmetry import symmetry_named
 from ...observer import Observer
+from ..stability.place import Place
+from ..stability.verdict import Verdict
+from ..stability.walk import StabilityWalk
 
 #: Static corrections below this share of the largest are left to the eigenvectors of the check points, which gives a
 #: smaller basis.
 _COMPRESSION = 1e-3
+#: Values at which the vectors of the small model of the verdicts are made.
+_SNAPSHOTS = 6
 #: Further places at most at which an enlarged basis is checked.
 _FRESH = 4
 #: Share of a band in which unstable eigenvalues are counted: its end must not cut through a mode.
@@ -90,6 +95,16 @@ class Family(Protocol):
 
     def states(self, values: np.ndarray) -> tuple[SteadyState, ...]: ...
 
+    def refusal(self, value: float) -> str: ...
+
+    def verdicts(self, values: np.ndarray, spectra: list[Spectrum]) -> dict[float, Verdict]: ...
+
+
+def _place_of(model: ValveModel, pressure: float, conditions: Conditions) -> Place:
+    """The place of a steady state under conditions."""
+    own = {name: getattr(conditions, name) for name in ("density", "alpha", "beta", "loss_factor")}
+    return Place.of(model.case).at(pressure=pressure, **own, **conditions.of_line)
+
 
 class FluidFamily:
     """One state; density, alpha, beta or the factor on the loss factors moves."""
@@ -98,13 +113,14 @@ class FluidFamily:
         self, model: ValveModel, state: SteadyState, axis: Axis, conditions: Conditions, options, observer: Observer
     ):
         self.state, self.axis, self.conditions, self.options, self.observer = state, axis, conditions, options, observer
+        self.walk = StabilityWalk(model.case, observer, model, symmetry_named(options.symmetry))
+        self.walk.give(_place_of(model, state.pressure, conditions), state.q)
         self.linear = linearise_class(model, state.q, state.pressure, symmetry_named(options.symmetry))
         self.pressure = state.pressure
         self.done: tuple[Check, ...] = ()
         self.notes: tuple[str, ...] = ()
         self.small = self.linear
         self._searches: WeakKeyDictionary[CoupledPencil, LeadingSearch] = WeakKeyDictionary()
-        self._frequencies = np.zeros(0)
         self.errors: dict[float, float] = {}
         self.workspace = Workspace()
 
@@ -184,15 +200,24 @@ class FluidFamily:
         return leading_modes(pencil, count, replace(asked, left=left))
 
     def _selected(self, value: float) -> LeadingSearch:
-        conditions = self.conditions_at(value)
-        resolved = self.linear.model.flow.resolved(conditions.of_line)
-        return select_search(self.options.search, conditions, self._lowest, self.options.count, resolved)
+        found = self.walk.search(self._place(value))
+        return replace(found, options=replace(found.options, tolerance=self.options.search.tolerance))
 
-    def _lowest(self, count: int) -> np.ndarray:
-        """Structural frequencies of the one state."""
-        if len(self._frequencies) < count:
-            self._frequencies = lowest_frequencies(self._full(self.axis.values[0]), count, self.workspace)
-        return self._frequencies[:count]
+    def _place(self, value: float) -> Place:
+        return _place_of(self.linear.model, self.pressure, self.conditions_at(value))
+
+    def refusal(self, value: float) -> str:
+        """Why the constants of the rubber do not hold at a value; empty where they do."""
+        return _refusal(self.walk, self._place(value))
+
+    def verdicts(self, values: np.ndarray, spectra: list[Spectrum]) -> dict[float, Verdict]:
+        """Verdict on each value, from cells of one column."""
+        places = [self._place(float(value)) for value in values]
+        if not places:
+            return {}
+        self.observer.progress("verdicts")
+        found = self.walk.verdicts(places, self.walk.column(places, min(len(places), _SNAPSHOTS)))
+        return dict(zip(map(float, values), found))
 
     def _full(self, value: float) -> CoupledPencil:
         return self.linear.pencil(self.conditions_at(value))
@@ -241,6 +266,7 @@ class PressureFamily:
         self.path = LoadPath(model, SteadyOptions.of(model.case), observer=observer)
         self.known: dict[float, SteadyState] = {}
         self.workspace = Workspace()
+        self.walk = StabilityWalk(model.case, observer, model, symmetry_named(options.symmetry))
         self.done: tuple[Check, ...] = ()
         self.notes: tuple[str, ...] = ()
         self.pressure = 0.0
@@ -253,7 +279,8 @@ class PressureFamily:
     def prepare(self, axis: Axis) -> None:
         self.pressure = axis.values[0]
 
-    def pencil(self, value: float) -> CoupledPencil:
+    def _place(self, value: float) -> Place:
+        """The place of a pressure, its state known to the walk."""
         self.pressure = value
         if value not in self.known:
             if self.known:
@@ -261,13 +288,30 @@ class PressureFamily:
                 if near.pressure != self.path.pressure:
                     self.path.q, self.path.pressure, self.path.slope = near.q, near.pressure, None
             self.known[value] = self.path.go_to(value)
+        place = _place_of(self.model, value, self.conditions)
+        self.walk.give(place, self.known[value].q)
+        return place
+
+    def refusal(self, value: float) -> str:
+        """Why the constants of the rubber do not hold at a pressure; empty where they do."""
+        return _refusal(self.walk, self._place(value)) if self.conditions.loss_factor else ""
+
+    def verdicts(self, values: np.ndarray, spectra: list[Spectrum]) -> dict[float, Verdict]:
+        """Verdict on each pressure, from its leading modes and a count."""
+        found = {}
+        for value, spectrum in zip(map(float, values), spectra):
+            self.observer.progress(f"verdict at {value:.6g} Pa")
+            found[value] = self.walk.verdict(self._place(value), spectrum)
+        return found
+
+    def pencil(self, value: float) -> CoupledPencil:
+        place = self._place(value)
         symmetry = symmetry_named(self.options.symmetry)
         pencil = linearise_class(self.model, self.known[value].q, value, symmetry).pencil(self.conditions)
         if value not in self._bands:
-            search, workspace = self.options.search, self.workspace
-            lowest = lambda n: lowest_frequencies(pencil, n, workspace)  # noqa: E731
-            resolved = self.model.flow.resolved(self.conditions.of_line)
-            self._bands[value] = select_search(search, self.conditions, lowest, self.options.count, resolved)
+            found = self.walk.search(place)
+            asked = replace(found.options, tolerance=self.options.search.tolerance)
+            self._bands[value] = replace(found, options=asked)
         self._searches[pencil] = self._bands[value]
         return pencil
 
@@ -294,6 +338,14 @@ class PressureFamily:
 
     def states(self, values: np.ndarray) -> tuple[SteadyState, ...]:
         return tuple(self.known[float(value)] for value in values)
+
+
+def _refusal(walk: StabilityWalk, place: Place) -> str:
+    try:
+        walk.require_valid(place)
+    except NotValidError as error:
+        return str(error)
+    return ""
 
 
 def _largest_gap(wanted: np.ndarray, found: np.ndarray) -> float:

@@ -36,7 +36,8 @@ def rows_of_sweep(result: SweepResult) -> list[str]:
         there = [b for b in result.branches if np.isfinite(b.growth_rate[i])]
         leading = max(there, key=lambda b: b.growth_rate[i], default=None)
         growth, frequency = (leading.growth_rate[i], leading.frequency[i]) if leading else (np.nan, np.nan)
-        rows.append(_row(value, growth, frequency, result.unstable_count[i]))
+        outcome = result.verdicts[i].outcome if result.verdicts else ""
+        rows.append(f"{_row(value, growth, frequency, result.unstable_count[i])}  {outcome}".rstrip())
     return rows
 
 

@@ -19,6 +19,7 @@ from ...record.states import SUMMARY
 from ...record.table import TableSpec
 from ..result import StudyResult
 from ..session import describe_surroundings
+from ..stability.verdict import Verdict
 from . import curves, locus
 from .printed import crossing_line, head, rows_of_sweep
 
@@ -185,6 +186,12 @@ class SweepResult(StudyResult):
         over = self.record.notes("over")
         return bool(over) and over[-1]["certified"]
 
+    @cached_property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Verdict on each value; none of a sweep that is not over, or was made by an earlier version."""
+        over = self.record.notes("over")
+        return tuple(map(Verdict.read, over[-1].get("verdicts", ()))) if over else ()
+
     @property
     def notes(self) -> tuple[str, ...]:
         over = self.record.notes("over")
@@ -223,6 +230,7 @@ class SweepResult(StudyResult):
             "values": self.values.tolist(),
             "branches": [branch.summary() for branch in self.branches],
             "unstable_count": self.unstable_count.tolist(),
+            "verdict": [verdict.summary() for verdict in self.verdicts],
             "crossings": [vars(crossing) for crossing in self.crossings()],
             "certificate": {"certified": self.certified, "checks": list(self.checks)},
             "surroundings": {name: v for name, v in describe_surroundings(self.case).items() if name != self.parameter},

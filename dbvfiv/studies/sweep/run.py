@@ -21,11 +21,13 @@ from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, chosen_symmetries
 from ...observer import Observer
 from ..solving import solving
+from ..stability.verdict import Verdict, not_valid_at
 from .family import Check, Family, FluidFamily, PressureFamily
 
 #: Writing what is done may take this share of the time; a sweep of small cost is written once.
 _KEEPING = 0.05
 _KEEP_AFTER = 2.0
+_UNKNOWN = Verdict.undecided("The sweep ended before a verdict was made.")
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,8 @@ class FoundBranches:
     checks : tuple of Check
     certified : bool
         All checks held.
+    verdicts : (p,) tuple of Verdict
+        On each value.
     states : tuple of SteadyState
         One for each value over pressure, a single one otherwise.
     notes, failures : tuple of str
@@ -113,6 +117,7 @@ class FoundBranches:
     unstable_count: np.ndarray
     checks: tuple[Check, ...]
     certified: bool
+    verdicts: tuple[Verdict, ...]
     states: tuple[SteadyState, ...]
     notes: tuple[str, ...] = ()
     failures: tuple[str, ...] = ()
@@ -199,6 +204,7 @@ def _outside(model: ValveModel, result: FoundBranches) -> tuple[str, ...]:
     if not growth.size:
         return ()
     leading = result.branches.frequency[np.argmax(growth, axis=0), np.arange(growth.shape[1])]
+    leading = leading[np.isfinite(leading)]
     sentence = outside_band(model.case, leading)
     return () if sentence is None else (sentence,)
 
@@ -213,10 +219,27 @@ class _Run:
         self.pencils: dict[float, object] = {}
         self.spectra: dict[int, Spectrum] = {}
         self.points: list[SweepPoint] = []
+        self.refused: dict[float, str] = {}
         self.branches: Branches | None = None
 
     def follow(self, values) -> None:
-        self.branches = track(self._pencil, values, self.track, solver=self._solve, observer=self._done)
+        """Track the modes over the values at which the constants of the rubber hold."""
+        sound, failure = [], None
+        for value in values:
+            try:
+                refusal = self.family.refusal(float(value))
+            except SolveError as error:  # what lies before it is followed
+                failure = error
+                break
+            if refusal:
+                self.refused[float(value)] = refusal
+                self._keep_point(SweepPoint(float(value), np.zeros(0, complex), -1))
+            else:
+                sound.append(float(value))
+        if sound:
+            self.branches = track(self._pencil, sound, self.track, solver=self._solve, observer=self._done)
+        if failure is not None:
+            raise failure
 
     def _pencil(self, value: float):
         value = float(value)
@@ -231,7 +254,9 @@ class _Run:
 
     def _done(self, value: float, _solves: int) -> None:
         spectrum = self._solve(self._pencil(value))
-        point = SweepPoint(value, spectrum.eigenvalues, spectrum.unstable_count)
+        self._keep_point(SweepPoint(value, spectrum.eigenvalues, spectrum.unstable_count))
+
+    def _keep_point(self, point: SweepPoint) -> None:
         self.points.append(point)
         self.observer.item(point)
         start = time.monotonic()
@@ -241,16 +266,23 @@ class _Run:
             self.keep_at = now + max(_KEEP_AFTER, (now - start) / _KEEPING)
 
     def result(self, interrupted: bool, failures) -> FoundBranches:
-        values = np.array([point.value for point in self.points])
-        points, solves, found = tuple(self.points), len(self.spectra), self.branches
-        if found is None and len(values):  # as far as it came, from the spectra kept
-            found = track(self._pencil, values, self.track, solver=self._solve)
+        sound = np.array([point.value for point in self.points if point.value not in self.refused])
+        solves, found = len(self.spectra), self.branches
+        if found is None and len(sound):  # as far as it came, from the spectra kept
+            found = track(self._pencil, sound, self.track, solver=self._solve)
         branches = (
-            _shown(found, self.family, values)
-            if len(values)
-            else Branches(np.zeros(0, int), values, *np.zeros((2, 0, 0)), 0)
+            _shown(found, self.family, sound)
+            if len(sound)
+            else Branches(np.zeros(0, int), sound, *np.zeros((2, 0, 0)), 0)
         )
-        checks, notes = self.family.checks(values) if len(values) and not interrupted else (self.family.done, ())
+        checks, notes = self.family.checks(sound) if len(sound) and not interrupted else (self.family.done, ())
+        known = {} if interrupted else self.family.verdicts(sound, [self._solve(self._pencil(v)) for v in sound])
+        known |= {value: Verdict.not_valid(sentence) for value, sentence in self.refused.items()}
+        if self.refused:
+            notes = (*notes, not_valid_at(self.axis.parameter, self.refused))
+        points = sorted(self.points, key=lambda point: list(self.axis.values).index(point.value))
+        values = np.array([point.value for point in points])
+        branches = _with_gaps(branches, sound, values)
         certified = bool(checks) and not interrupted and all(check.holds for check in checks)
         counts = np.array([point.unstable_count for point in points], int)
         return FoundBranches(
@@ -261,11 +293,21 @@ class _Run:
             counts,
             tuple(checks),
             certified,
+            tuple(known.get(value, _UNKNOWN) for value in values),
             self.family.states(values),
             tuple(notes),
             tuple(failures),
             interrupted,
         )
+
+
+def _with_gaps(branches: Branches, sound: np.ndarray, values: np.ndarray) -> Branches:
+    """The same branches over more values, those left out not being there."""
+    eigenvalues = np.full((len(branches.ids), len(values)), complex(np.nan, np.nan))
+    confidence = np.full(eigenvalues.shape, np.nan)
+    at = np.flatnonzero(np.isin(values, sound))
+    eigenvalues[:, at], confidence[:, at] = branches.eigenvalues, branches.confidence
+    return Branches(branches.ids, values, eigenvalues, confidence, branches.solves)
 
 
 def _shown(branches: Branches, family: Family, values: np.ndarray) -> Branches:

@@ -48,7 +48,8 @@ def run(session: Session, record: GrowingRecord) -> None:
         if rows:
             record.extend(table, {name: [row[name] for row in rows] for name in rows[0]})
         places[table] = [first, first + len(rows)]
-    record.note("over", certified=found.certified, remarks=list(found.notes), rows=places)
+    verdicts = [verdict.summary() for verdict in found.verdicts]
+    record.note("over", certified=found.certified, remarks=list(found.notes), rows=places, verdicts=verdicts)
     for sentence in found.failures:
         record.note("failure", text=sentence)
     if found.interrupted:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...verdict import JudgeOptions, Verdict, judge
+from ..stability.verdict import DIVERGES, FLUTTERS, STABLE, UNDECIDED
+from ..stability.verdict import Verdict as StabilityVerdict
 
 #: Columns of a history by name.
 Columns = Mapping[str, np.ndarray]
@@ -75,6 +77,7 @@ class RunVerdict:
         }
 
 
+_STABILITY = {"steady": STABLE, "decaying": STABLE, "limit cycle": FLUTTERS, "growing": FLUTTERS}
 _LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undecided", "irregular")
 
 
@@ -104,6 +107,23 @@ def assess(
         reason = "The smallest flow area stays at that of the lip gap at rest."
         found = [Verdict(**{**vars(v), "name": "closed", "decided": True, "reason": reason}) for v in found]
     return RunVerdict(*found, residual, len(time) - 1, float(time[-1]))
+
+
+def stability_of(summary: Mapping[str, Any]) -> StabilityVerdict:
+    """Stability of the steady state that a run was kicked from, by what became of the kick.
+
+    Parameters
+    ----------
+    summary : mapping
+        Of a `RunVerdict`.
+    """
+    lip = summary.get("lip_displacement") or {}
+    frequency = lip.get("frequency") or np.nan
+    outcome = _STABILITY.get(summary["verdict"], UNDECIDED)
+    if summary["verdict"] == "growing" and not np.isfinite(frequency):
+        outcome = DIVERGES
+    reason = f"After a kick the run in time ends as {summary['verdict']}: {summary['reason']}"
+    return StabilityVerdict(outcome, reason, frequency=frequency, certain=bool(summary["decided"]))
 
 
 def beyond_model(history: Columns) -> str | None:

@@ -17,11 +17,14 @@ from ...record.record import Record
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
 from ..result import StudyResult
+from ..stability.verdict import Verdict
 from . import figures
 from .animation import animate
-from .assess import assess
+from .assess import assess, stability_of
 from .tables import HISTORY, PROFILES, SCALARS, STATE_COLUMNS, STATES, added_columns
 
+#: Kind of the note that says why the constants of the rubber do not hold at the state that was kicked.
+REFUSAL = "not valid"
 _NO_VERDICT = {
     "verdict": "undecided",
     "decided": False,
@@ -132,6 +135,16 @@ class TransientResult(StudyResult):
         gap = self.mesh.part.copies * float(self.history["station_area"][0, 0])
         return assess(self.history, gap).summary()
 
+    @cached_property
+    def stability(self) -> Verdict | None:
+        """Verdict on the steady state that the run was kicked from; None of a run that was not kicked."""
+        if self.case.transient.start != "kick" or not self.begun:
+            return None
+        refusals = self.record.notes(REFUSAL)
+        if refusals:
+            return Verdict.not_valid(refusals[-1]["text"])
+        return stability_of(self.verdict)
+
     @property
     def complete(self) -> bool:
         """Whether the run went to its end, or to where its verdict ended it."""
@@ -168,6 +181,7 @@ class TransientResult(StudyResult):
                 last["dissipated"] = self.dissipated()
         return {
             **self.verdict,
+            "stability": self.stability and self.stability.summary(),
             "last": last,
             "states": len(self.states),
             "failures": list(self.failures),
@@ -194,6 +208,7 @@ class TransientResult(StudyResult):
                 f"{verdict['time']:.4g} s and {verdict['steps']} steps{under}"
             ),
             verdict["reason"],
+            *([self.stability.sentence(under.removeprefix(", "))] if self.stability else []),
             "",
             "                         last         mean    amplitude    frequency   cycles   periodicity error",
         ]

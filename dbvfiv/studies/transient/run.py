@@ -11,6 +11,7 @@ import numpy as np
 from ...errors import SolveError
 from ...model import ValveModel
 from ...model.equilibria import model_warnings
+from ...model.material_stability import material_stability
 from ...motion.choice import motion_of
 from ...motion.control import step_control
 from ...motion.drive import Drive
@@ -26,6 +27,7 @@ from .assess import RunVerdict, assess, beyond_model
 from .history import Reader
 from .keeping import Keeper
 from .progress import Progress
+from .result import REFUSAL
 from .stored import stored_state
 from .tables import tables_of
 
@@ -111,6 +113,7 @@ class Runner:
         progress = Progress(state, energy=energy, control=tuple(self.control.pack()))
         if kick is not None:
             progress.eigenvalue = kick.eigenvalue
+            self._judge_rubber(state)
         self._reader = Reader(self.motion, progress.energy)
         row = self._reader.first(state, inlet)
         self.keeper.append(row)
@@ -135,6 +138,14 @@ class Runner:
         if self.case.transient.start == "state":
             return stored_state(self.motion, self.case, inlet), None
         return first_state(self.motion, self.case, inlet, self.record)
+
+    def _judge_rubber(self, state: MotionState) -> None:
+        """Note where the constants of rubbers with loss factors do not hold at the state that is kicked."""
+        loss = self.motion.conditions.loss_factor
+        found = material_stability(self.model, state.q, loss) if loss else None
+        if found is not None and not found.holds:
+            self.record.note(REFUSAL, text=found.sentence)
+            self.record.warn(found.sentence)
 
     # -- the loop
     # ----

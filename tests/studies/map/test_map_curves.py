@@ -35,15 +35,15 @@ def test_linked_tongue_is_one_curve(case):
     assert not curve.exact and "not known between" in curve.reason
 
 
-@pytest.mark.parametrize("away", [0, 1])
-def test_a_wall_that_runs_away_calls_for_no_columns(case, away):
-    """A change of the number of unstable modes at the lower edge does, where no curve ends there."""
+@pytest.mark.parametrize("solved", [True, False])
+def test_a_change_at_the_lower_edge_calls_for_columns(case, solved):
+    """Where no curve ends there; beside a column whose cells are not valid nothing is known of it."""
     plan = MapPlan.of(case)
     columns = []
     for value, number in ((1000.0, 0), (2000.0, 1)):
-        cells = {"unstable": np.full((1, 3), number), "runaway": np.full((1, 3), number * away)}
+        cells = {"unstable": np.full((1, 3), number if solved else -1)}
         columns.append(MapColumn(value, 0, cells, np.zeros((0, 5)), 0.0))
-    assert bool(Web.of(plan, columns, 0).wanted()) == (not away)
+    assert bool(Web.of(plan, columns, 0).wanted()) == solved
 
 
 @pytest.fixture(scope="module")

@@ -92,6 +92,6 @@ def test_an_onset_has_a_kind_and_names_what_is_outside():
 def test_verdicts_name_what_is_outside():
     changes = MESH | {"outside.fluid": 1000.0, "outside.pipe_diameter": 0.33, "drive.pressure": 6e3}
     found = dbvfiv.load(changes=changes).modes(count=4)
-    assert "continuity with fluid of 1000 kg/m3 outside, in a pipe of 330 mm" in found.verdict
+    assert "continuity with fluid of 1000 kg/m3 outside, in a pipe of 330 mm" in found.sentence
     still = dbvfiv.load(changes=changes | {"modes.in_vacuo": True}).modes(count=4)
-    assert still.verdict.startswith("Stable with fluid of 1000 kg/m3 outside")
+    assert still.sentence.startswith("Stable with fluid of 1000 kg/m3 outside")

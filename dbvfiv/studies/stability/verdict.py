@@ -1,0 +1,225 @@
+"""Stability verdict on one steady state: the same object from every study that makes one.
+
+The verdict rests on a list of eigenvalues and on the independent count of the unstable ones (argument principle). It
+holds up to a frequency: small models resolve no modes above it, so "stable" names that frequency. An unstable
+eigenvalue whose pair satisfies the full equations is proof by itself. A wall whose rubber has lost material stability
+gives no verdict on vibration at all: its constants do not describe the rubber at these strains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from ...case.parameters import PARAMETERS
+
+STABLE, FLUTTERS, DIVERGES, NOT_VALID, UNDECIDED = "stable", "flutters", "diverges", "not valid", "undecided"
+#: Outcomes, the one that decides about several motions of a state first.
+OUTCOMES = (NOT_VALID, DIVERGES, FLUTTERS, UNDECIDED, STABLE)
+#: Size of a growth rate over that of its eigenvalue below which its sign is that of rounding.
+NEUTRAL = 1e-9
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Stability of one steady state.
+
+    Attributes
+    ----------
+    outcome : str
+        "stable"; "flutters": an oscillating mode grows; "diverges": a motion grows without oscillating; "not valid":
+        the rubber's constants are unstable here; "undecided".
+    reason : str
+        One sentence.
+    growth_rate, frequency : float, 1/s, Hz
+        Of the leading oscillating mode, of a valve that diverges those of the motion that does (0 Hz); NaN if unknown.
+    damping_ratio : float
+        Of the least damped oscillating mode that is listed; NaN if unknown.
+    critical_damping_factor : float
+        Factor on the loss factors, or on beta, at which flutter would begin; NaN where it was not asked for or where
+        no factor in reach makes the difference.
+    certain : bool
+        The list and the independent count agree; always so where nothing was searched because the constants fail.
+    band : float, Hz
+        Frequency up to which modes were looked for; infinite for all.
+    """
+
+    outcome: str
+    reason: str
+    growth_rate: float = np.nan
+    frequency: float = np.nan
+    damping_ratio: float = np.nan
+    critical_damping_factor: float = np.nan
+    certain: bool = False
+    band: float = np.inf
+
+    @classmethod
+    def of(
+        cls,
+        eigenvalues,
+        unstable: int,
+        counted: int,
+        certain: bool,
+        *,
+        proven: bool = True,
+        line: float = 0.0,
+        band: float = np.inf,
+        statement: str = "",
+    ) -> Verdict:
+        """Verdict from a list of leading eigenvalues and the independent count.
+
+        Parameters
+        ----------
+        eigenvalues : array_like, complex, 1/s
+            Leading ones, a conjugate pair given once.
+        unstable, counted : int
+            Unstable eigenvalues by the list and by the argument principle, conjugates counted apart.
+        certain : bool
+            The count followed its phase everywhere, and what both rest on is accurate enough.
+        proven : bool
+            The eigenvalues satisfy the full equations, so that an unstable one is proof without the count.
+        line : float, 1/s
+            Growth rate counted from.
+        band : float, Hz
+        statement : str
+            What to say of the two counts instead of the standard sentence.
+
+        Examples
+        --------
+        >>> Verdict.of([5 + 60j, -3 + 80j], 2, 2, True).outcome
+        'flutters'
+        >>> Verdict.of([], 0, 0, True).outcome
+        'undecided'
+        """
+        values = np.asarray(eigenvalues, complex)
+        values = values[np.isfinite(values.real)]
+        agrees = certain and unstable == counted
+        statement = statement or describe_counts(unstable, counted, certain, line, band)
+        if not values.size:
+            return cls(UNDECIDED, f"No mode was found in the search, which says nothing of the state. {statement}")
+        swings = values[values.imag != 0]
+        growing = values.real > np.maximum(line, NEUTRAL * np.abs(values))
+        still = values[growing & (values.imag == 0)]
+        measures = {"certain": bool(agrees), "band": float(band)} | _of_modes(swings)
+        if growing.any() and (agrees or proven):
+            if still.size:
+                rate = float(still.real.max())
+                measures |= {"growth_rate": rate, "frequency": 0.0}
+                also = " An oscillating mode grows besides." if (growing & (values.imag != 0)).any() else ""
+                reason = f"A motion grows by {rate:.4g} 1/s without oscillating.{also} {statement}"
+                return cls(DIVERGES, reason, **measures)
+            return cls(FLUTTERS, statement, **measures)
+        if growing.any() or not agrees or counted:
+            return cls(UNDECIDED, statement, **measures)
+        return cls(STABLE, statement, **measures)
+
+    @classmethod
+    def not_valid(cls, sentence: str) -> Verdict:
+        """Verdict on a wall whose rubber has lost material stability; the sentence says where and what mends it."""
+        return cls(NOT_VALID, sentence, certain=True, band=np.nan)
+
+    @classmethod
+    def undecided(cls, sentence: str) -> Verdict:
+        """No verdict, and why."""
+        return cls(UNDECIDED, sentence, band=np.nan)
+
+    @classmethod
+    def joined(cls, parts: Mapping[str, Verdict]) -> Verdict:
+        """Verdict on all symmetry classes of a state by their names: the worst of them, certain if all are."""
+        if len(parts) == 1:
+            return next(iter(parts.values()))
+        worst = min(parts, key=lambda name: (OUTCOMES.index(parts[name].outcome), -_or_least(parts[name].growth_rate)))
+        ratios = [part.damping_ratio for part in parts.values() if np.isfinite(part.damping_ratio)]
+        return replace(
+            parts[worst],
+            reason=" ".join(f"In {name}: {_lowered(part.reason)}" for name, part in parts.items()),
+            damping_ratio=min(ratios, default=np.nan),
+            certain=all(part.certain for part in parts.values()),
+        )
+
+    @property
+    def stable(self) -> bool | None:
+        """True or False where that is known, else None."""
+        return {STABLE: True, FLUTTERS: False, DIVERGES: False}.get(self.outcome)
+
+    @property
+    def holds(self) -> bool:
+        """Whether growth rates mean anything: the rubber's constants are stable here."""
+        return self.outcome != NOT_VALID
+
+    def sentence(self, conditions: str = "") -> str:
+        """One sentence for people, with the words behind the outcome that say under which conditions."""
+        words = f"{self.outcome[0].upper()}{self.outcome[1:]} {conditions}".rstrip()
+        return f"{words}: {_lowered(self.reason)}" + "".join(f" {said}" for said in (self.margin,) if said)
+
+    @property
+    def margin(self) -> str:
+        """The margin as a sentence; empty where nothing is known of it."""
+        if not self.holds or not np.isfinite(self.damping_ratio):
+            return ""
+        said = f"The least damped mode has a damping ratio of {100 * self.damping_ratio:.2g} %"
+        factor = self.critical_damping_factor
+        if np.isfinite(factor):
+            begins = "flutter would begin" if self.outcome == STABLE else "flutter would end"
+            said += f"; {begins} at {factor:.3g} times the damping of the wall"
+        return said + "."
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers for JSON; None for what is not known."""
+        return {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
+
+    @classmethod
+    def read(cls, summary: Mapping[str, Any]) -> Verdict:
+        """The verdict that `summary` gave."""
+        numbers = {"growth_rate", "frequency", "damping_ratio", "critical_damping_factor", "band"}
+        given = {field.name: summary[field.name] for field in fields(cls)}
+        missing = {name: np.nan for name in numbers if given[name] is None}
+        return cls(**given | missing)
+
+
+def _of_modes(swings: np.ndarray) -> dict[str, float]:
+    """Growth rate and frequency of the leading oscillating mode, and the least damping ratio."""
+    if not swings.size:
+        return {}
+    leading = swings[int(np.argmax(swings.real))]
+    return {
+        "growth_rate": float(leading.real),
+        "frequency": float(abs(leading.imag) / (2 * np.pi)),
+        "damping_ratio": float((-swings.real / np.abs(swings)).min()),
+    }
+
+
+def describe_counts(unstable: int, counted: int, certain: bool, line: float, band: float) -> str:
+    """Sentence on the unstable eigenvalues listed and counted, and on the region that was looked at."""
+    where = "" if line == 0 else f" with a growth rate above {line:.4g} 1/s"
+    where += "" if not np.isfinite(band) else f" up to {band:.4g} Hz"
+    if certain and unstable == counted:
+        return f"{unstable} unstable eigenvalues{where}: the spectrum and the independent count agree."
+    if counted < 0:
+        return f"{unstable} unstable eigenvalues{where} are listed; nobody counted them."
+    if not certain:
+        return f"{unstable} unstable eigenvalues{where} are listed; the independent count ({counted}) is uncertain."
+    return f"{unstable} unstable eigenvalues{where} are listed, the independent count finds {counted}: they disagree."
+
+
+def not_valid_at(parameter: str, unsound: Mapping[float, str]) -> str:
+    """Sentence on the values of a parameter at which the constants of the rubber do not hold."""
+    row, values = PARAMETERS[parameter], sorted(unsound)
+    low, high = (f"{value / row.scale:.6g}" for value in (values[0], values[-1]))
+    where = f"{low} {row.shown_unit}" if low == high else f"{len(values)} values from {low} to {high} {row.shown_unit}"
+    return f"Not valid at {where}: {unsound[values[0]]}"
+
+
+def _lowered(sentence: str) -> str:
+    return f"{sentence[:1].lower()}{sentence[1:]}"
+
+
+def _or_least(value: float) -> float:
+    return value if np.isfinite(value) else -np.inf
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and not np.isfinite(value) else value
