@@ -44,6 +44,9 @@ StrainLevel = Annotated[
 ]
 
 
+Constants = Literal["stable", "published"]
+
+
 def _density(default: Any) -> Any:
     return key(default, "Mass density.", gt=0, le=30000)
 
@@ -81,6 +84,17 @@ class Yeoh(Relaxing):
     c10: Modulus = key(..., "Factor of I1 - 3, half the shear modulus at small strain.", gt=0, le=1e12)
     c20: Modulus = key(0.0, "Factor of (I1 - 3)^2.", ge=-1e12, le=1e12)
     c30: Modulus = key(0.0, "Factor of (I1 - 3)^3.", ge=-1e12, le=1e12)
+    density: Density = _density(...)
+
+
+class Softening(Relaxing):
+    """Incompressible W = 1/2 [mu_inf x + 2 mu_0 x_0 (sqrt(1 + x/x_0) - 1) + c x^2/2] with x = I1 - 3."""
+
+    kind: Literal["softening"] = key(..., "Incompressible rubber with a knee at small strain, stable in every state.")
+    mu_inf: Modulus = key(0.0, "Shear modulus beyond the knee.", ge=0, le=1e12)
+    mu_0: Modulus = key(..., "What the shear modulus at small strain exceeds mu_inf by.", gt=0, le=1e12)
+    x_0: Number = key(..., "I1 - 3 at the knee, 3 times the square of a small strain in tension.", gt=0, le=1e6)
+    c: Modulus = key(0.0, "Stiffening at large strains.", ge=0, le=1e12)
     density: Density = _density(...)
 
 
@@ -148,7 +162,7 @@ class Fit(Relaxing):
     )
     planar: Path | None = key(None, "CSV file of a test in planar tension (pure shear), fitted with the others.")
     biaxial: Path | None = key(None, "CSV file of a test in equibiaxial tension, fitted with the others.")
-    law: Literal["mooney-rivlin", "neo-hookean", "yeoh"] = key("mooney-rivlin", "Form of its energy.")
+    law: Literal["softening", "mooney-rivlin", "neo-hookean", "yeoh"] = key("softening", "Form of its energy.")
     terms: Literal[1, 2, 3] | None = key(
         None,
         "Number of constants: mooney-rivlin 2 (c10, c01) or 3 (and c11), yeoh 3 or 2; the first of them if not given.",
@@ -178,10 +192,11 @@ class Fit(Relaxing):
 
 
 class ShippedRubber(Relaxing):
-    """One of the three tested rubbers at a strain level (constants of App. A)."""
+    """One of the three tested rubbers at a strain level."""
 
     kind: Literal["shipped"] = key(..., "A rubber whose constants come with the program.")
     rubber: Literal["CR", "SBR", "EPDM"] = key(..., "Which rubber.")
+    constants: Constants = key("stable", "As materials.constants has it for the built-in rubbers.")
     strain_level: Percent = key(0.10, "Strain up to which its constants were fitted.", ge=0.10, le=0.60)
     density: Density = _density(1300.0)
 
@@ -192,7 +207,9 @@ class BuiltIn(Relaxing):
     kind: Literal["built-in"] = key("built-in", "What the material is without this table.")
 
 
-Card = MooneyRivlin | Yeoh | NeoHookean | Isotropic | Orthotropic | HalpinTsai | Fit | ShippedRubber | BuiltIn
+Card = (
+    MooneyRivlin | Yeoh | Softening | NeoHookean | Isotropic | Orthotropic | HalpinTsai | Fit | ShippedRubber | BuiltIn
+)
 KINDS = {c.model_fields["kind"].annotation.__args__[0]: c for c in Card.__args__}
 
 
@@ -204,6 +221,11 @@ class Materials(Section):
         "Strain level of the built-in rubbers CR, SBR and EPDM; between the tested levels "
         "10, 20, 40 and 60 % the constants are interpolated; auto finds for each of them the level that agrees with "
         "what its layers strain at drive.pressure, or at the highest of steady.pressures.",
+    )
+    constants: Constants = key(
+        "stable",
+        "Constants of the built-in rubbers: of a law fitted to the published curves that is stable in every state, or "
+        "the published ones (App. A, the thesis), which lose stability at strains below their level.",
     )
     fibre_constants: Literal["program", "table"] = key(
         "program",
@@ -258,7 +280,8 @@ class Materials(Section):
         changes = {}
         for name, level in levels.items():
             own = self.named[name].model_dump(mode="json") if name in self.named else {}
-            changes[f"materials.{name}"] = own | {"kind": "shipped", "rubber": name, "strain_level": level}
+            shipped = {"kind": "shipped", "rubber": name, "strain_level": level, "constants": self.constants}
+            changes[f"materials.{name}"] = own | shipped
         return changes
 
     def is_built_in(self, name: str) -> bool:
@@ -285,7 +308,7 @@ class Materials(Section):
             return self.named[name]
         if name in RUBBERS:
             level = LOWEST_LEVEL if self.strain_level == AUTO else self.strain_level
-            return ShippedRubber(kind="shipped", rubber=name, strain_level=level)
+            return ShippedRubber(kind="shipped", rubber=name, strain_level=level, constants=self.constants)
         if name == "fibre":
             return HalpinTsai()
         raise KeyError(name)
