@@ -7,7 +7,7 @@ A material card is data only; what it does under strain is the business of the
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -42,6 +42,9 @@ StrainLevel = Annotated[
     BeforeValidator(_strain_level),
     Described("plain number or choice", 'a number at least 10 % and at most 60 %, or "auto"', _PERCENT),
 ]
+
+
+Constants = Literal["stable", "published"]
 
 
 def _density(default: Any) -> Any:
@@ -81,6 +84,17 @@ class Yeoh(Relaxing):
     c10: Modulus = key(..., "Factor of I1 - 3, half the shear modulus at small strain.", gt=0, le=1e12)
     c20: Modulus = key(0.0, "Factor of (I1 - 3)^2.", ge=-1e12, le=1e12)
     c30: Modulus = key(0.0, "Factor of (I1 - 3)^3.", ge=-1e12, le=1e12)
+    density: Density = _density(...)
+
+
+class Softening(Relaxing):
+    """Incompressible W = 1/2 [mu_inf x + 2 mu_0 x_0 (sqrt(1 + x/x_0) - 1) + c x^2/2] with x = I1 - 3."""
+
+    kind: Literal["softening"] = key(..., "Incompressible rubber with a knee at small strain, stable in every state.")
+    mu_inf: Modulus = key(0.0, "Shear modulus beyond the knee.", ge=0, le=1e12)
+    mu_0: Modulus = key(..., "What the shear modulus at small strain exceeds mu_inf by.", gt=0, le=1e12)
+    x_0: Number = key(..., "I1 - 3 at the knee, 3 times the square of a small strain in tension.", gt=0, le=1e6)
+    c: Modulus = key(0.0, "Stiffening at large strains.", ge=0, le=1e12)
     density: Density = _density(...)
 
 
@@ -148,7 +162,7 @@ class Fit(Relaxing):
     )
     planar: Path | None = key(None, "CSV file of a test in planar tension (pure shear), fitted with the others.")
     biaxial: Path | None = key(None, "CSV file of a test in equibiaxial tension, fitted with the others.")
-    law: Literal["mooney-rivlin", "neo-hookean", "yeoh"] = key("mooney-rivlin", "Form of its energy.")
+    law: Literal["softening", "mooney-rivlin", "neo-hookean", "yeoh"] = key("softening", "Form of its energy.")
     terms: Literal[1, 2, 3] | None = key(
         None,
         "Number of constants: mooney-rivlin 2 (c10, c01) or 3 (and c11), yeoh 3 or 2; the first of them if not given.",
@@ -178,10 +192,11 @@ class Fit(Relaxing):
 
 
 class ShippedRubber(Relaxing):
-    """One of the three tested rubbers at a strain level (constants of App. A)."""
+    """One of the three tested rubbers at a strain level."""
 
     kind: Literal["shipped"] = key(..., "A rubber whose constants come with the program.")
     rubber: Literal["CR", "SBR", "EPDM"] = key(..., "Which rubber.")
+    constants: Constants = key("stable", "As materials.constants has it for the built-in rubbers.")
     strain_level: Percent = key(0.10, "Strain up to which its constants were fitted.", ge=0.10, le=0.60)
     density: Density = _density(1300.0)
 
@@ -192,7 +207,9 @@ class BuiltIn(Relaxing):
     kind: Literal["built-in"] = key("built-in", "What the material is without this table.")
 
 
-Card = MooneyRivlin | Yeoh | NeoHookean | Isotropic | Orthotropic | HalpinTsai | Fit | ShippedRubber | BuiltIn
+Card = (
+    MooneyRivlin | Yeoh | Softening | NeoHookean | Isotropic | Orthotropic | HalpinTsai | Fit | ShippedRubber | BuiltIn
+)
 KINDS = {c.model_fields["kind"].annotation.__args__[0]: c for c in Card.__args__}
 
 
@@ -200,10 +217,17 @@ class Materials(Section):
     """Materials by name; every table ``[materials.NAME]`` adds or replaces one."""
 
     strain_level: StrainLevel = key(
-        0.10,
+        AUTO,
         "Strain level of the built-in rubbers CR, SBR and EPDM; between the tested levels "
-        "10, 20, 40 and 60 % the constants are interpolated; auto finds for each of them the level that agrees with "
-        "what its layers strain at drive.pressure, or at the highest of steady.pressures.",
+        "10, 20, 40 and 60 % the constants are interpolated (10 %, the thesis). With auto each has the level that its "
+        "layers strain to at the largest pressure that the case names: of drive.pressure and steady.pressures, and of "
+        "closure.rated_pressure or closure.pressures where one is given. It is settled once, on 14 x 24 elements, to "
+        "0.1 %, and is the same in all studies.",
+    )
+    constants: Constants = key(
+        "stable",
+        "Constants of the built-in rubbers: of a law fitted to the published curves that is stable in every state, or "
+        "the published ones (App. A, the thesis), which lose stability at strains below their level.",
     )
     fibre_constants: Literal["program", "table"] = key(
         "program",
@@ -258,8 +282,16 @@ class Materials(Section):
         changes = {}
         for name, level in levels.items():
             own = self.named[name].model_dump(mode="json") if name in self.named else {}
-            changes[f"materials.{name}"] = own | {"kind": "shipped", "rubber": name, "strain_level": level}
+            shipped = {"kind": "shipped", "rubber": name, "strain_level": level, "constants": self.constants}
+            changes[f"materials.{name}"] = own | shipped
         return changes
+
+    def levels(self, names: Collection[str]) -> dict[str, float]:
+        """Strain levels of those rubbers among some materials that have one; none while they are to be found."""
+        cards = {name: self.card(name) for name in RUBBERS if name in names}
+        if self.strain_level == AUTO and any(self.is_built_in(name) for name in cards):
+            return {}
+        return {name: card.strain_level for name, card in cards.items() if isinstance(card, ShippedRubber)}
 
     def is_built_in(self, name: str) -> bool:
         """Whether a name stands for a built-in material and not for a table that replaces it."""
@@ -285,7 +317,7 @@ class Materials(Section):
             return self.named[name]
         if name in RUBBERS:
             level = LOWEST_LEVEL if self.strain_level == AUTO else self.strain_level
-            return ShippedRubber(kind="shipped", rubber=name, strain_level=level)
+            return ShippedRubber(kind="shipped", rubber=name, strain_level=level, constants=self.constants)
         if name == "fibre":
             return HalpinTsai()
         raise KeyError(name)

@@ -17,6 +17,7 @@ ORDER = 13
 class Form(StrEnum):
     """Forms of the energy."""
 
+    SOFTENING = "softening"
     NEO_HOOKEAN = "neo-hookean"
     MOONEY_RIVLIN = "mooney-rivlin"
     YEOH = "yeoh"
@@ -58,9 +59,7 @@ def command(
     biaxial: Annotated[
         Path | None, typer.Option("--biaxial", metavar="FILE.csv", help="Test in equibiaxial tension.")
     ] = None,
-    law: Annotated[
-        Form | None, typer.Option("--law", help="Form told in full; the best for a wall if not given.")
-    ] = None,
+    law: Annotated[Form | None, typer.Option("--law", help="Form told in full; softening if not given.")] = None,
     terms: Annotated[int | None, typer.Option("--terms", help="Its number of terms.")] = None,
     constraint: Annotated[Constraint, typer.Option("--constraint", help="On the constants.")] = Constraint.NONE,
     stable_to: Annotated[

@@ -24,8 +24,9 @@ from dbvfiv.materials.orthotropic import OrthotropicPly
 from dbvfiv.materials.prony import Prony
 from dbvfiv.materials.prony_fit import PronyFit, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
 from dbvfiv.materials.rubber_forms import form_of
-from dbvfiv.materials.rubbers import rubber, rubber_names, strain_levels
-from dbvfiv.materials.stability import StableRange, stability_margin, stability_warning, stable_range
+from dbvfiv.materials.rubbers import published_rubber, rubber, rubber_names, strain_levels
+from dbvfiv.materials.softening import SofteningRubber
+from dbvfiv.materials.stability import StableRange, stability_margin, stable_range
 from dbvfiv.materials.tension_test import TensionTest, read_tension_test
 from dbvfiv.materials.yeoh import Yeoh
 
@@ -44,6 +45,7 @@ __all__ = [
     "PronyFit",
     "RubberFit",
     "ShippedLoss",
+    "SofteningRubber",
     "StableRange",
     "TensionTest",
     "Yeoh",
@@ -63,6 +65,7 @@ __all__ = [
     "law_from_case",
     "outside_band",
     "ply_from_constituents",
+    "published_rubber",
     "read_tension_test",
     "relaxation_from_case",
     "rubber",
@@ -70,7 +73,6 @@ __all__ = [
     "shipped_loss",
     "shipped_loss_names",
     "stability_margin",
-    "stability_warning",
     "stable_range",
     "strain_levels",
     "uniaxial_stress",

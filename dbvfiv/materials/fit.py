@@ -1,7 +1,8 @@
 """Constants of rubbers from tests in tension, planar and equibiaxial tension, one or several at once.
 
 The nominal stress is linear in the constants of neo-Hookean, Mooney-Rivlin and Yeoh forms, so the fit is a linear
-least-squares problem; Ogden's exponents are searched for about it (see `ogden_fit`). One kind of test alone tells
+least-squares problem; Ogden's exponents are searched for about it (see `ogden_fit`), and x_0 of the softening rubber,
+whose other constants are kept at least 0, which makes it stable in every state. One kind of test alone tells
 constants apart badly: over a small range of strains in tension the columns of C10 and C01 are nearly parallel, and the
 fit returns large constants of opposite sign that describe the test well and other states of strain badly. The
 condition number says how far this goes; the "stable" constraint keeps the constants usable.
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from dbvfiv.materials import ogden_fit
 from dbvfiv.materials.checks import MaterialError
@@ -22,7 +24,8 @@ from dbvfiv.materials.hill import least_modulus
 from dbvfiv.materials.law import Law
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
 from dbvfiv.materials.nonnegative import nonnegative
-from dbvfiv.materials.rubber_forms import Form, equivalent_strain, form_of, invariant_columns
+from dbvfiv.materials.rubber_forms import Form, equivalent_strain, first_invariant, form_of, invariant_columns
+from dbvfiv.materials.softening import SofteningRubber
 from dbvfiv.materials.stability import StableRange, stable_range_of
 from dbvfiv.materials.tension_test import TensionTest
 from dbvfiv.materials.yeoh import Yeoh
@@ -30,7 +33,9 @@ from dbvfiv.materials.yeoh import Yeoh
 CONSTRAINTS = ("none", "non-negative", "stable")
 ERRORS = ("absolute", "relative")
 #: Forms that the wall takes.
-TAKEN = ("neo-hookean", "mooney-rivlin", "yeoh")
+TAKEN = ("softening", "neo-hookean", "mooney-rivlin", "yeoh")
+#: x_0 that are tried before the best is refined.
+_KNEES = 80
 #: Of the matrix of a fit: what is smaller is noise of its arithmetic.
 _DIGITS = 1e-13
 __all__ = ["CONSTRAINTS", "ERRORS", "LEAST_MARGIN", "RubberFit", "fit_mooney_rivlin", "fit_rubber", "uniaxial_stress"]
@@ -51,9 +56,9 @@ class RubberFit:
     form : Form
     tests : tuple of TensionTest
     constants : numpy.ndarray, shape (terms,)
-        Those that W is linear in, Pa: the C_ij, or Ogden's mu_p.
-    exponents : numpy.ndarray, shape (terms,) or (0,)
-        Ogden's alpha_p.
+        Those that W is linear in, Pa: mu_inf, mu_0 and c of the softening rubber, the C_ij, or Ogden's mu_p.
+    exponents : numpy.ndarray, shape (terms,), (1,) or (0,)
+        Those that it is not linear in: Ogden's alpha_p, x_0 of the softening rubber.
     residuals : numpy.ndarray, shape (n,)
         Measured minus fitted nominal stress, Pa, test after test.
     r_squared : float
@@ -135,6 +140,8 @@ class RubberFit:
                 "The fit is for comparison."
             )
         first, second, third = (*(float(c) for c in self.constants), 0.0, 0.0)[:3]
+        if self.form.softens:
+            return SofteningRubber(first, second, float(self.exponents[0]), third, density)
         return (Yeoh if self.form.name == "yeoh" else MooneyRivlin)(first, second, third, density)
 
 
@@ -163,7 +170,8 @@ def fit_rubber(
         "non-negative": every constant at least 0 (Ogden: every mu_p alpha_p). For neo-Hookean, two-constant
         Mooney-Rivlin, Yeoh and Ogden that suffices for stability at all strains.
         "stable": a Hill margin (see `stability`) of at least 0.01 in every state of equivalent logarithmic strain
-        up to `stable_to`, not only in those tested.
+        up to `stable_to`, not only in those tested. The softening rubber takes none of them: its constants are at
+        least 0, and mu_inf at least mu_0/200, in any case, which suffices for stability at all strains.
     stable_to : float, optional
         Engineering strain of the tension that has this equivalent strain; the largest
         of the tests if not given. Only for "stable".
@@ -180,7 +188,7 @@ def fit_rubber(
         raise MaterialError(f"The constraint must be one of {', '.join(CONSTRAINTS)}, but {constraint!r} was given.")
     if error not in ERRORS:
         raise MaterialError(f"The error must be one of {', '.join(ERRORS)}, but {error!r} was given.")
-    unknowns = form.terms if form.powers else 2 * form.terms
+    unknowns = len(form.names) + len(form.exponent_names)
     different = len({(test.mode, float(s)) for test in tests for s in test.strain if s != 0.0})
     if different < unknowns + 1:
         which = "tension test has" if len(tests) == 1 and tests[0].mode == "uniaxial" else "tests have"
@@ -199,13 +207,29 @@ def fit_rubber(
     if form.powers:
         problem.require_independent()
         exponents, active = np.zeros(0), None
+    elif form.softens:
+        exponents, active = _search_knee(problem), None
     else:
         exponents, active = ogden_fit.search(problem)
     constants, free = problem.solve(exponents)
     jacobian = problem.matrix(exponents)
     if not form.powers:
-        jacobian = np.hstack([jacobian, ogden_fit.slopes(problem, exponents) * constants])
+        jacobian = np.hstack([jacobian, problem.slopes(exponents, constants)])
     return _described(problem, exponents, constants, jacobian, active or not np.array_equal(constants, free))
+
+
+def _search_knee(problem: _Problem) -> np.ndarray:
+    """x_0 (1,) of least residual, between I1 - 3 of the least strain other than zero and ten times the largest."""
+    seen = np.concatenate([first_invariant(test.mode, test.strain) for test in problem.tests])
+
+    def left(log_knee: float) -> float:
+        knee = np.exp([log_knee])
+        return float(np.sum((problem.matrix(knee) @ problem.solve(knee)[0] - problem.target) ** 2))
+
+    tried = np.linspace(np.log(seen[seen > 0.0].min()), np.log(10.0 * seen.max()), _KNEES)
+    best = int(np.argmin([left(knee) for knee in tried]))
+    between = tried[max(best - 1, 0)], tried[min(best + 1, _KNEES - 1)]
+    return np.exp([minimize_scalar(left, bounds=between, method="bounded", options={"xatol": 1e-9}).x])
 
 
 def _weights(stress: np.ndarray, error: str) -> np.ndarray:
@@ -233,6 +257,11 @@ class _Problem:
         rows = [self.form.columns(test.mode, test.strain, exponents) for test in self.tests]
         return self.weight[:, None] * np.concatenate(rows)
 
+    def slopes(self, exponents, constants) -> np.ndarray:
+        """Weighted derivatives of the stress by the exponents (n, len(exponents)) at constants (terms,)."""
+        rows = [self.form.slopes(test.mode, test.strain, exponents, constants) for test in self.tests]
+        return self.weight[:, None] * np.concatenate(rows)
+
     @property
     def target(self) -> np.ndarray:
         return self.weight * self.stress
@@ -251,19 +280,21 @@ class _Problem:
 
     def solve(self, exponents, constrained: bool = True) -> tuple[np.ndarray, np.ndarray]:
         """Constants under the constraint and without it, each (terms,), Pa."""
-        raw = self.matrix(exponents)
+        mixing = self.form.mixing
+        raw = self.matrix(exponents) @ mixing
         scale = np.linalg.norm(raw, axis=0)
         matrix = raw / scale
         u, singular, vt = np.linalg.svd(matrix, full_matrices=False)
         free = vt.T @ (u.T @ self.target / singular)
         scaled = free
-        if constrained and self.constraint == "non-negative":
-            sign = np.sign(exponents) if len(exponents) else np.ones(len(scale))
+        constraint = "non-negative" if self.form.softens else self.constraint
+        if constrained and constraint == "non-negative":
+            sign = np.sign(exponents) if self.form.name == "ogden" else np.ones(len(scale))
             scaled = sign * nonnegative(matrix * sign, self.target) if np.any(sign * free < 0.0) else free
-        elif constrained and self.constraint == "stable":
+        elif constrained and constraint == "stable":
             moduli = self.form.moduli(self.states, exponents) / scale[:, None, None]
             scaled = stable_constants(matrix, self.target, free, moduli, self.reach)
-        return scaled / scale, free / scale
+        return mixing @ (scaled / scale), mixing @ (free / scale)
 
 
 def _described(problem: _Problem, exponents, constants, jacobian, active: bool) -> RubberFit:

@@ -132,7 +132,10 @@ class FitReport:
     def _of_chosen(self) -> list[str]:
         fit = self.chosen
         limit = {"none": "no constraint", "non-negative": "constants at least 0", "stable": "stable"}[fit.constraint]
-        rows = [f"{fit.form.title}, {limit}{', which changes the answer' if fit.active else ''}: {_constants(fit)}."]
+        limit += ", which changes the answer" if fit.active else ""
+        if fit.form.softens:
+            limit = "stable in every state by its form, whatever the tests"
+        rows = [f"{fit.form.title}, {limit}: {_constants(fit)}."]
         for test, left in zip(fit.tests, fit.by_test):
             worst = int(np.argmax(np.abs(left)))
             rows.append(
@@ -151,7 +154,7 @@ class FitReport:
                 "  Beware: these constants lose stability within the strains of the tests, in states that were not "
                 "tested; use --constraint stable, or more kinds of test."
             )
-        if fit.condition_number > ILL_CONDITIONED:
+        if fit.condition_number > ILL_CONDITIONED and not fit.form.softens:  # its constants cannot cancel each other
             rows.append(
                 f"  Beware: a condition number of {fit.condition_number:.3g} means that the constants describe these "
                 "tests and say little of other states of strain."
@@ -175,8 +178,8 @@ def describe_fits(
     curves : list of Curve
         Of `loading_cycles.read_tests`.
     law, terms : optional
-        The form told in full; of those that the wall takes and that are stable as far as the tests reach, the one of
-        least residual if not given.
+        The form told in full; the softening rubber if not given and the tests suffice for it, else of those that the
+        wall takes and that are stable as far as the tests reach the one of least residual.
     constraint, stable_to, error, cycle
         See `fit.fit_rubber` and `loading_cycles.loading_tests`.
 
@@ -209,11 +212,11 @@ def describe_fits(
 
 
 def _best(fits: list[RubberFit]) -> RubberFit:
-    """Least residual of those for the wall, the stable ones first."""
+    """Least residual of those for the wall, the softening rubber and the stable ones first."""
     possible = [f for f in fits if f.form.name in TAKEN and f.shear_modulus > 0.0]
     if not possible:
         raise MaterialError("No fit finds a positive stiffness; does stress grow with strain in the tests?")
-    return min(possible, key=lambda f: (f.stable_range.equivalent_strain < f.reach, f.rms))
+    return min(possible, key=lambda f: (not f.form.softens, f.stable_range.equivalent_strain < f.reach, f.rms))
 
 
 def toml_table(fit: RubberFit, name: str, density: float, loss_factor: float | None = None) -> list[str]:
@@ -227,6 +230,7 @@ def toml_table(fit: RubberFit, name: str, density: float, loss_factor: float | N
         values = {"shear_modulus": fit.shear_modulus}
     rows = [f"[materials.{name}]", f'kind = "{kind}"']
     rows += [f'{key} = "{value / 1e6:.12g} MPa"' for key, value in values.items()]
+    rows += [f"{key} = {value:.12g}" for key, value in zip(fit.form.exponent_names, fit.exponents)]
     rows.append(f'density = "{density:g} kg/m^3"')
     if loss_factor is not None:
         rows.append(f"loss_factor = {loss_factor:.4g}")
@@ -234,7 +238,7 @@ def toml_table(fit: RubberFit, name: str, density: float, loss_factor: float | N
 
 
 def _constants(fit: RubberFit) -> str:
-    names = [*fit.form.names, *(f"alpha{p + 1}" for p in range(fit.exponents.size))]
+    names = [*fit.form.names, *fit.form.exponent_names]
     errors = fit.standard_errors
     told = []
     for i, name in enumerate(names):

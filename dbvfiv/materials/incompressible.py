@@ -69,13 +69,22 @@ def plane_stress_invariants(e) -> PlaneStressInvariants:
     return PlaneStressInvariants(i1, i2, gap, area)
 
 
+#: x0 of a rubber without a knee, so that its term and the derivatives are zeros at strains no sheet can have, too.
+_NO_KNEE = 1e100
+
+
 def rubber_energy(parameters, e):
-    """Energy of an incompressible sheet with S33 = 0: Mooney-Rivlin, and C20 (I1 - 3)^2 + C30 (I1 - 3)^3.
+    """Energy of an incompressible sheet with S33 = 0: Mooney-Rivlin, powers of x = I1 - 3, and a knee.
+
+        W = Mooney-Rivlin + C20 x^2 + C30 x^3 + m0 x0 (sqrt(1 + x/x0) - 1)
+
+    The last term is evaluated as m0 x/(1 + sqrt(1 + x/x0)), which loses no digits near x = 0, and is 0 for m0 = 0,
+    whatever x0 is.
 
     Parameters
     ----------
-    parameters : array_like, shape (>= 5,)
-        ``[c10, c01, c11, c20, c30, ...]``, Pa.
+    parameters : array_like, shape (>= 7,)
+        ``[c10, c01, c11, c20, c30, m0, x0, ...]``, Pa but for x0.
     e : array_like, shape (5,)
 
     Returns
@@ -83,7 +92,9 @@ def rubber_energy(parameters, e):
     scalar, J/m3. Not meaningful where det C2 <= 0, which is no deformation of a sheet.
     """
     i1 = plane_stress_invariants(e).i1_minus_3
-    return mooney_rivlin_energy(parameters, e) + (parameters[3] + parameters[4] * i1) * i1 * i1
+    m0, x0 = parameters[5], parameters[6] + (parameters[6] == 0) * _NO_KNEE
+    knee = m0 * i1 / (1 + (1 + i1 / x0) ** 0.5)
+    return mooney_rivlin_energy(parameters, e) + (parameters[3] + parameters[4] * i1) * i1 * i1 + knee
 
 
 def mooney_rivlin_energy(parameters, e):

@@ -22,6 +22,8 @@ from dbvfiv.materials.incompressible import rubber_energy
 LINEAR_ELASTIC = 0
 MOONEY_RIVLIN = 1
 PARAMETER_COUNT = 8
+#: Constants of a rubber among the parameters, and the one of them that is no modulus: x0.
+RUBBER_CONSTANTS, KNEE = 7, 6
 
 
 @runtime_checkable
@@ -31,12 +33,12 @@ class Law(Protocol):
     Attributes
     ----------
     kind : int
-        ``LINEAR_ELASTIC`` (0) or ``MOONEY_RIVLIN`` (1, with Yeoh's terms); a class constant.
+        ``LINEAR_ELASTIC`` (0) or ``MOONEY_RIVLIN`` (1, with Yeoh's terms and a knee); a class constant.
     density : float
         Reference density, kg/m3.
     parameters : numpy.ndarray, shape (8,), float64
         Kind 0: ``[Q11, Q22, Q12, Q66, Q55, Q44, 0, 0]`` with Q55 for the 13 and Q44 for the 23
-        shear. Kind 1: ``[c10, c01, c11, c20, c30, 0, 0, 0]``. All in Pa.
+        shear. Kind 1: ``[c10, c01, c11, c20, c30, m0, x0, 0]``, see `incompressible.rubber_energy`. All in Pa but x0.
     small_strain_shear_modulus : float
         In-plane shear modulus (12) in the reference state, Pa.
     """

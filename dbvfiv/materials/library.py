@@ -15,7 +15,8 @@ from dbvfiv.materials.loading_cycles import loading_tests, read_tests
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
 from dbvfiv.materials.orthotropic import OrthotropicPly
 from dbvfiv.materials.rubber_forms import form_of
-from dbvfiv.materials.rubbers import rubber
+from dbvfiv.materials.rubbers import published_rubber, rubber
+from dbvfiv.materials.softening import SofteningRubber
 from dbvfiv.materials.yeoh import Yeoh
 
 if TYPE_CHECKING:
@@ -46,15 +47,18 @@ def fit_of_card(card: Any) -> RubberFit:
     return fit_rubber(tests, form_of(card.law, card.terms), card.constraint, card.stable_to, card.error)
 
 
+#: Shipped rubbers by the set of constants.
+SHIPPED = {"stable": rubber, "published": published_rubber}
 _LAWS: dict[str, Callable[[Any], Law]] = {
     "mooney-rivlin": lambda c: MooneyRivlin(c.c10, c.c01, c.c11, c.density),
     "yeoh": lambda c: Yeoh(c.c10, c.c20, c.c30, c.density),
+    "softening": lambda c: SofteningRubber(c.mu_inf, c.mu_0, c.x_0, c.c, c.density),
     "neo-hookean": lambda c: MooneyRivlin.neo_hookean(c.shear_modulus, c.density),
     "isotropic": lambda c: IsotropicElastic(c.youngs_modulus, c.poisson_ratio, c.density),
     "orthotropic": lambda c: OrthotropicPly(c.e1, c.e2, c.nu12, c.g12, c.g13, c.g23, c.density),
     "halpin-tsai": _halpin_tsai,
     "fit": lambda c: fit_of_card(c).law(c.density),
-    "shipped": lambda c: rubber(c.rubber, c.strain_level, density=c.density),
+    "shipped": lambda c: SHIPPED[c.constants](c.rubber, c.strain_level, density=c.density),
 }
 CARD_KINDS = tuple(_LAWS)
 
@@ -80,8 +84,8 @@ def law_from_card(card: Any) -> Law:
 def law_from_case(case: Case, name: str) -> Law:
     """The law of a material by its name in a case.
 
-    Tables of the case go before the built-in CR, SBR, EPDM (at ``materials.strain_level``) and
-    fibre (by ``materials.fibre_constants``).
+    Tables of the case go before the built-in CR, SBR, EPDM (at ``materials.strain_level``, by
+    ``materials.constants``) and fibre (by ``materials.fibre_constants``).
 
     Raises
     ------

@@ -11,8 +11,6 @@ from itertools import combinations
 import numpy as np
 from scipy.optimize import least_squares
 
-from dbvfiv.materials.rubber_forms import ogden_slopes
-
 _STARTS = (-8.0, -4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
 _TRIED = {"none": 8, "non-negative": 8, "stable": 2}
 _LARGEST = 30.0
@@ -33,12 +31,6 @@ def search(problem) -> tuple[np.ndarray, bool | None]:
     if np.array_equal(constants, unconstrained):
         return _ordered(free), False
     return _ordered(_best(problem, constrained=True)), True
-
-
-def slopes(problem, exponents) -> np.ndarray:
-    """Weighted derivatives of the columns by their exponents (n, terms)."""
-    rows = [ogden_slopes(test.mode, test.strain, exponents) for test in problem.tests]
-    return problem.weight[:, None] * np.concatenate(rows)
 
 
 def _ordered(exponents: np.ndarray) -> np.ndarray:
@@ -81,7 +73,7 @@ def _polished(problem, exponents: np.ndarray) -> np.ndarray:
         return (problem.matrix(x[count:]) @ (x[:count] * scale) - problem.target) / size
 
     def derivative(x):
-        return np.hstack([problem.matrix(x[count:]) * scale, slopes(problem, x[count:]) * (x[:count] * scale)]) / size
+        return np.hstack([problem.matrix(x[count:]) * scale, problem.slopes(x[count:], x[:count] * scale)]) / size
 
     start = np.concatenate([constants / scale, exponents])
     answer = least_squares(residual, start, derivative, method="lm", xtol=_TIGHT, ftol=_TIGHT, gtol=_TIGHT)

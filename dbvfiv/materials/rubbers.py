@@ -1,9 +1,13 @@
 """The three tested rubbers at any strain level between the tested ones.
 
-The constants were fitted four times, to tension up to 10, 20, 40 and 60 % (Th. 3.2). Between the
-levels they are interpolated linearly in the strain level, all of them with the same weights.
-The energy is linear in the constants, so energy, stress and tangent at any given strain are then
-interpolated linearly too, however strongly the constants cancel each other.
+Each was tested four times, in tension up to 10, 20, 40 and 60 % (Th. 3.2); the constants of a level describe the curve
+of that test. Two sets are shipped: the published ones, and those of a law that is stable in every state (`softening`),
+fitted by least squares to 60 points of each published curve.
+
+Between the levels constants are interpolated linearly in the strain level, all of them with the same weights, but for
+x_0 of the stable set, whose logarithm is: between 10 and 60 % it grows thirty times. The published energy is linear in
+its constants, so energy, stress and tangent at any given strain are interpolated linearly too, however strongly the
+constants cancel each other. The stable law keeps its conditions between two sets that meet them.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ import numpy as np
 
 from dbvfiv.materials.checks import MaterialError, require_finite
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
+from dbvfiv.materials.softening import SofteningRubber
 
 _TABLES = {2: "two", 3: "three"}
 
@@ -35,8 +40,8 @@ def strain_levels() -> tuple[float, ...]:
     return tuple(_data()["strain_level"])
 
 
-def rubber(name: str, strain_level: float = 0.10, *, terms: int = 3, density: float | None = None) -> MooneyRivlin:
-    """A shipped rubber at a strain level.
+def rubber(name: str, strain_level: float = 0.10, *, density: float | None = None) -> SofteningRubber:
+    """A shipped rubber at a strain level, by constants that are stable in every state.
 
     Parameters
     ----------
@@ -44,10 +49,32 @@ def rubber(name: str, strain_level: float = 0.10, *, terms: int = 3, density: fl
         "CR", "SBR" or "EPDM".
     strain_level : float
         Engineering strain up to which the constants are meant, as a fraction, 0.10 to 0.60.
-    terms : int
-        3 for the constants the valve model uses (App. A), 2 for the two-constant fit of Table 3-3.
     density : float, optional
         kg/m3; the shipped 1300 if not given.
+
+    Raises
+    ------
+    MaterialError
+        For an unknown name or a level outside the tested ones.
+
+    Examples
+    --------
+    >>> round(rubber("CR", 0.10).small_strain_shear_modulus, -3)
+    1307000.0
+    """
+    mu_inf, mu_0, knee, c = _at_level("stable", name, strain_level, ("mu_inf", "mu_0", "x_0", "c"))
+    return SofteningRubber(mu_inf, mu_0, knee, c, _data()["density"] if density is None else density)
+
+
+def published_rubber(
+    name: str, strain_level: float = 0.10, *, terms: int = 3, density: float | None = None
+) -> MooneyRivlin:
+    """A shipped rubber at a strain level, by the published constants; arguments as `rubber` has them.
+
+    Parameters
+    ----------
+    terms : int
+        3 for the constants of App. A, 2 for the two-constant fit of Table 3-3.
 
     Raises
     ------
@@ -56,14 +83,19 @@ def rubber(name: str, strain_level: float = 0.10, *, terms: int = 3, density: fl
 
     Examples
     --------
-    >>> round(rubber("CR", 0.10).small_strain_shear_modulus)
+    >>> round(published_rubber("CR", 0.10).small_strain_shear_modulus)
     1422406
     """
-    data = _data()
     if terms not in _TABLES:
-        raise MaterialError(f"A shipped rubber has 2 or 3 constants, but terms = {terms!r} was given.")
-    table = data[_TABLES[terms]]
-    if name not in table:
+        raise MaterialError(f"A published rubber has 2 or 3 constants, but terms = {terms!r} was given.")
+    constants = _at_level(_TABLES[terms], name, strain_level, ("c10", "c01", "c11"))
+    return MooneyRivlin(*constants, _data()["density"] if density is None else density)
+
+
+def _at_level(table: str, name: str, strain_level: float, constants: tuple[str, ...]) -> list[float]:
+    """Constants of a rubber in a table of the shipped ones, interpolated."""
+    data = _data()
+    if name not in data[table]:
         raise MaterialError(f"The shipped rubbers are {', '.join(rubber_names())}, but {name!r} was given.")
     require_finite(f"Rubber {name}", strain_level=strain_level)
     levels = data["strain_level"]
@@ -72,5 +104,11 @@ def rubber(name: str, strain_level: float = 0.10, *, terms: int = 3, density: fl
             f"Rubber {name}: strain_level must lie between {levels[0]:.0%} and {levels[-1]:.0%}, "
             f"the tested levels, but {strain_level:.4g} ({strain_level:.4%}) was given."
         )
-    c10, c01, c11 = (float(np.interp(strain_level, levels, table[name][c])) for c in ("c10", "c01", "c11"))
-    return MooneyRivlin(c10, c01, c11, data["density"] if density is None else density)
+    found = []
+    for key in constants:
+        values = data[table][name][key]
+        if key == "x_0":
+            found.append(float(np.exp(np.interp(strain_level, levels, np.log(values)))))
+        else:
+            found.append(float(np.interp(strain_level, levels, values)))
+    return found

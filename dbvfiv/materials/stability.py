@@ -1,19 +1,28 @@
-"""Where a rubber's constants stop describing a stable material.
+"""Where a rubber's constants stop describing a stable material, slowly strained or in an instant.
 
 Criterion: Hill's inequality (Drucker's postulate for an elastic solid), d tau : D > 0 for every
 isochoric stretching D, with tau the Kirchhoff stress and its co-rotational rate. It does not
 depend on the pressure, hence not on plane stress, and is satisfied at all strains by a Mooney
 material with non-negative constants, whereas convexity in Green-Lagrange strain is not: the sound
 W = C01 (I2 - 3) loses that in tension at the stretch 4^(1/3). In principal axes, with
-a_i = l_i^2, b_i = l_i^-2, W1 = C10 + C11 (I2 - 3) and W2 = C01 + C11 (I1 - 3), it asks that
+a_i = l_i^2, b_i = l_i^-2 and W1, W11, ... the derivatives of W by I1 and I2, it asks that
 
-    H_ij = 4 delta_ij (a_i W1 + b_i W2) - 4 C11 (a_i b_j + b_i a_j)   is positive on traceless vectors,
+    H_ij = 4 delta_ij (a_i W1 + b_i W2) + 4 (a_i a_j W11 - (a_i b_j + b_i a_j) W12 + b_i b_j W22)
+                                                                     is positive on traceless vectors,
     2 (W1 + l_k^2 W2) (a_i - a_j)/(ln l_i - ln l_j) > 0               for the three shears ij,
 
 each of which equals 2 mu at rest. The margin is the least of the five over 2 mu. The second line
-is the Baker-Ericksen inequality (the greater stress along the greater stretch), scaled by
-logarithmic strains; the shear modulus of the Jaumann rate has the same sign. The Green-Lagrange
-tangent that the solver's material stiffness is built from is available as a second measure.
+is the Baker-Ericksen inequality (the greater stress along the greater stretch), scaled by logarithmic strains.
+
+With quasi-linear viscoelasticity (Maxwell branches dh_j = g_j dS beside the slow stress S) a fast change meets the
+material tangent C of S times r = 1 + sum g_j, but the same stress, so
+
+    d tau : D = r E' : C : E' + 2 tau : (D D),     E' = F^T D F,
+
+must be positive for every D. That is linear in r: if it holds at r = 1, where it is Hill's inequality, and at the
+largest r, it holds between. Since E' : C : E' is Hill's form less 2 tau : (D D) and both are diagonal in the principal
+axes but for the normal strains, the moduli are r H - (r - 1) 2 tau, the pressure in tau being that of S33 = 0. At a
+very large r they are those of the Green-Lagrange tangent alone.
 """
 
 from __future__ import annotations
@@ -21,17 +30,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import jax
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.optimize import brentq
 
 from dbvfiv.materials.checks import MaterialError
-from dbvfiv.materials.hill import RUBBER_POWERS, hill_moduli, least_modulus
+from dbvfiv.materials.hill import (
+    Slopes,
+    assembled,
+    differences,
+    invariants,
+    least_modulus,
+    moduli_of,
+    rubber_slopes,
+)
 from dbvfiv.materials.incompressible import plane_stress_invariants
-from dbvfiv.materials.law import MOONEY_RIVLIN, Law, energy_of
+from dbvfiv.materials.law import MOONEY_RIVLIN, Law
 
-MEASURES = ("hill", "tangent")
 LARGEST_LOG_STRAIN = float(np.log(10.0))
 _EDGE_SAMPLES = 801
 
@@ -73,62 +87,73 @@ def hill_margin(law: Law, log_stretches) -> np.ndarray:
     """Least Hill modulus over 2 mu at given principal logarithmic strains (..., 3) -> (...)."""
     ln = np.asarray(log_stretches, dtype=float)
     valid = np.all(np.isfinite(ln), axis=-1)
-    by_constant = hill_moduli(np.where(valid[..., None], ln, 0.0), RUBBER_POWERS)
-    moduli = np.tensordot(by_constant, law.parameters[: len(RUBBER_POWERS)], axes=([-3], [0]))
+    ln = np.where(valid[..., None], ln, 0.0)
+    moduli = moduli_of(ln, rubber_slopes(law.parameters, *invariants(ln)))
     return np.where(valid, least_modulus(moduli) / (2.0 * law.small_strain_shear_modulus), -np.inf)
 
 
-def stability_margin(law: Law, strains, measure: str = "hill") -> np.ndarray:
-    """How much of its initial stiffness the material keeps, in its weakest direction.
+def stability_margin(law: Law, strains, instantaneous: float = 1.0) -> np.ndarray:
+    """Share of its initial stiffness that a material keeps in its weakest direction, slow or instantaneous.
 
     Parameters
     ----------
     law : Law
     strains : array_like, shape (..., 5)
         Green-Lagrange strains ``[E11, E22, 2 E12, 2 E13, 2 E23]`` as they occur in a solution.
-    measure : {"hill", "tangent"}
-        "hill": least Hill modulus over 2 mu (see the module). "tangent": least eigenvalue of
-        d2W/de2 relative to d2W/de2 at rest (generalised eigenvalue). The linear laws have a
-        constant tangent, so both are 1 for them; the softening of St Venant-Kirchhoff materials
-        in strong compression is not looked at.
+    instantaneous : float
+        r, the instantaneous tangent over the slow one: 1 + the sum of the strengths of a Prony series; 1 for a material
+        that does not relax.
 
     Returns
     -------
     numpy.ndarray, shape (...)
-        1 at rest, 0 at the limit of stability, negative beyond; ``-inf`` where the strain is
-        impossible for a sheet (det C2 <= 0) or not finite.
+        The lesser of both criteria (see the module): 1 at rest, 0 at the limit of stability, negative beyond; ``-inf``
+        where the strain is impossible for a sheet (det C2 <= 0) or not finite. 1 for the linear laws; the softening of
+        St Venant-Kirchhoff materials in strong compression is not looked at.
 
     Raises
     ------
     MaterialError
-        For an unknown measure or strains whose last axis is not of length five.
+        For strains whose last axis is not of length five, or an instantaneous modulus below the slow one.
     """
     e = np.asarray(strains, dtype=float)
     if e.ndim == 0 or e.shape[-1] != 5:
         raise MaterialError(f"Strains must have five components on the last axis, but their shape is {e.shape}.")
-    if measure not in MEASURES:
-        raise MaterialError(f"The measure must be one of {', '.join(MEASURES)}, but {measure!r} was given.")
+    if not 1.0 <= instantaneous < np.inf:
+        raise MaterialError(
+            f"The instantaneous modulus over the slow one must be finite and at least 1, but {instantaneous:g} was "
+            "given."
+        )
     finite = np.all(np.isfinite(e), axis=-1)
-    e = np.where(finite[..., None], e, 0.0)
     if law.kind != MOONEY_RIVLIN:
         return np.where(finite, 1.0, -np.inf)
+    e = np.where(finite[..., None], e, 0.0)
     logs = principal_log_strains(e)
-    if measure == "hill":
-        return np.where(finite, hill_margin(law, logs), -np.inf)
     possible = finite & np.isfinite(logs[..., 0])
-    return np.where(possible, _tangent_margin(law, np.where(possible[..., None], e, 0.0)), -np.inf)
+    ln, e = (np.where(possible[..., None], x, 0.0) for x in (logs, e))
+    slopes = rubber_slopes(law.parameters, *invariants(ln))
+    moduli = moduli_of(ln, slopes)
+    least = least_modulus(moduli)
+    if instantaneous > 1.0:
+        stressed = (1.0 - 1.0 / instantaneous) * _stress_moduli(e, ln, slopes)
+        least = np.minimum(least, least_modulus(moduli - stressed))
+    return np.where(possible, least / (2.0 * law.small_strain_shear_modulus), -np.inf)
 
 
-@jax.jit
-def _tangents(kind, parameters, e):
-    return jax.vmap(jax.hessian(energy_of, argnums=2), in_axes=(None, None, 0))(kind, parameters, e)
-
-
-def _tangent_margin(law: Law, e: np.ndarray) -> np.ndarray:
-    flat = np.concatenate([np.zeros((1, 5)), e.reshape(-1, 5)])
-    tangents = np.asarray(_tangents(law.kind, law.parameters, flat))
-    factor = solve_triangular(np.linalg.cholesky(tangents[0]), np.eye(5), lower=True)
-    return np.linalg.eigvalsh(factor @ tangents[1:] @ factor.T)[..., 0].reshape(e.shape[:-1])
+def _stress_moduli(e, ln, slopes: Slopes) -> np.ndarray:
+    """2 tau : (D D) as moduli (..., 5, 5) in principal axes, with the pressure that makes S33 = 0."""
+    c11, c22, c12, c13, c23 = 1.0 + 2.0 * e[..., 0], 1.0 + 2.0 * e[..., 1], e[..., 2], e[..., 3], e[..., 4]
+    # third row of C^-1, det C = 1
+    row = c12 * c23 - c13 * c22, c12 * c13 - c11 * c23, c11 * c22 - c12 * c12
+    pressure = 2.0 * (slopes.w1 - slopes.w2 * sum(x * x for x in row)) / row[2]
+    w1, w2 = slopes.w1[..., None], slopes.w2[..., None]
+    tau = 2.0 * (np.exp(2.0 * ln) * w1 - np.exp(-2.0 * ln) * w2) - pressure[..., None]
+    pairs = tau.sum(axis=-1, keepdims=True) - tau
+    # (b_i + b_j)/(b_i - b_j) (ln l_i - ln l_j): from D to rates of the logarithmic strain
+    apart = differences(ln)
+    safe = np.where(np.abs(apart) < 1e-4, 1.0, apart)
+    rate = np.where(np.abs(apart) < 1e-4, 1.0 + apart * apart / 3.0, safe / np.tanh(safe))
+    return assembled(2.0 * tau[..., None] * np.eye(3), pairs / rate)
 
 
 @dataclass(frozen=True)
@@ -217,33 +242,3 @@ def _distance_to_limit(margin: Callable, ray: np.ndarray) -> float:
         return float("inf")
     low, high = distance[lost[0] - 1], distance[lost[0]]
     return float(brentq(lambda s: float(margin(s * ray)), low, high, xtol=1e-13))
-
-
-def stability_warning(name: str, law: Law, strains) -> str | None:
-    """One sentence if any of the strains that occur is beyond the material's stable range.
-
-    Parameters
-    ----------
-    name : str
-        What to call the material.
-    law : Law
-    strains : array_like, shape (..., 5)
-
-    Returns
-    -------
-    str or None
-    """
-    margin = np.ravel(stability_margin(law, strains))
-    lost = np.count_nonzero(margin <= 0.0)
-    if lost == 0:
-        return None
-    logs = principal_log_strains(np.reshape(strains, (-1, 5))[int(np.argmin(margin))])
-    where = (
-        "principal stretches " + ", ".join(f"{s:.3f}" for s in np.exp(logs))
-        if np.all(np.isfinite(logs))
-        else "a strain that no sheet can reach"
-    )
-    return (
-        f"The constants of {name} describe an unstable material at {lost} of {margin.size} strains that "
-        f"occur; the lowest stiffness there is {margin.min():.2g} of the initial one, at {where}."
-    )

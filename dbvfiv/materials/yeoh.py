@@ -57,4 +57,4 @@ class Yeoh:
 
     def energy(self, e):
         """Strain energy per reference volume, J/m3, of ``e = [E11, E22, 2 E12, 2 E13, 2 E23]``."""
-        return rubber_energy((self.c10, 0.0, 0.0, self.c20, self.c30), e)
+        return rubber_energy(self.parameters, e)

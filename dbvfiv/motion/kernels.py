@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..shell.kernel_rubber import FAST
+from ..shell.kernel_rubber import FAST, first_invariant, has_more
 from ..shell.kernel_section import linear_response, point_strain
 from ..shell.kernel_strain import numbers_of, strains_at
 
@@ -33,7 +33,8 @@ def row_motion(rows, nodes, nodal, rate, area, area_rate):
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def _rubber_energy(c10, c01, c11, c20, c30, e):
+def _rubber_energy(constants, e):
+    c10, c01, c11 = constants[0], constants[1], constants[2]
     a = 1 + 2 * e[0]
     b = 1 + 2 * e[1]
     c = e[2]
@@ -43,9 +44,13 @@ def _rubber_energy(c10, c01, c11, c20, c30, e):
     h = (1 + (b * g * g - 2 * c * g * k + a * k * k)) / det
     i1 = (a + b - 2) + (h - 1)
     i2 = (det - 1) + (a + b) * h - g * g - k * k - 2
-    if c20 != 0.0 or c30 != 0.0:
-        return c10 * i1 + c01 * i2 + c11 * i1 * i2 + (c20 + c30 * i1) * i1 * i1
-    return c10 * i1 + c01 * i2 + c11 * i1 * i2
+    total = c10 * i1 + c01 * i2 + c11 * i1 * i2
+    if has_more(constants):
+        x = first_invariant(e)
+        total += (constants[3] + constants[4] * x) * x * x
+        if constants[5] != 0.0:
+            total += constants[5] * x / (1 + np.sqrt(1 + x / constants[6]))
+    return total
 
 
 @numba.njit(cache=True, fastmath=FAST)
@@ -80,8 +85,7 @@ def strain_energy(
                 density += 0.5 * stress[i] * strain[i]
             for l in range(points.shape[0]):
                 point_strain(points[l, 0], h, scales[l], strain, e)
-                c = constants[l]
-                density += points[l, 1] * h * _rubber_energy(c[0], c[1], c[2], c[3], c[4], e)
+                density += points[l, 1] * h * _rubber_energy(constants[l], e)
             total += area[el, point] * density
         for a in range(own.shape[1]):
             for b in range(own.shape[1]):

@@ -36,7 +36,7 @@ def slow_resultants(
     ----------
     stiffness : (g, 8, 8) array
         Of the linear layers of each group.
-    points, constants, scales : (k, 2), (k, 5), (k,) arrays
+    points, constants, scales : (k, 2), (k, 7), (k,) arrays
         Of all points that carry rubber.
     member : (k,) int array
         The group of each of these points; negative for none.

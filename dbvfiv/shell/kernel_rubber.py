@@ -1,5 +1,5 @@
 """Stress and tangent of incompressible rubbers in plane stress, in closed form for compiled loops: Mooney-Rivlin with
-C10, C01, C11, and powers of I1 - 3 by C20 and C30 (Yeoh).
+C10, C01, C11, powers of x = I1 - 3 by C20 and C30 (Yeoh), and the knee m0 x0 (sqrt(1 + x/x0) - 1).
 
 The law is defined by its energy in `dbvfiv.materials`; this is its first and second derivative with respect to [E11,
 E22, 2E12, 2E13, 2E23], checked against automatic differentiation of that energy.
@@ -10,12 +10,13 @@ Equation (T.6) of docs/theory.md.
 from __future__ import annotations
 
 import numba
+import numpy as np
 
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def _deformation(c10, c01, c11, e):
+def _deformation(constants, e):
     """Right Cauchy-Green components, C33 and its gradient with respect to C11, C22, C12, C13, C23, and the derivatives
     of the energy by both invariants.
     """
@@ -30,28 +31,59 @@ def _deformation(c10, c01, c11, e):
     h = (1 + n) * inv
     i1 = (a + b - 2) + (h - 1)
     i2 = (det - 1) + (a + b) * h - g * g - k * k - 2
-    w1 = c10 + c11 * i2
-    w2 = c01 + c11 * i1
+    w1 = constants[0] + constants[2] * i2
+    w2 = constants[1] + constants[2] * i1
     h0 = (k * k - h * b) * inv
     h1 = (g * g - h * a) * inv
     h2 = 2 * (h * c - g * k) * inv
     h3 = 2 * (b * g - c * k) * inv
     h4 = 2 * (a * k - c * g) * inv
-    return a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2, i1
+    return a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def rubber_stress(c10, c01, c11, c20, c30, e, s):
-    """Fill the stress s (5,) for strains e (5,)."""
-    a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2, i1 = _deformation(c10, c01, c11, e)
+def first_invariant(e):
+    """I1 - 3 of strains e (5,) without cancellation; see `dbvfiv.materials.incompressible`."""
+    trace = 2 * (e[0] + e[1])
+    det = 4 * e[0] * e[1] - e[2] * e[2]
+    plane = 4 * (e[0] * e[0] + e[0] * e[1] + e[1] * e[1]) + e[2] * e[2]
+    across = (1 + 2 * e[1]) * e[3] * e[3] - 2 * e[2] * e[3] * e[4] + (1 + 2 * e[0]) * e[4] * e[4]
+    return (plane + trace * det + across) / (1 + trace + det)
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def has_more(constants):
+    """Whether a rubber has more terms than those of Mooney and Rivlin, which are left out where they are zero."""
+    return constants[3] != 0.0 or constants[4] != 0.0 or constants[5] != 0.0
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def i1_slopes(constants, e):
+    """First and second derivative by I1 of the terms of C20, C30 and the knee."""
+    c20, c30, m0 = constants[3], constants[4], constants[5]
+    x = first_invariant(e)
+    first = x * (2 * c20 + 3 * c30 * x)
+    second = 2 * c20 + 6 * c30 * x
+    if m0 != 0.0:
+        stretched = 1 + x / constants[6]
+        slope = 0.5 * m0 / np.sqrt(stretched)
+        first += slope
+        second -= 0.5 * slope / (constants[6] * stretched)
+    return first, second
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def rubber_stress(constants, e, s):
+    """Fill the stress s (5,) for the `RUBBER_CONSTANTS` of a law and strains e (5,)."""
+    a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2 = _deformation(constants, e)
     sum_ab = a + b
     s[0] = 2 * (w1 * (1 + h0) + w2 * (b + h + sum_ab * h0))
     s[1] = 2 * (w1 * (1 + h1) + w2 * (a + h + sum_ab * h1))
     s[2] = w1 * h2 + w2 * (sum_ab * h2 - 2 * c)
     s[3] = w1 * h3 + w2 * (sum_ab * h3 - 2 * g)
     s[4] = w1 * h4 + w2 * (sum_ab * h4 - 2 * k)
-    if c20 != 0.0 or c30 != 0.0:  # apart, so that the digits of the rubbers without them stay what they are
-        w = i1 * (2 * c20 + 3 * c30 * i1)
+    if has_more(constants):
+        w = i1_slopes(constants, e)[0]
         s[0] += 2 * w * (1 + h0)
         s[1] += 2 * w * (1 + h1)
         s[2] += w * h2
@@ -60,9 +92,10 @@ def rubber_stress(c10, c01, c11, c20, c30, e, s):
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def rubber_tangent(c10, c01, c11, c20, c30, e, s, t):
-    """Fill stress s (5,) and the upper triangle of the tangent t (5, 5) for strains e (5,)."""
-    a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2, i1 = _deformation(c10, c01, c11, e)
+def rubber_tangent(constants, e, s, t):
+    """Fill stress s (5,) and the upper triangle of the tangent t (5, 5); arguments as `rubber_stress` has them."""
+    c11 = constants[2]
+    a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2 = _deformation(constants, e)
     r = a + b
     d2 = -2 * c
     p0 = 1 + h0
@@ -109,9 +142,8 @@ def rubber_tangent(c10, c01, c11, c20, c30, e, s, t):
     t[3, 3] = w * h33 - 2 * w2 + 2 * c11 * h3 * q3
     t[3, 4] = w * h34 + c11 * (h3 * q4 + h4 * q3)
     t[4, 4] = w * h44 - 2 * w2 + 2 * c11 * h4 * q4
-    if c20 != 0.0 or c30 != 0.0:
-        w = i1 * (2 * c20 + 3 * c30 * i1)
-        v = 2 * c20 + 6 * c30 * i1
+    if has_more(constants):
+        w, v = i1_slopes(constants, e)
         s[0] += 2 * w * p0
         s[1] += 2 * w * p1
         s[2] += w * h2

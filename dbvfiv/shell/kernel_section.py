@@ -44,7 +44,7 @@ def point_strain(zeta, h, scale, strain, e):
 def add_point_stress(point, constants, scale, h, strain, stress, e, s):
     """Add what one point of rubber contributes to the resultants (8,); e and s are workspace (5,)."""
     point_strain(point[0], h, scale, strain, e)
-    rubber_stress(constants[0], constants[1], constants[2], constants[3], constants[4], e, s)
+    rubber_stress(constants, e, s)
     w = point[1] * h
     t = point[0] * h
     for i in range(3):
@@ -82,8 +82,7 @@ def section_tangent(stiffness, points, constants, scales, h, strain, stress, tan
     for l in range(points.shape[0]):
         k = scales[l]
         point_strain(points[l, 0], h, k, strain, e)
-        c = constants[l]
-        rubber_tangent(c[0], c[1], c[2], c[3], c[4], e, s, t5)
+        rubber_tangent(constants[l], e, s, t5)
         w = points[l, 1] * h
         t = points[l, 0] * h
         wt = w * t

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..materials.law import KNEE, RUBBER_CONSTANTS
 from ..materials.prony import Prony
 
 LINEAR, RUBBER = 0, 1
@@ -161,7 +162,7 @@ class Section:
         -------
         stiffness : (8, 8) array
             See `linear_stiffness`.
-        points, constants, scales : (k, 2), (k, 5), (k,) arrays
+        points, constants, scales : (k, 2), (k, 7), (k,) arrays
             See `rubber_points`.
         """
         if factors is None:
@@ -171,6 +172,7 @@ class Section:
         points, constants, scales = self.rubber_points
         chosen = kept != 0
         scaled = constants[chosen] * kept[chosen, None]
+        scaled[:, KNEE] = constants[chosen, KNEE]  # a strain, no stress
         return self._linear_stiffness(factor), points[chosen], scaled, scales[chosen]
 
     @cached_property
@@ -209,19 +211,24 @@ class Section:
     @cached_property
     def plane_stiffness(self) -> np.ndarray:
         """(6, 6) stiffness of all layers at rest, rows and scaling as those of `linear_stiffness`; rubber answers as
-        an incompressible material of shear modulus 2 (C10 + C01) does in plane stress.
+        an incompressible material of its shear modulus does in plane stress.
         """
         total = self.linear_stiffness[:6, :6].copy()
-        for (zeta, weight), (c10, c01, *_) in zip(*self.rubber_points[:2]):
-            rubber = 2 * (c10 + c01) * np.array([[4.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 1.0]])
+        for (zeta, weight), constants in zip(*self.rubber_points[:2]):
+            modulus = 2 * (constants[0] + constants[1]) + constants[5]
+            rubber = modulus * np.array([[4.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 1.0]])
             total += weight * np.kron(np.array([[1.0, zeta], [zeta, zeta**2]]), rubber)
         return total
 
     @cached_property
     def rubber_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points (k, 2), constants (k, 5) and shear scale (k,) of the points that carry rubber."""
+        """Points (k, 2), constants (k, 7) and shear scale (k,) of the points that carry rubber."""
         chosen = self.kinds == RUBBER
-        return self.points[chosen].copy(), self.parameters[chosen, :5].copy(), self.shear_scale[chosen].copy()
+        return (
+            self.points[chosen].copy(),
+            self.parameters[chosen, :RUBBER_CONSTANTS].copy(),
+            self.shear_scale[chosen].copy(),
+        )
 
 
 def strain_rotation(c: float, s: float) -> np.ndarray:

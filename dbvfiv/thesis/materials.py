@@ -8,7 +8,7 @@ from ..drawing.style import branch_looks, new_figure
 from ..materials.fit import uniaxial_stress
 from ..materials.halpin_tsai import ply_from_constituents
 from ..materials.rayleigh import rayleigh_constants
-from ..materials.rubbers import rubber, strain_levels
+from ..materials.rubbers import published_rubber, strain_levels
 from ..report.content import picture
 from .entry import Entry, Number, Outcome
 from .workshop import Workshop
@@ -27,7 +27,7 @@ def rubber_constants(workshop: Workshop) -> Outcome:
     numbers = []
     for name, levels in _TABLE_3_3.items():
         for level, printed in zip(strain_levels(), levels):
-            law = rubber(name, level)
+            law = published_rubber(name, level)
             for symbol, ours, theirs in zip(("C10", "C01", "C11"), (law.c10, law.c01, law.c11), printed):
                 numbers.append(Number(f"{name} {100 * level:g} %, {symbol}", ours / 1e6, theirs, "MPa"))
     worst = max(abs(n.ours - n.published) for n in numbers)
@@ -44,7 +44,7 @@ def rubber_curves(workshop: Workshop) -> Outcome:
             for level, look in zip(strain_levels(), branch_looks(4)):
                 stretch = np.linspace(1.0, 1.0 + level, 60)
                 for terms, dashes in ((3, "-"), (2, ":")):
-                    stress = uniaxial_stress(rubber(name, level, terms=terms), stretch) / 1e6
+                    stress = uniaxial_stress(published_rubber(name, level, terms=terms), stretch) / 1e6
                     label = f"{100 * level:g} %" if terms == 3 else None
                     axes.plot(100 * (stretch - 1), stress, dashes, color=look["color"], label=label)
             axes.set_title(name, loc="left")

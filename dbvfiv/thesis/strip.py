@@ -7,7 +7,7 @@ import scipy.sparse.linalg as spla
 
 from ..drawing.style import new_figure
 from ..errors import SolveError
-from ..materials import fibre_ply, rubber
+from ..materials import fibre_ply, published_rubber
 from ..report.content import picture
 from ..shell import Layer, Section, Shell, ShellMesh
 from .entry import Entry, Number, Outcome
@@ -26,8 +26,8 @@ SHEAR = 5.0 / 6.0
 def layers() -> tuple[Layer, ...]:
     """The strip's layers from its lower to its upper face: two EPDM, plies at -54 and +54 degrees, two SBR, one CR."""
     ply = fibre_ply("program")
-    stack = [(rubber("EPDM", 0.1), 3e-3, 0.0)] * 2 + [(ply, 1e-3, -54.0), (ply, 1e-3, 54.0)]
-    stack += [(rubber("SBR", 0.1), 3e-3, 0.0)] * 2 + [(rubber("CR", 0.1), 3e-3, 0.0)]
+    stack = [(published_rubber("EPDM", 0.1), 3e-3, 0.0)] * 2 + [(ply, 1e-3, -54.0), (ply, 1e-3, 54.0)]
+    stack += [(published_rubber("SBR", 0.1), 3e-3, 0.0)] * 2 + [(published_rubber("CR", 0.1), 3e-3, 0.0)]
     return tuple(Layer(law, thickness, angle, SHEAR) for law, thickness, angle in stack)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dbvfiv.materials import published_rubber, rubber, uniaxial_stress
 from dbvfiv.materials.library import law_from_card
 from dbvfiv.studies.case import load_case
 
@@ -29,8 +30,8 @@ def test_the_table_pasted_is_the_fit_from_the_case(command_line, tmp_path):
     case = tmp_path / "my.toml"
     case.write_text(
         document["toml"]
-        + f"\n[materials.same]\nkind='fit'\npath='{TRELOAR}'\nterms=3\nconstraint='stable'\nstable_to='80 %'\n"
-        "density='1300 kg/m^3'\n"
+        + f"\n[materials.same]\nkind='fit'\npath='{TRELOAR}'\nlaw='mooney-rivlin'\nterms=3\nconstraint='stable'\n"
+        "stable_to='80 %'\ndensity='1300 kg/m^3'\n"
     )
     named = load_case(case).materials.named
     pasted, fitted = law_from_card(named["NR"]), law_from_card(named["same"])
@@ -40,13 +41,28 @@ def test_the_table_pasted_is_the_fit_from_the_case(command_line, tmp_path):
 
 
 def test_a_yeoh_rubber_goes_from_its_tests_into_a_case(command_line, tmp_path):
-    outcome = command_line("fit", TRELOAR)  # the best that a wall takes
+    outcome = command_line("fit", TRELOAR, "--law", "yeoh")
     case = tmp_path / "my.toml"
     case.write_text(outcome.out[outcome.out.index("[materials.rubber]") :])
     law = law_from_card(load_case(case).materials.named["rubber"])
     np.testing.assert_allclose(law.parameters[[0, 3, 4]] / 1e6, [0.183027, -1.41845e-3, 3.93471e-5], rtol=1e-5)
     case.write_text("[materials.A]\nkind='yeoh'\nc10='-1 MPa'\ndensity=1300\n")
     assert "materials.A" in command_line("case", str(case)).err
+
+
+def test_the_softening_rubber_is_told_where_no_law_is_named(command_line, tmp_path):
+    tension = tmp_path / "tension.csv"
+    stretch = np.linspace(1.005, 1.4, 40)
+    stress = uniaxial_stress(published_rubber("EPDM", 0.4), stretch)
+    rows = "".join(f"{s!r},{p!r}\n" for s, p in zip(stretch.tolist(), stress.tolist()))
+    tension.write_text("stretch [-],nominal_stress [Pa]\n" + rows)
+    outcome = command_line("fit", str(tension))
+    case = tmp_path / "my.toml"
+    case.write_text(outcome.out[outcome.out.index("[materials.rubber]") :])
+    law = law_from_card(load_case(case).materials.named["rubber"])
+    shipped = rubber("EPDM", 0.4)
+    np.testing.assert_allclose([law.mu_0, law.c], [shipped.mu_0, shipped.c], rtol=0.03)
+    assert law.x_0 == pytest.approx(shipped.x_0, rel=0.05)
 
 
 def test_a_form_that_the_wall_lacks_is_said(command_line):

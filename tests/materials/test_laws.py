@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal, localcontext
 from fractions import Fraction
 
 import jax
@@ -15,18 +16,22 @@ from dbvfiv.materials import (
     MaterialError,
     MooneyRivlin,
     OrthotropicPly,
+    SofteningRubber,
     Yeoh,
     energy_of,
     fibre_ply,
+    published_rubber,
     rubber,
 )
 from dbvfiv.materials.incompressible import mooney_rivlin_energy, plane_stress_invariants
 
 LAWS = {
-    "SBR 10 %": rubber("SBR", 0.10),
-    "CR 60 %": rubber("CR", 0.60),
+    "SBR 10 %": published_rubber("SBR", 0.10),
+    "CR 60 %": published_rubber("CR", 0.60),
     "neo-Hookean": MooneyRivlin.neo_hookean(1.1e6, 1300.0),
     "Yeoh": Yeoh(0.3e6, -0.02e6, 0.01e6, 1300.0),
+    "softening": SofteningRubber(0.2e6, 1e6, 4e-3, 9e6, 1300.0),
+    "stable EPDM 20 %": rubber("EPDM", 0.20),
     "isotropic": IsotropicElastic(6e6, 0.49, 1300.0),
     "ply": fibre_ply(),
 }
@@ -61,11 +66,37 @@ def test_invariants_equal_their_definitions_exactly(size):
 
 @pytest.mark.parametrize("size", [1e-2, 1e-5, 1e-8])
 def test_small_strains_lose_no_digits(size):
-    parameters = rubber("SBR", 0.10).parameters
+    parameters = published_rubber("SBR", 0.10).parameters
     exact_parameters = [Fraction(p) for p in parameters]
     for e in size * STRAINS:
         exact = float(mooney_rivlin_energy(exact_parameters, [Fraction(v) for v in e]))
         assert mooney_rivlin_energy(parameters, e) == pytest.approx(exact, rel=1e-13)
+
+
+@pytest.mark.parametrize("size", [1e-2, 1e-5, 1e-8])
+def test_knee_loses_no_digits_at_small_strain(size):
+    law = SofteningRubber(0.0, 1e6, 4e-3, 0.0, 1300.0)
+    for e in size * STRAINS:
+        x = plane_stress_invariants([Fraction(v) for v in e]).i1_minus_3
+        with localcontext() as context:
+            context.prec = 60
+            ratio = 1 + Decimal(x.numerator) / Decimal(x.denominator) / Decimal(law.x_0)
+            exact = float(Decimal(law.mu_0) * Decimal(law.x_0) * (ratio.sqrt() - 1))
+        assert law.energy(e) == pytest.approx(exact, rel=1e-13)
+
+
+def test_softening_energy_is_its_formula():
+    law = LAWS["softening"]
+    for e in STRAINS:
+        x = plane_stress_invariants(e).i1_minus_3
+        knee = 2 * law.mu_0 * law.x_0 * (np.sqrt(1 + x / law.x_0) - 1)
+        assert law.energy(e) == pytest.approx((law.mu_inf * x + knee + law.c * x**2 / 2) / 2, rel=1e-12)
+
+
+def test_rubber_without_a_knee_has_finite_derivatives_by_its_constants():
+    for derivative in (jax.grad, jax.hessian):
+        found = derivative(energy_of, argnums=1)(1, jnp.asarray(published_rubber("CR").parameters), STRAINS[0])
+        assert np.all(np.isfinite(found))
 
 
 def test_kirchhoff_energy_is_the_laminate_formula():
@@ -97,7 +128,7 @@ def test_one_function_serves_all(law):
 def test_unused_branch_cannot_spoil_the_used_one():
     ply = fibre_ply()
     no_area = jnp.array([-0.5, 0.0, 0.0, 0.2, 0.0])  # det C2 = 0: the rubber's energy is infinite
-    assert not np.isfinite(energy_of(1, rubber("CR").parameters, no_area))
+    assert not np.isfinite(energy_of(1, published_rubber("CR").parameters, no_area))
     for derivative in (jax.grad, jax.hessian):
         assert np.all(np.isfinite(derivative(energy_of, argnums=2)(0, ply.parameters, no_area)))
     assert np.all(np.isfinite(jax.grad(energy_of, argnums=1)(0, ply.parameters, no_area)))
@@ -121,7 +152,7 @@ def test_reference_state_is_free_and_has_the_small_strain_stiffness(law):
 
 
 def test_rubber_at_rest_is_incompressible_plane_stress():
-    law = rubber("EPDM", 0.2)
+    law = published_rubber("EPDM", 0.2)
     mu = law.small_strain_shear_modulus
     expected = mu * np.array([[4, 2, 0, 0, 0], [2, 4, 0, 0, 0], [0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1]])
     np.testing.assert_allclose(jax.hessian(law.energy)(jnp.zeros(5)), expected, rtol=1e-13, atol=1e-6)

@@ -11,13 +11,16 @@ from dbvfiv.materials import (
     IsotropicElastic,
     MooneyRivlin,
     OrthotropicPly,
+    SofteningRubber,
     fibre_ply,
     law_from_case,
     ply_from_constituents,
+    published_rubber,
     rubber,
     uniaxial_stress,
 )
 from dbvfiv.materials.library import CARD_KINDS
+from dbvfiv.studies.case import thesis_case
 
 
 def _case(**materials):
@@ -29,10 +32,19 @@ def test_every_kind_of_card_has_a_law():
 
 
 def test_built_in_materials():
-    case = Case()
+    case = thesis_case()
     for name in ("CR", "SBR", "EPDM"):
         assert law_from_case(case, name) == rubber(name, 0.10)
     assert law_from_case(case, "fibre") == fibre_ply("program")
+
+
+def test_published_constants():
+    case = _case(constants="published", strain_level="20 %")
+    assert law_from_case(case, "SBR") == published_rubber("SBR", 0.20)
+    levels = case.replace(case.materials.at_levels({"SBR": 0.3}))
+    assert law_from_case(levels, "SBR") == published_rubber("SBR", 0.3)
+    with pytest.raises(CaseError, match="materials.constants.*stable.*published"):
+        _case(constants="thesis")
 
 
 def test_strain_level_and_fibre_constants():
@@ -71,6 +83,14 @@ def test_strain_level_and_fibre_constants():
             {"kind": "shipped", "rubber": "EPDM", "strain_level": "40 %", "density": 1150.0},
             rubber("EPDM", 0.4, density=1150.0),
         ),
+        (
+            {"kind": "shipped", "rubber": "CR", "constants": "published"},
+            published_rubber("CR", 0.1, density=1300.0),
+        ),
+        (
+            {"kind": "softening", "mu_0": "1 MPa", "x_0": 0.01, "c": 2e6, "density": 1150.0},
+            SofteningRubber(0.0, 1e6, 0.01, 2e6, 1150.0),
+        ),
     ],
 )
 def test_tables_of_the_case(card, law):
@@ -88,9 +108,12 @@ def test_fitted_material(tmp_path):
     stress = uniaxial_stress(MooneyRivlin(3e5, 1e5, 0.0, 1.0), stretch)
     rows = "".join(f"{s!r},{p!r}\n" for s, p in zip(stretch.tolist(), stress.tolist()))
     path.write_text("stretch [-],nominal_stress [Pa]\n" + rows)
-    card = {"kind": "fit", "path": str(path), "terms": 2, "density": 1200.0}
+    card = {"kind": "fit", "path": str(path), "law": "mooney-rivlin", "terms": 2, "density": 1200.0}
     law = law_from_case(_case(mine=card), "mine")
     assert (law.c10, law.c01, law.c11, law.density) == pytest.approx((3e5, 1e5, 0.0, 1200.0), rel=1e-9)
+
+    law = law_from_case(_case(mine={"kind": "fit", "path": str(path), "density": 1200.0}), "mine")
+    assert isinstance(law, SofteningRubber) and law.small_strain_shear_modulus == pytest.approx(8e5, rel=0.05)
 
     path.write_text("stretch [-],nominal_stress [Pa]\n1.1,oops\n")
     with pytest.raises(CaseError, match="materials.mine cannot be used.*line 2.*'oops'") as caught:
@@ -100,4 +123,4 @@ def test_fitted_material(tmp_path):
 
 def test_unknown_name_is_refused():
     with pytest.raises(CaseError, match="'steel' is no material.*CR, SBR, EPDM, fibre"):
-        law_from_case(Case(), "steel")
+        law_from_case(thesis_case(), "steel")

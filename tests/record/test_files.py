@@ -10,7 +10,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.materials.rubbers import rubber
+from dbvfiv.materials.rubbers import published_rubber
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header, read_header, write_header
@@ -78,7 +78,7 @@ def test_numbers_carry_units_case_and_versions(coarse_run):
 
 
 def test_files_of_the_case_travel_with_the_result(tmp_path, coarse_run, monkeypatch):
-    law = rubber("CR", 0.1)
+    law = published_rubber("CR", 0.1)
     stretch = np.linspace(1.01, 1.3, 20)
     stress = 2 * (stretch - stretch**-2) * (law.parameters[0] + law.parameters[1] / stretch)
     data = tmp_path / "tension.csv"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dbvfiv.materials import IsotropicElastic, OrthotropicPly, rubber
+from dbvfiv.materials import IsotropicElastic, OrthotropicPly, published_rubber
 from dbvfiv.model.linear import DirectFactor
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 
@@ -75,11 +75,11 @@ def mixed_section() -> Section:
     ply = OrthotropicPly(1.5e9, 8e6, 0.287, 5.57e6, 5.57e6, 2.94e6, 1270.0)
     return Section(
         (
-            Layer(rubber("CR", 0.1), 6.35e-3, name="CR"),
-            Layer(rubber("SBR", 0.2), 3.175e-3, name="SBR"),
+            Layer(published_rubber("CR", 0.1), 6.35e-3, name="CR"),
+            Layer(published_rubber("SBR", 0.2), 3.175e-3, name="SBR"),
             Layer(ply, 0.8382e-3, 54.0, 5 / 6, "ply +54"),
             Layer(ply, 0.8382e-3, -54.0, 5 / 6, "ply -54"),
-            Layer(rubber("EPDM", 0.4), 3.175e-3, 0.0, 0.9, "EPDM"),
+            Layer(published_rubber("EPDM", 0.4), 3.175e-3, 0.0, 0.9, "EPDM"),
         )
     )
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.materials import IsotropicElastic, MooneyRivlin, OrthotropicPly, Yeoh
-from dbvfiv.shell import Layer, Section, Shell
+from dbvfiv.materials import IsotropicElastic, MooneyRivlin, OrthotropicPly, SofteningRubber, Yeoh
+from dbvfiv.shell import Layer, Section, Shell, StepWall
 from tests.shell.structures import random_state
 
 
@@ -43,6 +43,10 @@ SECTIONS = {
     "Yeoh rubber": Section(
         (Layer(Yeoh(4e5, -3e4, 2e4, 1300.0), 0.006), Layer(MooneyRivlin(4e5, 1e5, 2e5, 1300.0), 0.006)), 2
     ),
+    "softening rubber": Section(
+        (Layer(SofteningRubber(2e5, 1e6, 3e-3, 9e6, 1300.0), 0.006), Layer(MooneyRivlin(4e5, 1e5, 2e5, 1300.0), 0.006)),
+        2,
+    ),
     "ply only": Section((Layer(OrthotropicPly(25e6, 1e6, 0.25, 0.5e6, 0.5e6, 0.2e6, 1.0), 0.012, 30.0, 5 / 6),)),
     "one point a layer": Section(
         (Layer(IsotropicElastic(1e6, 0.3, 1.0), 0.004), Layer(MooneyRivlin(4e5, 0.0, 0.0, 1300.0), 0.008)), 1
@@ -62,6 +66,29 @@ def test_other_walls(cylinder_mesh, name):
     assert np.abs(force - total.ravel()).max() < 1e-12 * np.abs(total).max()
     slope = difference(shell.force, q, direction, 1e-3)
     assert np.linalg.norm(shell.dofs.matrix(data) @ direction - slope) < 1e-7 * np.linalg.norm(slope)
+
+
+@pytest.mark.parametrize("stretch, turn", [(0.1, 0.4), (1e-3, 1e-3), (1e-5, 1e-5)])
+def test_softening_rubber_is_that_of_its_energy(cylinder_mesh, stretch, turn):
+    shell = Shell(cylinder_mesh, Section((Layer(SofteningRubber(2e4, 4e6, 1.2e-3, 69e6, 1300.0), 0.012),)))
+    q = shell.dofs.restrict(random_state(shell.mesh, 7, stretch, turn))
+    expected_force, expected_tangent = assembled(shell, q)
+    force, data = shell.force_and_tangent(q)
+    scale = max(np.abs(expected_force).max(), np.abs(expected_tangent).max() * np.abs(shell.mesh.nodes).max() * 1e-2)
+    assert np.abs(force - expected_force).max() < 1e-12 * scale
+    assert np.abs(shell.force(q) - expected_force).max() < 1e-12 * scale
+    assert np.abs(shell.dofs.matrix(data).toarray() - expected_tangent).max() < 1e-12 * np.abs(expected_tangent).max()
+
+
+def test_factor_on_a_softening_layer_is_one_on_its_stress(cylinder_mesh):
+    """x_0 is a strain: the factor of a layer that relaxes leaves it as it is."""
+    law = SofteningRubber(2e4, 4e6, 1.2e-3, 69e6, 1300.0)
+    shell = Shell(cylinder_mesh, Section((Layer(law, 0.012),)))
+    q = shell.dofs.restrict(random_state(shell.mesh, 7, 0.05, 0.2))
+    twice = StepWall(shell.wall_of(np.array([2.0])), np.zeros((shell.mesh.element_count, 4, 8)))
+    np.testing.assert_allclose(
+        shell.force(q, twice), 2.0 * shell.force(q), rtol=0, atol=1e-12 * np.abs(shell.force(q)).max()
+    )
 
 
 def test_held_unknowns_drop_out(saddle_shell):

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from dbvfiv.materials import fibre_ply, rubber
+from dbvfiv.materials import fibre_ply, published_rubber
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.thesis import strip
 from tests.shell.structures import dead_load, grid, solve_path
@@ -25,9 +25,9 @@ LENGTH, WIDTH, SPAN = 0.16, 0.05, 0.05
 def layers(angle=54.0, plies=True, shear=5 / 6):
     """Bottom to top."""
     ply = fibre_ply("program")
-    stack = [(rubber("EPDM", 0.1), 3e-3, 0), (rubber("EPDM", 0.1), 3e-3, 0)]
-    stack += [(ply, 1e-3, -angle), (ply, 1e-3, angle)] if plies else [(rubber("SBR", 0.1), 2e-3, 0)]
-    stack += [(rubber("SBR", 0.1), 3e-3, 0), (rubber("SBR", 0.1), 3e-3, 0), (rubber("CR", 0.1), 3e-3, 0)]
+    stack = [(published_rubber("EPDM", 0.1), 3e-3, 0), (published_rubber("EPDM", 0.1), 3e-3, 0)]
+    stack += [(ply, 1e-3, -angle), (ply, 1e-3, angle)] if plies else [(published_rubber("SBR", 0.1), 2e-3, 0)]
+    stack += [(published_rubber(name, 0.1), 3e-3, 0) for name in ("SBR", "SBR", "CR")]
     return tuple(Layer(law, h, a, shear) for law, h, a in stack)
 
 
