@@ -9,10 +9,10 @@ import numpy as np
 
 from ..errors import SolveError
 from ..geometry.divisions import grading
-from ..materials.stability import stability_margin
 from ..observer import Observer
 from .load_steps import LoadStepOptions, LoadSteps, Way
 from .loading import Loading
+from .material_stability import material_stability
 from .newton import NewtonOptions
 from .state import SteadyState, describe_state
 from .valve import ValveModel
@@ -287,22 +287,7 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
 
 
 def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str]:
-    """Sentences about the states found: strains at which a rubber law is no longer stable."""
-
-    section = model.shell.section
-    worst: dict[str, tuple[float, float]] = {}
-    for state in states:
-        strain = model.shell.strains(state.q)
-        for i, layer in enumerate(section.layers):
-            if layer.law.kind == 0:
-                continue
-            points = slice(i * section.points_per_layer, (i + 1) * section.points_per_layer)
-            margin = float(np.min(stability_margin(layer.law, strain[:, :, points].reshape(-1, 5))))
-            if margin <= 0 and margin < worst.get(layer.name, (0.0, 0.0))[0]:
-                worst[layer.name] = (margin, state.pressure)
-    for name, (margin, pressure) in worst.items():
-        yield (
-            f"The constants of {name} lose stability within the strains that occur: at {pressure:.6g} Pa "
-            f"the smallest eigenvalue of its tangent falls to "
-            f"{margin:.2g} of the value at rest; choose a higher strain level or fit the constants over a wider range."
-        )
+    """Sentences about the states found: the worst of those in which a rubber is no longer stable."""
+    judged = [material_stability(model, state) for state in states]
+    if judged and not (worst := min(judged, key=lambda found: found.margin)).holds:
+        yield worst.sentence

@@ -1,4 +1,4 @@
-"""Material stability of the rubber at every layer point of a steady state, long-term and instantaneous."""
+"""Material stability of a wall in a state: the least margin of its rubbers, slow and instantaneous, and its place."""
 
 from __future__ import annotations
 
@@ -7,30 +7,91 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..materials.law import MOONEY_RIVLIN
-from ..materials.stability import stability_margin
+from ..materials.stability import principal_log_strains, stability_margin
+from .state import SteadyState
 from .valve import ValveModel
 
 
 @dataclass(frozen=True)
 class MaterialStability:
-    """Least material stability margin over the wall."""
+    """Worst of all points of rubber in a wall; plies are not judged.
 
+    Attributes
+    ----------
+    pressure : float
+        Of the state, Pa.
+    margin : float
+        Least share of the stiffness at rest that is kept, of the slow and the instantaneous criterion (see
+        `dbvfiv.materials.stability`); 1 for a wall without rubber.
+    material : str
+        Of the layer of that point.
+    place : tuple of float
+        Its mid-surface point before the wall moves: x, y, z, m.
+    share : float
+        Part of the wall's volume whose margin is not positive.
+    stretches : tuple of float
+        Principal stretches there, ascending; NaN where no sheet has such strains.
+    """
+
+    pressure: float
     margin: float
-    sentence: str = ""
+    material: str
+    place: tuple[float, float, float]
+    share: float
+    stretches: tuple[float, float, float]
 
     @property
     def holds(self) -> bool:
-        return self.margin > 0
+        """Whether every point is stable."""
+        return self.margin > 0.0
+
+    @property
+    def sentence(self) -> str:
+        """The verdict; says what to change where it does not hold."""
+        stretches = ", ".join(f"{stretch:.3f}" for stretch in self.stretches)
+        x, y, z = self.place
+        where = f"at ({x:.3f}, {y:.3f}, {z:.3f}) m, principal stretches {stretches}"
+        at = f"at {self.pressure:.6g} Pa"
+        if self.holds:
+            kept = f"{self.material} keeps {self.margin:.2g} of its stiffness"
+            return f"The rubber's constants are stable {at}; {kept} {where}."
+        return (
+            f"Not valid {at}: the rubber's constants are unstable here, in {100 * self.share:.2g} % of the wall's "
+            f"volume; the least stiffness of {self.material} is {self.margin:.2g} of that at rest {where}; take "
+            'materials.constants = "stable", another strain level, or constants from `dbvfiv fit`.'
+        )
 
 
-def material_stability(model: ValveModel, q: np.ndarray, loss_factor: float) -> MaterialStability:
-    """Judge the material stability of a state q (n,) with a factor on the loss factors of all materials."""
+def material_stability(model: ValveModel, state: SteadyState, loss_factor: float | None = None) -> MaterialStability:
+    """Judge the rubber of a wall in a steady state.
+
+    Parameters
+    ----------
+    model : ValveModel
+    state : SteadyState
+    loss_factor : float, optional
+        Factor on the loss factors of all layers; that of the case without it.
+    """
+    factor = model.case.damping.loss_factor if loss_factor is None else loss_factor
     shell, section = model.shell, model.shell.section
-    strains, each = shell.strains(q), section.points_per_layer
-    least, name = np.inf, ""
+    strains, volume = shell.strains(state.q), shell.point_volumes
+    margins = np.ones(strains.shape[:-1])
     for i, layer in enumerate(section.layers):
         if layer.law.kind == MOONEY_RIVLIN:
-            margin = float(stability_margin(layer.law, strains[:, :, i * each : (i + 1) * each].reshape(-1, 5)).min())
-            if margin < least:
-                least, name = margin, layer.name
-    return MaterialStability(least, f"The rubber's constants are unstable here: {name}." if least <= 0 else "")
+            own = slice(i * section.points_per_layer, (i + 1) * section.points_per_layer)
+            margins[:, :, own] = stability_margin(layer.law, strains[:, :, own], _instantaneous(layer, factor))
+    element, gauss, point = np.unravel_index(np.argmin(margins), margins.shape)
+    logs = principal_log_strains(strains[element, gauss, point])
+    return MaterialStability(
+        pressure=state.pressure,
+        margin=float(margins[element, gauss, point]),
+        material=section.layers[point // section.points_per_layer].name,
+        place=tuple(float(x) for x in shell.geometry.position[element, gauss]),
+        share=float(volume[margins <= 0.0].sum() / volume.sum()),
+        stretches=tuple(float(stretch) for stretch in np.exp(logs)),
+    )
+
+
+def _instantaneous(layer, loss_factor: float) -> float:
+    """Instantaneous tangent over the slow one of a layer, with a factor on its loss factors."""
+    return 1.0 if layer.relaxation is None else 1.0 + sum(layer.relaxation.scaled(loss_factor).strengths)

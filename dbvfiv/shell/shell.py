@@ -267,6 +267,13 @@ class Shell:
             return strains
         return np.where(self.at_rest.points[:, None, :, 1:] > 0, strains, 0.0)
 
+    @cached_property
+    def point_volumes(self) -> np.ndarray:
+        """Volumes (ne, 4, np) that the layer points stand for, m3, by the area of the mid-surface."""
+        weights = self.at_rest.points[..., 1]
+        weights = weights if weights.ndim == 1 else weights[:, None]
+        return (self.geometry.thickness[:, None] * self.geometry.area)[:, :, None] * weights
+
     def folded_places(self) -> np.ndarray:
         """Positions (k, 3) of the integration points at which half the wall exceeds the radius of the mid-surface."""
         return self.geometry.position[thickness_over_radius(self.geometry) > 1.0]

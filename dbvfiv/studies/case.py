@@ -110,7 +110,12 @@ Case = create_model(
 
 
 #: Keys in which the thesis's computations differ from the defaults.
-THESIS = {"materials.strain_level": "10 %", "damping.model": "rayleigh", "fluid.continuity": "quasi-steady"}
+THESIS = {
+    "materials.strain_level": "10 %",
+    "materials.constants": "published",
+    "damping.model": "rayleigh",
+    "fluid.continuity": "quasi-steady",
+}
 
 
 def thesis_case(changes: Changes = ()) -> Case:
