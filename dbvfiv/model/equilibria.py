@@ -288,6 +288,6 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
 
 def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str]:
     """Sentences about the states found: the worst of those in which a rubber is no longer stable."""
-    judged = [material_stability(model, state) for state in states]
+    judged = [material_stability(model, state.q, state.pressure) for state in states]
     if judged and not (worst := min(judged, key=lambda found: found.margin)).holds:
         yield worst.sentence

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..materials.law import MOONEY_RIVLIN
 from ..materials.stability import principal_log_strains, stability_margin
-from .state import SteadyState
 from .valve import ValveModel
 
 
@@ -56,25 +55,30 @@ class MaterialStability:
             kept = f"{self.material} keeps {self.margin:.2g} of its stiffness"
             return f"The rubber's constants are stable {at}; {kept} {where}."
         return (
-            f"Not valid {at}: the rubber's constants are unstable here, in {100 * self.share:.2g} % of the wall's "
-            f"volume; the least stiffness of {self.material} is {self.margin:.2g} of that at rest {where}; take "
+            f"The rubber's constants are unstable here: {at} in {100 * self.share:.2g} % of the wall's volume; the least "
+            f"stiffness of {self.material} is {self.margin:.2g} of that at rest {where}; take "
             'materials.constants = "stable", another strain level, or constants from `dbvfiv fit`.'
         )
 
 
-def material_stability(model: ValveModel, state: SteadyState, loss_factor: float | None = None) -> MaterialStability:
+def material_stability(
+    model: ValveModel, q: np.ndarray, pressure: float, loss_factor: float | None = None
+) -> MaterialStability:
     """Judge the rubber of a wall in a steady state.
 
     Parameters
     ----------
     model : ValveModel
-    state : SteadyState
+    q : (n,) array
+        Its displacements.
+    pressure : float
+        Of the state, Pa.
     loss_factor : float, optional
         Factor on the loss factors of all layers; that of the case without it.
     """
     factor = model.case.damping.loss_factor if loss_factor is None else loss_factor
     shell, section = model.shell, model.shell.section
-    strains, volume = shell.strains(state.q), shell.point_volumes
+    strains, volume = shell.strains(q), shell.point_volumes
     margins = np.ones(strains.shape[:-1])
     for i, layer in enumerate(section.layers):
         if layer.law.kind == MOONEY_RIVLIN:
@@ -83,7 +87,7 @@ def material_stability(model: ValveModel, state: SteadyState, loss_factor: float
     element, gauss, point = np.unravel_index(np.argmin(margins), margins.shape)
     logs = principal_log_strains(strains[element, gauss, point])
     return MaterialStability(
-        pressure=state.pressure,
+        pressure=pressure,
         margin=float(margins[element, gauss, point]),
         material=section.layers[point // section.points_per_layer].name,
         place=tuple(float(x) for x in shell.geometry.position[element, gauss]),

@@ -183,7 +183,7 @@ def run_modes(
             "modes.in_vacuo gives those of the structure at rest."
         )
     if conditions.loss_factor:
-        rubber = material_stability(model, state.q, conditions.loss_factor)
+        rubber = material_stability(model, state.q, state.pressure, conditions.loss_factor)
         if not rubber.holds:
             raise NotValidError(rubber.sentence)
     observer.begin("modes", 1)

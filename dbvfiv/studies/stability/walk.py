@@ -213,7 +213,7 @@ class StabilityWalk:
         if key not in self._validity:
             if len(self._validity) > 4000:
                 self._validity.clear()
-            found = material_stability(self.built(place).model, self.equilibrium(place), loss)
+            found = material_stability(self.built(place).model, self.equilibrium(place), place.pressure, loss)
             self._validity[key] = "" if found.holds else found.sentence
         if self._validity[key]:
             raise NotValidError(self._validity[key])

@@ -113,7 +113,7 @@ class Runner:
         progress = Progress(state, energy=energy, control=tuple(self.control.pack()))
         if kick is not None:
             progress.eigenvalue = kick.eigenvalue
-            self._judge_rubber(state)
+            self._judge_rubber(state, inlet)
         self._reader = Reader(self.motion, progress.energy)
         row = self._reader.first(state, inlet)
         self.keeper.append(row)
@@ -139,10 +139,10 @@ class Runner:
             return stored_state(self.motion, self.case, inlet), None
         return first_state(self.motion, self.case, inlet, self.record)
 
-    def _judge_rubber(self, state: MotionState) -> None:
+    def _judge_rubber(self, state: MotionState, inlet: float) -> None:
         """Note where the constants of rubbers with loss factors do not hold at the state that is kicked."""
         loss = self.motion.conditions.loss_factor
-        found = material_stability(self.model, state.q, loss) if loss else None
+        found = material_stability(self.model, state.q, inlet, loss) if loss else None
         if found is not None and not found.holds:
             self.record.note(REFUSAL, text=found.sentence)
             self.record.warn(found.sentence)
