@@ -55,8 +55,8 @@ class MaterialStability:
             kept = f"{self.material} keeps {self.margin:.2g} of its stiffness"
             return f"The rubber's constants are stable {at}; {kept} {where}."
         return (
-            f"The rubber's constants are unstable here: {at} in {100 * self.share:.2g} % of the wall's volume; the least "
-            f"stiffness of {self.material} is {self.margin:.2g} of that at rest {where}; take "
+            f"The rubber's constants are unstable here: {at} in {100 * self.share:.2g} % of the wall's volume; the "
+            f"least stiffness of {self.material} is {self.margin:.2g} of that at rest {where}; take "
             'materials.constants = "stable", another strain level, or constants from `dbvfiv fit`.'
         )
 

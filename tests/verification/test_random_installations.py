@@ -65,6 +65,8 @@ def random_installation(rng) -> dict:
             keys["outside.pipe_diameter"] = float(rng.uniform(0.33, 1.5))
     keys["gravity.direction"] = str(rng.choice(["none", "-z", "+z"]))
     keys["damping.model"] = str(rng.choice(["rayleigh", "loss factor"]))
+    if keys["damping.model"] == "loss factor":
+        keys["materials.constants"] = "stable"
     level = density * GRAVITY * 0.56 * {"none": 0.0, "-z": -1.0, "+z": 1.0}[keys["gravity.direction"]]
     drive = float(10 ** rng.uniform(2, 4.6))
     return keys | {"drive.pressure": max(keys["downstream.pressure"] + level, 0.0) + drive}

@@ -49,12 +49,8 @@ def examined(around: int, along: int, number: int, seed: int, pressures: int) ->
 
 
 def examined_relaxing(around: int, along: int, number: int, seed: int, pressures: int, mesh=FORMER) -> list[Examined]:
-    """The same of walls that relax, each with a basis of its own; on even rows and columns.
-
-    Graded ones resolve strains in the bend of the lip at which constants of the 10 % level have lost stability. Factors
-    near 2 on the loss factors make such walls grow by themselves, in a dozen ways at once that do not oscillate.
-    """
-    changes = {"damping.model": "loss factor", **mesh}
+    """The same of walls of stable rubbers that relax, each with a basis of its own."""
+    changes = {"damping.model": "loss factor", "materials.constants": "stable", **mesh}
     states = linearised_states(around, along, random_pressures(pressures, seed), **changes)
     out = []
     for state in relaxing_states(states, number, seed):

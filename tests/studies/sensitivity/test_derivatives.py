@@ -58,7 +58,7 @@ LOSSY = Conditions(10.0, 1.0, 0.0, 1.0)
 
 @pytest.fixture(scope="module")
 def lossy_valve():
-    changes = {"mesh.around": 8, "mesh.along": 14, "damping.model": "loss factor"}
+    changes = {"mesh.around": 8, "mesh.along": 14, "damping.model": "loss factor", "materials.constants": "stable"}
     model = ValveModel(thesis_case(changes))
     q = find_equilibria(model, [6e3]).states[0].q
     options = SearchOptions(max_frequency=100.0, left=True)

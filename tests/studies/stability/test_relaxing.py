@@ -27,6 +27,7 @@ def lossy_case():
             "mesh.along=14",
             *(f"{key}={value}" for key, value in FORMER.items()),
             "damping.model='loss factor'",
+            "materials.constants='stable'",
             "fluid.density=20",
             "drive.pressure=6000",
             "map.workers=1",
