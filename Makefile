@@ -37,6 +37,7 @@ reproduce: setup
 
 docs: setup
 	@$(PYTHON) -m dbvfiv.studies.case > docs/case-reference.md
+	@$(PYTHON) -m dbvfiv.studies.case thesis > cases/dbv12.toml
 	@$(PYTHON) -m mkdocs build --strict --quiet
 	@echo "The manual is in build/site/index.html."
 

@@ -7,7 +7,7 @@ from time import process_time
 
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.observer import Observer
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.transient.run import Runner
 
@@ -42,7 +42,7 @@ class _Clock(Observer):
 @benchmark("cycles")
 def cycles():
     """The branch with stability, and the transient from a kick of 1 mm to its verdict, steps of 0.25 ms."""
-    session = Session(Case().replace(BRANCH))
+    session = Session(thesis_case(BRANCH))
     model, clock = session.model, _Clock()
     start = process_time()
     session.perform("cycle", observer=clock)

@@ -19,13 +19,13 @@ from .statics import MESHES, model_of, refactorisation
 _ONE_EQUILIBRIUM = """
 import json, sys
 import dbvfiv
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import find_equilibria
 def peak():  # getrusage would count what the parent process held when it started this one
     return int(next(line for line in open("/proc/self/status") if line.startswith("VmHWM")).split()[1]) / 1024
 before = peak()
-model = ValveModel(Case().replace({"mesh.around": int(sys.argv[1]), "mesh.along": int(sys.argv[2])}))
+model = ValveModel(thesis_case({"mesh.around": int(sys.argv[1]), "mesh.along": int(sys.argv[2])}))
 failures = find_equilibria(model, [18e3]).failures
 print(json.dumps({"before": before, "peak": peak(), "failures": failures}))
 """

@@ -10,7 +10,7 @@ import numpy as np
 from dbvfiv.model import Conditions, ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.motion.options import RunOptions
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk
 from dbvfiv.studies.transient.run import Runner
@@ -41,7 +41,7 @@ def _times(functions: dict, rounds: int = 3) -> dict[str, float]:
 @benchmark("outside-modes")
 def modes():
     """Ten leading pairs at 6 kPa with their linearisation, and a column of 64 densities with its steady state."""
-    models = {"dry": ValveModel(Case()), "wet": ValveModel(Case().replace(WATER))}
+    models = {"dry": ValveModel(thesis_case()), "wet": ValveModel(thesis_case(WATER))}
     q = find_equilibria(models["dry"], [6e3]).states[0].q
     workspace, wet = Workspace(), models["wet"]
     structure = wet.shell.dofs.matrix(wet.structure(q)[1])
@@ -99,7 +99,7 @@ def modes():
 @benchmark("outside-steps")
 def time_steps():
     """Blocks of steps with water outside and without, in turn; both with history and file."""
-    models = {"dry": ValveModel(Case().replace(RINGING)), "wet": ValveModel(Case().replace(RINGING | WATER))}
+    models = {"dry": ValveModel(thesis_case(RINGING)), "wet": ValveModel(thesis_case(RINGING | WATER))}
     states, spent = {}, {name: [] for name in models}
     for name, model in models.items():
         warm = model.case.replace({"transient.duration": 50e-4})

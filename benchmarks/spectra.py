@@ -8,7 +8,7 @@ import numpy as np
 
 from dbvfiv.model import Conditions, ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import find_equilibria
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from eigen import Relaxation, SearchOptions, Workspace, certified_spectrum, leading_modes, lowest_frequencies, sweep
 
 from .registry import Row, benchmark, medians, seconds
@@ -63,7 +63,7 @@ def modes_behind_a_line():
     """
     conditions, times, found = Conditions(1000.0, 0.0, 4e-4), {}, {}
     for name, keys in (("rigid", {}), ("elastic", {"upstream.wave_speed": 1000.0})):
-        model = ValveModel(Case().replace(LINE | keys))
+        model = ValveModel(thesis_case(LINE | keys))
         pencil = linearise(model, find_equilibria(model, [18e3]).states[0].q, 18e3).pencil(conditions)
         options, workspace = SearchOptions(200.0, limit_point=-1 / conditions.beta), Workspace()
         solves = {

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.column import MapPlan
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.stability.walk import StabilityWalk
@@ -28,8 +28,7 @@ def stability_map():
     """Two processes, their start included; the direct way on a sample of cells of the same map, steady states and
     linearisations left out of its time.
     """
-    case = load_case(
-        None,
+    case = thesis_case(
         [
             "mesh.around=28",
             "mesh.along=48",
@@ -117,8 +116,7 @@ def maps_with_curves():
     """The whole map, both continuity laws, with its exact curves; points of the curves against the full pencil."""
     works = {}
     for damping, (changes, target) in DAMPINGS.items():
-        case = load_case(
-            None,
+        case = thesis_case(
             [
                 "mesh.around=28",
                 "mesh.along=48",

@@ -15,7 +15,7 @@ from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.record import GrowingRecord
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.transient.keeping import row_bytes
 from dbvfiv.studies.transient.run import Runner
 from dbvfiv.studies.transient.tables import RESTART, tables_of
@@ -95,7 +95,7 @@ def time_steps_relaxing():
     damping, in turn; both with history and file.
     """
     walls = {"rayleigh": {}, "loss factor": {"damping.model": "loss factor"}}
-    models = {name: ValveModel(Case().replace(RINGING | more)) for name, more in walls.items()}
+    models = {name: ValveModel(thesis_case(RINGING | more)) for name, more in walls.items()}
     states, spent, residuals = {}, {name: [] for name in walls}, {}
     for name, model in models.items():
         warm = model.case.replace({"transient.duration": 50e-4})
@@ -121,7 +121,7 @@ def time_steps_relaxing():
 @benchmark("time-steps")
 def time_steps():
     """2000 steps of 0.1 ms as `dbvfiv transient` makes them: history, verdicts and the file included."""
-    case = Case().replace(CYCLE)
+    case = thesis_case(CYCLE)
     model = ValveModel(case)
     cycle = Runner(model).start().progress.state
     case = case.replace({"transient.step": 1e-4, "transient.duration": cycle.time + STEPS * 1e-4})

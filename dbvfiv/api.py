@@ -76,12 +76,12 @@ class Valve:
 
     @property
     def model(self) -> ValveModel:
-        """The coupled model of the case."""
+        """The coupled model of the case, with strain levels settled where materials.strain_level is "auto"."""
         return self.session.model
 
     def plot(self, folder: str | Path = ".", format: str = "png", only: Sequence[str] = ()) -> list[Path]:
         """Draw the valve as its case describes it, with measures, wall and layers; nothing is solved."""
-        figures = draw_figures(described.drawers_of(self.model), only, f"case {self.name!r}")
+        figures = draw_figures(described.drawers_of(self.session.described), only, f"case {self.name!r}")
         return write_figures(figures, folder, format)
 
     def replace(self, changes: Changes) -> Valve:

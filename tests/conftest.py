@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import dbvfiv
+from dbvfiv.studies.case import thesis_case
 
 settings.register_profile(
     "dbvfiv", deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -56,7 +57,7 @@ COARSE = {"mesh.around": 8, "mesh.along": 16}
 @pytest.fixture(scope="session")
 def coarse_valve():
     """The 12-inch valve on a mesh on which a state takes a fraction of a second."""
-    return dbvfiv.load(changes=COARSE)
+    return dbvfiv.load(thesis_case(), COARSE)
 
 
 @pytest.fixture(scope="session")

@@ -3,9 +3,9 @@
 from functools import cache
 from types import MappingProxyType
 
-import dbvfiv
 from dbvfiv.model import ValveModel
 from dbvfiv.motion.start import steady_positions
+from dbvfiv.studies.case import thesis_case
 
 #: Rows and columns at even distances; with the element of earlier versions too.
 EVEN = MappingProxyType({"mesh.rows": "uniform", "mesh.columns": "uniform"})
@@ -14,7 +14,7 @@ FORMER = MappingProxyType({"mesh.element": "MITC4", **EVEN})
 
 @cache
 def small_model(*changes):
-    case = dbvfiv.load().case.replace({"mesh.around": 6, "mesh.along": 8} | dict(changes))
+    case = thesis_case({"mesh.around": 6, "mesh.along": 8} | dict(changes))
     return ValveModel(case)
 
 

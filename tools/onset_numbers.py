@@ -20,7 +20,7 @@ prepare()
 
 import numpy as np  # noqa: E402
 
-from dbvfiv.studies.case import load_case  # noqa: E402
+from dbvfiv.studies.case import thesis_case  # noqa: E402
 from dbvfiv.studies.onset.run import run_onset  # noqa: E402
 from dbvfiv.studies.onset.search import OnsetOptions  # noqa: E402
 from dbvfiv.studies.stability.walk import StabilityWalk  # noqa: E402
@@ -32,7 +32,7 @@ LAWS = ("quasi-steady", "storage")
 def main(path: Path, keys: list[str]) -> None:
     """Write the onsets, of the case with some keys changed."""
     base = [f"mesh.around={MESH[0]}", f"mesh.along={MESH[1]}", "damping.alpha=0", "damping.beta=0.003"]
-    case = load_case(None, base + keys)
+    case = thesis_case(base + keys)
     walk = StabilityWalk(case)
     done = json.loads(path.read_text()) if path.exists() else {}
 

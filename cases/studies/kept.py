@@ -6,7 +6,7 @@ from pathlib import Path
 
 import dbvfiv
 from dbvfiv.api import Valve
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 
 
 def takes_keys(parser) -> None:
@@ -18,7 +18,7 @@ def takes_keys(parser) -> None:
 
 def base_case(given):
     """The 12-inch valve with the keys given on the command line of a study."""
-    return load_case(None, given.keys)
+    return thesis_case(given.keys)
 
 
 def kept_run(case, path: Path, observer=None):

@@ -1,4 +1,4 @@
-"""How the wall damps: Rayleigh's two constants, or materials that relax."""
+"""How the wall damps: materials that relax, or Rayleigh's two constants."""
 
 from __future__ import annotations
 
@@ -62,19 +62,19 @@ Band = Annotated[
 
 
 class Damping(Section):
-    """Rayleigh damping C = alpha M + beta K, or alpha M and materials that relax.
+    """Damping alpha M and materials that relax, or Rayleigh damping C = alpha M + beta K.
 
     `alpha`, `beta`, `loss_factor` and `branches` hold numbers also where they were not given.
     """
 
     model: Literal["rayleigh", "loss factor"] = key(
-        "rayleigh",
-        "Damping proportional to mass and stiffness (rayleigh, the thesis), or by the loss factors of the materials, "
-        "layer by layer (loss factor).",
+        "loss factor",
+        "Damping by the loss factors of the materials, layer by layer (loss factor), or proportional to mass and "
+        "stiffness (rayleigh, the thesis).",
     )
     alpha: Rate | None = key(
         None,
-        "Factor of the mass matrix; where not given 5 1/s with rayleigh and 0 with loss factor.",
+        "Factor of the mass matrix; where not given 0 with loss factor and 5 1/s with rayleigh.",
         **PARAMETERS["alpha"].limits,
     )
     beta: Time | None = key(

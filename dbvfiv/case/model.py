@@ -45,7 +45,7 @@ class Case(Section):
     )
     materials: Materials = key(Materials(), "Materials by name.")
     shell: physics.Shell = key(physics.Shell(), "Choices of the shell theory.")
-    damping: Damping = key(Damping(), "Rayleigh damping, or materials that relax.")
+    damping: Damping = key(Damping(), "Materials that relax, or Rayleigh damping.")
     fluid: physics.Fluid = key(physics.Fluid(), "The fluid and its conservation laws.")
     drive: physics.Drive = key(physics.Drive(), "The load.")
     upstream: Upstream = key(Upstream(), "The line in front of the valve.")

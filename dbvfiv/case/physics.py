@@ -72,9 +72,9 @@ class Fluid(Section):
 
     density: Density = key(1000.0, "Mass density.", **PARAMETERS["density"].limits)
     continuity: Literal["quasi-steady", "storage"] = key(
-        "quasi-steady",
-        "A U the same at every station (quasi-steady, the thesis), or dA/dt + d(AU)/dz = 0 (storage), which conserves "
-        "volume under moving walls and is what predictions should rest on; new case files have it.",
+        "storage",
+        "dA/dt + d(AU)/dz = 0 (storage), which conserves volume under moving walls, or A U the same at every station "
+        "(quasi-steady, the thesis).",
     )
     unsteady: StrictBool = key(True, "Keep the unsteady term of Bernoulli's equation.")
     viscosity: Viscosity = key(

@@ -18,8 +18,8 @@ _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 HEAD = """# A case of dbvfiv: a duckbill valve, its material, the fluid and the load.
 #
 # Quantities are SI numbers or strings with units: 18e3 or "18 kPa", 0.012 or "12 mm", "54 deg", "10 %".
-# Every key is optional and is set to its default here, which is the 12-inch inline valve; delete what you
-# do not change. `dbvfiv case FILE` checks the file, `dbvfiv case --explain KEY` explains a key.
+{}
+# `dbvfiv case FILE` checks the file, `dbvfiv case --explain KEY` explains a key.
 """
 
 OWN_MATERIAL = """
@@ -35,7 +35,7 @@ OWN_MATERIAL = """
 """
 
 
-def case_toml(case: Section, comments: bool = True) -> str:
+def case_toml(case: Section, comments: bool = True, about: str = "") -> str:
     """Return the case as TOML.
 
     Parameters
@@ -44,8 +44,11 @@ def case_toml(case: Section, comments: bool = True) -> str:
         Of any model: every section that it has is written.
     comments : bool
         Put description and allowed values above each key.
+    about : str
+        Sentence for the head of a text with comments.
     """
-    parts = [HEAD] if comments else [f"# dbvfiv {__version__}: every key of this case"]
+    said = "\n".join(_commented(f"{_defaults_said(case)} {about}"))
+    parts = [HEAD.format(said)] if comments else [f"# dbvfiv {__version__}: every key of this case"]
     for name, field in type(case).model_fields.items():
         value = getattr(case, name)
         if name == "drive" and getattr(case, "seeks_operating_point", False):
@@ -64,6 +67,29 @@ def case_toml(case: Section, comments: bool = True) -> str:
             if comments:
                 parts.append(OWN_MATERIAL.rstrip("\n"))
     return "\n".join(parts) + "\n"
+
+
+def _defaults_said(case: Section) -> str:
+    """Sentence on the keys of a case that are not at their defaults."""
+    usual = type(case)()
+    others = [
+        f"{name}.{key}" if isinstance(section, Section) else name
+        for name, section in case
+        for key in (type(section).model_fields if isinstance(section, Section) else [""])
+        if _differs(section, getattr(usual, name), key)
+    ]
+    but_for = f", but for {', '.join(others)}" if others else ""
+    return (
+        "Every key is optional; delete what you do not change. All have their defaults here, the 12-inch inline valve"
+        f"{but_for}."
+    )
+
+
+def _differs(section: Any, usual: Any, key: str) -> bool:
+    """Whether a key of a section, or a list in its place, was set to something else than usual."""
+    if not key:
+        return section != usual
+    return key not in getattr(section, "following", ()) and getattr(section, key) != getattr(usual, key)
 
 
 def _tables(name: str, items: tuple[Section, ...], comments: bool) -> Iterator[str]:
@@ -96,6 +122,11 @@ def _comment(field: Any) -> Iterator[str]:
         words = f"{words} [{allowed_words(field)}]"
     elif typing.get_origin(field.annotation) is tuple and not field.is_required() and not field.default:
         words = f"{words} Each is a table of {', '.join(element_model(field.annotation).model_fields)}."
+    yield from _commented(words)
+
+
+def _commented(words: str) -> Iterator[str]:
+    """Lines of a comment."""
     for line in textwrap.wrap(words, _WIDTH - 2):
         yield f"# {line}"
 

@@ -68,6 +68,11 @@ class Record(ABC):
         """What was not reached, in sentences."""
         return self._said("failure")
 
+    @property
+    def settled(self) -> str:
+        """Sentence on strain levels that were settled for this run; empty where the case names them."""
+        return next((note["text"] for note in reversed(self.log) if note["what"] == "settled"), "")
+
     def _said(self, what: str) -> tuple[str, ...]:
         """Sentences of the last attempt: whoever goes on from an earlier one says again what still holds."""
         log = self.log

@@ -134,6 +134,9 @@ def gather(
     """
     session = Session(case, name)
     session.mesh  # a case that gives no model is told before anything runs
+    if case.seeks_levels:
+        session = session.settle(observer("strain levels"))
+        case = session.case
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

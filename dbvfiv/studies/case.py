@@ -1,10 +1,12 @@
 """The whole case: the physics, and the section that each study brings.
 
-``python -m dbvfiv.studies.case`` prints the page of all keys, ``docs/case-reference.md``.
+``python -m dbvfiv.studies.case`` prints the page of all keys, ``docs/case-reference.md``; with ``thesis`` behind it the
+valve of the thesis, ``cases/dbv12.toml``.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Collection, Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
@@ -12,10 +14,12 @@ from typing import Any, Self
 
 from pydantic import create_model, model_validator
 
+from ..case.changes import Changes, change_case
 from ..case.load import key_path, read_case_file
 from ..case.model import Case as PhysicsCase
 from ..case.reference import page
 from ..case.section import BrokenRule, Section, key
+from ..case.write import case_toml
 from . import KINDS
 
 
@@ -34,6 +38,14 @@ class _CaseOfStudies(PhysicsCase):
         """
         alone = "pressure" in self.drive.model_fields_set and "pressures" not in self.steady.model_fields_set
         return (self.drive.pressure,) if alone else self.steady.pressures
+
+    def straining_pressures(self) -> tuple[float | None, float | None]:
+        """Largest pressures, Pa, that the case names: as drive.pressure, None for the operating point of a pump alone,
+        and of the closed valve, None where no key says one.
+        """
+        opening = None if self.meets_pump("steady") else max(self.drive.pressure, *self.steady_pressures())
+        closed = {"rated_pressure", "pressures"} & self.closure.model_fields_set
+        return opening, (self.closure.rated_pressure or max(self.closure.pressures)) if closed else None
 
     @model_validator(mode="after")
     def _steps_take_what_is_upstream(self) -> Self:
@@ -97,6 +109,15 @@ Case = create_model(
 )
 
 
+#: Keys in which the thesis's computations differ from the defaults.
+THESIS = {"materials.strain_level": "10 %", "damping.model": "rayleigh", "fluid.continuity": "quasi-steady"}
+
+
+def thesis_case(changes: Changes = ()) -> Case:
+    """The 12-inch valve as the thesis computes it, ``cases/dbv12.toml``, with some keys changed."""
+    return change_case(Case().replace(THESIS), changes)
+
+
 def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> Case:
     """Read and check a case file.
 
@@ -123,4 +144,5 @@ def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> 
 
 
 if __name__ == "__main__":
-    print(page(Case), end="")
+    of_thesis = case_toml(thesis_case(), about="Those are as the thesis has them.")
+    print(of_thesis if sys.argv[1:] == ["thesis"] else page(Case), end="")

@@ -30,6 +30,7 @@ def kept_run(kind: str, session: Session, path: Path, observer: Observer | None 
         If the run was interrupted; what was found is in the file.
     CaseError, SolveError
     """
+    session = session.settle(observer)
     kept = _load(path)
     if kept is not None and kept.kind == kind and kept.case == session.case:
         if kept.complete or kept.failures:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from ..model import ValveModel
 from ..model.equilibria import find_equilibrium, redescribe, rest_state
 from ..model.operating_point import operating_pressure
 from ..model.state import SteadyState
-from ..model.strain_level import agree_levels
+from ..model.strain_level import SettledLevels, settle_levels
 from ..observer import Observer
 from ..record.files import check_writable, kind_of
 from ..record.header import Header
@@ -48,11 +48,17 @@ def named_changes(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def describe_surroundings(case: Case) -> dict[str, Any]:
-    """Fluid and damping of a case, for JSON."""
+    """Fluid, damping and strain levels of a case, for JSON."""
     damping = {name: getattr(case.damping, name) for name in ("alpha", "beta", "loss_factor")}
     known = {name: value for name, value in damping.items() if not case.damping.lacks(name)}
     outside = {"outside": case.outside.words} if case.outside.is_there else {}
-    return {"density": case.fluid.density, "continuity": case.fluid.continuity} | known | outside
+    levels = case.materials.levels({layer.material for layer in case.layers})
+    strained = {"strain_level": levels} if levels else {}
+    return {"density": case.fluid.density, "continuity": case.fluid.continuity} | known | outside | strained
+
+
+#: What a session builds of its case, and another with the same wall and load may have from it.
+_MODELS = ("described", "model", "mesh")
 
 
 class Session:
@@ -69,16 +75,21 @@ class Session:
     Attributes
     ----------
     model : ValveModel
-        The coupled model, built on first use.
+        The coupled model, built on first use, with settled strain levels.
     mesh : MeshData
     """
 
     def __init__(self, case: Case, name: str = "case", start: SteadyState | None = None):
         self.case, self.name, self.start = case, name, start
+        #: Session that this one changes some keys of, and these: its strain levels are those of that session.
+        self.origin: tuple[Session, dict[str, Any]] | None = None
+        #: How its strain levels were settled, which every study of it tells.
+        self.settled: SettledLevels | None = None
+        self._at_levels: Session | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the model, which is built again when it is asked for."""
-        return {"case": self.case, "name": self.name, "start": self.start}
+        return {name: value for name, value in vars(self).items() if name not in _MODELS}
 
     @cached_property
     def model(self) -> ValveModel:
@@ -89,30 +100,54 @@ class Session:
         CaseError
             If the case gives no model.
         """
-        try:
+        return self.settle().model if self.case.seeks_levels else self.described
+
+    @cached_property
+    def described(self) -> ValveModel:
+        """The model before anything is solved: rubbers whose strain levels are sought have the lowest tested ones."""
+
+        def build() -> ValveModel:
             model = ValveModel(self.case)
             model.shell.energies  # built on first use otherwise, and it is here that an invalid metric shows
             return model
-        except CaseError:
-            raise
-        except ValueError as error:  # what geometry, mesh and shell refuse
-            raise CaseError(str(error)) from error
+
+        return _attempt(build)
 
     @cached_property
     def mesh(self) -> MeshData:
-        return MeshData.of(self.model)
+        return MeshData.of(self.described)
 
     def replace(self, changes: Mapping[str, Any]) -> Session:
-        """A session with some keys of its case changed; the same one if none is.
+        """A session with some keys of its case changed, and its strain levels kept; the same one if none is.
 
         The model stays where only keys of studies change.
         """
         if not changes:
             return self
         session = Session(self.case.replace(changes), self.name)
+        session.settled = self.settled
+        if self.case.seeks_levels:
+            session.origin = self, dict(changes)
         if {key.partition(".")[0] for key in changes} <= set(KINDS):
-            session.__dict__.update({name: self.__dict__[name] for name in ("model", "mesh") if name in self.__dict__})
+            session.__dict__.update({name: self.__dict__[name] for name in _MODELS if name in self.__dict__})
         return session
+
+    def settle(self, observer: Observer | None = None) -> Session:
+        """The session with strain levels for materials.strain_level = "auto"; itself where none are sought.
+
+        They are settled once, with the largest pressures of the case that was loaded: what a study is asked for does
+        not change them.
+        """
+        if not self.case.seeks_levels:
+            return self
+        if self._at_levels is None and self.origin is not None:
+            origin, changes = self.origin
+            self._at_levels = origin.settle(observer).replace(changes).settle(observer)
+        elif self._at_levels is None:
+            found = _attempt(lambda: settle_levels(self.case, *self.case.straining_pressures(), observer))
+            self._at_levels = Session(self.case.replace(self.case.materials.at_levels(found.levels)), self.name)
+            self._at_levels.settled = found
+        return self._at_levels
 
     def equilibrium(self, observer: Observer) -> SteadyState:
         """The steady state at drive.pressure: the one known already, the valve at rest, or by load steps.
@@ -160,28 +195,11 @@ class Session:
             If nothing can be found at all.
         """
         if self.case.seeks_levels and kind != "levels":
-            return self._at_own_levels(kind, observer).perform(kind, output, observer, **choices)
+            return self.settle(observer).perform(kind, output, observer, **choices)
         if self.case.meets_pump(kind):
             return self._at_operating_point(kind, observer).perform(kind, output, observer, **choices)
         header = Header.of(kind, self.case, self.name)
         return self._run(kind, header, output, observer, None, choices)
-
-    def _at_own_levels(self, kind: str, observer: Observer | None) -> Session:
-        """The session of the case with the strain levels that agree with its state at the pressure of a study."""
-        if self.case.meets_pump(kind) or self.case.drive.kind != "flow":
-            raise CaseError(
-                "materials.strain_level is 'auto', which needs a steady flow at a known pressure; give drive.pressure "
-                "with drive.kind = 'flow' and no operating point of a pump to look for, or a level.",
-                "materials.strain_level",
-            )
-        pressure = max(self.case.steady_pressures()) if kind == "steady" else self.case.drive.pressure
-        found = agree_levels(self.case, pressure, observer)
-        if observer is not None:
-            levels = ", ".join(f"{name} {100 * level:.4g} %" for name, level in found.levels.items())
-            observer.warn(f"Strain levels that agree with the state at {pressure:.6g} Pa: {levels}.")
-            for sentence in found.bounded():
-                observer.warn(sentence)
-        return Session(found.case, self.name, found.state)
 
     def _at_operating_point(self, kind: str, observer: Observer | None) -> Session:
         """The session of the case with the pressure at which valve and pump meet."""
@@ -189,7 +207,7 @@ class Session:
         changes: dict[str, Any] = {"drive.pressure": pressure}
         if kind == "steady":
             changes["steady.pressures"] = [pressure]
-        return Session(self.case.replace(changes), self.name)
+        return self.replace(changes)
 
     def resume(self, known: Record, observer: Observer | None = None, **choices: Any) -> Any:
         """Go on with a run in its file; `known` is what it holds."""
@@ -201,6 +219,10 @@ class Session:
         mesh = self.mesh  # a case that gives no model is told before a file is touched
         with GrowingRecord(header, mesh, study.tables(mesh), output, observer, known) as record:
             complete = False
+            if self.settled is not None:
+                record.note("settled", text=str(self.settled))
+                for sentence in self.settled.warnings:
+                    record.warn(sentence)
             try:
                 study.run(self, record, **choices)
                 complete = True
@@ -210,6 +232,16 @@ class Session:
                 record.end(False)
             record.conclude(complete)
         return study.result(record, self)
+
+
+def _attempt(work: Callable[[], Any]) -> Any:
+    """Do some work on a case, with what geometry, mesh and shell refuse as a `CaseError`."""
+    try:
+        return work()
+    except CaseError:
+        raise
+    except ValueError as error:
+        raise CaseError(str(error)) from error
 
 
 def load_result(path: str | Path) -> Any:

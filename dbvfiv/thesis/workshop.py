@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..observer import Observer
-from ..studies.case import Case
+from ..studies.case import thesis_case
 from ..studies.closure.result import ClosureResult
 from ..studies.kept import kept_run
 from ..studies.session import Session
@@ -35,7 +35,7 @@ class Workshop:
     def __init__(self, folder: Path, quick: bool = False, observer: Observer | None = None):
         self.folder, self.quick, self.observer = folder, quick, observer
         around, along = QUICK if quick else FULL
-        self.base = Case().replace({"mesh.around": around, "mesh.along": along})
+        self.base = thesis_case({"mesh.around": around, "mesh.along": along})
 
     def steady(self, pressures: Sequence[float], changes: Mapping[str, Any] | None = None) -> SteadyResult:
         """States at pressures, Pa, of the 12-inch valve with some keys changed."""

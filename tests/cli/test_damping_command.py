@@ -8,6 +8,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.drawing.damping import damping_figure
+from dbvfiv.studies.case import thesis_case
 
 LOSS = ("--set", "damping.model=loss factor")
 COARSE = ("--set", "mesh.around=6", "--set", "mesh.along=10")
@@ -27,7 +28,7 @@ def test_json_holds_the_same_from_python(command_line):
     document = json.loads(
         command_line("damping", *LOSS, "--set", "damping.loss_factor=2", "--json", "--at", "0.5,41").out
     )
-    report = dbvfiv.load(changes={"damping.model": "loss factor", "damping.loss_factor": 2}).damping()
+    report = dbvfiv.load(thesis_case(), {"damping.model": "loss factor", "damping.loss_factor": 2}).damping()
     assert [m["name"] for m in document["materials"]] == ["CR", "SBR", "fibre", "EPDM"]
     for entry, material in zip(document["materials"], report.materials):
         np.testing.assert_allclose(

@@ -10,7 +10,7 @@ from dbvfiv.flow import Channel, FlowMotion
 from dbvfiv.flow.terms.gap_friction import MEETING, GapFriction
 from dbvfiv.model import Conditions, ValveModel, linearise
 from dbvfiv.model.equilibria import LoadPath, find_equilibria
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.place import Place, is_surrounding
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import leading_modes
@@ -124,12 +124,12 @@ def test_unit_density_has_the_same_pressures():
 @pytest.mark.parametrize("given", ["treacle", 0, -1e-3, "1 kPa", True, 11.0, "1e-6 m^2/s"])
 def test_bad_viscosities(given):
     with pytest.raises(CaseError, match=r"fluid\.viscosity is given as .* must be"):
-        Case().replace({"fluid.viscosity": given})
+        thesis_case({"fluid.viscosity": given})
 
 
 @pytest.mark.parametrize("given, value", [("none", 0.0), ("water", 1.0016e-3), ("2 mPa s", 2e-3), (0.1, 0.1)])
 def test_viscosities(given, value):
-    assert Case().replace({"fluid.viscosity": given}).fluid.dynamic_viscosity == pytest.approx(value)
+    assert thesis_case({"fluid.viscosity": given}).fluid.dynamic_viscosity == pytest.approx(value)
 
 
 COARSE = {"mesh.around": 8, "mesh.along": 14}
@@ -142,7 +142,7 @@ def test_wide_openings_lose_little_and_gaps_nearly_all():
     """
     flows = {}
     for viscosity in ("none", "water", 1e-9):
-        model = ValveModel(Case().replace(COARSE | {"fluid.viscosity": viscosity}))
+        model = ValveModel(thesis_case(COARSE | {"fluid.viscosity": viscosity}))
         flows[viscosity] = [s.mass_flow for s in find_equilibria(model, [100.0, 18e3]).states]
     plain, water, thin = (np.array(flows[name]) for name in ("none", "water", 1e-9))
     assert 0.97 < water[1] / plain[1] < 0.995
@@ -153,8 +153,8 @@ def test_wide_openings_lose_little_and_gaps_nearly_all():
 @pytest.mark.parametrize("law", ["quasi-steady", "storage"])
 def test_cells_of_a_column_are_those_of_the_full_pencil(law):
     """Columns know fluids of unit density only. The density moves the steady state, so no study keeps it for others."""
-    case = Case().replace(COARSE | {"fluid.viscosity": "water", "fluid.continuity": law, "drive.pressure": 600.0})
-    assert not is_surrounding(case, "density") and is_surrounding(Case(), "density")
+    case = thesis_case(COARSE | {"fluid.viscosity": "water", "fluid.continuity": law, "drive.pressure": 600.0})
+    assert not is_surrounding(case, "density") and is_surrounding(thesis_case(), "density")
     walk, place = StabilityWalk(case), Place.of(case).at(density=900.0)
     betas = (1e-3, 2e-3, 3e-3, 5e-3)
     column = walk.column([place.at(beta=beta) for beta in betas])

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.case.model import Case
 from dbvfiv.flow import RowAreas
 from dbvfiv.geometry import valve_mesh
 from dbvfiv.model.supports import free_unknowns
 from dbvfiv.shell import DofMap
+from dbvfiv.studies.case import thesis_case
 
 
 @pytest.fixture(scope="module")
 def rows():
-    case = Case().replace({"mesh.around": 8, "mesh.along": 14})
+    case = thesis_case({"mesh.around": 8, "mesh.along": 14})
     mesh = valve_mesh(case.valve, case.mesh)
     dofs = DofMap(free_unknowns(mesh), mesh.quads)
     return mesh, dofs, RowAreas(mesh, dofs.index)

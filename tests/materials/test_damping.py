@@ -17,14 +17,14 @@ from dbvfiv.materials.damping_report import describe_damping, outside_band, read
 from dbvfiv.materials.rayleigh import rayleigh_constants, rayleigh_ratio
 from dbvfiv.model.build import build_section
 from dbvfiv.model.dynamics import Conditions
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import Case, thesis_case
 
 LOSS = {"damping.model": "loss factor"}
 FREQUENCY = np.geomspace(0.8, 250.0, 26)
 
 
 def case_of(**keys) -> Case:
-    return Case().replace(LOSS | {"materials.CR": keys})
+    return thesis_case(LOSS | {"materials.CR": keys})
 
 
 def written(path, head: str, *columns, separator=", ") -> str:
@@ -52,26 +52,26 @@ def test_shipped_loss_factors_are_middles_of_their_ranges():
 
 @pytest.mark.parametrize("name", ["CR", "SBR", "EPDM", "fibre"])
 def test_built_in_materials_take_the_shipped_values(name):
-    found = damping_of(Case().replace(LOSS), name)
+    found = damping_of(thesis_case(LOSS), name)
     at = np.geomspace(1, 200, 50)
     np.testing.assert_allclose(found.prony.loss_factor(at), shipped_loss(name).value, rtol=0.03)
     assert f"shipped for {name}" in found.source
 
 
 def test_every_layer_relaxes_with_the_same_times_and_none_does_under_rayleigh_damping():
-    relaxing = [layer.relaxation for layer in build_section(Case().replace(LOSS)).layers]
+    relaxing = [layer.relaxation for layer in build_section(thesis_case(LOSS)).layers]
     assert {prony.times for prony in relaxing} == {relaxing[0].times} and len(relaxing[0].times) == 4
-    assert {layer.relaxation for layer in build_section(Case()).layers} == {None}
-    assert relaxation_from_case(Case(), "CR") is None
+    assert {layer.relaxation for layer in build_section(thesis_case()).layers} == {None}
+    assert relaxation_from_case(thesis_case(), "CR") is None
 
 
 def test_laws_and_conditions_of_rayleigh_cases_are_what_they_were():
-    assert Conditions.of(Case()) == Conditions(1000.0, 5.0, 0.003, 0.0)
-    assert Conditions.of(Case().replace(LOSS)) == Conditions(1000.0, 0.0, 0.0, 1.0)
-    assert Conditions.of(Case().replace(LOSS | {"damping.loss_factor": 0.5, "damping.alpha": 2})) == Conditions(
+    assert Conditions.of(thesis_case()) == Conditions(1000.0, 5.0, 0.003, 0.0)
+    assert Conditions.of(thesis_case(LOSS)) == Conditions(1000.0, 0.0, 0.0, 1.0)
+    assert Conditions.of(thesis_case(LOSS | {"damping.loss_factor": 0.5, "damping.alpha": 2})) == Conditions(
         1000.0, 2.0, 0.0, 0.5
     )
-    slow, relaxing = build_section(Case()), build_section(Case().replace(LOSS))
+    slow, relaxing = build_section(thesis_case()), build_section(thesis_case(LOSS))
     assert [layer.law for layer in slow.layers] == [layer.law for layer in relaxing.layers]
     assert np.array_equal(slow.parameters, relaxing.parameters)
 
@@ -89,14 +89,16 @@ def test_a_loss_factor_of_ones_own_or_by_name():
 def test_a_table_of_a_built_in_material_leaves_its_constants_as_they_are():
     from dbvfiv.materials import law_from_case
 
-    case = Case().replace({"materials.strain_level": 0.4, "materials.CR.loss_factor": 0.2})
-    assert law_from_case(case, "CR") == law_from_case(Case().replace({"materials.strain_level": 0.4}), "CR")
-    assert law_from_case(case.replace({"materials.fibre.loss_factor": 0.1}), "fibre") == law_from_case(Case(), "fibre")
+    case = thesis_case({"materials.strain_level": 0.4, "materials.CR.loss_factor": 0.2})
+    assert law_from_case(case, "CR") == law_from_case(thesis_case({"materials.strain_level": 0.4}), "CR")
+    assert law_from_case(case.replace({"materials.fibre.loss_factor": 0.1}), "fibre") == law_from_case(
+        thesis_case(), "fibre"
+    )
 
 
 def test_keys_of_a_table_can_be_changed_one_by_one():
     own = {"kind": "neo-hookean", "shear_modulus": 1e6, "density": 1200.0, "loss_factor": 0.1}
-    case = Case().replace({"materials.CR": own}).replace({"materials.CR.loss_factor": 0.2})
+    case = thesis_case({"materials.CR": own}).replace({"materials.CR.loss_factor": 0.2})
     assert case.materials.card("CR").shear_modulus == 1e6 and case.materials.card("CR").loss_factor == 0.2
 
 
@@ -277,7 +279,7 @@ def test_a_bad_relaxation_table_is_refused_in_a_sentence(tmp_path, one_sentence,
 
 
 def test_files_that_are_gone_are_told(tmp_path, one_sentence):
-    gone = Case().from_dict(case_of(loss_data=str(tmp_path / "gone.csv")).to_dict())
+    gone = thesis_case().from_dict(case_of(loss_data=str(tmp_path / "gone.csv")).to_dict())
     with pytest.raises(CaseError, match="gone.csv cannot be read") as refused:
         relaxation_from_case(gone, "CR")
     assert one_sentence(str(refused.value))
@@ -322,16 +324,16 @@ def test_the_report_halves_the_loss_factor_and_counts_the_factor_on_all():
 def test_under_rayleigh_damping_a_material_may_say_nothing():
     layers = [{"material": "A", "thickness": 0.01}]
     own = {"kind": "neo-hookean", "shear_modulus": 1e6, "density": 1000}
-    case = Case().replace({"materials.A": own, "layers": layers})
+    case = thesis_case({"materials.A": own, "layers": layers})
     report = describe_damping(case)
     assert report.materials == () and "alpha = 5 1/s" in report.lines()[0]
     assert report.rayleigh(41.0) == pytest.approx(rayleigh_ratio(41.0, 5.0, 0.003))
 
 
 def test_frequencies_outside_the_band_are_told(one_sentence):
-    case = Case().replace(LOSS)
+    case = thesis_case(LOSS)
     assert outside_band(case, [1.0, 40.0, 200.0, 0.0, np.nan]) is None
-    assert outside_band(Case(), [0.1]) is None
+    assert outside_band(thesis_case(), [0.1]) is None
     told = outside_band(case, [0.5, 40.0])
     assert told.startswith("0.5 Hz lies outside damping.band, 1 to 200 Hz") and one_sentence(told)
     assert outside_band(case, [0.1, 0.2, 0.3, 250, 10]).startswith("4 of 5 frequencies, between 0.1 and 250 Hz")

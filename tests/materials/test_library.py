@@ -18,6 +18,7 @@ from dbvfiv.materials import (
     uniaxial_stress,
 )
 from dbvfiv.materials.library import CARD_KINDS
+from dbvfiv.studies.case import thesis_case
 
 
 def _case(**materials):
@@ -29,7 +30,7 @@ def test_every_kind_of_card_has_a_law():
 
 
 def test_built_in_materials():
-    case = Case()
+    case = thesis_case()
     for name in ("CR", "SBR", "EPDM"):
         assert law_from_case(case, name) == rubber(name, 0.10)
     assert law_from_case(case, "fibre") == fibre_ply("program")
@@ -100,4 +101,4 @@ def test_fitted_material(tmp_path):
 
 def test_unknown_name_is_refused():
     with pytest.raises(CaseError, match="'steel' is no material.*CR, SBR, EPDM, fibre"):
-        law_from_case(Case(), "steel")
+        law_from_case(thesis_case(), "steel")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dbvfiv.materials import MaterialError, Prony, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
 from dbvfiv.materials.prony_fit import relaxation_times
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 
 BAND = (1.0, 200.0)
 FREQUENCY = np.geomspace(0.5, 400.0, 60)
@@ -107,7 +107,7 @@ def test_constant_loss_factors_over_the_default_band(branches, loss_factor):
 
 @pytest.mark.parametrize("band", [(10.0, 20.0), (1.0, 10.0), (5.0, 100.0), (1.0, 1000.0), (0.02, 200.0)])
 def test_the_default_number_of_branches_serves_other_bands(band):
-    branches = Case().replace({"damping.band": list(band)}).damping.branches
+    branches = thesis_case({"damping.band": list(band)}).damping.branches
     for loss_factor in (0.05, 0.1, 0.2, 0.3, 0.5):
         assert fit_constant(loss_factor, band, branches).largest_error < 0.04
 

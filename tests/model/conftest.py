@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from dbvfiv.model import ValveModel
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from tests.small_valves import EVEN
 
 SMALL = {"mesh.around": 6, "mesh.along": 12, **EVEN}  # noise at the nodes would turn narrow columns inside out
 
 
 def build(**changes) -> ValveModel:
-    return ValveModel(Case().replace(SMALL | {key.replace("__", "."): value for key, value in changes.items()}))
+    return ValveModel(thesis_case(SMALL | {key.replace("__", "."): value for key, value in changes.items()}))
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ import pytest
 
 from dbvfiv.model import Conditions, ValveModel, dynamic_residual
 from dbvfiv.model.analytic import AnalyticResidual
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 from tests.small_valves import EVEN
 
 STEPS = {2: 1e-3, 3: 1e-2}
@@ -18,9 +18,7 @@ STEPS = {2: 1e-3, 3: 1e-2}
 @pytest.fixture(scope="module")
 def residual():
     return AnalyticResidual(
-        ValveModel(
-            load_case(None, ["mesh.around=6", "mesh.along=8", *(f"{key}={value}" for key, value in EVEN.items())])
-        )
+        ValveModel(thesis_case(["mesh.around=6", "mesh.along=8", *(f"{key}={value}" for key, value in EVEN.items())]))
     )
 
 

@@ -11,7 +11,7 @@ from dbvfiv.case.write import case_toml
 from dbvfiv.model import ValveModel
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.shell.recovery import layer_fields
-from dbvfiv.studies.case import Case, load_case
+from dbvfiv.studies.case import load_case, thesis_case
 
 MESH = {"mesh.around": 6, "mesh.along": 10}
 RUBBER = {"material": "CR", "thickness": 0.006}
@@ -19,7 +19,7 @@ PLY = {"material": "fibre", "thickness": 0.001, "angle": 30.0}
 
 
 def model_of(*layers, **more) -> ValveModel:
-    return ValveModel(Case().replace(MESH | {"layers": list(layers)} | more))
+    return ValveModel(thesis_case(MESH | {"layers": list(layers)} | more))
 
 
 def random_state(model: ValveModel) -> np.ndarray:
@@ -92,8 +92,8 @@ def test_layers_that_are_not_there_have_no_strains_and_no_mass():
 def test_steady_modes_and_motion_know_fillers():
     """A ply in the saddle stiffens it; modes are counted twice, energies of both loops agree, rubbers relax in time."""
     filler = [RUBBER, PLY | {"begin": 0.21, "end": 0.49}, RUBBER]
-    plain = dbvfiv.load(changes=MESH | {"layers": [RUBBER, RUBBER]}).steady(pressure=6e3)
-    valve = dbvfiv.load(changes=MESH | {"layers": filler, "damping.model": "loss factor"})
+    plain = dbvfiv.load(thesis_case(), MESH | {"layers": [RUBBER, RUBBER]}).steady(pressure=6e3)
+    valve = dbvfiv.load(thesis_case(), MESH | {"layers": filler, "damping.model": "loss factor"})
     state = valve.steady(pressure=6e3)
     assert state.mass_flow < 0.98 * plain.mass_flow
     certificate = state.modes(density=10.0).certificate
@@ -108,7 +108,7 @@ def test_steady_modes_and_motion_know_fillers():
 
 def test_fillers_scale_and_are_written(tmp_path):
     changes = {"layers": [RUBBER, PLY | {"begin": "100 mm", "end": "300 mm", "around_to": 0.5}, RUBBER]}
-    case = Case().replace(MESH | changes)
+    case = thesis_case(MESH | changes)
     for comments in (True, False):
         (tmp_path / "case.toml").write_text(case_toml(case, comments))
         assert load_case(tmp_path / "case.toml") == case
@@ -129,5 +129,5 @@ BAD = {
 def test_bad_fillers(name, one_sentence):
     layers, words = BAD[name]
     with pytest.raises(CaseError, match=words) as caught:
-        Case().replace({"layers": layers})
+        thesis_case({"layers": layers})
     assert one_sentence(str(caught.value))

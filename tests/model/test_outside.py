@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-import dbvfiv
 from dbvfiv.errors import SolveError
 from dbvfiv.model import Conditions, ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.model.outside import leading_added_mass
+from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes
 
 MESH = {"mesh.around": 8, "mesh.along": 14}
@@ -22,8 +22,8 @@ MESH = {"mesh.around": 8, "mesh.along": 14}
 @cache
 def valve(fluid="same", pressure=10e3, **outside) -> tuple[ValveModel, np.ndarray]:
     keys = {f"outside.{name}": value for name, value in outside.items()} | {"outside.fluid": fluid}
-    model = ValveModel(dbvfiv.load().case.replace(MESH | keys))
-    return model, find_equilibria(ValveModel(dbvfiv.load().case.replace(MESH)), [pressure]).states[0].q
+    model = ValveModel(thesis_case(MESH | keys))
+    return model, find_equilibria(ValveModel(thesis_case(MESH)), [pressure]).states[0].q
 
 
 @cache
@@ -119,7 +119,7 @@ def test_modes_at_ten_kilopascals_lie_near_those_of_an_independent_probe():
 
 def test_steady_states_are_not_changed():
     model, q = valve()
-    plain = ValveModel(dbvfiv.load().case.replace(MESH))
+    plain = ValveModel(thesis_case(MESH))
     assert np.array_equal(model.residual(q, 10e3), plain.residual(q, 10e3))
 
 

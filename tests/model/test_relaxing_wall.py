@@ -13,7 +13,7 @@ from dbvfiv.model import Conditions, ValveModel, linearise
 from dbvfiv.model.build import build_section
 from dbvfiv.model.system import ValveSystem, pencil_at
 from dbvfiv.shell import Section
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 
 from .conftest import SMALL
 
@@ -22,7 +22,7 @@ RUBBER, PLY = Prony((0.3, 0.1), (1e-3, 1e-2)), Prony((0.05, 0.02), (1e-2, 0.1))
 
 def relaxing_valve(**changes) -> ValveModel:
     """A small valve of which rubbers relax by one series, plies by another."""
-    case = Case().replace(SMALL | {key.replace("__", "."): value for key, value in changes.items()})
+    case = thesis_case(SMALL | {key.replace("__", "."): value for key, value in changes.items()})
     plain = build_section(case)
     layers = (replace(x, relaxation=PLY if x.law.kind == 0 else RUBBER) for x in plain.layers)
     return ValveModel(case, Section(tuple(layers), plain.points_per_layer))

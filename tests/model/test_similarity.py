@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.studies.case import thesis_case
 
 MESH = {"mesh.around": 8, "mesh.along": 14, "damping.alpha": 4.0, "damping.beta": 2e-3, "steady.tolerance": 1e-11}
 TWICE = {"valve.scale": 2, "supports.lip_stop_stiffness": 2e8, "damping.alpha": 2.0, "damping.beta": 4e-3}
@@ -17,8 +18,8 @@ TWICE = {"valve.scale": 2, "supports.lip_stop_stiffness": 2e8, "damping.alpha": 
 @pytest.mark.parametrize("continuity", ["quasi-steady", "storage"])
 def test_twice_the_size_is_half_the_frequency(continuity):
     changes = MESH | {"fluid.continuity": continuity}
-    one = dbvfiv.load(changes=changes).steady(pressure=6e3)
-    two = dbvfiv.load(changes=changes | TWICE).steady(pressure=6e3)
+    one = dbvfiv.load(thesis_case(), changes).steady(pressure=6e3)
+    two = dbvfiv.load(thesis_case(), changes | TWICE).steady(pressure=6e3)
     size = np.abs(one.nodal[:, :3]).max()
     assert two.nodal[:, :3] / 2 == pytest.approx(one.nodal[:, :3], abs=1e-8 * size)
     assert two.nodal[:, 3:] == pytest.approx(one.nodal[:, 3:], abs=1e-8)

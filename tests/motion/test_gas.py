@@ -12,6 +12,7 @@ from dbvfiv.motion.gas import GasMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.start import Push, kicked, steady_positions
 from dbvfiv.motion.stepper import Stepper
+from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes
 
 AIR = {
@@ -86,7 +87,7 @@ def test_slams_stay_above_vacuum(tmp_path):
     """6 kPa: without compression pressures of this motion fall to -20 MPa; a gas ends at its absolute pressure."""
     changes = AIR | SOUND | {"mesh.around": 6, "mesh.along": 8, "drive.pressure": 6e3}
     changes |= {"transient.start": "kick", "transient.kick_opening": 1e-3, "transient.step": 2e-4}
-    run = dbvfiv.load(changes=changes | {"transient.duration": 0.06}).transient(output=tmp_path / "run.h5")
+    run = dbvfiv.load(thesis_case(), changes | {"transient.duration": 0.06}).transient(output=tmp_path / "run.h5")
     history = run.history
     assert history["time"][-1] == pytest.approx(0.06)
     assert history["station_pressure"].min() > -1.2 * 343.0**2 / 1.4

@@ -4,6 +4,7 @@ import numpy as np
 
 import dbvfiv
 from dbvfiv.drawing.described import valve_figure
+from dbvfiv.studies.case import thesis_case
 
 OWN = {
     "mesh.around": 8,
@@ -21,7 +22,7 @@ def texts(axes):
 
 
 def test_the_picture_shows_measures_wall_and_layers():
-    valve = dbvfiv.load(changes=OWN)
+    valve = dbvfiv.load(thesis_case(), OWN)
     figure = valve_figure(valve.model)
     by_title = {axes.get_title(loc="left").split(",")[0].split(":")[0]: axes for axes in figure.axes}
     side, plan = by_title["Plane x = 0"], by_title["Plane y = 0"]

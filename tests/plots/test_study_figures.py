@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import BoundaryNorm
 
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map import figures as map_figures
 from dbvfiv.studies.map.column import MapPlan
 from dbvfiv.studies.onset import figures as onset_figures
@@ -82,7 +82,7 @@ def test_branches_are_told_apart_without_colour(sweep):
 
 
 def onset_result(values, growth, certified=None):
-    case = Case().replace({"onset.over": f"pressure={values[0]:g}:{values[-1] + 1:g}:5"})
+    case = thesis_case({"onset.over": f"pressure={values[0]:g}:{values[-1] + 1:g}:5"})
     rows = np.stack([growth, *(np.full(len(growth), -100.0 * k) for k in (1, 2, 3))], axis=1)
     point = {"value": 9e3, "frequency": 37.0, "growth_rate": 0.0, "criticality": "super", "uncertainty": 200.0}
     point |= {"edge": True, "gains": False}
@@ -133,7 +133,7 @@ def test_an_onset_scan_of_one_value_shows_it():
 
 
 def map_result(certified=None):
-    case = Case().replace({"map.x": "pressure=1000:12000:6", "map.y": "density=1:1000:5:log"})
+    case = thesis_case({"map.x": "pressure=1000:12000:6", "map.y": "density=1:1000:5:log"})
     plan = MapPlan.of(case)
     shape = (len(plan.laws), 5, 6)
     growth = np.broadcast_to(np.linspace(80, -80, 6) + 0 * np.arange(5)[:, None], shape).copy()

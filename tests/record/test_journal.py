@@ -16,7 +16,7 @@ from dbvfiv.record.journal import DiskFull, Journal
 from dbvfiv.record.layout import TEXT, Column
 from dbvfiv.record.record import GrowingRecord, StoredRecord
 from dbvfiv.record.table import TableSpec
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import Case, thesis_case
 
 ROOT = Path(__file__).parent.parent.parent
 TABLE = TableSpec(
@@ -31,7 +31,7 @@ def tables(_mesh=None):
 
 
 def header():
-    return Header.of("steady", Case())
+    return Header.of("steady", thesis_case())
 
 
 def row(i):

@@ -5,6 +5,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.studies.case import thesis_case
 
 
 def test_one_pressure_gives_a_state(coarse_valve, coarse_run):
@@ -35,7 +36,7 @@ def test_failures_are_raised(coarse_valve, one_sentence):
         with pytest.raises((CaseError, TypeError)):
             coarse_valve.steady(pressure=pressure)
     with pytest.raises(CaseError) as caught:
-        dbvfiv.load(changes={"shell.metric": "true", "valve.thickness_factor": 2}).model
+        dbvfiv.load(thesis_case(), {"shell.metric": "true", "valve.thickness_factor": 2}).model
     assert one_sentence(str(caught.value))
 
 
@@ -46,5 +47,5 @@ def test_nothing_else_is_offered():
 
 def test_pressures_are_those_of_the_command_line():
     """Only drive.pressure given: one state at it, as `dbvfiv steady --set drive.pressure=...` gives."""
-    valve = dbvfiv.load(changes={"mesh.around": 8, "mesh.along": 16, "drive.pressure": "4 kPa"})
+    valve = dbvfiv.load(thesis_case(), {"mesh.around": 8, "mesh.along": 16, "drive.pressure": "4 kPa"})
     assert [state.pressure for state in valve.steady().states] == [4e3]

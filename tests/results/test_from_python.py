@@ -8,6 +8,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
+from dbvfiv.studies.case import thesis_case
 
 COARSE = {"mesh.around": 4, "mesh.along": 6, "drive.pressure": 2e3, "fluid.density": 10}
 
@@ -101,7 +102,7 @@ def test_what_the_package_offers():
 )
 def test_changes_as_people_write_them(tmp_path, changes, key, value):
     (tmp_path / "a.toml").write_text("")
-    for valve in (dbvfiv.load(tmp_path / "a.toml", changes), dbvfiv.load().replace(changes)):
+    for valve in (dbvfiv.load(tmp_path / "a.toml", changes), dbvfiv.load(thesis_case()).replace(changes)):
         found = valve.case
         for part in key.split("."):
             found = getattr(found, part)

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.case.model import Case
 from dbvfiv.geometry import valve_mesh
 from dbvfiv.shell import Shell, ShellMesh
+from dbvfiv.studies.case import thesis_case
 from tests.shell.structures import grid, isotropic_section, mixed_section
 
 
@@ -31,7 +31,7 @@ def _cylinder() -> ShellMesh:
 
 def _valve() -> ShellMesh:
     # even columns: random motions are measured in the mean element and would turn narrow ones inside out
-    case = Case().replace({"mesh.around": 4, "mesh.along": 6, "mesh.rows": "uniform", "mesh.columns": "uniform"})
+    case = thesis_case({"mesh.around": 4, "mesh.along": 6, "mesh.rows": "uniform", "mesh.columns": "uniform"})
     mesh = valve_mesh(case.valve, case.mesh)
     planes = [(mesh.rows[:, 0], 0), (mesh.rows[:, -1], 1)]
     return ShellMesh.build(mesh.nodes, mesh.quads, mesh.thickness, planes=planes)

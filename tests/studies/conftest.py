@@ -1,6 +1,6 @@
 import pytest
 
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.walk import StabilityWalk
 
 COARSE = [
@@ -15,7 +15,7 @@ COARSE = [
 
 @pytest.fixture(scope="session")
 def coarse_case():
-    return load_case(None, COARSE)
+    return thesis_case(COARSE)
 
 
 @pytest.fixture(scope="session")

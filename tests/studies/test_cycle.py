@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import dbvfiv
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model.dynamics import Conditions
 from dbvfiv.motion.equations import ValveMotion
@@ -13,6 +12,7 @@ from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.stepper import Stepper
 from dbvfiv.observer import Observer
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import Session, load_result, resume_result
 
 CASE = {
@@ -26,7 +26,7 @@ CASE = {
 
 
 def session_of(**changes):
-    return Session(dbvfiv.load().case.replace(CASE | {key.replace("__", "."): v for key, v in changes.items()}))
+    return Session(thesis_case(CASE | {key.replace("__", "."): v for key, v in changes.items()}))
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.measured import DISCHARGE, read_measured
 from dbvfiv.case.quantity import GRAVITY
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.steady.comparison import draw
 from dbvfiv.studies.steady.measured import against
 from tests.small_valves import make_valve
@@ -110,14 +110,14 @@ def test_bad_measured_points(tmp_path, text, words):
     file = tmp_path / "points.csv"
     file.write_text(text)
     with pytest.raises(CaseError, match=rf"steady\.measured is given as .*, wh.*{words}"):
-        load_case(None, [f"steady.measured={file}"])
+        thesis_case([f"steady.measured={file}"])
     with pytest.raises(CaseError, match=rf"steady\.measured is given as .*, wh.*{words}"):
         load(steady__measured=str(file)).steady([6e3])
 
 
 def test_a_missing_file_of_points():
     with pytest.raises(CaseError, match=r"steady\.measured.*which does not exist"):
-        load_case(None, ["steady.measured=nowhere.csv"])
+        thesis_case(["steady.measured=nowhere.csv"])
 
 
 def test_measured_points_beside_computed_ones(tmp_path, command_line):

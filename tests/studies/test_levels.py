@@ -9,7 +9,7 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.write import case_toml
 from dbvfiv.model.strain_level import tension_of
-from dbvfiv.studies.case import Case, load_case
+from dbvfiv.studies.case import load_case, thesis_case
 
 COARSE = {"mesh.around": 8, "mesh.along": 14}
 AUTO = COARSE | {"materials.strain_level": "auto"}
@@ -23,7 +23,7 @@ def test_strain_of_tension_is_found_from_its_invariant(strain):
 
 @pytest.fixture(scope="module")
 def found():
-    return dbvfiv.load(changes=COARSE).levels(["18 kPa", "36 kPa"])
+    return dbvfiv.load(thesis_case(), COARSE).levels(["18 kPa", "36 kPa"])
 
 
 def test_levels_agree_with_the_strains_they_give(found):
@@ -36,18 +36,18 @@ def test_levels_agree_with_the_strains_they_give(found):
         assert row["level"] == pytest.approx(level, abs=2e-3) and row["mean"] < row["peak"]
         for name in ("SBR", "EPDM"):
             assert rows[pressure, name]["level"] == 0.10 > rows[pressure, name]["peak"]
-    given = dbvfiv.load(changes=COARSE).steady(pressure=36e3)
+    given = dbvfiv.load(thesis_case(), COARSE).steady(pressure=36e3)
     assert rows[36e3, "CR"]["mass_flow"] > 1.03 * given.mass_flow
 
 
 def test_auto_is_the_state_of_the_levels_found(found):
-    state = dbvfiv.load(changes=AUTO).steady(pressure=36e3)
+    state = dbvfiv.load(thesis_case(), AUTO).steady(pressure=36e3)
     row = next(row for row in found.rows if row["pressure"] == 36e3)
     assert state.mass_flow == pytest.approx(row["mass_flow"], rel=1e-4)
     case = state.results.case
     assert case.materials.card("CR").strain_level == pytest.approx(row["level"], abs=2e-4)
     assert not case.seeks_levels
-    modes = dbvfiv.load(changes=AUTO | {"drive.pressure": 36e3}).modes(count=2, in_vacuo=True)
+    modes = dbvfiv.load(thesis_case(), AUTO | {"drive.pressure": 36e3}).modes(count=2, in_vacuo=True)
     again = state.modes(count=2, in_vacuo=True)
     for one, two in zip(modes.modes, again.modes):
         assert one.frequency == pytest.approx(two.frequency, rel=1e-3)
@@ -71,14 +71,14 @@ def test_what_has_no_levels_is_refused(one_sentence):
     silicone = {"kind": "neo-hookean", "shear_modulus": 1e6, "density": 1100}
     other = {"materials.A": silicone, "layers": [{"material": "A", "thickness": 0.01}]}
     with pytest.raises(CaseError, match="No layer is one of the built-in rubbers") as caught:
-        dbvfiv.load(changes=COARSE | other).levels("6 kPa")
+        dbvfiv.load(thesis_case(), COARSE | other).levels("6 kPa")
     assert one_sentence(str(caught.value))
-    assert not Case().replace(other | {"materials.strain_level": "auto"}).seeks_levels
+    assert not thesis_case(other | {"materials.strain_level": "auto"}).seeks_levels
     with pytest.raises(CaseError, match="strain_level is 'auto', which needs a steady flow"):
-        dbvfiv.load(changes=AUTO | {"drive.kind": "uniform"}).steady(pressure=1e3)
+        dbvfiv.load(thesis_case(), AUTO | {"drive.kind": "uniform"}).steady(pressure=1e3)
     for wrong in ("automatic", 0.05, "70 %", True):
         with pytest.raises(CaseError, match=r"strain_level is given as .*60 %, or \"auto\"|truth value"):
-            Case().replace({"materials.strain_level": wrong})
+            thesis_case({"materials.strain_level": wrong})
 
 
 def test_the_command_prints_and_keeps_levels(tmp_path, command_line):

@@ -14,7 +14,7 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.measured import AREA, DISCHARGE, SHAPE, TAPS, read_measured
 from dbvfiv.drawing.faces import faces
-from dbvfiv.studies.case import Case, load_case
+from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure import comparison as closure
 from dbvfiv.studies.measured.kept import kept_tables
 from dbvfiv.studies.measured.sections import cut, distances
@@ -93,7 +93,7 @@ def test_a_bad_table_is_refused_in_one_sentence(tmp_path, command_line, one_sent
     file = tmp_path / "points.csv"
     file.write_text(text)
     with pytest.raises(CaseError, match=rf"steady\.measured is given as .*, wh.*{words}"):
-        load_case(None, [f"steady.measured={file}"])
+        thesis_case([f"steady.measured={file}"])
     done = command_line("case", f"--set=steady.measured={file}")
     assert done.status == 2 and one_sentence(done.err), done.err
 
@@ -104,7 +104,7 @@ def test_back_pressure_takes_no_discharge(tmp_path):
     with pytest.raises(
         CaseError, match=r"closure\.measured is given as .* which holds a discharge, and here belong areas"
     ):
-        load_case(None, [f"closure.measured={file}"])
+        thesis_case([f"closure.measured={file}"])
     with pytest.raises(CaseError, match=r"closure\.measured is given as .*, which holds a discharge"):
         dbvfiv.load(None, SMALL | {"closure.measured": str(file)}).closure(["2 kPa"])
 
@@ -113,15 +113,15 @@ def test_several_files(tmp_path):
     good, bad = tmp_path / "good.csv", tmp_path / "bad.csv"
     good.write_text("pressure [kPa], flow [L/s]\n1, 2\n")
     bad.write_text("pressure [kPa], area [cm2]\n")
-    case = load_case(None, [f'steady.measured=["{good}", "{good}"]'])
+    case = thesis_case([f'steady.measured=["{good}", "{good}"]'])
     assert case.steady.measured == (good, good) and Case.from_dict(case.to_dict()) == case
     with pytest.raises(
         CaseError, match=r"steady\.measured is given as a list of 2, of which '.*bad.csv' is one which ho"
     ):
-        load_case(None, [f'steady.measured=["{good}", "{bad}"]'])
+        thesis_case([f'steady.measured=["{good}", "{bad}"]'])
     for wrong, words in (("[3]", "of which one names no file"), ("3", "which names no file")):
         with pytest.raises(CaseError, match=words):
-            load_case(None, [f"steady.measured={wrong}"])
+            thesis_case([f"steady.measured={wrong}"])
     assert Case.from_dict({"steady": {"measured": None}}).steady.measured == ()  # as earlier versions wrote it
 
 

@@ -14,7 +14,7 @@ from dbvfiv.model import ValveModel
 from dbvfiv.model.dynamics import Conditions, dynamic_residual, linearise
 from dbvfiv.model.equilibria import LoadPath, rest_state
 from dbvfiv.observer import Observer
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.modes.run import ModesOptions, of_the_wall, run_modes
 from eigen import CoupledPencil, Relaxation, SearchOptions, certified_spectrum
 from eigen.residual import acceptable
@@ -25,7 +25,7 @@ WATER = Conditions(1000.0, 5.0, 0.003)
 
 @pytest.fixture(scope="module")
 def model():
-    return ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16}))
+    return ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16}))
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_sorted_once_each_and_accurate(flutter):
 def test_against_all_eigenvalues_of_a_small_valve():
     """Dense QZ of the whole first-order pencil on a mesh that allows it, for both continuity laws."""
     for continuity in ("quasi-steady", "storage"):
-        small = ValveModel(Case().replace({"mesh.around": 4, "mesh.along": 8, "fluid.continuity": continuity}))
+        small = ValveModel(thesis_case({"mesh.around": 4, "mesh.along": 8, "fluid.continuity": continuity}))
         at = LoadPath(small).go_to(4e3)
         found = run_modes(small, at, LIGHT, ModesOptions(4))
         every = la.eigvals(*linearise(small, at.q, 4e3).pencil(LIGHT).first_order())
@@ -179,7 +179,7 @@ def test_extreme_densities(model, state, density):
 
 
 def test_a_uniform_pressure_has_no_fluid(state):
-    shut = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16, "drive.kind": "uniform"}))
+    shut = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16, "drive.kind": "uniform"}))
     found = run_modes(shut, LoadPath(shut).go_to(500.0), WATER, ModesOptions(2))
     assert found.in_vacuo and found.pressures.shape[1] == 0 and found.stable is True
 
@@ -204,7 +204,7 @@ def test_the_flutter_of_the_reference_mesh():
     """28 x 48, 6 kPa, 10 kg/m3: about +27 1/s at 36.3 Hz, the next near -24 1/s at 16.8 Hz; a few per cent between two
     models.
     """
-    model = ValveModel(Case())
+    model = ValveModel(thesis_case())
     found = run_modes(model, LoadPath(model).go_to(6e3), LIGHT)
     first, second = found.eigenvalues[:2]
     assert first.real == pytest.approx(27, abs=3) and first.imag / (2 * np.pi) == pytest.approx(36.3, rel=0.03)

@@ -11,7 +11,7 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 
 SMALL = {
     "mesh.around": 6,
@@ -107,7 +107,7 @@ def test_what_has_no_meaning_with_a_pump_is_refused():
 
 
 def test_a_head_is_another_way_to_give_the_pressure():
-    case = load_case(None, ["drive.head=3 m", "fluid.density=800"])
+    case = thesis_case(["drive.head=3 m", "fluid.density=800"])
     assert case.drive.pressure == pytest.approx(800 * GRAVITY * 3, rel=1e-14) and case.drive.head is None
     assert case.steady_pressures() == (case.drive.pressure,)
     other = case.replace({"drive.head": 2.0})

@@ -10,6 +10,7 @@ import pytest
 import dbvfiv
 from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.symmetry import SYMMETRIES
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.classes import ClassStiffness
 from dbvfiv.studies.closure.model import closure_model
 from dbvfiv.studies.map.classes import leading_of as leading_of_map
@@ -21,7 +22,7 @@ SMALL = {"mesh.around": 8, "mesh.along": 14, "drive.pressure": "6 kPa", "damping
 
 
 def make(**changes):
-    return dbvfiv.load(dbvfiv.load().case.replace(SMALL | {k.replace("__", "."): v for k, v in changes.items()}))
+    return dbvfiv.load(thesis_case(SMALL | {k.replace("__", "."): v for k, v in changes.items()}))
 
 
 @pytest.fixture(scope="module")

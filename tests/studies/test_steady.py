@@ -13,12 +13,12 @@ from dbvfiv.model.lip import LipCentre
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.observer import Observer
 from dbvfiv.record.states import summarise
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import Case, thesis_case
 
 
 @pytest.fixture(scope="module")
 def model():
-    return ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 12}))
+    return ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 12}))
 
 
 @pytest.mark.parametrize("pressure", [50.0, 400.0, 2e3, 18e3, 60e3])
@@ -85,17 +85,17 @@ def test_heads_of_the_fluid():
     """Metres of the fluid, whatever the order of keys, and metres of water."""
     for text in ("[fluid]\ndensity = 800\n[drive]\npressure = '2 m'", "drive.pressure = '2 m'\nfluid.density = 800"):
         assert make_case(Case, parse_toml(text)).drive.pressure == pytest.approx(2 * 800 * 9.80665, rel=1e-14)
-    assert Case().replace({"drive.pressure": "2 m"}).drive.pressure == pytest.approx(19613.3, rel=1e-14)
+    assert thesis_case({"drive.pressure": "2 m"}).drive.pressure == pytest.approx(19613.3, rel=1e-14)
     for text in ("2 mH2O", "200 cmH2O", "2000mmH2O"):
-        case = Case().replace({"drive.pressure": text, "fluid.density": 10, "steady.pressures": [text]})
+        case = thesis_case({"drive.pressure": text, "fluid.density": 10, "steady.pressures": [text]})
         assert case.drive.pressure == case.steady.pressures[0] == pytest.approx(19613.3, rel=1e-12)
-    changed = Case().replace({"fluid.density": 10}).replace({"closure.pressures": ["3 m"]})
+    changed = thesis_case({"fluid.density": 10}).replace({"closure.pressures": ["3 m"]})
     assert changed.closure.pressures == pytest.approx((3 * 10 * 9.80665,), rel=1e-14)
     for key, given in (("drive.pressure", "2 mm"), ("sweep.over", "pressure=1 m:2 m:3"), ("fluid.density", "2 m")):
         with pytest.raises(CaseError):
-            Case().replace({key: given})
+            thesis_case({key: given})
     with pytest.raises(CaseError, match="modulus|pressure"):
-        Case().replace({"materials.rubber": {"kind": "neo-hookean", "shear_modulus": "2 m", "density": 1000}})
+        thesis_case({"materials.rubber": {"kind": "neo-hookean", "shear_modulus": "2 m", "density": 1000}})
 
 
 def test_run_keeps_the_order_asked_for(model):
@@ -122,10 +122,10 @@ def test_run_keeps_the_order_asked_for(model):
 
 def test_folded_wall_is_told():
     """Half the wall (7.5 mm) exceeds the radius (6.2 mm) at the side edge just behind the duckbill."""
-    fine = ValveModel(Case().replace({"mesh.around": 28, "mesh.along": 24}))
+    fine = ValveModel(thesis_case({"mesh.around": 28, "mesh.along": 24}))
     (sentence,) = model_warnings(fine)
     assert "Half the wall exceeds the radius" in sentence and "z 0.21" in sentence
-    thin = ValveModel(Case().replace({"mesh.around": 28, "mesh.along": 24, "valve.thickness_factor": 0.5}))
+    thin = ValveModel(thesis_case({"mesh.around": 28, "mesh.along": 24, "valve.thickness_factor": 0.5}))
     assert not list(model_warnings(thin))
 
 
@@ -174,7 +174,7 @@ def test_an_interrupt_keeps_what_is_done(model):
 
 
 def test_uniform_pressure():
-    model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 12, "drive.kind": "uniform"}))
+    model = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 12, "drive.kind": "uniform"}))
     state = LoadPath(model).go_to(2e3)
     assert state.converged and state.mass_flow == 0.0 and state.lip_displacement > 0
 
@@ -182,7 +182,7 @@ def test_uniform_pressure():
 @pytest.mark.slow
 def test_a_state_without_a_finite_flow_is_an_error():
     """Lips 100 mm apart at rest open beyond the flange: before, a flow of inf was "converged"."""
-    model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16, "valve.initial_gap": "100 mm"}))
+    model = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16, "valve.initial_gap": "100 mm"}))
     result = find_equilibria(model, [6e3])
     assert not result.states
     assert "no finite steady flow" in result.failures[0] or "No equilibrium" in result.failures[0]

@@ -14,7 +14,7 @@ from dbvfiv.model import ValveModel
 from dbvfiv.model.dynamics import Conditions
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.modes.run import ModesOptions, run_modes
 from dbvfiv.studies.sweep.run import SweepOptions, run_sweep
 
@@ -25,7 +25,7 @@ DENSITY = parse_axis("density=1:1000:13:log")
 
 @pytest.fixture(scope="module")
 def model():
-    return ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16}))
+    return ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16}))
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +153,7 @@ def test_a_pressure_that_is_not_reached_ends_the_sweep(model, monkeypatch, one_s
 
 
 def test_refusals(model, state, one_sentence):
-    shut = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16, "drive.kind": "uniform"}))
+    shut = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16, "drive.kind": "uniform"}))
     with pytest.raises(CaseError) as caught:
         run_sweep(shut, DENSITY, LIGHT, OPTIONS, state=state)
     assert one_sentence(str(caught.value))
@@ -179,7 +179,7 @@ def test_what_is_done_is_kept_on_the_way(model, state, over_density, monkeypatch
 @pytest.mark.parametrize("over", ["density=5:50:4:log", "loss_factor=0.5:2:4:log"])
 def test_a_wall_that_relaxes_agrees_with_full_solves(over):
     changes = {"mesh.around": 8, "mesh.along": 14, "damping.model": "loss factor", "drive.pressure": 6000}
-    model = ValveModel(Case().replace(changes))
+    model = ValveModel(thesis_case(changes))
     state, axis = LoadPath(model).go_to(6e3), parse_stability_axis(over)
     conditions = Conditions(10.0, 0.0, 0.0, 1.0)
     found = run_sweep(model, axis, conditions, SweepOptions(count=3, checks=2), state=state)

@@ -14,7 +14,7 @@ from dbvfiv.materials import Prony, fit_constant
 from dbvfiv.model import Conditions, LinearisedState, ValveModel, linearise
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.model.relaxing import WallRelaxation
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from eigen import CoupledPencil, Relaxation
 
 LARGEST_LOSS = 2.0
@@ -58,7 +58,7 @@ class RandomState:
 
 def linearised_states(around: int, along: int, pressures, **changes) -> list[LinearisedState]:
     """Steady states of the 12-inch valve on one mesh at ascending pressures, Pa."""
-    model = ValveModel(Case().replace({"mesh.around": around, "mesh.along": along, **changes}))
+    model = ValveModel(thesis_case({"mesh.around": around, "mesh.along": along, **changes}))
     path = LoadPath(model)
     return [linearise(model, path.go_to(float(p)).q, float(p)) for p in np.sort(pressures)]
 

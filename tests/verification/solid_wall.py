@@ -22,7 +22,7 @@ from dbvfiv.geometry.divisions import grading
 from dbvfiv.materials import IsotropicElastic
 from dbvfiv.model import ValveModel
 from dbvfiv.model.linear import DirectFactor
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from tests.verification import layered_solid
 
 #: One material for the whole wall (App. B).
@@ -49,7 +49,7 @@ class FoldedWallError(ValueError):
 def valve_model(around: int, along: int, factor: float, changes=ISOTROPIC, **more) -> ValveModel:
     """The 12-inch valve with a wall of `factor` times the uniform 14.38 mm."""
     wall = {"valve.wall": "uniform", "valve.thickness_factor": factor, "drive.unloaded_edge": 0.0}
-    return ValveModel(Case().replace({"mesh.around": around, "mesh.along": along} | wall | changes | more))
+    return ValveModel(thesis_case({"mesh.around": around, "mesh.along": along} | wall | changes | more))
 
 
 @dataclass

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from continuation import ContinuationOptions, NewtonOptions, continue_branch
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.onset.normal_form import system_of
 from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk
@@ -16,7 +16,7 @@ HIGHEST = 60e3
 
 @pytest.fixture(scope="module")
 def walk():
-    return StabilityWalk(load_case(None, ["mesh.around=10", "mesh.along=20", "drive.pressure=300 Pa"]))
+    return StabilityWalk(thesis_case(["mesh.around=10", "mesh.along=20", "drive.pressure=300 Pa"]))
 
 
 @pytest.fixture(scope="module")

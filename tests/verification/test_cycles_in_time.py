@@ -10,12 +10,12 @@ import os
 import numpy as np
 import pytest
 
-import dbvfiv
 from dbvfiv.model.dynamics import Conditions
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.stepper import StepOptions, Stepper
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import Session
 
 pytestmark = pytest.mark.slow
@@ -33,7 +33,7 @@ PERIODS = 8
 
 @pytest.fixture(scope="module")
 def branch():
-    return Session(dbvfiv.load().case.replace(CASE)).perform("cycle")
+    return Session(thesis_case(CASE)).perform("cycle")
 
 
 def run(point, steps: int, size: float = 1.0, periods: int = PERIODS) -> np.ndarray:
@@ -107,7 +107,7 @@ def test_amplitude_and_exponent(branch, value):
 def test_the_branch_on_the_mesh_of_the_cases():
     """28 x 48 elements, six densities: amplitude within 0.5 %, period within 0.1 %."""
     mesh = {"mesh.around": 28, "mesh.along": 48, "cycle.over": "density=25:60:8"}
-    branch = Session(dbvfiv.load().case.replace(CASE | mesh)).perform("cycle")
+    branch = Session(thesis_case(CASE | mesh)).perform("cycle")
     wrong = []
     for value in (50.0, 45.0, 40.0, 35.0, 30.0, 25.0):
         point = branch.nearest(value)

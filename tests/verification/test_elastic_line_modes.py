@@ -15,7 +15,7 @@ from dbvfiv.model import Conditions, ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.stepper import StepOptions
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, TransferBasis, certified_spectrum
 from tests.verification.test_line_modes import random_installation
@@ -56,7 +56,7 @@ def test_balances_of_line_and_valve(law, speed):
         "transient.duration": 400 * step,  # areas are kept in single precision: what enters has to be much
         "upstream.wave_speed": speed,
     }
-    model = ValveModel(Case().replace(SMALL | WAVES | keys))
+    model = ValveModel(thesis_case(SMALL | WAVES | keys))
     run = Runner(model, replace(RunOptions.of(model.case), step=StepOptions(tolerance=1e-9, floor=1e-13))).start()
     assert not run.failures
     h = run.history
@@ -89,7 +89,7 @@ def test_a_line_of_more_waves_than_a_count_follows_is_counted_in_its_band():
     """Of 110 m and little damping; over all frequencies a thousand points leave the count open."""
     keys = {"mesh.around": 8, "mesh.along": 14, "fluid.density": 360.0, "damping.alpha": 0.0, "damping.beta": 4e-3}
     line = {"upstream.length": 110.0, "upstream.diameter": "504 mm", "upstream.wave_speed": 693.0, "drive.at": "line"}
-    model = ValveModel(Case().replace(keys | line | {"drive.pressure": 463.0}))
+    model = ValveModel(thesis_case(keys | line | {"drive.pressure": 463.0}))
     linear, conditions = linearise(model, LoadPath(model).go_to(463.0).q, 463.0), Conditions.of(model.case)
     pencil = linear.pencil(conditions, storage=1.0)
     found = certified(model, conditions, pencil, TransferBasis(pencil))
@@ -111,7 +111,7 @@ def installations(number: int, seed: int, states: int = 3) -> list[str]:
         if rng.random() < 0.3:
             keys["damping.model"] = "loss factor"
         density = float(10 ** rng.uniform(-1, 3.3))
-        case = Case().replace(keys | {"fluid.density": density})
+        case = thesis_case(keys | {"fluid.density": density})
         model = ValveModel(case)
         q = LoadPath(model).go_to(pressure).q
         if rng.random() < 0.3:  # a falling curve through the state

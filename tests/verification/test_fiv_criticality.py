@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.model import ValveModel
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.onset.normal_form import normal_form
 from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
 from dbvfiv.studies.transient.run import run_transient
@@ -25,8 +25,8 @@ class Onset:
     """The onset over density of a coarse valve at 6 kPa, its normal form, and runs beside it."""
 
     def __init__(self):
-        self.case = load_case(
-            None, ["mesh.around=8", "mesh.along=16", "damping.alpha=0", "damping.beta=0.003", "drive.pressure=6 kPa"]
+        self.case = thesis_case(
+            ["mesh.around=8", "mesh.along=16", "damping.alpha=0", "damping.beta=0.003", "drive.pressure=6 kPa"]
         )
         options = OnsetOptions("density", tuple(np.geomspace(1, 1000, 21)), True, normal_form=False, coarse_mesh=0)
         search = OnsetSearch(self.case, options)

@@ -27,12 +27,12 @@ def measured() -> dict:
     """Onset densities at 2 and 6 kPa, onset pressures at 10 kg/m3, and leading eigenvalues at 6 kPa, for both
     continuity laws.
     """
-    from dbvfiv.studies.case import Case
+    from dbvfiv.studies.case import thesis_case
     from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
     from dbvfiv.studies.stability.place import Place
     from dbvfiv.studies.stability.walk import StabilityWalk
 
-    case = Case().replace(MESH)
+    case = thesis_case(MESH)
     walk, base = StabilityWalk(case), Place.of(case)
 
     def onsets(parameter, values, **fixed):

@@ -17,7 +17,7 @@ from dbvfiv.model import Conditions, ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.stepper import StepOptions
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, TransferBasis, certified_spectrum, leading_modes
 from tests.small_valves import FORMER
@@ -44,8 +44,8 @@ def by_hand(bare, conditions, storage: float, length: float, velocity: float):
 @pytest.mark.parametrize("at", ["line", "reservoir"])
 def test_modes_for_pipes_of_four_lengths(at, storage):
     conditions = Conditions(1000.0, 0.0, 4e-4)
-    piped = Case().replace(SMALL | WATER | {"upstream.length": 1.0, "drive.at": at})
-    bare, model = ValveModel(Case().replace(SMALL | WATER)), ValveModel(piped)
+    piped = thesis_case(SMALL | WATER | {"upstream.length": 1.0, "drive.at": at})
+    bare, model = ValveModel(thesis_case(SMALL | WATER)), ValveModel(piped)
     path = LoadPath(model)
     state = path.go_to(500.0)
     head = 0.0 if at == "line" else 0.5 * 1000.0 * state.station_velocity[-1] ** 2
@@ -63,7 +63,7 @@ def test_a_model_of_a_length_is_the_model_at_that_length():
     conditions = Conditions(1000.0, 0.0, 4e-4)
     for friction in (0.0, 0.02):
         keys = SMALL | WATER | {"upstream.friction": friction, "upstream.diameter": "250 mm"}
-        short, long = (ValveModel(Case().replace(keys | {"upstream.length": x})) for x in (3.0, 12.0))
+        short, long = (ValveModel(thesis_case(keys | {"upstream.length": x})) for x in (3.0, 12.0))
         q = LoadPath(long).go_to(500.0).q
         one = linearise(short, q, 500.0).pencil(replace(conditions, pipe_length=12.0))
         other = linearise(long, q, 500.0).pencil(conditions)
@@ -80,7 +80,7 @@ def test_water_flutters_behind_a_long_pipe_under_the_quasi_steady_law():
     better = {0.5: (-8.25, 38.84), 2.0: (-1.37, 39.34), 10.0: (2.80, 40.06), 100.0: (3.95, 40.36)}
     cases = [(at, mesh) for at in ("line", "reservoir") for mesh in (FORMER, {})]
     for at, mesh in cases:
-        model = ValveModel(Case().replace(WATER | {"upstream.length": 1.0, "drive.at": at} | dict(mesh)))
+        model = ValveModel(thesis_case(WATER | {"upstream.length": 1.0, "drive.at": at} | dict(mesh)))
         linear = linearise(model, LoadPath(model).go_to(500.0).q, 500.0)
         for length, (growth, frequency) in (probes if mesh else better).items():
             found = leading_modes(linear.pencil(Conditions(1000.0, 0.0, 4e-4, 0.0, length)), 4).eigenvalues
@@ -117,7 +117,7 @@ def test_balances_of_line_and_valve(law):
         "transient.step": step,
         "transient.duration": 400 * step,
     }
-    case = Case().replace(SMALL | LINE | keys)
+    case = thesis_case(SMALL | LINE | keys)
     model = ValveModel(case)
     run = Runner(model, replace(RunOptions.of(case), step=StepOptions(tolerance=1e-9, floor=1e-13))).start()
     assert not run.failures
@@ -168,7 +168,7 @@ def test_a_hundred_random_installations():
     for _ in range(20):
         pressure = float(10 ** rng.uniform(2, 4.7))
         keys = random_installation(rng)
-        model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 14, "drive.pressure": pressure} | keys))
+        model = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 14, "drive.pressure": pressure} | keys))
         linear, basis = linearise(model, LoadPath(model).go_to(pressure).q, pressure), None
         for _ in range(5):
             beta = 0.0 if rng.random() < 0.1 else float(10 ** rng.uniform(-5, -2))

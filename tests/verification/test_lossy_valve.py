@@ -20,7 +20,7 @@ import pytest
 
 from dbvfiv.materials.damping import damping_of
 from dbvfiv.model import Conditions, LinearisedState, ValveModel, linearise
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes, lowest_frequencies
 
 MODES = 8
@@ -36,7 +36,7 @@ def at_rest(loss_factor: float, branches: int = 4, modulus: float = MODULUS) -> 
         "damping.model": "loss factor",
         "damping.branches": branches,
     }
-    model = ValveModel(Case().replace(changes))
+    model = ValveModel(thesis_case(changes))
     return linearise(model, np.zeros(model.size), 0.0)
 
 

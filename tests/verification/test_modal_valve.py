@@ -13,7 +13,7 @@ import pytest
 from scipy.sparse.linalg import eigsh
 
 from dbvfiv.model import ValveModel
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 
 REFERENCE = np.array([13.51, 18.63, 24.04, 30.90])
 
@@ -30,7 +30,7 @@ def frequencies(around, along, shear_correction, count=len(REFERENCE), mass="con
         "mesh.around": around,
         "mesh.along": along,
     }
-    model = ValveModel(Case().replace(changes))
+    model = ValveModel(thesis_case(changes))
     dofs = model.shell.dofs
     stiffness = dofs.matrix(model.shell.force_and_tangent(model.rest())[1]).tocsc()
     mass = dofs.matrix(model.mass(model.rest())).tocsc()

@@ -11,7 +11,7 @@ from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
 from dbvfiv.model import Conditions, ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, TransferBasis, certified_spectrum
 from eigen.dense import all_eigenvalues
 
@@ -75,7 +75,7 @@ def look_at(number: int, seed: int, conditions_each: int = 3) -> tuple[list[str]
     rng, left_open, refused, unstable = np.random.default_rng(seed), [], [], 0
     for i in range(number):
         keys = random_installation(rng)
-        case = Case().replace(MESH | keys)
+        case = thesis_case(MESH | keys)
         model = ValveModel(case)
         try:
             linear = linearise(model, LoadPath(model).go_to(case.drive.pressure).q, case.drive.pressure)
@@ -125,7 +125,7 @@ def test_waves_resolved_far_above_the_modes():
         "drive.at": "reservoir",
         "drive.pressure": 343.6359928351305,
     }
-    case = Case().replace(MESH | keys)
+    case = thesis_case(MESH | keys)
     model = ValveModel(case)
     linear = linearise(model, LoadPath(model).go_to(case.drive.pressure).q, case.drive.pressure)
     own = Conditions.of(case)

@@ -7,7 +7,7 @@ import pytest
 
 from dbvfiv.model import Conditions, ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, certified_spectrum, lowest_frequencies
 
 
@@ -34,7 +34,7 @@ def look_at(number: int, seed: int) -> list[str]:
         keys = random_outside(rng)
         pressure, density = float(10.0 ** rng.uniform(2, 4.5)), float(10.0 ** rng.uniform(0, 3.3))
         storage, beta = float(rng.choice([0.0, 1.0])), float(10.0 ** rng.uniform(-4, -2.3))
-        model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 14} | keys))
+        model = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 14} | keys))
         loss = 1.0 if model.relaxation.groups else 0.0
         conditions = Conditions(density, 0.0, 0.0 if loss else beta, loss, keys.get("upstream.length"))
         pencil = linearise(model, LoadPath(model).go_to(pressure).q, pressure).pencil(conditions, storage=storage)

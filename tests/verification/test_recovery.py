@@ -6,7 +6,7 @@ import pytest
 from dbvfiv.flow.terms.tail import Tail
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 
 #: K of Eq. 7.2 beside Fig. 7-9, and the flows of Th. 4.3.3.
 PUBLISHED = {18e3: (0.86, 47.88), 29e3: (0.83, 75.52), 36e3: (0.79, 90.82)}
@@ -25,7 +25,7 @@ def test_published_factors_beside_ours(size):
     """The thesis took its pressures against that at the exit, so its states are those of a free discharge here. Its
     factors lie 4 to 7 % above ours and above what its own flows give, and say so of a K that depends on experiment.
     """
-    model = ValveModel(Case().replace({"mesh.around": size[0], "mesh.along": size[1]}))
+    model = ValveModel(thesis_case({"mesh.around": size[0], "mesh.along": size[1]}))
     path, inlet = LoadPath(model), 4 * float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
     print("\n  kPa  published  ours  of the published flow  recovered kPa: published, ours")
     for pressure, (published, flow) in PUBLISHED.items():
@@ -45,7 +45,7 @@ def test_published_factors_beside_ours(size):
 
 def test_a_loss_that_is_given_recovers_as_the_equation_has_it():
     model = ValveModel(
-        Case().replace(
+        thesis_case(
             {"mesh.around": 8, "mesh.along": 14, "downstream.pipe_diameter": TUNNEL, "downstream.expansion_loss": 0.86}
         )
     )

@@ -15,7 +15,7 @@ from dbvfiv.model.build import build_section
 from dbvfiv.model.relaxing import WallRelaxation
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from eigen import CoupledPencil, Relaxation, SearchOptions, leading_modes
 from tests.shell.structures import rectangle
 
@@ -153,7 +153,7 @@ def test_a_sandwich_with_thick_skins_is_the_beam_with_one_rotation_for_all_layer
 @pytest.fixture(scope="module")
 def pressed():
     """A small valve at 6 kPa whose layers all relax by one series."""
-    case = Case().replace({"mesh.around": 6, "mesh.along": 12, "damping.alpha": 0.0, "damping.beta": 0.0})
+    case = thesis_case({"mesh.around": 6, "mesh.along": 12, "damping.alpha": 0.0, "damping.beta": 0.0})
     plain = build_section(case)
     layers = tuple(replace(layer, relaxation=SERIES) for layer in plain.layers)
     model = ValveModel(case, Section(layers, plain.points_per_layer))

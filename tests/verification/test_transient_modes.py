@@ -18,6 +18,7 @@ from dbvfiv.model import Conditions, linearise
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, sweep
 
@@ -54,7 +55,7 @@ def three_routes(
         "transient.start": "kick",
         "transient.kick_opening": PUSH,
     } | (further or {})
-    valve = dbvfiv.load(changes=changes)
+    valve = dbvfiv.load(thesis_case(), changes)
     model = valve.model
     full = next(m for m in valve.modes(count=8).modes if m.frequency > 0)
     eigenvalue = complex(full.growth_rate, 2 * np.pi * full.frequency)
@@ -155,7 +156,7 @@ def test_three_routes_with_the_averaged_mass():
     found = three_routes(law, pressure, density, further={"shell.mass": "averaged"})
     check_three_routes(found, "averaged mass")
     changes = {"mesh.around": 8, "mesh.along": 12, "damping.alpha": 0.0, "damping.beta": BETA}
-    valve = dbvfiv.load(changes=changes | {"fluid.density": density, "drive.pressure": pressure})
+    valve = dbvfiv.load(thesis_case(), changes | {"fluid.density": density, "drive.pressure": pressure})
     consistent = next(m for m in valve.modes(count=8).modes if m.frequency > 0)
     assert abs(found["full"].imag) / (2 * np.pi) < 0.99 * consistent.frequency
 

@@ -16,6 +16,7 @@ import dbvfiv
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.transient.run import Runner
 from tests.small_valves import FORMER
 
@@ -40,7 +41,7 @@ def two_routes(
         "transient.kick_opening": PUSH,
         "transient.duration": 0.2,
     }
-    model = dbvfiv.load(changes=changes).model
+    model = dbvfiv.load(thesis_case(), changes).model
     case, q = model.case, steady_positions(model, pressure)
     lip, rings, value = model.shell.dofs.index[model.mesh.rows[0, 0], 1], [], None
     step = 1e-3
@@ -96,7 +97,7 @@ def test_the_onset_lies_where_the_sign_changes_in_time(law, pressure, bracket):
         "onset.normal_form": False,
         "onset.coarse_mesh": 0.0,
     }
-    found = dbvfiv.load(changes=changes).onset(f"density={bracket[0]}:{bracket[1]}:5").summary()["points"]
+    found = dbvfiv.load(thesis_case(), changes).onset(f"density={bracket[0]}:{bracket[1]}:5").summary()["points"]
     assert len(found) == 1
     onset, limits = found[0]["value"], []
     densities = onset * np.array([0.98, 1.02])

@@ -16,6 +16,7 @@ from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.stepper import StepOptions, Stepper
+from dbvfiv.studies.case import thesis_case
 from tests.small_valves import FORMER
 from tests.verification.moving import PointMotion
 
@@ -40,7 +41,7 @@ def run(motion, state, step: float, count: int, pressure=lambda t: 0.0, nd: floa
 @pytest.mark.parametrize("nd", [0.0, 0.5])
 def test_order_of_the_coupled_scheme(law, nd):
     """The open valve in water while the inlet pressure changes smoothly, compared at one instant."""
-    model = dbvfiv.load(changes=COARSE | {"fluid.continuity": law, "damping.alpha": 0.0}).model
+    model = dbvfiv.load(thesis_case(), COARSE | {"fluid.continuity": law, "damping.alpha": 0.0}).model
     motion = ValveMotion(model)
     q = steady_positions(model, 12e3)
     density = motion.conditions.density
@@ -75,7 +76,7 @@ def free_swing(count: int, changes=MappingProxyType({})) -> tuple[np.ndarray, np
 
     The valve is let go from its shape at 2 kPa: no load, no stops, no damping of any kind.
     """
-    start = steady_positions(dbvfiv.load(changes=COARSE).model, 2e3)
+    start = steady_positions(dbvfiv.load(thesis_case(), COARSE).model, 2e3)
     free = {
         "drive.kind": "uniform",
         "drive.pressure": 0.0,
@@ -83,7 +84,7 @@ def free_swing(count: int, changes=MappingProxyType({})) -> tuple[np.ndarray, np
         "damping.alpha": 0.0,
         "damping.beta": 0.0,
     }
-    motion = ValveMotion(dbvfiv.load(changes=COARSE | free | dict(changes)).model)
+    motion = ValveMotion(dbvfiv.load(thesis_case(), COARSE | free | dict(changes)).model)
     state = consistent_state(motion, 0.0, start, 0 * start, 0.0, 0.0)
     stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: 0.0, StepOptions(tolerance=1e-8))
     energy = sum(motion.energies(state.q, state.v))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.transient.run import run_transient
 
 STUDY = Path(__file__).parents[2] / "cases" / "studies" / "sudden_pressure.py"
@@ -27,7 +28,7 @@ def approach(pressure: float, mesh, duration: float, step: float):
         "transient.duration": duration,
         "transient.step": step,
     }
-    valve = dbvfiv.load(changes=changes)
+    valve = dbvfiv.load(thesis_case(), changes)
     history = run_transient(valve.model).history
     off = history["mass_flow"] / valve.steady(pressure).mass_flow - 1.0
     time = history["time"]

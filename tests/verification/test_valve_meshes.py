@@ -13,7 +13,7 @@ from scipy.sparse.linalg import eigsh
 
 from dbvfiv.model import Conditions, ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes
 from tests.verification.test_modal_valve import frequencies
 
@@ -27,7 +27,7 @@ def measured(around: int, along: int, mass="consistent", pressures=FLOWS) -> tup
     """Onset density at 6 kPa, kg/m3, growth there at 45 kg/m3, 1/s, and flow at pressures from 6 kPa on, kg/s
     (quasi-steady, alpha 0, beta 3 ms).
     """
-    model = ValveModel(Case().replace({"mesh.around": around, "mesh.along": along, "shell.mass": mass}))
+    model = ValveModel(thesis_case({"mesh.around": around, "mesh.along": along, "shell.mass": mass}))
     states = find_equilibria(model, pressures).states
     small = linearise(model, states[0].q, states[0].pressure)
     options = SearchOptions(limit_point=-1 / 0.003)
@@ -64,7 +64,7 @@ def test_edges_that_bow_go_to_the_same_flow():
     found = []
     for around, along in MESHES[:2]:
         keys = {"mesh.around": around, "mesh.along": along, "mesh.element": "MITC4+drilling"}
-        found.append(find_equilibria(ValveModel(Case().replace(keys)), FLOWS[:1]).states[0].mass_flow)
+        found.append(find_equilibria(ValveModel(thesis_case(keys)), FLOWS[:1]).states[0].mass_flow)
     print(f"\nflow at 6 kPa {np.round(found, 4)} kg/s")
     assert found == pytest.approx([10.430, 10.655], rel=1e-3)
     assert (4 * found[1] - found[0]) / 3 == pytest.approx(LIMIT_FLOW[0], rel=2e-3)
@@ -115,7 +115,7 @@ def test_isotropic_valve_with_the_averaged_mass():
 
 def in_vacuo(around: int, along: int, mass: str) -> np.ndarray:
     """Five lowest frequencies, Hz, of the layered valve as it stands at 6 kPa, without fluid and damping."""
-    model = ValveModel(Case().replace({"mesh.around": around, "mesh.along": along, "shell.mass": mass}))
+    model = ValveModel(thesis_case({"mesh.around": around, "mesh.along": along, "shell.mass": mass}))
     q = find_equilibria(model, FLOWS[:1]).states[0].q
     stiffness, inertia = (model.shell.dofs.matrix(v).tocsc() for v in (model.structure(q)[1], model.mass(q)))
     values = eigsh(stiffness, 5, inertia, sigma=-1000.0, return_eigenvectors=False)

@@ -7,7 +7,7 @@ import pytest
 
 from dbvfiv.model import Conditions, ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, Workspace, leading_modes
 from eigen.certificate import certified_spectrum
 from eigen.transfer import TransferBasis
@@ -17,7 +17,7 @@ LIGHT = Conditions(10.0, 0.0, 0.003)
 
 
 def model_of(around, along, **changes):
-    return ValveModel(Case().replace({"mesh.around": around, "mesh.along": along} | changes))
+    return ValveModel(thesis_case({"mesh.around": around, "mesh.along": along} | changes))
 
 
 def linearised(model, pressures):

@@ -16,7 +16,7 @@ import pytest
 
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import find_equilibria
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from tests.shell.structures import richardson
 from tests.small_valves import FORMER
 
@@ -26,7 +26,7 @@ FIRST_MODEL = {"10 %": np.array([42.0, 67.4, 82.0]), "20 %": np.array([48.8, 77.
 
 
 def states(pressures, around=28, along=48, **changes):
-    case = Case().replace(
+    case = thesis_case(
         {"mesh.around": around, "mesh.along": along} | {k.replace("__", "."): v for k, v in changes.items()}
     )
     result = find_equilibria(ValveModel(case), pressures)
@@ -84,7 +84,7 @@ def flows(**changes) -> np.ndarray:
 
 
 def layup(angle: float | None) -> list[dict]:
-    layers = Case().to_dict()["layers"]
+    layers = thesis_case().to_dict()["layers"]
     if angle is None:
         return [layer for layer in layers if layer["material"] != "fibre"]
     layers[2]["angle"], layers[3]["angle"] = angle, -angle

@@ -7,14 +7,14 @@ import pytest
 
 from dbvfiv.model import Conditions, ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, TransferBasis, certified_spectrum
 from eigen.negative_stiffness import negative_motions
 
 
 @pytest.mark.slow
 def test_the_12_inch_valve_at_36_kpa_with_loss_factors():
-    case = Case().replace({"damping.model": "loss factor", "drive.pressure": 36e3})
+    case = thesis_case({"damping.model": "loss factor", "drive.pressure": 36e3})
     model = ValveModel(case)
     linear = linearise(model, LoadPath(model).go_to(36e3).q, 36e3)
     conditions, basis, space = Conditions.of(case), None, None

@@ -6,18 +6,11 @@ from pathlib import Path
 
 from ...case.reference import explain, explanation_text
 from ...case.section import Section
-from ...case.write import HEAD, case_toml
+from ...case.write import case_toml
 from ...errors import CaseError
 from ...geometry import key_point_table
 from ...studies.case import Case, load_case
 from .._output import print_json
-
-#: What a new case differs in from the defaults, which reproduce the thesis: this law conserves volume.
-_PREDICTION = "fluid.continuity=storage"
-_SAID = """#
-# One key is no default: fluid.continuity = "storage", the law that conserves volume under moving walls, which
-# predictions should rest on. Without that line the law of the thesis is taken, "quasi-steady".
-"""
 
 
 def check(target: str | None, overrides: list[str] | None, as_json: bool) -> None:
@@ -33,8 +26,7 @@ def write_new(target: str | None, overrides: list[str] | None, as_json: bool) ->
     """Write a commented starter; raises `CaseError` where that cannot be."""
     if target is None:
         raise CaseError("--new needs the name of the file to write, such as my.toml.")
-    text = case_toml(load_case(None, (_PREDICTION, *(overrides or ()))), comments=True).replace(HEAD, HEAD + _SAID, 1)
-    _write(target, text)
+    _write(target, case_toml(load_case(None, overrides or ()), comments=True))
     if as_json:
         print_json({"written": target})
     else:

@@ -29,7 +29,7 @@ def perform(kind: str, case: Case, request: Request, name: str, output: Path | N
     """Run a study on a case with what its command asks for, and report it."""
     changes = {key: value for key, value in request.changes.items() if value is not None}
     choices = {key: value for key, value in request.choices.items() if value is not None}
-    session = Session(case.replace(changes) if changes else case, name)
+    session = Session(case, name).replace(changes)
     session.mesh  # a case that gives no model is told before a table begins
     live = None if as_json else find_study(kind).live
     progress = Progress(quiet=as_json, row=live and live(session.case))
@@ -68,7 +68,7 @@ def report(
         places = {"output": str(output) if output else None, "figures": [str(figure) for figure in figures]}
         print_json(result.summary() | places)
     else:
-        lines = result.remarks() if printed else result.lines()
+        lines = [*(result.remarks() if printed else result.lines()), *filter(None, [result.record.settled])]
         if lines:
             print("\n".join(lines))
         print_places(output, figures, plots)

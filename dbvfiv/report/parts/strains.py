@@ -20,7 +20,7 @@ def part(found: Gathered) -> Part | None:
         return None
     state = result.nearest(found.case.drive.pressure)
     highest = max(result.states, key=lambda s: s.pressure)
-    level = found.case.materials.strain_level
+    levels = found.case.materials.levels({layer.material for layer in found.case.layers})
     rows = []
     for i, name in enumerate(state.layers.names):
         law = law_from_case(found.case, found.case.layers[i].material)
@@ -35,9 +35,10 @@ def part(found: Gathered) -> Part | None:
         "stress, MPa",
         "stable stretch, uniaxial",
     )
-    told = f"{100 * level:g} %" if isinstance(level, float) else str(level)
+    told = ", ".join(f"{name} {100 * level:.3g} %" for name, level in levels.items())
+    at_levels = f"Rubber constants of the strain levels {told}. " if levels else ""
     sentences = (
-        f"Rubber constants of the {told} strain level. Stretches are the smallest and the largest in the plane of a "
+        f"{at_levels}Stretches are the smallest and the largest in the plane of a "
         "layer; stresses are von Mises values of the Cauchy stress, the largest in any element. The last column says "
         "between which stretches the constants describe a stable material in tension and compression along one "
         "direction.",

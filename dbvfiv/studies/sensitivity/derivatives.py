@@ -83,11 +83,18 @@ def _has(model: ValveModel, name: str) -> bool:
         return model.flow.has_fluid and model.flow.unsteady
     if name == "angle":  # of all plies at once
         return len({abs(layer.angle) for layer in model.case.layers if layer.angle}) == 1
+    if name == "strain":  # of all rubbers at once
+        return len(set(_levels(model).values())) == 1
     try:
         require_parameter(model.case, name)
     except CaseError:
         return False
     return True
+
+
+def _levels(model: ValveModel) -> dict[str, float]:
+    """Strain levels of the rubbers in a wall."""
+    return model.case.materials.levels({layer.material for layer in model.case.layers})
 
 
 def unit_of(name: str) -> str:
@@ -211,7 +218,7 @@ def _value(model, pressure, conditions, name) -> float:
     if name == "angle":
         return max(abs(layer.angle) for layer in model.case.layers)
     if name == "strain":
-        return model.case.materials.strain_level
+        return max(_levels(model).values())  # of all rubbers: see `_has`
     i, quantity = _layer(name)
     layer = model.shell.section.layers[i]
     return float(getattr(layer if quantity in ("thickness", "angle") else layer.law, quantity))

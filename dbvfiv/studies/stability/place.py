@@ -237,8 +237,7 @@ def require_parameter(case: Case, name: str) -> None:
     if lacking:
         raise CaseError(f"There is no {name} to change: {lacking}.", key=PARAMETERS[name].key)
     used = {layer.material for layer in case.layers}
-    shipped = [name for name in RUBBERS if case.materials.is_built_in(name)]
-    if name == "strain" and not used & set(shipped):
+    if name == "strain" and not case.seeks_levels and not case.materials.levels(used):
         raise CaseError(
             "There is no strain level to change, because no layer is one of the built-in rubbers "
             f"{', '.join(RUBBERS)}; the layers are of {', '.join(sorted(used))}."
@@ -264,7 +263,8 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     if "thickness" in design:
         changes["valve.thickness_factor"] = case.valve.thickness_factor * design["thickness"]
     if "strain" in design:
-        changes["materials.strain_level"] = design["strain"]
+        rubbers = case.materials.levels({layer.material for layer in case.layers})
+        changes |= case.materials.at_levels(dict.fromkeys(rubbers, design["strain"]))
     if "angle" in design:
         layers = case.to_dict()["layers"]
         for layer in layers:

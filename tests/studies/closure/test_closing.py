@@ -8,7 +8,7 @@ import pytest
 from dbvfiv.flow import Channel
 from dbvfiv.flow.reversed import ReversibleFluid
 from dbvfiv.flow.stepping import MovingFluid
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.closing import ClosingResult, ClosingSample, Turn, closing_valve, run_closing
 from dbvfiv.studies.closure.closing_motion import ContactValve
 from tests.small_valves import FORMER
@@ -94,7 +94,7 @@ def test_pressure_slopes_agree_with_differences(kind, storage, new_speed, theta)
 
 
 def test_contact_of_the_coupled_valve_is_part_of_its_exact_tangent():
-    model = ContactValve(Case().replace(COARSE))
+    model = ContactValve(thesis_case(COARSE))
     generator = np.random.default_rng(4)
     nodal = 2e-4 * generator.standard_normal((len(model.mesh.nodes), 5))
     nodal[:, 1] -= 3e-4
@@ -125,7 +125,7 @@ def test_a_history_that_opens_again_is_not_shut_before_it_shuts_for_good():
 
 
 def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
-    case = Case().replace(
+    case = thesis_case(
         COARSE
         | {
             "mesh.around": 8,

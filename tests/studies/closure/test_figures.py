@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.studies.case import thesis_case
 
 
 @pytest.fixture(scope="module")
 def closure():
     changes = {"mesh.around": 6, "mesh.along": 10, "closure.max_step": "5 kPa", "closure.start": "open"}
-    return dbvfiv.load(changes=changes | {"closure.eigenvalues": 2}).closure(["2 kPa", 9e3])
+    return dbvfiv.load(thesis_case(), changes | {"closure.eigenvalues": 2}).closure(["2 kPa", 9e3])
 
 
 def test_the_contact_map_reaches_to_its_maximum_and_says_it(closure):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.safety import find_safety
 from dbvfiv.studies.session import load_result
 from tests.small_valves import FORMER
@@ -20,7 +20,7 @@ def result(pressures, sealed, overlap=None, buckling=(), supports="contact", fai
         SimpleNamespace(pressure=p, sealed_length=s, overlap=o, arclength=False)
         for p, s, o in zip(pressures, sealed, overlap)
     ]
-    case = Case().replace({"closure.pressures": [max(pressures)]} | {f"closure.{k}": v for k, v in changes.items()})
+    case = thesis_case({"closure.pressures": [max(pressures)]} | {f"closure.{k}": v for k, v in changes.items()})
     buckled = [SimpleNamespace(pressure=p) for p in buckling]
     return SimpleNamespace(walk=walk, case=case, buckling=buckled, supports=supports, walk_failure=failure)
 
@@ -79,7 +79,7 @@ THIN = {
 @pytest.mark.slow
 def test_a_wall_that_snaps_shows_its_last_state_before_and_the_factor(tmp_path):
     path = tmp_path / "thin.h5"
-    found = dbvfiv.load(changes=THIN).closure(["3 kPa", "8 kPa"], output=path)
+    found = dbvfiv.load(thesis_case(), THIN).closure(["3 kPa", "8 kPa"], output=path)
     assert [state.pressure for state in found.states] == [3e3, 8e3]
     limit, last = found.buckling[0], found.before_limit
     assert limit.kind == "limit point" and 3e3 < last.pressure < limit.pressure

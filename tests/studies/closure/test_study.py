@@ -11,7 +11,7 @@ import pytest
 
 from dbvfiv.errors import SolveError
 from dbvfiv.observer import Observer
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure import path as closure_path
 from dbvfiv.studies.closure.energy import EnergyLedger
 from dbvfiv.studies.closure.model import closure_model
@@ -31,7 +31,7 @@ COARSE = EVEN | {
 
 @pytest.fixture(scope="module")
 def case() -> Case:
-    return Case().replace(COARSE)
+    return thesis_case(COARSE)
 
 
 def closure(case, pressures=None, observer=None):
@@ -204,7 +204,7 @@ def test_shut_intervals_are_cut_between_rows_where_roots_of_areas_are_linear():
 
 
 def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
-    case = Case().replace({"mesh.around": 56, "mesh.along": 16})
+    case = thesis_case({"mesh.around": 56, "mesh.along": 16})
     model = closure_model(case)
     passage = opening(model, model.pressed.rest())
     assert passage.reference == pytest.approx(0.00019 * 0.125, rel=0.05)

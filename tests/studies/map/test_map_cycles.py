@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-import dbvfiv
 from dbvfiv.observer import Observer
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import Session, load_result, resume_result
 
 CASE = {
@@ -26,7 +26,7 @@ CASE = {
 
 
 def session_of(**changes):
-    return Session(dbvfiv.load().case.replace(CASE | {key.replace("__", "."): v for key, v in changes.items()}))
+    return Session(thesis_case(CASE | {key.replace("__", "."): v for key, v in changes.items()}))
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.map.runaway import runs_away
 from dbvfiv.studies.stability.place import Place
@@ -16,7 +16,7 @@ COARSE = ["mesh.around=6", "mesh.along=8", "damping.model='loss factor'", "map.c
 
 
 def mapped(*changes):
-    return run_map(load_case(None, [*COARSE, "map.checks=1", *changes]), workers=1)
+    return run_map(thesis_case([*COARSE, "map.checks=1", *changes]), workers=1)
 
 
 def agrees_with_modes(found, law, j, i):
@@ -68,7 +68,7 @@ def test_columns_over_loss_factors_hold_what_runs_away():
 )
 def test_no_mode_is_lost_beside_what_runs_away(pressure, densities):
     """The leading one swings in part as the wall runs away; without that part it is far off."""
-    case = load_case(None, [*COARSE, "damping.loss_factor=2", "fluid.continuity=storage"])
+    case = thesis_case([*COARSE, "damping.loss_factor=2", "fluid.continuity=storage"])
     walk, base = StabilityWalk(case), Place.of(case).at(pressure=pressure, storage=1.0)
     values = np.sort([*np.geomspace(1.0, 1000.0, 12), *densities])
     column = walk.column([base.at(density=density) for density in values])

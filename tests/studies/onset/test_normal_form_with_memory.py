@@ -5,7 +5,7 @@ import pytest
 
 from continuation.memory import hopf_normal_form_with_memory
 from dbvfiv.model.memory_forms import ValveMemoryForms
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.onset.normal_form import normal_form
 from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
 
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 
 def test_without_relaxation_both_ways_give_the_same():
     given = ["mesh.around=6", "mesh.along=8", "damping.alpha=1", "damping.beta=0.003", "drive.pressure=6 kPa"]
-    case = load_case(None, given)
+    case = thesis_case(given)
     options = OnsetOptions("density", tuple(np.geomspace(1, 1000, 9)), True, normal_form=False, coarse_mesh=0)
     search = OnsetSearch(case, options)
     (crossing,) = search.scan.run(options.values)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.errors import CaseError, SolveError
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.onset.run import run_onset
 from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
@@ -141,7 +141,7 @@ def test_nothing_is_claimed_beside_a_value_without_a_certificate(coarse_case, mo
 def test_what_a_case_does_not_have_is_no_parameter(one_sentence, parameter, words):
     """Before, every state of such a scan was the same."""
     own = {"kind": "neo-hookean", "shear_modulus": "1 MPa", "density": 1200}
-    case = Case().replace({"materials.own": own, "layers": [{"material": "own", "thickness": 0.01}]})
+    case = thesis_case({"materials.own": own, "layers": [{"material": "own", "thickness": 0.01}]})
     for ask in (
         lambda: run_onset(case.replace({"onset.over": parameter})),
         lambda: run_map(case.replace({"map.x": USUAL[parameter], "map.y": "density=1:10:2"})),

@@ -5,7 +5,7 @@ import pytest
 
 from dbvfiv.model import Conditions, ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.sensitivity import derivatives as sensitivity
 from eigen import SearchOptions, leading_modes
 
@@ -14,7 +14,7 @@ CONDITIONS = Conditions(10.0, 1.0, 0.003)
 
 @pytest.fixture(scope="module")
 def valve():
-    model = ValveModel(Case().replace({"mesh.around": 8, "mesh.along": 16}))
+    model = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16}))
     q = find_equilibria(model, [6e3]).states[0].q
     options = SearchOptions(limit_point=-1 / 0.003, left=True)
     return model, q, leading_modes(linearise(model, q, 6e3).pencil(CONDITIONS), 2, options).mode(0)
@@ -59,7 +59,7 @@ LOSSY = Conditions(10.0, 1.0, 0.0, 1.0)
 @pytest.fixture(scope="module")
 def lossy_valve():
     changes = {"mesh.around": 8, "mesh.along": 14, "damping.model": "loss factor"}
-    model = ValveModel(Case().replace(changes))
+    model = ValveModel(thesis_case(changes))
     q = find_equilibria(model, [6e3]).states[0].q
     options = SearchOptions(max_frequency=100.0, left=True)
     return model, q, leading_modes(linearise(model, q, 6e3).pencil(LOSSY), 2, options).mode(0)

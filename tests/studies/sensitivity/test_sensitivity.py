@@ -8,6 +8,7 @@ import pytest
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
+from dbvfiv.studies.case import thesis_case
 
 CHANGES = {"mesh.around": 8, "mesh.along": 14, "damping.alpha": 0, "fluid.density": 10, "drive.pressure": 6e3}
 NAMES = ["pressure", "beta", "layer 3 angle", "alpha"]
@@ -15,7 +16,7 @@ NAMES = ["pressure", "beta", "layer 3 angle", "alpha"]
 
 @pytest.fixture(scope="module")
 def valve():
-    return dbvfiv.load(changes=CHANGES)
+    return dbvfiv.load(thesis_case(), CHANGES)
 
 
 @pytest.fixture(scope="module")

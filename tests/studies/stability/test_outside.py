@@ -10,6 +10,7 @@ import pytest
 import dbvfiv
 from dbvfiv.model import Conditions, ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.sensitivity.derivatives import eigenvalue_sensitivities
 from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk
@@ -19,7 +20,7 @@ MESH = {"mesh.around": 8, "mesh.along": 14, "damping.alpha": 0.0, "damping.beta"
 
 
 def walk_of(**keys):
-    case = dbvfiv.load().case.replace(MESH | keys)
+    case = thesis_case(MESH | keys)
     return case, StabilityWalk(case)
 
 
@@ -52,7 +53,7 @@ def test_most_cells_need_no_direct_solution():
 
 
 def test_sensitivities_are_slopes_of_the_eigenvalue():
-    case = dbvfiv.load().case.replace(MESH | {"outside.fluid": "same"})
+    case = thesis_case(MESH | {"outside.fluid": "same"})
     model, pressure, conditions = ValveModel(case), 8e3, Conditions(200.0, 0.0, 0.002)
 
     def leading(pressure, density, near=None):
@@ -82,7 +83,7 @@ def test_sensitivities_are_slopes_of_the_eigenvalue():
 def test_an_onset_has_a_kind_and_names_what_is_outside():
     changes = MESH | {"outside.fluid": "same", "drive.pressure": 6e3, "damping.beta": 0.003}
     changes |= {"onset.over": "density=20:600:6:log", "onset.coarse_mesh": 0.0}
-    found = dbvfiv.load(changes=changes).onset()
+    found = dbvfiv.load(thesis_case(), changes).onset()
     assert found.points
     assert all(point["criticality"] in ("super", "sub") for point in found.points if point["frequency"])
     assert "with the same fluid outside, unbounded" in found.lines()[0]
@@ -91,7 +92,7 @@ def test_an_onset_has_a_kind_and_names_what_is_outside():
 
 def test_verdicts_name_what_is_outside():
     changes = MESH | {"outside.fluid": 1000.0, "outside.pipe_diameter": 0.33, "drive.pressure": 6e3}
-    found = dbvfiv.load(changes=changes).modes(count=4)
+    found = dbvfiv.load(thesis_case(), changes).modes(count=4)
     assert "continuity with fluid of 1000 kg/m3 outside, in a pipe of 330 mm" in found.verdict
-    still = dbvfiv.load(changes=changes | {"modes.in_vacuo": True}).modes(count=4)
+    still = dbvfiv.load(thesis_case(), changes | {"modes.in_vacuo": True}).modes(count=4)
     assert still.verdict.startswith("Stable with fluid of 1000 kg/m3 outside")

@@ -6,7 +6,7 @@ import pytest
 from dbvfiv import resume
 from dbvfiv.api import Valve
 from dbvfiv.observer import Observer
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.onset.run import run_onset
 from dbvfiv.studies.session import load_result
@@ -21,8 +21,7 @@ LAWS = pytest.mark.parametrize("continuity", [pytest.param("quasi-steady", marks
 @pytest.fixture(scope="module")
 def lossy_case():
     """On the mesh that its densities and loss factors were chosen on."""
-    return load_case(
-        None,
+    return thesis_case(
         [
             "mesh.around=8",
             "mesh.along=14",

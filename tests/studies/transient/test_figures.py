@@ -6,6 +6,7 @@ from PIL import Image
 
 import dbvfiv
 from dbvfiv.errors import CaseError
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.verdict import Series, in_steps
 
 
@@ -18,7 +19,7 @@ def texts(figure):
 def run(tmp_path_factory):
     path = tmp_path_factory.mktemp("run") / "run.h5"
     changes = {"mesh.around": 6, "mesh.along": 8, "transient.duration": 0.04, "drive.pressure": 12e3}
-    return dbvfiv.load(changes=changes).transient(output=path)
+    return dbvfiv.load(thesis_case(), changes).transient(output=path)
 
 
 def test_the_imbalance_has_an_axis_of_its_own(run):

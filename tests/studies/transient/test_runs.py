@@ -8,7 +8,7 @@ from dbvfiv.case import CaseError
 from dbvfiv.errors import SolveError
 from dbvfiv.motion.drive import Drive
 from dbvfiv.motion.start import steady_positions
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient.assess import beyond_model
 from dbvfiv.studies.transient.run import run_transient
@@ -137,7 +137,7 @@ def test_bad_drive_tables(tmp_path, valve, text, words):
     table.write_text(text)
     with pytest.raises(CaseError, match=words):
         valve().case.replace({"transient.drive_table": str(table)})
-        load_case(None, [f"transient.drive_table={table}"])
+        thesis_case([f"transient.drive_table={table}"])
 
 
 @pytest.mark.parametrize("start", ["rest", "steady", "kick"])
@@ -203,7 +203,7 @@ def test_impossible_starts(tmp_path, valve):
 
 
 def test_the_python_interface_runs_and_resumes(tmp_path):
-    small = dbvfiv.load(changes={"mesh.around": 4, "mesh.along": 6, "transient.step": "2 ms"})
+    small = dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6, "transient.step": "2 ms"})
     path = tmp_path / "run.h5"
     run = small.transient("10 ms", density=500.0, output=path)
     assert run.case.transient.duration == 0.01 and run.case.fluid.density == 500.0
