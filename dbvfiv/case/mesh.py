@@ -22,21 +22,20 @@ class Mesh(Section):
     along: StrictInt = key(48, "Elements along the axis, from lip to flange, in all.", ge=6, le=2000)
     grading: Number = key(0.5, "Length of the element at the side edge over that at the centre.", ge=0.05, le=2.0)
     layer_points: StrictInt = key(2, "Gauss points through the thickness of each layer.", ge=1, le=10)
-    element: Literal["MITC4+EAS", "MITC4+", "MITC4", "MITC4+drilling"] = key(
+    element: Literal["MITC4+EAS", "MITC4"] = key(
         "MITC4+EAS",
-        "What is assumed about the in-plane strains: as the shape gives them (MITC4), bending of warped elements "
-        "without stretching (MITC4+), and with that free bending in the plane of the element (MITC4+EAS). With a "
-        "sixth unknown of each node, by which edges bow, trapezoids bend freely in their plane, too (MITC4+drilling).",
+        "What is assumed about the in-plane strains: free bending of warped elements, and of all in their plane "
+        "(MITC4+EAS), or strains as the shape gives them (MITC4), for comparison.",
     )
-    rows: Literal["graded", "breaks", "uniform"] = key(
-        "graded",
+    rows: Literal["lip", "graded", "uniform"] = key(
+        "lip",
         "Rows of nodes on every joint of the surface and step of the wall, and closer towards joints at which the "
-        "surface turns (graded); evenly between them (breaks); or evenly between the joints alone, whatever the wall "
-        "does (uniform).",
+        "surface turns and towards the lip (lip); towards those joints alone (graded, earlier versions); or evenly "
+        "between the joints, whatever the wall does (uniform).",
     )
     row_grading: Number = key(
         0.4,
-        "Length of the rows at a joint at which the surface turns by 20 degrees over that far from it.",
+        "Length of the rows at the lip, and at a joint at which the surface turns by 20 degrees, over that far away.",
         ge=0.05,
         le=1.0,
     )
@@ -48,14 +47,18 @@ class Mesh(Section):
         "Axial positions of all rows from the lip (0) to the flange, in place of rows and breaks; where along is not "
         "one less than their number, along rows are spread as these are.",
     )
-    columns: Literal["graded", "breaks", "uniform"] = key(
+    columns: Literal["graded", "uniform"] = key(
         "graded",
         "Columns of nodes on the edge of the loaded columns, of those with a lip stop and of the bend at the side of "
-        "the lip, and closer in that bend (graded); evenly between them (breaks); or even columns whatever these do "
-        "(uniform).",
+        "the lip, and closer in that bend (graded); or even columns whatever these do (uniform).",
     )
     column_grading: Number = key(
         1 / 3, "Length of the columns in the bend at the side of the lip over that beside it.", ge=0.05, le=1.0
+    )
+    inertia: Literal["parabolic", "linear"] = key(
+        "parabolic",
+        "Course between rows of the pressure by which the fluid resists being accelerated: the parabola that straight "
+        "courses of the velocity make (parabolic), or straight (linear, the thesis).",
     )
 
     def check_positions(self, length: float) -> None:

@@ -8,7 +8,7 @@ program (App. A). U is the inlet velocity. Continuity is blended between two law
 moving walls. Terms add losses and inertances: see `dbvfiv.flow.term`. The thesis leaves gravity out; here `levels` has
 what it does to a valve that stands upright.
 
-Equations (T.9), (T.10) and (T.11) of docs/theory.md.
+Equations (T.9), (T.10), (T.11) and (T.32) of docs/theory.md.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from . import derivatives
 from .heads import outward_head, reversible_head
 from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
 from .reversed import ReversibleFluid
-from .term import VISCOSITY, FlowTerm, Stream, upstream_integral
+from .term import VISCOSITY, FlowTerm, Stream, upstream_integral, wall_share
 
 
 class Channel(FlowLaw):
@@ -53,6 +53,8 @@ class Channel(FlowLaw):
         Arcs of the wall that the fluid wets, m; terms of a viscous fluid need them.
     density : float, kg/m3
         Of the fluid that equilibria are found with.
+    bowed : bool
+        Let the integral of the speed be a parabola between stations, as the wall feels it, and not straight.
 
     Raises
     ------
@@ -62,7 +64,7 @@ class Channel(FlowLaw):
     """
 
     DATA = ("step", "floor", "terms", "back", "static", "perimeter")
-    STATIC = ("unsteady", "reversible")
+    STATIC = ("unsteady", "reversible", "bowed")
     inner_names = ("inlet velocity",)
 
     def __init__(
@@ -78,6 +80,7 @@ class Channel(FlowLaw):
         levels_outside: np.ndarray | None = None,
         perimeter: np.ndarray | None = None,
         density: float = 1.0,
+        bowed: bool = False,
     ):
         self.z = np.asarray(z, float)
         self.step = np.diff(self.z)
@@ -89,7 +92,7 @@ class Channel(FlowLaw):
         inside, outside = (none if given is None else np.asarray(given, float) for given in (levels, levels_outside))
         self.level, self.static = float(inside[-1] - inside[0]), inside - inside[0] - (outside - outside[0])
         self.back = float(back) + self.level
-        self.unsteady, self.reversible = bool(unsteady), bool(reversible)
+        self.unsteady, self.reversible, self.bowed = bool(unsteady), bool(reversible), bool(bowed)
         self.perimeter, self.density = none if perimeter is None else np.asarray(perimeter, float), float(density)
         self.terms = tuple(terms)
         self._check_terms()
@@ -164,6 +167,8 @@ class Channel(FlowLaw):
         """
         speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
         psi = upstream_integral(self.step, speed)
+        if self.bowed:
+            psi = psi + wall_share(self.step, speed)
         if self.terms:
             psi = psi + self.term_momenta(self.stream(area, area_rate, speed, inner), parameters)
         return psi

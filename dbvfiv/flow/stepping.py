@@ -21,6 +21,8 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
+from .term import wall_share
+
 if TYPE_CHECKING:
     from .channel import Channel
 
@@ -60,7 +62,10 @@ class MovingFluid:
         for k in range(count):
             self._upstream[k, k:-1] += 0.5 * channel.step[k:]
             self._upstream[k, k + 1 :] += 0.5 * channel.step[k:]
-
+        self._momentum = self._upstream
+        if channel.bowed:
+            share = jax.vmap(lambda speed: wall_share(channel.step, speed), 1, 1)
+            self._momentum = self._upstream + np.asarray(share(np.eye(count)))
         self._parameters = channel.values({"inlet": 0.0, "density": self.density})
 
     def _open(self, area: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -93,7 +98,7 @@ class MovingFluid:
         if self.channel.storage:
             discharge = discharge - self.channel.storage * (self._upstream @ (slope * rate))
         speed = discharge / open_
-        psi = self._upstream @ speed
+        psi = self.integrate(speed)
         if not self.channel.terms:
             return FlowState(speed, psi)
         lost, momentum = self._terms(area, rate, velocity)
@@ -214,8 +219,8 @@ class MovingFluid:
         return tuple(own + more for own, more in zip(found, self._term_slopes(area, rate, velocity)[1]))
 
     def integrate(self, values: np.ndarray) -> np.ndarray:
-        """Integral from the inlet to each station of values (m,) or of each column (m, l)."""
-        return self._upstream @ values
+        """Integral from the inlet to each station of speeds (m,) or of each column (m, l), as the wall feels it."""
+        return self._momentum @ values
 
     def pressure_slopes(
         self, mid: tuple, new: tuple, speed: float, new_speed: float, theta: float, velocity: float, psi_weight: float

@@ -74,6 +74,19 @@ class FlowTerm(Traceable):
         return 0.0
 
 
+def wall_share(step, speed):
+    """What the wall feels of the integral of speeds (m,) from the inlet beyond its values at the stations, m2/s;
+    traceable.
+
+    A speed that runs straight over a section of length h, from U_a to U_b, makes a parabola of its integral, which lies
+    by h (U_b - U_a)/12 from a straight course with the same moments; stations take what lies on their sections by the
+    lengths of these. The outlet, whose pressure is given, and the inlet keep their own.
+    """
+    bow = step**2 * (speed[1:] - speed[:-1]) / 12.0
+    inner = (bow[1:] + bow[:-1]) / (step[1:] + step[:-1])
+    return jnp.concatenate([jnp.zeros(1), inner, jnp.zeros(1)])
+
+
 def upstream_integral(step, values):
     """Trapezoidal integral of values (m,) from the inlet (last) to each station, `step` (m-1,) apart; traceable."""
     pieces = 0.5 * step * (values[1:] + values[:-1])

@@ -53,8 +53,7 @@ def row_division(valve: Valve, mesh: Mesh, surface: Surface, parts=()) -> Divisi
     if valve.key_points is not None:  # supports and loads change there, whatever the points do
         asked += [valve.duckbill_length, valve.duckbill_length + valve.saddle_length]
     breaks = [z for z in (*asked, *wall, *patches) if joints[0] < z < joints[-1]]
-    law = _row_law(mesh, surface) if mesh.rows == "graded" else None
-    return divide(joints, breaks, mesh.along, law)
+    return divide(joints, breaks, mesh.along, _row_law(mesh, surface))
 
 
 def column_division(mesh: Mesh, surface: Surface, breaks) -> Division:
@@ -68,7 +67,7 @@ def column_division(mesh: Mesh, surface: Surface, breaks) -> Division:
     bend = near[0] if near else bend
     if bend < 1.0 and not near:
         breaks.append(bend)
-    if mesh.columns == "breaks" or not bend < 1.0:
+    if not bend < 1.0:
         return divide(ends, breaks, mesh.around)
     law = np.array([0.0, bend, 1.0]), np.array([0.0, bend, bend + (1.0 - bend) / mesh.column_grading])
     return divide(ends, breaks, mesh.around, law)
@@ -161,10 +160,13 @@ def _share(lengths: np.ndarray, count: int) -> np.ndarray:
 
 
 def _row_law(mesh: Mesh, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """How many rows lie up to an axial position: `mesh.row_grading` is their length at a full kink over that away."""
+    """How many rows lie up to an axial position: `mesh.row_grading` is their length at a full kink, which the lip may
+    count as, over that away.
+    """
     z = np.linspace(surface.breaks[0], surface.breaks[-1], _FINE)
     density, reach = np.ones_like(z), REACH * (z[-1] - z[0])
-    for joint, angle in zip(surface.breaks[1:-1], kinks(surface)):
+    lip = FULL_KINK if mesh.rows == "lip" else 0.0
+    for joint, angle in zip(surface.breaks[:-1], [lip, *kinks(surface)]):
         share = min(1.0, max(0.0, (angle - NO_KINK) / (FULL_KINK - NO_KINK)))
         near = 1.0 + share * (1.0 / mesh.row_grading - 1.0) * np.exp(-np.abs(z - joint) / reach)
         density = np.maximum(density, near)

@@ -17,7 +17,6 @@ from ..flow import FlowMotion
 from ..flow.derivatives import along
 from ..shell.reference import SHAPE, SLOPE
 from ..shell.rotation import director
-from ..shell.supports import UNKNOWNS_PER_NODE
 from .outside_forms import OutsideForms
 from .valve import ValveModel
 
@@ -57,7 +56,6 @@ class AnalyticResidual:
             "directors": jnp.asarray(shell.mesh.directors),
             "frames": jnp.asarray(shell.mesh.frames),
             "mass": jnp.asarray(shell.inertia_integrals),
-            "drilling": jnp.asarray(shell.drilling_inertia.reshape(shell.dofs.free[:, UNKNOWNS_PER_NODE:].shape)),
             "still": jnp.zeros(shell.dofs.free.shape),
             "stations": jnp.asarray(model.station_of_node),
             "loaded": jnp.asarray(model.loaded),
@@ -186,7 +184,7 @@ def _directors(nodal, arrays):
 
 
 def _inertia(nodal, rate, acceleration, alpha, arrays):
-    """Inertia and mass-proportional damping forces (nn, c)."""
+    """Inertia and mass-proportional damping forces (nn, 5)."""
     spin = lambda x, v: jax.jvp(lambda y: _directors(y, arrays), (x,), (v,))[1]  # noqa: E731
     turning = spin(nodal, rate)
     turned = jax.jvp(spin, (nodal, rate), (rate, acceleration))[1] + alpha * turning
@@ -197,10 +195,7 @@ def _inertia(nodal, rate, acceleration, alpha, arrays):
     force = jnp.zeros((count, 3)).at[quads].add(weighted(0, moved) + weighted(1, turned))
     moment = jnp.zeros((count, 3)).at[quads].add(weighted(1, moved) + weighted(2, turned))
     _, pull = jax.vjp(lambda y: _directors(y, arrays), nodal)
-    inertia = pull(moment)[0].at[:, :3].add(force)
-    return inertia.at[:, UNKNOWNS_PER_NODE:].add(
-        arrays["drilling"] * (acceleration + alpha * rate)[:, UNKNOWNS_PER_NODE:]
-    )
+    return pull(moment)[0].at[:, :3].add(force)
 
 
 def _pressure_force(nodal, nodal_pressure, arrays):

@@ -85,7 +85,8 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
     terms, floor = terms_of(case), case.fluid.area_floor * gap_area
     given = {"back": case.downstream.pressure, "perimeter": mesh.perimeter, "density": case.fluid.density}
     given |= _levels(case, mesh)
-    rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, **given)
+    bowed = case.mesh.inertia == "parabolic"
+    rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, bowed=bowed, **given)
     if case.is_compressed:
         channel = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, reversible=True, **given)
         return GasChannel(channel, case.fluid.sound_speed, case.fluid.heat_capacity_ratio, case.boiling_pressure)
@@ -94,7 +95,7 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
     line = next(term for term in terms if isinstance(term, (Line, PiecedLine)))
     pump = next((term for term in terms if isinstance(term, Pump)), None)
     rest = [term for term in terms if term not in (line, pump)]
-    channel = Channel(mesh.z, floor, storage, terms=rest, **given)
+    channel = Channel(mesh.z, floor, storage, terms=rest, bowed=bowed, **given)
     pipes = case.upstream.pipes
     waves = ElasticLine(line, [pipe.wave_speed for pipe in pipes], [pipe.elements for pipe in pipes], pump)
     return LineChannel(channel, rigid, waves)

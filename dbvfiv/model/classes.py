@@ -18,7 +18,6 @@ import scipy.sparse as sp
 from ..flow.plug import centroid_matrix, centroid_slope, plug_parts
 from ..shell import Shell
 from ..shell.pressure import pressure_stiffness
-from ..shell.supports import free_in_columns
 from .dynamics import LinearisedState, linearise
 from .symmetry import ClassDofs, Symmetry
 from .valve import ValveModel
@@ -90,8 +89,7 @@ def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Sy
 
 
 def shell_of_class(shell: Shell, free: np.ndarray, nodal: np.ndarray) -> Shell:
-    """The same shell with other free unknowns (nn, 5), counted from a state (nn, c)."""
-    free = free_in_columns(free, shell.dofs.columns)
+    """The same shell with other free unknowns (nn, 5), counted from a state (nn, 5)."""
     kept = shell.__dict__.setdefault("_classes", {})
     key = free.tobytes()
     if key not in kept:

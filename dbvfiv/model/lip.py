@@ -6,7 +6,6 @@ import numpy as np
 
 from ..geometry import ValveMesh
 from ..shell import Shell
-from ..shell.supports import UNKNOWNS_PER_NODE
 
 
 class LipCentre:
@@ -26,7 +25,7 @@ class LipCentre:
         self.half_wall = 0.5 * float(surface.thickness[around].mean())
         self._height = float(surface.nodes[node, 1])
         self._director, self._frame = surface.directors[node], surface.frames[node]
-        self._unknowns = shell.dofs.index[node, :UNKNOWNS_PER_NODE]
+        self._unknowns = shell.dofs.index[node]
 
     def displacement(self, q: np.ndarray) -> float:
         """Displacement in y, m, of the mid-surface of one lip, from the free unknowns (n,); below zero where the lip

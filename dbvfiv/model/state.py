@@ -42,7 +42,7 @@ class SteadyState:
     q : (n,) array
         Free displacements (m) and rotations (rad).
     nodal : (nn, c) array
-        Displacements and rotations of all nodes, c = 5; with drilling rotations c = 6.
+        Displacements and rotations of all nodes, c = 5.
     mass_flow : float, kg/s
     volume_flow : float, m3/s
     outlet_area : float, m2

@@ -145,7 +145,7 @@ class ClassDofs(DofMap):
 
     def at(self, base: np.ndarray) -> ClassDofs:
         """The same unknowns counted from another state; numbering and sparsity are shared."""
-        for name in ("index", "element_index", "pattern", "slots", "drilling_slots"):
+        for name in ("index", "element_index", "pattern", "slots"):
             getattr(self, name)  # found once, so that the copy has them
         other = object.__new__(ClassDofs)
         other.__dict__.update(self.__dict__, base=base)

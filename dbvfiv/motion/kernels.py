@@ -63,13 +63,13 @@ def strain_energy(
     wall,
 ):
     """Strain energy, J; arguments as `dbvfiv.shell.kernel.shell_force` has them."""
-    area, thickness, own = reference[4], reference[5], reference[7]
+    area, thickness = reference[4:]
     stiffness, points, constants, scales = wall
     x = np.empty((4, 3))
     d = np.empty((4, 3))
     u = np.empty((3, 3))
     v = np.empty((3, 3))
-    z = np.empty(20)
+    z = np.empty(16)
     strain = np.empty(8)
     stress = np.empty(8)
     e = np.empty(5)
@@ -87,7 +87,4 @@ def strain_energy(
                 point_strain(points[l, 0], h, scales[l], strain, e)
                 density += points[l, 1] * h * _rubber_energy(constants[l], e)
             total += area[el, point] * density
-        for a in range(own.shape[1]):
-            for b in range(own.shape[1]):
-                total += 0.5 * own[el, a, b] * z[16 + a] * z[16 + b]
     return total

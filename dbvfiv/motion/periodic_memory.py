@@ -63,11 +63,11 @@ class PeriodicMemory:
 
     def force(self, q: np.ndarray, held: np.ndarray) -> np.ndarray:
         """Force (n,) of resultants that are held at positions (n,)."""
-        return self.shell.force(q, StepWall(self._none, np.ascontiguousarray(held), whole=False))
+        return self.shell.force(q, StepWall(self._none, np.ascontiguousarray(held)))
 
     def geometric(self, q: np.ndarray, held: np.ndarray) -> np.ndarray:
         """Values (nnz,) of its derivative by the positions."""
-        return self.shell.force_and_tangent(q, step=StepWall(self._none, np.ascontiguousarray(held), whole=False))[1]
+        return self.shell.force_and_tangent(q, step=StepWall(self._none, np.ascontiguousarray(held)))[1]
 
 
 @dataclass(frozen=True, eq=False)

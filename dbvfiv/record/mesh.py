@@ -64,7 +64,7 @@ class MeshData:
     directors : (nn, 3)
     frames : (nn, 2, 3)
     free : (nn, c) bool
-        Unknowns that no support holds: displacements, rotations and, of elements that have them, drilling rotations.
+        Unknowns that no support holds: displacements and rotations.
     thickness : (ne,) m
     layer_names : (nl,) tuple of str, inside to outside
     layer_angles : (nl,) degrees

@@ -9,18 +9,12 @@ symmetric tangent.
 
 ``MITC4``
     The products as they are.
-``MITC4+``
+``MITC4+EAS``
     The strains along the edges are kept, and inside x_d.x_d is replaced by what the others say of it in a flat
     element, by which warped elements bend without stretching (Ko, Lee & Bathe 2016, Computers and Structures 169,
-    57-68; 2017, 182, 404-418). Flat elements stay as they are for small displacements, and for homogeneous strains of
-    any size.
-``MITC4+EAS``
-    On top of it four enhanced membrane modes (Simo & Rifai 1990, Int. J. Num. Meth. Eng. 29, 1595-1638), by which flat
-    elements bend in their plane. They are condensed once, with the stiffness of the wall at rest: exactly for linear
-    walls; for rubber it is one of many admissible assumed strains, the same at all states.
-``MITC4+drilling``
-    Edges that bow as well (`drilling`), by one more unknown of each node, and the two enhanced modes of these four that
-    do not shear: trapezoids bend freely in their plane, too.
+    57-68; 2017, 182, 404-418). On top of it four enhanced membrane modes (Simo & Rifai 1990, Int. J. Num. Meth. Eng.
+    29, 1595-1638), by which flat elements bend in their plane. They are condensed once, with the stiffness of the wall
+    at rest: exactly for linear walls; for rubber it is one of many admissible assumed strains, the same at all states.
 
 Enhanced elements are known to buckle by themselves under pressure along their short side (Sussman & Bathe 2014,
 Computers and Structures 140, 14-22): the enhancement takes away the stiffness against the hourglass motion x_d, and
@@ -37,11 +31,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .drilling import bow_strains, own_stiffness
 from .reference import GAUSS, ReferenceGeometry, strain_map
 
-MITC4, MITC4_PLUS, ENHANCED, DRILLING = "MITC4", "MITC4+", "MITC4+EAS", "MITC4+drilling"
-ELEMENTS = (ENHANCED, MITC4_PLUS, MITC4, DRILLING)
+ENHANCED, MITC4 = ELEMENTS = "MITC4+EAS", "MITC4"
 
 #: Tangents at the centre x_r, x_s and distortion x_d from the nodes (3, 4).
 VECTORS = 0.25 * np.array([[-1.0, 1.0, 1.0, -1.0], [-1.0, -1.0, 1.0, 1.0], [1.0, -1.0, 1.0, -1.0]])
@@ -73,8 +65,6 @@ def _bilinear() -> np.ndarray:
 BILINEAR = _bilinear()
 #: Enhanced modes at the points in natural coordinates (4, 3, 4).
 _MODES = np.stack([np.array([[r, 0, 0, 0], [0, s, 0, 0], [0, 0, r, s]]) for r, s in GAUSS])
-#: How many of them an element has. Bows of edges shear as the last two do: with both nothing would hold them.
-_ENHANCED_BY = {ENHANCED: 4, DRILLING: 2}
 
 
 def rest_products(x: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -91,18 +81,14 @@ class AssumedStrains:
 
     Attributes
     ----------
-    inplane : (ne, 4, 6, 12 + m) array
-        Covariant strain coefficients c0 (3) and c1 (3) at the points from `rest_products` and m drilling rotations, 4
-        or none.
+    inplane : (ne, 4, 6, 12) array
+        Covariant strain coefficients c0 (3) and c1 (3) at the points from `rest_products`.
     products : (ne, 12) array
         The products at rest.
-    drilling : (ne, m, m) array, N m
-        Stiffness of drilling rotations besides that of the strains.
     """
 
     inplane: np.ndarray
     products: np.ndarray
-    drilling: np.ndarray
 
 
 def assumed_strains(mesh, geometry: ReferenceGeometry, section, element: str) -> AssumedStrains:
@@ -117,15 +103,11 @@ def assumed_strains(mesh, geometry: ReferenceGeometry, section, element: str) ->
         raise ValueError(f"The element is '{element}', but only {', '.join(ELEMENTS)} exist.")
     x = mesh.nodes[mesh.quads]
     tied = BILINEAR if element == MITC4 else _tied(x, geometry.thickness)
-    bows = 4 if element == DRILLING else 0
-    whole, own = np.zeros((len(x), 4, 6, 12 + bows)), np.zeros((len(x), bows, bows))
+    whole = np.zeros((len(x), 4, 6, 12))
     whole[:, :, :3, :6] = whole[:, :, 3:, 6:12] = tied
-    if bows:
-        whole[:, :, :3, 12:] = bow_strains(mesh)
-        own = own_stiffness(mesh, geometry, wall_at_rest(section, geometry.thickness)[:, :3, :3])
-    if element in _ENHANCED_BY:
-        whole[:, :, :3] += _enhancement(x, geometry, section, whole, _ENHANCED_BY[element])
-    return AssumedStrains(whole, rest_products(x, mesh.directors[mesh.quads]), own)
+    if element == ENHANCED:
+        whole[:, :, :3] += _enhancement(x, geometry, section, whole)
+    return AssumedStrains(whole, rest_products(x, mesh.directors[mesh.quads]))
 
 
 def _tied(x: np.ndarray, thickness: np.ndarray) -> np.ndarray:
@@ -159,9 +141,9 @@ def local_map(geometry: ReferenceGeometry) -> np.ndarray:
     return out
 
 
-def _enhancement(x, geometry: ReferenceGeometry, section, compatible: np.ndarray, count: int) -> np.ndarray:
-    """(ne, 4, 3, k): what the first `count` enhanced modes add to c0 at their amplitudes of least energy of the wall at
-    rest, `compatible` being (ne, 4, 6, k).
+def _enhancement(x, geometry: ReferenceGeometry, section, compatible: np.ndarray) -> np.ndarray:
+    """(ne, 4, 3, k): what the enhanced modes add to c0 at their amplitudes of least energy of the wall at rest,
+    `compatible` being (ne, 4, 6, k).
     """
     u = np.einsum("ma,eai->emi", VECTORS[:2], x)
     normal = np.cross(u[:, 0], u[:, 1])
@@ -176,7 +158,7 @@ def _enhancement(x, geometry: ReferenceGeometry, section, compatible: np.ndarray
     axes = np.stack([first, second], axis=1)
     dual = np.linalg.inv(np.einsum("eci,edi->ecd", u, u)) @ u
     turned = strain_map(np.einsum("eai,eci->eac", axes, dual))
-    modes = (size[:, None] / geometry.area)[..., None, None] * (turned[:, None] @ _MODES[..., :count])
+    modes = (size[:, None] / geometry.area)[..., None, None] * (turned[:, None] @ _MODES)
     covariant = np.linalg.solve(geometry.q, modes)
     local = local_map(geometry)
     strained = np.concatenate([modes, -geometry.qk @ covariant], axis=2)  # (ne, 4, 6, m)

@@ -67,7 +67,6 @@ def element_arrays(mesh, geometry: ReferenceGeometry, points: np.ndarray, metric
         "area": geometry.area,
         "inplane": assumed.inplane,
         "products": assumed.products,
-        "drilling": assumed.drilling,
         "s0": geometry.shear0,
     }
     if points.ndim > 2:
@@ -108,21 +107,21 @@ def local_strains(unknowns, element, layers, metric):
 
     Parameters
     ----------
-    unknowns : (4, c) displacements, rotations and, of elements that have them, drilling rotations of the nodes
+    unknowns : (4, 5) displacements and rotations of the nodes
     """
     return strains_of_shape(shape(unknowns, element), element, layers, metric)
 
 
 def shape(unknowns, element):
-    """Positions and directors (4, 3) of the nodes, drilling rotations (4,) or (0,), and one."""
+    """Positions and directors (4, 3) of the nodes."""
     d = jax.vmap(director)(unknowns[:, 3:5], element["director"], element["frame"])
-    return element["x"] + unknowns[:, :3], d, unknowns[:, 5:].ravel(), jnp.ones((), d.dtype)
+    return element["x"] + unknowns[:, :3], d
 
 
 def strains_of_shape(place, element, layers, metric):
-    """`local_strains` from a `shape`; but for a constant a quadratic form of it, by its last number too."""
-    x, d, drilling, one = place
-    numbers = jnp.concatenate([inplane_products(x, d) - element["products"], one * drilling])
+    """`local_strains` from a `shape`; but for a constant a quadratic form of it."""
+    x, d = place
+    numbers = inplane_products(x, d) - element["products"]
     covariant = jnp.einsum("pij,j->pi", element["inplane"], numbers)
     c0, c1 = covariant[:, :3], covariant[:, 3:]
     edge = 0.25 * jnp.sum(
@@ -202,13 +201,11 @@ def element_energy(kinds, metric, unknowns, element, layers):
     kinds : tuple of int, static
         Law of each layer point.
     metric : str, static
-    unknowns : (4, c)
+    unknowns : (4, 5)
     element, layers : dict of arrays, see `element_arrays` and `section_arrays`
     """
     strains = material_strains(local_strains(unknowns, element, layers, metric), layers)
-    strained = jnp.sum(point_volumes(metric, element, layers) * point_energies(kinds, layers["parameters"], strains))
-    drilling = unknowns[:, 5:].ravel()
-    return strained + 0.5 * drilling @ element["drilling"] @ drilling
+    return jnp.sum(point_volumes(metric, element, layers) * point_energies(kinds, layers["parameters"], strains))
 
 
 def point_volumes(metric, element, layers):
@@ -218,7 +215,7 @@ def point_volumes(metric, element, layers):
 
 
 def material_part(kinds, metric, unknowns, element, layers):
-    """Part (4 c, 4 c) of the Hessian of `element_energy` by which strains change stresses, not that by which stresses
+    """Part (20, 20) of the Hessian of `element_energy` by which strains change stresses, not that by which stresses
     turn.
     """
     strains, back = jax.linearize(
@@ -253,19 +250,19 @@ class EnergyFunctions:
         self.layers = section_arrays(section, geometry, metric)
 
     def energy(self, unknowns):
-        """(ne,) energies from unknowns (ne, 4, c)."""
+        """(ne,) energies from unknowns (ne, 4, 5)."""
         return _energies(self.kinds, self.metric, unknowns, self.elements, self.layers)
 
     def force(self, unknowns):
-        """(ne, 4 c) gradients."""
+        """(ne, 20) gradients."""
         return _gradients(self.kinds, self.metric, unknowns, self.elements, self.layers)
 
     def tangent(self, unknowns):
-        """(ne, 4 c, 4 c) Hessians."""
+        """(ne, 20, 20) Hessians."""
         return _hessians(self.kinds, self.metric, unknowns, self.elements, self.layers)
 
     def material_tangent(self, unknowns, share):
-        """(ne, 4 c, 4 c): material part of the Hessians, each layer's by a factor; share (nl,)."""
+        """(ne, 20, 20): material part of the Hessians, each layer's by a factor; share (nl,)."""
         factor = jnp.repeat(jnp.asarray(share), len(self.kinds) // len(share))
         elements, layers = self.elements, self.layers | {"weight": self.layers["weight"] * factor}
         if "weight" in elements:
@@ -273,11 +270,11 @@ class EnergyFunctions:
         return _materials(self.kinds, self.metric, unknowns, elements, layers)
 
     def second(self, unknowns, a, b):
-        """(ne, 4 c): second directional derivative of the force along a and b (ne, 4, c)."""
+        """(ne, 20): second directional derivative of the force along a and b (ne, 4, 5)."""
         return _second(self.kinds, self.metric, unknowns, a, b, self.elements, self.layers)
 
     def third(self, unknowns, a, b, c):
-        """(ne, 4 c): third directional derivative of the force."""
+        """(ne, 20): third directional derivative of the force."""
         return _third(self.kinds, self.metric, unknowns, a, b, c, self.elements, self.layers)
 
     def strains(self, unknowns):

@@ -4,7 +4,7 @@ The mechanics are defined once, by the energy in `energy.py`; this loop evaluate
 the structure used: strains are constant maps of sixteen numbers z that are bilinear in positions and directors, so the
 layers integrate to 8 x 8 section tangents, these to one 16 x 16 tangent by z, and only that meets the slope of z, which
 is linear in the nodal positions; its second derivative is constant. It agrees with automatic differentiation to
-rounding. Drilling rotations (`drilling`), where an element has them, are four more numbers of their own.
+rounding.
 
 Element unknowns are node-major: three displacements and two rotations of each of the four nodes.
 """
@@ -15,7 +15,6 @@ import numba
 import numpy as np
 
 from .assumed_strain import FACTORS, PAIRS, PRODUCTS, VECTORS
-from .kernel_drilling import add_bow_stress, add_bow_tangent, add_drilling_tangent, add_own_stiffness, hold_drilling
 from .kernel_rubber import FAST
 from .kernel_section import section_stress, section_tangent
 from .kernel_strain import numbers_of, strains_at
@@ -30,7 +29,7 @@ _EDGES = np.ascontiguousarray(SHEAR_EDGES)
 
 @numba.njit(fastmath=FAST, inline="always")
 def _add_stress(inplane, across, weight, stress, w):
-    """Add what one point of the given area contributes to the forces on the first sixteen numbers in w (20,)."""
+    """Add what one point of the given area contributes to the forces on the numbers in w (16,)."""
     for i in range(6):
         s = weight * stress[i]
         for k in range(12):
@@ -81,8 +80,8 @@ def _forces(w, u, v, x, d, fu, fv, fx, fd):
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def _add_to_nodes(quad, fx, fd, w, drilled, director1, out):
-    """Add the forces on positions, directors and drilling rotations of an element to out (nn, c)."""
+def _add_to_nodes(quad, fx, fd, director1, out):
+    """Add the forces on positions and directors of an element to out (nn, 5)."""
     for a in range(4):
         node = quad[a]
         for i in range(3):
@@ -92,13 +91,11 @@ def _add_to_nodes(quad, fx, fd, w, drilled, director1, out):
             for i in range(3):
                 total += fd[a, i] * director1[node, r, i]
             out[node, 3 + r] += total
-    for a in range(drilled):
-        out[quad[a], 5] += w[16 + a]
 
 
 @numba.njit(inline="always")
 def _workspace():
-    """Positions, directors and forces on both (4, 3), vectors and forces on them (3, 3), numbers and forces (20,),
+    """Positions, directors and forces on both (4, 3), vectors and forces on them (3, 3), numbers and forces (16,),
     strains and resultants (8,).
     """
     x = np.empty((4, 3))
@@ -109,8 +106,8 @@ def _workspace():
     v = np.empty((3, 3))
     fu = np.empty((3, 3))
     fv = np.empty((3, 3))
-    z = np.empty(20)
-    w = np.empty(20)
+    z = np.empty(16)
+    w = np.empty(16)
     strain = np.empty(8)
     stress = np.empty(8)
     return x, d, fx, fd, u, v, fu, fv, z, w, strain, stress
@@ -128,7 +125,7 @@ def shell_force(
     held,
     out,
 ):
-    """Add the internal force to out (nn, c); unknowns q (nn, c), c = 6 with drilling rotations and else 5.
+    """Add the internal force to out (nn, 5); unknowns q (nn, 5).
 
     Parameters
     ----------
@@ -139,7 +136,7 @@ def shell_force(
     held : (ne, 4, 8) array or None
         Resultants at each Gauss point on top of those of the layers.
     """
-    inplane, across, area, thickness, bows, own = reference[2:]
+    inplane, across, area, thickness = reference[2:]
     stiffness, points, constants, scales = wall
     x, d, fx, fd, u, v, fu, fv, z, w, strain, stress = _workspace()
     e = np.empty(5)
@@ -147,7 +144,7 @@ def shell_force(
     for el in range(quads.shape[0]):
         quad = quads[el]
         numbers_of(el, quad, nodes, q, director, reference, x, d, u, v, z)
-        for k in range(20):
+        for k in range(16):
             w[k] = 0.0
         for point in range(4):
             strains_at(el, point, reference, z, strain)
@@ -156,16 +153,14 @@ def shell_force(
                 for i in range(8):
                     stress[i] += held[el, point, i]
             _add_stress(inplane[el, point], across[el, point], area[el, point], stress, w)
-            add_bow_stress(bows[el, point], area[el, point], stress, w)
-        hold_drilling(own[el], z, w)
         _forces(w, u, v, x, d, fu, fv, fx, fd)
-        _add_to_nodes(quad, fx, fd, w, own.shape[1], director1, out)
+        _add_to_nodes(quad, fx, fd, director1, out)
 
 
 @numba.njit(fastmath=FAST, inline="always")
 def _add_tangent(inplane, across, weight, tangent, product, kz):
-    """Add what one point contributes to the upper triangle of the tangent by the first numbers, kz (16, 16) of (20,
-    20); product (8, 16) is that of the strains, to be filled.
+    """Add what one point contributes to the upper triangle of the tangent by the numbers, kz (16, 16);
+    product (8, 16) is that of the strains, to be filled.
     """
     for i in range(8):
         for k in range(16):
@@ -282,25 +277,21 @@ def shell_tangent(
     held,
     geometric,
     slots,
-    drilling_slots,
     out,
     data,
 ):
-    """Add the internal force to out (nn, c) and the tangent to the matrix values data (nnz,).
+    """Add the internal force to out (nn, 5) and the tangent to the matrix values data (nnz,).
 
     Parameters
     ----------
     held : (ne, 4, 8) array or None
         Resultants at each Gauss point on top of those of the layers; they do not change with the strains.
     geometric : bool
-        False leaves out what the resultants and drilling rotations by themselves add to the tangent: the material part
-        remains.
+        False leaves out what the resultants by themselves add to the tangent: the material part remains.
     slots : (ne, 400) int array
         Where each entry of the 20 x 20 element matrix goes in `data`; negative for constrained unknowns.
-    drilling_slots : tuple of int arrays
-        The same of rows and columns of drilling rotations, see `dbvfiv.shell.supports.DofMap`.
     """
-    inplane, across, area, thickness, bows, own = reference[2:]
+    inplane, across, area, thickness = reference[2:]
     stiffness, points, constants, scales = wall
     x, d, fx, fd, u, v, fu, fv, z, w, strain, stress = _workspace()
     tangent = np.empty((8, 8))
@@ -308,8 +299,7 @@ def shell_tangent(
     s = np.empty(5)
     t5 = np.zeros((5, 5))
     section = np.empty((8, 16))
-    kz = np.empty((20, 20))
-    mixed = np.empty((4, 20))
+    kz = np.empty((16, 16))
     by_x = np.empty((16, 4, 3))
     by_d = np.empty((16, 4, 3))
     bz = np.empty((16, 20))
@@ -318,9 +308,9 @@ def shell_tangent(
     for el in range(quads.shape[0]):
         quad = quads[el]
         numbers_of(el, quad, nodes, q, director, reference, x, d, u, v, z)
-        for i in range(20):
+        for i in range(16):
             w[i] = 0.0
-            for j in range(20):
+            for j in range(16):
                 kz[i, j] = 0.0
         for point in range(4):
             strains_at(el, point, reference, z, strain)
@@ -328,11 +318,8 @@ def shell_tangent(
             if held is not None:
                 for i in range(8):
                     stress[i] += held[el, point, i]
-            weight, bow = area[el, point], bows[el, point]
-            _add_stress(inplane[el, point], across[el, point], weight, stress, w)
-            add_bow_stress(bow, weight, stress, w)
-            _add_tangent(inplane[el, point], across[el, point], weight, tangent, section, kz)
-            add_bow_tangent(bow, weight, tangent, section, kz)
+            _add_stress(inplane[el, point], across[el, point], area[el, point], stress, w)
+            _add_tangent(inplane[el, point], across[el, point], area[el, point], tangent, section, kz)
         for i in range(12, 16):
             for j in range(12):
                 kz[i, j] = kz[j, i]
@@ -354,11 +341,7 @@ def shell_tangent(
                     k[i, j] += t * product[l, j]
         if geometric:
             _add_geometric(quad, w, fd, director1, director2, k)
-            hold_drilling(own[el], z, w)
-            add_own_stiffness(own[el], kz)
-        _add_to_nodes(quad, fx, fd, w, own.shape[1], director1, out)
-        if own.shape[1] > 0:
-            add_drilling_tangent(el, kz, bz, drilling_slots, mixed, data)
+        _add_to_nodes(quad, fx, fd, director1, out)
         slot = slots[el]
         for i in range(20):
             for j in range(20):

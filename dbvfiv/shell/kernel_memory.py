@@ -30,7 +30,7 @@ def slow_resultants(
     strain_out,
     slow_out,
 ):
-    """Fill strains (ne, 4, 8) and the slow law's resultants (ne, 4, g, 8) of each group; unknowns q (nn, c).
+    """Fill strains (ne, 4, 8) and the slow law's resultants (ne, 4, g, 8) of each group; unknowns q (nn, 5).
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def slow_resultants(
     d = np.empty((4, 3))
     u = np.empty((3, 3))
     v = np.empty((3, 3))
-    z = np.empty(20)
+    z = np.empty(16)
     e = np.empty(5)
     s = np.empty(5)
     for el in range(quads.shape[0]):

@@ -1,7 +1,7 @@
 """Compiled kinematics of one element: its shape, the numbers its strains depend on, and strains from them.
 
-The numbers are the six in-plane products of `assumed_strain`, their change along the directors (six), the transverse
-shears at the edges (four), and its drilling rotations (four or none); `energy.py` defines the same.
+The numbers are the six in-plane products of `assumed_strain`, their change along the directors (six), and the
+transverse shears at the edges (four); `energy.py` defines the same.
 
 Equation (T.2) of docs/theory.md.
 """
@@ -68,14 +68,12 @@ def numbers(x, d, u, v, products, shear, z):
 
 
 @numba.njit(fastmath=FAST, inline="always")
-def strains(inplane, across, bows, z, strain):
+def strains(inplane, across, z, strain):
     """Section strains in local axes: membrane (3), bending (3), transverse shear (2), by the maps of one point."""
     for i in range(6):
         total = 0.0
         for k in range(12):
             total += inplane[i, k] * z[k]
-        for k in range(bows.shape[1]):
-            total += bows[i, k] * z[16 + k]
         strain[i] = total
     for i in range(2):
         total = 0.0
@@ -86,15 +84,13 @@ def strains(inplane, across, bows, z, strain):
 
 @numba.njit(fastmath=FAST, inline="always")
 def numbers_of(el, quad, nodes, displacement, director, reference, x, d, u, v, z):
-    """Shape and numbers z (20,) of an element; `reference` as `dbvfiv.shell.shell.Shell` holds it."""
+    """Shape and numbers z (16,) of an element; `reference` as `dbvfiv.shell.shell.Shell` holds it."""
     gather(quad, nodes, displacement, director, x, d)
     vectors(x, d, u, v)
     numbers(x, d, u, v, reference[0][el], reference[1][el], z)
-    for a in range(reference[6].shape[3]):
-        z[16 + a] = displacement[quad[a], 5]
 
 
 @numba.njit(fastmath=FAST, inline="always")
 def strains_at(el, point, reference, z, strain):
     """Section strains at one point of an element."""
-    strains(reference[2][el, point], reference[3][el, point], reference[6][el, point], z, strain)
+    strains(reference[2][el, point], reference[3][el, point], z, strain)

@@ -80,12 +80,10 @@ def assemble_mass(quads, integrals, director1, slots, data):
 
 
 @numba.njit(cache=True, fastmath=FAST)
-def inertia_force(quads, integrals, drilling, director1, director2, rate, acceleration, out):
-    """Add M a + h to out (nn, c): inertia at nodal velocities and accelerations (nn, c), h the part quadratic in the
-    velocities; drilling (nn,), or (0,) without drilling rotations.
+def inertia_force(quads, integrals, director1, director2, rate, acceleration, out):
+    """Add M a + h to out (nn, 5): inertia at nodal velocities and accelerations (nn, 5), h the part quadratic in the
+    velocities.
     """
-    for n in range(drilling.shape[0]):
-        out[n, 5] += drilling[n] * acceleration[n, 5]
     count = director1.shape[0]
     turn = np.empty((count, 3))
     for n in range(count):
@@ -122,16 +120,14 @@ def inertia_force(quads, integrals, drilling, director1, director2, rate, accele
 
 
 @numba.njit(cache=True, fastmath=FAST)
-def kinetic_energy(quads, integrals, drilling, director1, rate):
-    """Kinetic energy, J, at nodal velocities (nn, c)."""
+def kinetic_energy(quads, integrals, director1, rate):
+    """Kinetic energy, J, at nodal velocities (nn, 5)."""
     count = director1.shape[0]
     turn = np.empty((count, 3))
     for n in range(count):
         for i in range(3):
             turn[n, i] = director1[n, 0, i] * rate[n, 3] + director1[n, 1, i] * rate[n, 4]
     total = 0.0
-    for n in range(drilling.shape[0]):
-        total += drilling[n] * rate[n, 5] ** 2
     for el in range(quads.shape[0]):
         for a in range(4):
             na = quads[el, a]

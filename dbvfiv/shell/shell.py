@@ -7,17 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from .assumed_strain import DRILLING, ENHANCED, assumed_strains, local_map
-from .drilling import own_inertia
+from .assumed_strain import ENHANCED, assumed_strains, local_map
 from .energy import FIRST_ORDER, EnergyFunctions
 from .kernel import shell_force, shell_tangent
-from .mass import CONSISTENT, assemble_mass, inertia_force, kinetic_energy, mass_integrals
+from .mass import AVERAGED, assemble_mass, inertia_force, kinetic_energy, mass_integrals
 from .mesh import ShellMesh
 from .reference import reference_geometry, shear_map, thickness_over_radius
 from .relaxed_forms import relaxed_force_form
 from .rotation import director_derivatives
 from .section import Section
-from .supports import UNKNOWNS_PER_NODE, DofMap, free_in_columns
+from .supports import UNKNOWNS_PER_NODE, DofMap
 from .zones import WallParts, Zones
 
 
@@ -28,12 +27,6 @@ class _Part:
     elements: slice | np.ndarray
     quads: np.ndarray
     reference: tuple
-
-    def seen_by(self, step: StepWall | None) -> tuple:
-        """The undeformed elements, of whose drilling rotations a wall may leave out the own stiffness."""
-        if step is None or step.whole:
-            return self.reference
-        return (*self.reference[:-1], np.zeros_like(self.reference[-1]))
 
 
 @dataclass(frozen=True)
@@ -46,13 +39,10 @@ class StepWall:
         Laws of its layers, zone by zone, see `Section.wall`.
     held : (ne, 4, 8) array
         Resultants at each Gauss point that come on top of those of the layers.
-    whole : bool
-        Whether drilling rotations have their own stiffness besides that of the layers.
     """
 
     wall: tuple
     held: np.ndarray
-    whole: bool = True
 
 
 class Shell:
@@ -62,9 +52,8 @@ class Shell:
     ----------
     mesh : ShellMesh
     section : Section
-    free : (nn, 5) or, with drilling rotations, (nn, 6) bool array, optional
-        Free unknowns of each node; all by default. Drilling rotations follow from five columns
-        (`dbvfiv.shell.supports.free_in_columns`), and of elements without them a sixth is left out.
+    free : (nn, 5) bool array, optional
+        Free unknowns of each node; all by default.
     metric : "first-order", "true" or "shifted"
         Through-thickness treatment, see `dbvfiv.shell.energy`. Only the first-order treatment has a compiled element
         loop; the other is evaluated by automatic differentiation of its energy, several times slower.
@@ -86,13 +75,12 @@ class Shell:
         metric: str = FIRST_ORDER,
         element: str = ENHANCED,
         zones: Zones | None = None,
-        mass_kind: str = CONSISTENT,
+        mass_kind: str = AVERAGED,
     ):
         self.mesh = mesh
         self.section = section
         free = np.ones((mesh.node_count, UNKNOWNS_PER_NODE), bool) if free is None else np.asarray(free, bool)
-        columns = UNKNOWNS_PER_NODE + (element == DRILLING)
-        self.dofs = DofMap(free_in_columns(free, columns), mesh.quads)
+        self.dofs = DofMap(free, mesh.quads)
         self.metric = metric
         self.geometry = reference_geometry(mesh)
         g = self.geometry
@@ -101,8 +89,7 @@ class Shell:
         self.mass_kind = mass_kind
         self.at_rest = section if zones is None else WallParts(section, zones)
         self._assumed = a = assumed_strains(mesh, g, self.at_rest, element)
-        local, bows = (np.ascontiguousarray(part) for part in np.split(local_map(g) @ a.inplane, [12], axis=3))
-        reference = (a.products, g.shear0, local, shear_map(g), g.area, g.thickness, bows, a.drilling)
+        reference = (a.products, g.shear0, local_map(g) @ a.inplane, shear_map(g), g.area, g.thickness)
         if zones is None:
             self.parts = (_Part(slice(None), mesh.quads, reference),)
         else:
@@ -111,12 +98,10 @@ class Shell:
             )
         self.wall = self.wall_of()
         self.inertia_integrals = mass_integrals(g, self.at_rest, mass_kind)
-        share = self.inertia_integrals[:, 0].sum(axis=2)
-        self.drilling_inertia = own_inertia(mesh, g, share) if self.dofs.drilled else np.zeros(0)
         self._frames = np.ascontiguousarray(mesh.frames)
 
     def with_free(self, free=None) -> Shell:
-        """The same shell with other free unknowns (nn, c); all by default."""
+        """The same shell with other free unknowns (nn, 5); all by default."""
         return Shell(self.mesh, self.section, free, self.metric, self.element, self.zones, self.mass_kind)
 
     def wall_of(self, factors: np.ndarray | None = None) -> tuple:
@@ -135,7 +120,7 @@ class Shell:
         return EnergyFunctions(self.mesh, self.geometry, self.section, self.metric, self._assumed, points)
 
     def directors(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Directors (nn, 3), first (nn, 2, 3) and second (nn, 3, 3) derivatives for nodal unknowns (nn, c)."""
+        """Directors (nn, 3), first (nn, 2, 3) and second (nn, 3, 3) derivatives for nodal unknowns (nn, 5)."""
         count = self.mesh.node_count
         d, d1, d2 = np.empty((count, 3)), np.empty((count, 2, 3)), np.empty((count, 3, 3))
         director_derivatives(np.ascontiguousarray(nodal[:, 3:5]), self.mesh.directors, self._frames, d, d1, d2)
@@ -155,7 +140,7 @@ class Shell:
         walls, held = (self.wall, None) if step is None else (step.wall, step.held)
         for part, wall in zip(self.parts, walls):
             own = None if held is None else held[part.elements]
-            shell_force(part.quads, self.mesh.nodes, nodal, d, d1, part.seen_by(step), wall, own, out)
+            shell_force(part.quads, self.mesh.nodes, nodal, d, d1, part.reference, wall, own, out)
         return self.dofs.restrict(out)
 
     def force_and_tangent(
@@ -178,8 +163,8 @@ class Shell:
         walls, held = (self.wall, None) if step is None else (step.wall, step.held)
         for part, wall in zip(self.parts, walls):
             own = None if held is None else held[part.elements]
-            fixed = (part.quads, self.mesh.nodes, nodal, d, d1, d2, part.seen_by(step))
-            shell_tangent(*fixed, wall, own, True, *self._slots(part), out, data)
+            fixed = (part.quads, self.mesh.nodes, nodal, d, d1, d2, part.reference)
+            shell_tangent(*fixed, wall, own, True, self.dofs.slots[part.elements], out, data)
         return self.dofs.restrict(out), data
 
     def relaxing_tangents(self, q: np.ndarray) -> list[np.ndarray]:
@@ -198,16 +183,11 @@ class Shell:
                 unused = np.zeros_like(nodal)
                 for part, wall in zip(self.parts, self.wall_of(share)):
                     fixed = (part.quads, self.mesh.nodes, nodal, *directors, part.reference)
-                    shell_tangent(*fixed, wall, None, False, *self._slots(part), unused, data)
+                    shell_tangent(*fixed, wall, None, False, self.dofs.slots[part.elements], unused, data)
             else:
                 self._scatter_matrix(np.asarray(self.energies.material_tangent(self._element_unknowns(q), share)), data)
             found.append(data)
         return found
-
-    def _slots(self, part: _Part) -> tuple:
-        """Where entries of the elements of a part go among matrix values, and those of drilling rotations."""
-        dofs, own = self.dofs, part.elements
-        return dofs.slots[own], tuple(slots[own] for slots in dofs.drilling_slots)
 
     def mass(self, q: np.ndarray | None = None) -> np.ndarray:
         """Values (nnz,) of the mass matrix at a state (at rest by default), kg and kg m2."""
@@ -215,9 +195,6 @@ class Shell:
         _, d1, _ = self.directors(self.dofs.expand(q))
         data = np.zeros(len(self.dofs.pattern[1]))
         assemble_mass(self.mesh.quads, self.inertia_integrals, d1, self.dofs.slots, data)
-        if self.dofs.drilled:
-            slots = self.dofs.drilling_diagonal
-            data[slots[slots >= 0]] += self.drilling_inertia[slots >= 0]
         return data
 
     def convective_inertia(self, q: np.ndarray, rate: np.ndarray) -> np.ndarray:
@@ -229,13 +206,13 @@ class Shell:
         nodal = self.dofs.expand(q)
         _, d1, d2 = self.directors(nodal)
         moved, out = (self.dofs.expand(rate), self.dofs.expand(acceleration)), np.zeros_like(nodal)
-        inertia_force(self.mesh.quads, self.inertia_integrals, self.drilling_inertia, d1, d2, *moved, out)
+        inertia_force(self.mesh.quads, self.inertia_integrals, d1, d2, *moved, out)
         return self.dofs.restrict(out)
 
     def kinetic_energy(self, q: np.ndarray, rate: np.ndarray) -> float:
         """J, at positions and velocities (n,)."""
-        first, inertia = self.directors(self.dofs.expand(q))[1], (self.inertia_integrals, self.drilling_inertia)
-        return float(kinetic_energy(self.mesh.quads, *inertia, first, self.dofs.expand(rate)))
+        first = self.directors(self.dofs.expand(q))[1]
+        return float(kinetic_energy(self.mesh.quads, self.inertia_integrals, first, self.dofs.expand(rate)))
 
     def second(self, q, a, b) -> np.ndarray:
         """Second directional derivative (n,) of the internal force along a and b (n,)."""
@@ -283,10 +260,10 @@ class Shell:
 
     def _scatter(self, element_forces: np.ndarray) -> np.ndarray:
         out = np.zeros(self.dofs.free.shape)
-        np.add.at(out, self.mesh.quads, element_forces.reshape(-1, 4, self.dofs.columns))
+        np.add.at(out, self.mesh.quads, element_forces.reshape(-1, 4, UNKNOWNS_PER_NODE))
         return self.dofs.restrict(out)
 
     def _scatter_matrix(self, element_matrices: np.ndarray, data: np.ndarray) -> None:
-        slots = self.dofs.whole_slots.ravel()
+        slots = self.dofs.slots.ravel()
         keep = slots >= 0
         np.add.at(data, slots[keep], element_matrices.reshape(-1)[keep])

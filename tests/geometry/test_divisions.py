@@ -35,7 +35,7 @@ def is_on(positions, place) -> bool:
     return bool(np.min(np.abs(positions - place)) < 1e-12)
 
 
-@pytest.mark.parametrize("rows", ["graded", "breaks", "uniform"])
+@pytest.mark.parametrize("rows", ["lip", "graded", "uniform"])
 @pytest.mark.parametrize("along", [6, 7, 14, 24, 33, 48, 96])
 def test_rows_lie_on_joints_and_steps(rows, along):
     found = rows_of(along, rows=rows)
@@ -52,18 +52,27 @@ def test_uniform_rows_are_even():
 def test_rows_close_up_at_joints_where_the_surface_turns():
     """The surface turns by atan(0.133 / 0.28) = 25.4 degrees at both ends of the saddle."""
     assert np.degrees(kinks(SURFACE)) == pytest.approx([25.41, 25.41], abs=0.01)
-    z = rows_of(480, row_grading=0.25).positions
+    z = rows_of(480, rows="graded", row_grading=0.25).positions
     length, middle = np.diff(z), 0.5 * (z[1:] + z[:-1])
     for joint in (0.21, 0.49):
         near, far = length[np.argmin(np.abs(middle - joint))], length[np.argmin(np.abs(middle - joint + 0.15))]
         assert near / far == pytest.approx(0.25, abs=0.03)
-    assert rows_of(48, row_grading=1.0).positions == pytest.approx(rows_of(48, rows="breaks").positions, abs=1e-12)
+    pieces = np.split(rows_of(48, row_grading=1.0).positions, [18, 26, 42])
+    for piece in pieces:  # 0 to 0.21, 0.30, 0.49 and 0.56 m
+        assert np.ptp(np.diff(piece)) < 1e-12
+
+
+def test_rows_close_up_at_the_lip():
+    """By as much as at a joint at which the surface turns; those of earlier versions do not."""
+    for rows, share in (("lip", 0.4), ("graded", 1.0)):
+        z = rows_of(480, rows=rows).positions
+        assert z[1] / np.diff(z)[np.searchsorted(z, 0.1)] == pytest.approx(share, abs=0.02)
 
 
 def test_smooth_saddle_has_no_joint_to_close_up_at():
     case = Case().replace({"valve.saddle": "smooth"})
-    graded = row_division(case.valve, case.mesh, surface_of(case.valve)).positions
-    assert graded == pytest.approx(rows_of(48, rows="breaks").positions, abs=1e-4)
+    graded = row_division(case.valve, case.replace({"mesh.rows": "graded"}).mesh, surface_of(case.valve)).positions
+    assert graded == pytest.approx(rows_of(48, row_grading=1.0).positions, abs=1e-4)
 
 
 def test_twice_the_rows_hold_the_former_ones():
@@ -116,8 +125,8 @@ def test_columns_lie_on_the_edges_of_load_and_stops():
         assert np.all(np.diff(columns) > 0)
     even = Case().replace({"mesh.columns": "uniform"}).mesh
     assert column_division(even, SURFACE, (0.77,)).positions == pytest.approx(np.linspace(0, 1, 29))
-    breaks = Case().replace({"mesh.columns": "breaks"}).mesh
-    assert column_division(breaks, SURFACE, (25 / 28, 0.5)).positions == pytest.approx(np.linspace(0, 1, 29))
+    ungraded = Case().replace({"mesh.column_grading": 1.0}).mesh
+    assert column_division(ungraded, SURFACE, (25 / 28, 0.5)).positions == pytest.approx(np.linspace(0, 1, 29))
 
 
 def test_columns_close_up_in_the_bend():

@@ -18,9 +18,9 @@ from tests.systems.whole_valve import whole_valve
 PRESSURE = 12e3
 
 
-@pytest.fixture(scope="module", params=["MITC4+EAS", "MITC4+drilling"])
-def model(request):
-    return make_valve({"mesh.element": request.param})
+@pytest.fixture(scope="module")
+def model():
+    return make_valve()
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,6 @@ from dbvfiv.model.symmetry import HALF_SYMMETRIES, SYMMETRIES
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.whole_valve import WholeValve
-from dbvfiv.shell.supports import free_in_columns
 from eigen.search import leading_modes
 from tests.model.test_analytic_forms import difference as mixed_difference
 from tests.model.test_analytic_forms import motions
@@ -59,14 +58,9 @@ def lifted(quarter, half, nodal, parity=1.0):
     return out
 
 
-def class_of(model, symmetry):
-    """(nn, c) free unknowns of a class, drilling rotations among them where the model has them."""
-    return free_in_columns(symmetry.free_unknowns(model.mesh), model.shell.dofs.columns)
-
-
 def basis(quarter, half, symmetry, of_half):
     """(n, k) motions of a class of the half from the unknowns of a class of the quarter."""
-    free, of_half = (class_of(x, own) for x, own in ((quarter, symmetry), (half, of_half)))
+    free, of_half = (own.free_unknowns(x.mesh) for x, own in ((quarter, symmetry), (half, of_half)))
     columns = []
     for node, which in zip(*np.nonzero(free)):
         nodal = np.zeros(free.shape)

@@ -125,11 +125,9 @@ def random_state(mesh: ShellMesh, seed: int, stretch: float = 0.1, turn: float =
     return nodal
 
 
-def random_unknowns(shell: Shell, seed: int, stretch: float, turn: float, drilling: float = 0.05) -> np.ndarray:
-    """(n,) unknowns of a `random_state`, with random drilling rotations, rad, where the shell has them."""
-    q, turned = shell.dofs.restrict(random_state(shell.mesh, seed, stretch, turn)), shell.dofs.index[:, 5:].ravel()
-    q[turned] = drilling * np.random.default_rng(seed + 1).uniform(-1, 1, len(turned))
-    return q
+def random_unknowns(shell: Shell, seed: int, stretch: float, turn: float) -> np.ndarray:
+    """(n,) unknowns of a `random_state`."""
+    return shell.dofs.restrict(random_state(shell.mesh, seed, stretch, turn))
 
 
 @dataclass(frozen=True)

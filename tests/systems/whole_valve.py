@@ -12,7 +12,6 @@ from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.whole_valve import WholeValve
 from dbvfiv.shell import Section, Shell, ShellMesh
 from dbvfiv.shell.pressure import pressure_stiffness
-from dbvfiv.shell.supports import free_in_columns
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,6 @@ class Whole:
 
     def basis(self, free: np.ndarray, signs: tuple[int, int]) -> sp.csr_matrix:
         """(n, k) motions of the whole valve from unknowns of a quarter that are free (nn, 5), mirrored with signs."""
-        free = free_in_columns(free, self.index.shape[1])
         number = np.full(free.shape, -1)
         number[free] = np.arange(np.count_nonzero(free))
         mirror = self.valve.sign

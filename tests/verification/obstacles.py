@@ -43,8 +43,8 @@ def solved(shell: Shell, load: np.ndarray) -> np.ndarray:
     return shell.dofs.expand(spsolve(shell.dofs.matrix(data).tocsc(), shell.dofs.restrict(load)))
 
 
-def all_free(patch: Grid, columns: int = 5) -> np.ndarray:
-    return np.ones((len(patch.nodes), columns), bool)
+def all_free(patch: Grid) -> np.ndarray:
+    return np.ones((len(patch.nodes), 5), bool)
 
 
 def edge_load(patch: Grid, line: np.ndarray, direction: int, total: float) -> np.ndarray:
@@ -111,7 +111,7 @@ def cook(element: str, n: int, angle: float = 0.0) -> float:
         return 48.0 * u, low + v * (high - low), 0 * u
 
     patch = grid(n, n, place)
-    free = all_free(patch, 6)
+    free = all_free(patch)
     free[patch.index[0]] = False
     free[:, 2:5] = False
     shell = build(patch, isotropic_section(1.0, 1 / 3, 1.0), free, element, h=1.0, material_axis=(1.0, angle, 0))

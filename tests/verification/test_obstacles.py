@@ -3,7 +3,7 @@
 A row of trapezoids under bending in its plane is out of reach for elements of two unknowns a node, whoever wrote them:
 none that passes the patch test bends freely as a trapezoid (MacNeal 1987, Int. J. Num. Meth. Eng. 24, 1793-1799). A
 beam of leaning elements between upright ends has a trapezoid at either end, which is what holds it; a parallelogram
-bends freely. Edges that bow, by a third unknown, do both. The cylinder pinched by point forces wants its 16 x 16
+bends freely. The cylinder pinched by point forces wants its 16 x 16
 elements where the dent is: spaced evenly they do not resolve it.
 """
 
@@ -15,7 +15,7 @@ import pytest
 from tests.shell.structures import observed_order
 from tests.verification import membranes, obstacles
 
-ELEMENT, BOWING = "MITC4+EAS", "MITC4+drilling"
+ELEMENT = "MITC4+EAS"
 COURSE = {
     "Cook's panel": (obstacles.cook, (2, 4, 8, 16)),
     "hemisphere": (obstacles.hemisphere, (4, 8, 16, 32)),
@@ -29,15 +29,14 @@ COURSE = {
 }
 
 
-@pytest.mark.parametrize("element", [ELEMENT, BOWING])
 @pytest.mark.parametrize("name", COURSE)
-def test_obstacle(name, element):
+def test_obstacle(name):
     """Within 2 % of the published value at 16 (Cook, roof, hemisphere n x n; beams 2 n x n/4)."""
     problem, meshes = COURSE[name]
-    values = np.array([problem(element, n) for n in meshes])
+    values = np.array([problem(ELEMENT, n) for n in meshes])
     plain = np.array([problem("MITC4", n) for n in meshes])
     steps = np.abs(np.diff(values))
-    print(f"\n{name}, {element}: {dict(zip(meshes, np.round(values, 4)))}, orders {np.round(observed_order(steps), 2)}")
+    print(f"\n{name}: {dict(zip(meshes, np.round(values, 4)))}, orders {np.round(observed_order(steps), 2)}")
     print(f"  MITC4: {dict(zip(meshes, np.round(plain, 4)))}")
     assert values[meshes.index(16)] == pytest.approx(1.0, abs=0.02)
 
@@ -67,20 +66,6 @@ def test_beam_of_six_elements_beside_classical_ones(shape):
     print(f"\n{shape}: own {own:.6f}, QM6 {modes:.6f}, Pian and Sumihara {hybrid:.6f}")
     assert own == pytest.approx(modes, rel=1e-8)
     assert own == pytest.approx(hybrid, rel=2e-3)
-
-
-@pytest.mark.parametrize("shape, found", [("rectangles", 0.986), ("parallelograms", 0.847), ("trapezoids", 0.865)])
-def test_beam_of_six_elements_that_bow(shape, found):
-    """Rectangles within 5 % of beam theory, the others at 0.75 of it and better, and within 5 % on twice the elements.
-    Published elements with drilling rotations reach 0.993, 0.970 and 0.985 (GCMQ: Chang et al. 2019, Int. J. Num. Meth.
-    Eng., doi:10.1002/nme.6066).
-    """
-    coarse, fine = (obstacles.straight_beam(BOWING, shape, 6 * k, k) for k in (1, 2))
-    print(f"\n{shape}, edges that bow: 6 x 1 {coarse:.4f}, 12 x 2 {fine:.4f}")
-    assert coarse == pytest.approx(found, abs=2e-3)
-    assert coarse > (0.95 if shape == "rectangles" else 0.75)
-    assert fine == pytest.approx(1.0, abs=0.05) and fine > coarse
-    assert obstacles.straight_beam(BOWING, shape, load=2) == pytest.approx(1.0, abs=0.04)  # across
 
 
 @pytest.mark.parametrize("lean", [0.0, 1.0, -1.0, 2.0])

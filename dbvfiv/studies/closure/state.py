@@ -72,7 +72,7 @@ class ClosureState:
     converged, iterations, load_steps, multiplier_updates, residual, rounding, reason
         How it was found.
     nodal : (nn, c) array, m and rad
-        Displacements and rotations of all nodes, c = 5; with drilling rotations c = 6.
+        Displacements and rotations of all nodes, c = 5.
     opening : (rows,) array, m2
         Passage of the computed part at each row.
     contact_pressure, gap : (nn,) arrays, Pa, m

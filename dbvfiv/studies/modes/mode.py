@@ -53,7 +53,7 @@ class ModeShape:
     residual, backward_error : float
         See `eigen.Spectrum`.
     shape : (nn, c) complex
-        Displacements and rotations of the nodes, c = 5 or with drilling rotations 6; the largest displacement is 1 and
+        Displacements and rotations of the nodes, c = 5; the largest displacement is 1 and
         real.
     area : (m,) complex, m2 per m
     pressure : (m,) complex, Pa per m

@@ -45,7 +45,7 @@ class TransientState:
     ----------
     time : float, s
     nodal, nodal_rate : (nn, c) arrays
-        Displacements (m) and rotations (rad) of the nodes, and their rates, c = 5; with drilling rotations c = 6.
+        Displacements (m) and rotations (rad) of the nodes, and their rates, c = 5.
     station_pressure, station_area : (m,) arrays, Pa, m2 of the part that is computed
     station_velocity : (m,) array, m/s
         At the flange only; the others are not a number.
