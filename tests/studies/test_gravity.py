@@ -159,7 +159,10 @@ def test_studies_over_the_density_follow_the_steady_state():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("keys", [DOWN, DOWN | {"damping.model": "loss factor", "materials.constants": "stable"}], ids=["beta", "loss factors"])
+LOSSES = {"damping.model": "loss factor", "materials.constants": "stable"}
+
+
+@pytest.mark.parametrize("keys", [DOWN, DOWN | LOSSES], ids=["beta", "loss factors"])
 def test_normal_forms_hold_the_weight(keys):
     """Those of a wall that relaxes are those of one that does not where nothing relaxes."""
     model = load(keys, {"damping.beta": 1e-3} if "damping.model" not in keys else {}).model
