@@ -158,10 +158,10 @@ def test_studies_over_the_density_follow_the_steady_state():
     assert found.growth_rate == pytest.approx((high - low) / 2.0, rel=1e-3)
 
 
-@pytest.mark.slow
 LOSSES = {"damping.model": "loss factor", "materials.constants": "stable"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keys", [DOWN, DOWN | LOSSES], ids=["beta", "loss factors"])
 def test_normal_forms_hold_the_weight(keys):
     """Those of a wall that relaxes are those of one that does not where nothing relaxes."""
