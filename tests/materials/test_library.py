@@ -34,7 +34,7 @@ def test_every_kind_of_card_has_a_law():
 def test_built_in_materials():
     case = thesis_case()
     for name in ("CR", "SBR", "EPDM"):
-        assert law_from_case(case, name) == rubber(name, 0.10)
+        assert law_from_case(case, name) == published_rubber(name, 0.10)
     assert law_from_case(case, "fibre") == fibre_ply("program")
 
 
