@@ -110,7 +110,14 @@ Case = create_model(
 
 
 #: Keys in which the thesis's computations differ from the defaults.
-THESIS = {"materials.strain_level": "10 %", "damping.model": "rayleigh", "fluid.continuity": "quasi-steady"}
+THESIS = {
+    "mesh.rows": "graded",
+    "mesh.inertia": "linear",
+    "materials.strain_level": "10 %",
+    "shell.mass": "consistent",
+    "damping.model": "rayleigh",
+    "fluid.continuity": "quasi-steady",
+}
 
 
 def thesis_case(changes: Changes = ()) -> Case:
