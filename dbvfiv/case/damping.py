@@ -25,7 +25,10 @@ _DEFAULTS = {
 #: What a model does not have, and what to do instead.
 _FOREIGN = {
     "rayleigh": ("loss_factor", "set damping.model to 'loss factor', or leave it out"),
-    "loss factor": ("beta", "leave it out: the materials' loss factors take its place"),
+    "loss factor": (
+        "beta",
+        "leave it out, as the materials' loss factors take its place, or set damping.model to 'rayleigh'",
+    ),
 }
 
 

@@ -84,7 +84,8 @@ class Case(Section):
                         f"materials.{name}.loss_factor",
                         "missing with damping.model = 'loss factor'",
                         f"how {name} relaxes must be said by loss_factor (a number, or one of "
-                        f"{', '.join(SHIPPED_LOSSES)}), loss_data, relaxation_data or prony",
+                        f"{', '.join(SHIPPED_LOSSES)}), loss_data, relaxation_data or prony, or damping.model be "
+                        "'rayleigh'",
                     )
         if len(self.layers) * self.mesh.layer_points < 2:
             raise BrokenRule(
@@ -265,7 +266,11 @@ class Case(Section):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Rebuild a case from ``to_dict`` without looking for the files it was made from."""
+        """Rebuild a case from ``to_dict`` without looking for the files it was made from; one of a version that had no
+        damping.model damps by Rayleigh's constants.
+        """
+        if isinstance(data.get("damping"), Mapping):
+            data = {**data, "damping": {"model": "rayleigh", **data["damping"]}}
         return make_case(cls, data, check_files=False)
 
     def replace(self, changes: Mapping[str, Any]) -> Self:

@@ -36,6 +36,8 @@ SETTLING = (14, 24)
 DIGITS = 3
 #: Level of the first round of settling: with constants of 10 % soft walls lose stability before they are loaded.
 FIRST_LEVEL = 0.20
+#: Smallest load step over the target, and how often a target that is not reached is halved.
+SMALLEST_STEP, HALVINGS = 1 / 256, 4
 #: A valve under back pressure, its inner faces in contact. On the 12-inch valve at 28 kPa its strains are within
 #: 0.3 % of those of the closure study, which brings the penetration of this penalty to nothing.
 CLOSED = {
@@ -162,8 +164,8 @@ def settle_levels(
 ) -> SettledLevels:
     """Levels of the built-in rubbers at the largest pressures that a case names, on a mesh of `SETTLING` elements.
 
-    Each rubber takes the largest level of the states. Of a state that is not reached the last equilibrium on the way
-    to it counts. Nothing is refused: where there is no such state either, rubbers keep the lowest tested level.
+    Each rubber takes the largest level of the states. A pressure that is not reached is halved; nothing is refused:
+    where halves of it are not reached either, rubbers keep the lowest tested level.
 
     Parameters
     ----------
@@ -176,10 +178,16 @@ def settle_levels(
         Is told of progress.
     """
     observer = Observer() if observer is None else observer
-    loads = [_Load(pressure, observer)]
+    loads = [_Load(pressure, observer, lower=HALVINGS)]
     if back_pressure is not None:
-        loads.append(_Load(back_pressure, observer, CLOSED, " from outside"))
-    coarse = case.replace(dict(zip(("mesh.around", "mesh.along"), SETTLING)))
+        loads.append(_Load(back_pressure, observer, CLOSED, " from outside", HALVINGS))
+    coarse = case.replace(
+        {
+            "mesh.around": SETTLING[0],
+            "mesh.along": SETTLING[1],
+            "steady.min_step": max(SMALLEST_STEP, case.steady.min_step),
+        }
+    )
     first = dict.fromkeys(sought_rubbers(case), FIRST_LEVEL)
     *_, found = _rounds(coarse, loads, first, observer)
     levels = {name: float(round(level, DIGITS)) for name, level in found.levels.items()}
@@ -212,45 +220,59 @@ class _Load:
         Keys of the case in this state.
     side : str
         Words behind its pressure.
+    lower : int
+        How often the pressure may be halved where it is not reached; it stays so for all rounds that follow.
     path : LoadPath or None
-        Of the last round. It stands at the last equilibrium on the way where the pressure was not reached.
+        Of the last round.
     state : SteadyState or None
-        Of the last round; None where it was not reached.
+        Of the last round; None where no pressure was reached, and the valve is at rest.
     missed : SolveError or None
-        Why not.
+        Why the pressure was not reached first.
+    halved : int
+        How often it was halved.
     """
 
     pressure: float | None
     observer: Observer
     changes: Mapping[str, Any] = field(default_factory=dict)
     side: str = ""
+    lower: int = 0
     path: LoadPath | None = None
     state: SteadyState | None = None
     missed: SolveError | None = None
+    halved: int = 0
 
     def strain(self, case: Case, levels: Mapping[str, float]) -> list[LayerLevel]:
         """Layers of the state with the constants of a case, from that of the last round where that serves."""
         model = ValveModel(case.replace(self.changes) if self.changes else case)
-        self.state = self.missed = None
-        for start in (self.path, None) if self.path is not None else (None,):
+        start, self.state = self.path if self.state is not None else None, None
+        while self.state is None and self.halved <= self.lower:
             self.path = LoadPath(model, SteadyOptions.of(model.case), observer=self.observer)
             try:
                 if start is not None:
                     self.path.q, self.path.pressure = start.q, start.pressure
                     self.path.settle()
-                target = operating_pressure(model, self.observer) if self.pressure is None else self.pressure
-                self.state, self.missed = self.path.go_to(target), None
-                break
+                self.state = self.path.go_to(self._target(model))
             except SolveError as error:
-                self.missed = error
-        return list(layer_levels(model, self.path.q, levels))
+                if start is None:
+                    self.missed, self.halved = self.missed or error, self.halved + 1
+                start = None
+        return list(layer_levels(model, model.rest() if self.state is None else self.state.q, levels))
+
+    def _target(self, model: ValveModel) -> float:
+        """Pressure of this round, Pa: halves of what is above that at rest."""
+        if self.pressure is None and self.halved:
+            raise self.missed  # there is no operating point to be halved
+        whole = operating_pressure(model, self.observer) if self.pressure is None else self.pressure
+        return model.flow.back + (whole - model.flow.back) / 2**self.halved
 
     def told(self) -> str:
         """Its pressure in words."""
         asked = "the operating point of the pump" if self.pressure is None else f"{self.pressure / 1e3:.6g} kPa"
         if self.missed is None:
             return asked + self.side
-        return f"{self.path.pressure / 1e3:.4g} kPa{self.side}, as {asked} was not reached"
+        reached = "rest" if self.state is None else f"{self.state.pressure / 1e3:.6g} kPa{self.side}"
+        return f"{reached}, as {asked} was not reached"
 
 
 @dataclass(frozen=True)

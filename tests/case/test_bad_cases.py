@@ -196,7 +196,7 @@ BAD = {
     "sound faster than a fluid has it": ("[fluid]\nsound_speed = 1e6", r"fluid\.sound_speed.*at most 100000"),
     "sound without a unit": ("[fluid]\nsound_speed = '343'", r"fluid\.sound_speed.*no unit"),
     "gas that no section can store": (
-        "[fluid]\nsound_speed = 343",
+        "[fluid]\nsound_speed = 343\ncontinuity = 'quasi-steady'",
         r"fluid\.sound_speed is 343 m/s with fluid\.continuity = 'quasi-steady'.*must be 'storage'",
     ),
     "gas behind waves in a line": (

@@ -9,16 +9,16 @@ from dbvfiv.case.load import parse_toml
 from dbvfiv.case.write import case_toml
 from dbvfiv.studies.case import Case, load_case
 
-LOSS = {"damping.model": "loss factor"}
+LOSS, RAYLEIGH = {"damping.model": "loss factor"}, {"damping.model": "rayleigh"}
 
 
 def test_numbers_that_are_not_given_follow_from_the_model():
     damping = Case().damping
-    assert (damping.model, damping.alpha, damping.beta, damping.loss_factor) == ("rayleigh", 5.0, 0.003, 0.0)
+    assert (damping.model, damping.alpha, damping.beta, damping.loss_factor) == ("loss factor", 0.0, 0.0, 1.0)
     assert (damping.band, damping.branches) == ((1.0, 200.0), 4)
-    damping = Case().replace(LOSS).damping
-    assert (damping.alpha, damping.beta, damping.loss_factor) == (0.0, 0.0, 1.0)
-    assert Case().replace(LOSS).replace({"damping.model": "rayleigh"}) == Case()
+    damping = Case().replace(RAYLEIGH).damping
+    assert (damping.alpha, damping.beta, damping.loss_factor) == (5.0, 0.003, 0.0)
+    assert Case().replace(RAYLEIGH).replace(LOSS) == Case()
     assert Case().replace({"damping.band": ["0.1 Hz", "1 kHz"]}).damping.branches == 6
 
 
@@ -35,7 +35,8 @@ def test_what_is_given_stays():
         LOSS,
         LOSS | {"damping.loss_factor": 0.5, "damping.band": [2, "300 Hz"]},
         LOSS | {"materials.CR.loss_factor": "NBR", "materials.fibre.prony": [[0.1, "3 ms"], [0.2, 1]]},
-        {"damping.beta": 0.001},
+        RAYLEIGH,
+        RAYLEIGH | {"damping.beta": 0.001},
     ],
 )
 def test_every_case_can_be_written_and_read(changes):
@@ -59,7 +60,7 @@ BAD = {
         "line 3: damping.beta is 0.001 s with damping.model = 'loss factor'",
     ),
     "loss factor with Rayleigh": (
-        "[damping]\nloss_factor=1",
+        "[damping]\nmodel='rayleigh'\nloss_factor=1",
         "damping.loss_factor is 1 with.*'rayleigh'.*leave it out",
     ),
     "negative factor": (ON + "loss_factor=-1", "damping.loss_factor.*at least 0"),
@@ -112,6 +113,7 @@ def test_materials_that_no_layer_uses_need_say_nothing(tmp_path):
 
 
 def test_parameters_that_the_model_lacks():
-    assert Case().damping.lacks("beta") is None and Case().replace(LOSS).damping.lacks("loss_factor") is None
-    assert "damping.model = 'rayleigh'" in Case().damping.lacks("loss_factor")
-    assert "damping.model = 'loss factor'" in Case().replace(LOSS).damping.lacks("beta")
+    rayleigh = Case().replace(RAYLEIGH)
+    assert rayleigh.damping.lacks("beta") is None and Case().damping.lacks("loss_factor") is None
+    assert "damping.model = 'rayleigh'" in rayleigh.damping.lacks("loss_factor")
+    assert "damping.model = 'loss factor'" in Case().damping.lacks("beta")

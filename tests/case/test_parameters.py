@@ -9,7 +9,7 @@ from dbvfiv.case.describe import allowed_words, walk
 from dbvfiv.case.parameters import CONDITIONS, DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, SYSTEM_NAMES, listed
 from dbvfiv.case.stability_axis import parse_stability_axis
 from dbvfiv.model.dynamics import Conditions
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.session import KEYWORDS
 from dbvfiv.studies.stability.place import Place
 
@@ -32,9 +32,9 @@ def test_usual_range_is_one(row):
 @pytest.mark.parametrize("name", ["density", "alpha", "beta"])
 def test_limits_of_keys_are_those_of_the_table(name):
     row = PARAMETERS[name]
-    assert Case().replace({row.key: row.high}) is not None
+    assert thesis_case({row.key: row.high}) is not None
     with pytest.raises(CaseError, match="at most"):
-        Case().replace({row.key: row.high * 1.01})
+        thesis_case({row.key: row.high * 1.01})
     section, key = row.key.split(".")
     words = allowed_words(type(getattr(Case(), section)).model_fields[key])
     assert ("at least" in words) == row.low_included
@@ -60,7 +60,7 @@ def test_groups():
 
 
 def test_a_place_knows_every_parameter():
-    place = Place.of(Case())
+    place = Place.of(thesis_case())
     assert [place.value(name) for name in CONDITIONS] == [18e3, 1000.0, 5.0, 0.003, 0.0, 0.0, 0.0, 0.0, 0.0]
     assert set(place.at(angle=30).mu()) == {*SYSTEM_NAMES, "angle"}
 

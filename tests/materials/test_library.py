@@ -79,7 +79,8 @@ def test_tables_of_the_case(card, law):
 
 
 def test_tables_of_the_case_go_before_built_in_ones():
-    case = _case(fibre_constants="table", fibre={"kind": "halpin-tsai", "fibre_fraction": 0.3})
+    card = {"kind": "halpin-tsai", "fibre_fraction": 0.3, "loss_factor": "fibre"}
+    case = _case(fibre_constants="table", fibre=card)
     assert law_from_case(case, "fibre").e1 == ply_from_constituents(fibre_fraction=0.3).e1
 
 
