@@ -110,8 +110,11 @@ Case = create_model(
 
 #: Keys in which the thesis's computations differ from the defaults.
 THESIS = {
+    "mesh.rows": "graded",
+    "mesh.inertia": "linear",
     "materials.strain_level": "10 %",
     "materials.constants": "published",
+    "shell.mass": "consistent",
     "damping.model": "rayleigh",
     "fluid.continuity": "quasi-steady",
 }

@@ -220,7 +220,7 @@ def test_the_true_metric_by_its_word_or_as_truth(tmp_path):
 def test_a_mass_that_does_not_exist(one_sentence):
     assert load_case(None, ["shell.mass=averaged"]).shell.mass == "averaged"
     with pytest.raises(
-        CaseError, match='shell.mass is given as .*lumped.*; it must be "consistent" or "averaged"'
+        CaseError, match='shell.mass is given as .*lumped.*; it must be "averaged" or "consistent"'
     ) as caught:
         load_case(None, ["shell.mass=lumped"])
     assert one_sentence(str(caught.value))
