@@ -6,6 +6,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+#: Across a side of a panel: no panel of the same surface, or its own image about x = 0 or y = 0.
+EDGE, IMAGE_X, IMAGE_Y = -1, -2, -3
+#: Places of a surface that are this near to each other over its size are one.
+SAME = 1e-9
+
 
 @dataclass(frozen=True)
 class Panels:
@@ -22,6 +27,8 @@ class Panels:
     areas : (k,) array, m2
     bend : (k,) array
         Normal velocity at its centre that a source panel has from its own curvature, see `own_bend`.
+    beside : (k, 4) array of int
+        Panel across each side, from corner a to a + 1; `EDGE`, `IMAGE_X` or `IMAGE_Y` where there is none.
     """
 
     corners: np.ndarray
@@ -29,6 +36,7 @@ class Panels:
     normals: np.ndarray
     areas: np.ndarray
     bend: np.ndarray
+    beside: np.ndarray
 
     def __len__(self) -> int:
         return len(self.areas)
@@ -61,12 +69,16 @@ class Panels:
         height = np.einsum("kai,ki->ka", corners - middle[:, None], normal)
         flat = corners - height[..., None] * normal[:, None]
         bend = np.zeros(len(area)) if corner_normals is None else own_bend(corners, corner_normals)
-        return cls(np.ascontiguousarray(flat), _centroid(flat, normal, area), normal, area, bend)
+        centre = _centroid(flat, normal, area)
+        return cls(np.ascontiguousarray(flat), centre, normal, area, bend, panels_beside(corners))
 
     @classmethod
     def joined(cls, *parts: Panels) -> Panels:
         """All panels of several surfaces, in order."""
-        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
+        joined = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)}
+        first = np.repeat(np.cumsum([0, *map(len, parts[:-1])]), [len(p) for p in parts])[:, None]
+        joined["beside"] = joined["beside"] + np.where(joined["beside"] >= 0, first, 0)
+        return cls(**joined)
 
     @property
     def extents(self) -> np.ndarray:
@@ -109,3 +121,24 @@ def own_bend(corners: np.ndarray, corner_normals: np.ndarray) -> np.ndarray:
     (a, first), (b, second) = sides
     total = first * b * np.arcsinh(a / b) + second * a * np.arcsinh(b / a)
     return total / (4.0 * np.pi)
+
+
+def panels_beside(corners: np.ndarray) -> np.ndarray:
+    """Panel (k, 4) across each side of panels (k, 4, 3) of one surface, see `Panels.beside`.
+
+    Sides are matched by the places of their ends. One that has no length, or belongs to more than two panels, is an
+    edge.
+    """
+    places = np.round(corners.reshape(-1, 3) / (SAME * np.abs(corners).max())) + 0.0
+    nodes = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1, 4)
+    ends = np.sort(np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    _, side, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    side = side.reshape(-1)
+    order = np.argsort(side, kind="stable")
+    one, other = order[count[side[order]] == 2].reshape(-1, 2).T
+    found = np.full(len(side), EDGE)
+    on_plane = (places.reshape(-1, 4, 3) == 0.0) & (np.roll(places.reshape(-1, 4, 3), -1, axis=1) == 0.0)
+    found[on_plane[..., 0].ravel()], found[on_plane[..., 1].ravel()] = IMAGE_X, IMAGE_Y
+    found[one], found[other] = other // 4, one // 4
+    found[ends[:, 0] == ends[:, 1]] = EDGE
+    return found.reshape(-1, 4)

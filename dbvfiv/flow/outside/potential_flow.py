@@ -1,7 +1,8 @@
 """Potential flow outside a moving surface: what pressure its motion makes.
 
-Sources sigma on all panels; their normal velocities are those of the surfaces, zero on rigid ones, and on open
-panels the potential vanishes instead. Panels that never move are eliminated once.
+Sources on all panels, of strengths that vary smoothly along a surface; their normal velocities are those of the
+surfaces, zero on rigid ones, and on open panels the potential vanishes instead. Panels that never move are eliminated
+once.
 
 Equation (T.19) of docs/theory.md.
 """
@@ -12,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator
 
-from .influence import image_signs, influence
-from .panels import Panels
+from .influence import REFLECTIONS, image_signs, influence
+from .panels import EDGE, IMAGE_X, IMAGE_Y, Panels
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ class PotentialFlow:
         self.signs = image_signs(symmetry)
         self._fixed, self._open = self.surroundings.panels, self.surroundings.rigid_count
         if self._fixed is not None:
-            self._alone = influence(self._fixed, self._fixed, self.signs, 0)
+            self._alone = smooth_influence(self._fixed, self._fixed, self.signs, True)
 
     def _rows(self, potential, velocity):
         """Conditions on the panels of the surroundings."""
@@ -177,17 +179,19 @@ class PotentialFlow:
         """Potentials and velocities of moving on moving panels, of the surroundings on them, of them on the
         surroundings, and of those on themselves.
         """
-        own, fixed = influence(moving, moving, signs, 0, (held, held)), self._fixed
+        own, fixed = smooth_influence(moving, moving, signs, True, (held, held)), self._fixed
         if fixed is None:
             return own, None, None, None
-        across = influence(moving, fixed, signs, frozen=(held, fixed))
-        return own, across, influence(fixed, moving, signs, frozen=(fixed, held)), self._alone
+        across = smooth_influence(moving, fixed, signs, frozen=(held, fixed))
+        return own, across, smooth_influence(fixed, moving, signs, frozen=(fixed, held)), self._alone
 
     def _symmetric(self, moving: Panels, held: Panels):
         """The same for symmetric images, on which the whole flux rests."""
         signs = image_signs("SS")
         blocks = self._blocks(moving, held, signs)
-        return blocks if self._fixed is None else (*blocks[:3], influence(self._fixed, self._fixed, signs, 0))
+        if self._fixed is None:
+            return blocks
+        return (*blocks[:3], smooth_influence(self._fixed, self._fixed, signs, True))
 
     def _own(self, moving: Panels, blocks) -> tuple[np.ndarray, np.ndarray | None]:
         """What panels' own velocities lack for the whole flux of each to be right, for moving and other panels."""
@@ -199,3 +203,61 @@ class PotentialFlow:
         flux += areas @ back[1]
         other = moving.areas @ across[1] + areas @ alone[1]
         return self.closed - flux / moving.areas, self.closed - other / areas
+
+
+def smooth_influence(
+    targets: Panels,
+    sources: Panels,
+    signs: np.ndarray,
+    own: bool = False,
+    frozen: tuple[Panels, Panels] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Potential and normal velocity at the centres of panels, of sources of unit strength at the centres of others.
+
+    Parameters
+    ----------
+    targets, sources, signs, frozen
+        See `influence`.
+    own : bool
+        Whether targets and sources are the same panels. The half of its strength that a source sends to its own side
+        is that at its centre.
+
+    Returns
+    -------
+    potential, velocity : (t, s) arrays, m and 1
+    """
+    potential, velocity = influence(targets, sources, signs, 0 if own else None, frozen)
+    strength = panel_strength(sources, signs)
+    velocity = velocity @ strength
+    if own:
+        velocity += 0.5 * (sp.eye_array(len(sources)) - strength)
+    return potential @ strength, velocity
+
+
+def panel_strength(panels: Panels, signs: np.ndarray) -> sp.csr_array:
+    """Strengths (k, k) of panels, constant on each, that act as sources that vary smoothly between their centres.
+
+    A strength s that varies along a surface acts on what is not near as panels of s - h^2 s''/24 do: the moments of a
+    panel of width h about its centre give h^2 s''/24, those of the gradient on it -h^2 s''/12. Panel k has
+
+        s_k + sum_j l_kj d_kj (s_k - s_j) / (24 A_k)
+
+    with the panels j beside it, images included, the length l of the side between them and the distance d of their
+    centres; so the whole strength stays what it is. Without, waves of m panels are light by (2 pi/m)^2 / 24 at least.
+
+    Parameters
+    ----------
+    panels : Panels
+    signs : (4,) array
+        Of the images, see `image_signs`.
+    """
+    row, side = np.nonzero(panels.beside != EDGE)
+    beside = panels.beside[row, side]
+    column = np.where(beside >= 0, beside, row)
+    image = np.select([beside == IMAGE_X, beside == IMAGE_Y], [1, 2], 0)
+    ends = panels.corners[row, side], panels.corners[row, (side + 1) % 4]
+    apart = REFLECTIONS[image] * panels.centres[column] - panels.centres[row]
+    share = np.linalg.norm(ends[1] - ends[0], axis=1) * np.linalg.norm(apart, axis=1) / (24.0 * panels.areas[row])
+    values = np.concatenate([share, -share * np.asarray(signs)[image]])
+    places = np.concatenate([row, row]), np.concatenate([row, column])
+    return sp.csr_array(sp.eye_array(len(panels)) + sp.coo_array((values, places), (len(panels),) * 2))

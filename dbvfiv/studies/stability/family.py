@@ -13,6 +13,8 @@ from ...model.leading import LeadingSearch, select_search
 
 #: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
 _KEPT = 256
+#: Structural frequencies in vacuo that a band holds at least.
+LEAST_MODES = 10
 
 
 class ValveFamily(PencilFamily):
@@ -27,7 +29,8 @@ class ValveFamily(PencilFamily):
         Hz; only modes up to it are searched for. Without it and without stiffness damping the band follows from the
         structural frequencies of the state.
     modes : int
-        Structural frequencies that such a band holds.
+        Modes wanted; a band holds as many structural frequencies, ten at least, so that studies that list few modes
+        search where those do that list many.
     workspace : Workspace, optional
         Keeps the symbolic factorisation for those between states.
     """
@@ -39,7 +42,8 @@ class ValveFamily(PencilFamily):
         modes: int = 10,
         workspace: Workspace | None = None,
     ):
-        self.linear, self.max_frequency, self.modes, self._workspace = linear, max_frequency, modes, workspace
+        self.linear, self.max_frequency, self._workspace = linear, max_frequency, workspace
+        self.modes = max(modes, LEAST_MODES)
         self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
         self.forces, self.slope = linear.coupling
         self.added = 0 if linear.added is None else linear.added.rank

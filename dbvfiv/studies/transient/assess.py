@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from ...model import ValveModel
 from ...verdict import JudgeOptions, Verdict, judge
 from ..stability.verdict import DIVERGES, FLUTTERS, STABLE, UNDECIDED
 from ..stability.verdict import Verdict as StabilityVerdict
 
 #: Columns of a history by name.
 Columns = Mapping[str, np.ndarray]
-#: Areas below this multiple of the lip gap at rest count as closed.
-CLOSED = 2.0
+#: Smallest area over that at rest up to which a valve is closed: under a pressure that drives fluid out, of which a
+#: shut one lets no more pass than leaks through, and where nothing drives fluid out.
+SHUT, UNOPENED = 0.5, 2.0
 #: Pascal; no fluid's pressure falls further below that of the surroundings.
 ATMOSPHERE = 101_325.0
 
@@ -82,16 +84,22 @@ _LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undeci
 
 
 def assess(
-    history: Columns, gap: float, residual: float = np.nan, options: JudgeOptions = JudgeOptions(), since: float = 0.0
+    history: Columns,
+    model: ValveModel,
+    residual: float = np.nan,
+    options: JudgeOptions = JudgeOptions(),
+    since: float = 0.0,
 ) -> RunVerdict:
     """Verdict on a history.
+
+    A valve is closed where its lips shut the gap they have at rest, or where nothing drives fluid out and they do not
+    open; one that stands at its gap under a pressure lets flow what passes there.
 
     Parameters
     ----------
     history : mapping of str to array
         See `dbvfiv.studies.transient.tables.SCALARS`.
-    gap : float
-        Flow area of the whole valve at the lip at rest, m2.
+    model : ValveModel
     residual : float
         Of the equilibrium at the end; not a number if it is not known.
     since : float
@@ -102,9 +110,10 @@ def assess(
     known = residual if np.isfinite(residual) else None
     signals = ("mass_flow", "lip_displacement", "lip_opening")
     found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in signals]
-    closed = judge(time[chosen], history["smallest_area"][chosen], options, closed_below=CLOSED * gap)
-    if closed.name == "closed":
-        reason = "The smallest flow area stays at that of the lip gap at rest."
+    driven = history["inlet_pressure"] > model.case.rest_pressure
+    area = history["smallest_area"] / (np.where(driven, SHUT, UNOPENED) * lip_gap(model))
+    if judge(time[chosen], area[chosen], options, closed_below=1.0).name == "closed":
+        reason = "The lips shut the gap that they have at rest, or nothing drives fluid out and they do not open."
         found = [Verdict(**{**vars(v), "name": "closed", "decided": True, "reason": reason}) for v in found]
     return RunVerdict(*found, residual, len(time) - 1, float(time[-1]))
 
@@ -124,6 +133,12 @@ def stability_of(summary: Mapping[str, Any]) -> StabilityVerdict:
         outcome = DIVERGES
     reason = f"After a kick the run in time ends as {summary['verdict']}: {summary['reason']}"
     return StabilityVerdict(outcome, reason, frequency=frequency, certain=bool(summary["decided"]))
+
+
+def lip_gap(model: ValveModel) -> float:
+    """Flow area of the whole valve at the lip at rest, m2."""
+    mesh = model.mesh
+    return mesh.part.copies * float(mesh.rest_area[0] - mesh.wall_deduction[0])
 
 
 def beyond_model(history: Columns) -> str | None:

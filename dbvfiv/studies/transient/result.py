@@ -132,8 +132,7 @@ class TransientResult(StudyResult):
         if not self.begun:
             return dict(_NO_VERDICT)
         # a run that goes on or was killed has an older one, or none
-        gap = self.mesh.part.copies * float(self.history["station_area"][0, 0])
-        return assess(self.history, gap).summary()
+        return assess(self.history, self.model).summary()
 
     @cached_property
     def stability(self) -> Verdict | None:

@@ -94,7 +94,6 @@ class Runner:
         self.motion = motion_of(model, staggered=case.transient.coupling == "staggered")
         self.stepper = Stepper(self.motion, self.options.scheme, self.drive, self.options.step)
         self.control = step_control(self.stepper, self.options.control)
-        self.gap = model.mesh.part.copies * float(model.mesh.rest_area[0] - model.mesh.wall_deduction[0])
         self.keeper = Keeper(self.record, model)
 
     def start(self, first: MotionState | None = None) -> TransientRun:
@@ -256,7 +255,7 @@ class Runner:
         since = self.drive.times[-1] if constant else 0.0
         if np.count_nonzero(self.keeper["time"] >= since) < 2:
             since = 0.0
-        verdict = assess(self.keeper, self.gap, residual, since=since)
+        verdict = assess(self.keeper, self.model, residual, since=since)
         self.record.note("verdict", **verdict.summary())
         self.record.progress(f"{verdict.name}{'' if verdict.decided else '?'} at {state.time:.4g} s")
         return verdict

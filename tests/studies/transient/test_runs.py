@@ -10,7 +10,7 @@ from dbvfiv.motion.drive import Drive
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.transient.assess import beyond_model
+from dbvfiv.studies.transient.assess import assess, beyond_model, lip_gap
 from dbvfiv.studies.transient.run import run_transient
 
 from .runs import SHORT, transient
@@ -149,6 +149,38 @@ def test_a_valve_without_pressure_stays_as_it_is(tmp_path, valve, command_line, 
     limit = 1e-12 if start != "kick" else 1.1e-5
     assert np.abs(result.history["lip_displacement"]).max() < limit
     assert command_line("info", tmp_path / "run.h5").status == 0
+
+
+@pytest.mark.parametrize("start, density", [("steady", 1000.0), ("rest", 1.2)])
+def test_a_stiff_valve_that_stands_at_its_gap_is_open(valve, start, density):
+    """It opens by a thousandth of its gap at rest, and lets flow what a jet of that area carries."""
+    changes = {"valve.thickness_factor": 8.0, "drive.pressure": 500.0, "fluid.density": density}
+    changes |= {"damping.alpha": 400.0, "transient.start": start, "transient.duration": 0.5}
+    run = run_transient(valve(changes | {"transient.numerical_damping": 0.1}))
+    assert run.verdict.name == "steady" and run.verdict.decided
+    area = run.history["smallest_area"][-1]
+    assert area == pytest.approx(lip_gap(run.model), rel=2e-3)
+    assert run.history["mass_flow"][-1] == pytest.approx(area * np.sqrt(2 * density * 500.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("back", [0.0, 1e3])
+def test_a_valve_whose_drive_falls_away_or_turns_around_closes(tmp_path, valve, back):
+    table = tmp_path / "drive.csv"
+    table.write_text("0, 6000\n0.05, 6000\n0.15, 0\n")
+    changes = {"transient.drive_table": str(table), "downstream.pressure": back, "transient.start": "steady"}
+    changes |= {"fluid.density": 10.0, "damping.alpha": 400.0, "transient.duration": 0.4}
+    run = run_transient(valve(changes | {"transient.numerical_damping": 0.1}))
+    assert run.history["smallest_area"][0] > 20 * lip_gap(run.model)
+    assert run.verdict.name == "closed" and run.verdict.decided
+
+
+def test_lips_pressed_together_against_the_drive_are_closed(valve):
+    """A passage of half the gap at rest or less is shut, also where fluid leaks out of it; a wider one is not."""
+    model, time = valve(), np.linspace(0.0, 1.0, 101)
+    history = {name: np.full(101, 1e-3) for name in ("mass_flow", "lip_displacement", "lip_opening")}
+    history |= {"time": time, "inlet_pressure": np.full(101, 18e3)}
+    for share, name in ((0.4, "closed"), (0.6, "steady")):
+        assert assess(history | {"smallest_area": np.full(101, share * lip_gap(model))}, model).name == name
 
 
 def test_the_verdict_ends_the_run(valve):
