@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -79,14 +80,20 @@ def random_cases(number: int, seed: int, valves=tuple(VALVES), each: int = 10) -
     rng = np.random.default_rng(seed)
     for first in range(0, number, each):
         path = valves[(first // each) % len(valves)]
-        around, along = VALVES[path]
-        base = load_case(path, [f"mesh.around={around}", f"mesh.along={along}"])
+        base = _settled(path)
         pipe = rng.random() < 0.5
         line = {"upstream.length": PIPE, "upstream.diameter": 2.2 * base.valve.flange_radius}
         base = base.replace(line if pipe else {"upstream": {}})
         base = base.replace({"drive.pressure": float(50.0 * 1000.0 ** rng.random())})
         for i in range(first, min(first + each, number)):
             yield i, base.replace(_random_surroundings(rng, base))
+
+
+@cache
+def _settled(path: str) -> Case:
+    """A case on its coarse mesh, with its strain levels settled."""
+    around, along = VALVES[path]
+    return Session(load_case(path, [f"mesh.around={around}", f"mesh.along={along}"])).settle().case
 
 
 def _random_surroundings(rng: np.random.Generator, base: Case) -> dict:
