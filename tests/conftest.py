@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pytest
 from hypothesis import HealthCheck, settings
 
-import dbvfiv
+from dbvfiv.api import Valve
 from dbvfiv.studies.case import thesis_case
 
 settings.register_profile(
@@ -57,7 +57,7 @@ COARSE = {"mesh.around": 8, "mesh.along": 16}
 @pytest.fixture(scope="session")
 def coarse_valve():
     """The 12-inch valve on a mesh on which a state takes a fraction of a second."""
-    return dbvfiv.load(thesis_case(), COARSE)
+    return Valve(thesis_case(COARSE), "dbv12")
 
 
 @pytest.fixture(scope="session")

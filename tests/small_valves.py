@@ -5,8 +5,10 @@ from types import MappingProxyType
 
 from dbvfiv.model import ValveModel
 from dbvfiv.motion.start import steady_positions
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.case import THESIS, thesis_case
 
+#: The thesis's settings for a command without a case file.
+THESIS_SET = tuple(f"--set={key}={value}" for key, value in THESIS.items())
 #: Rows and columns at even distances; with the element of earlier versions too.
 EVEN = MappingProxyType({"mesh.rows": "uniform", "mesh.columns": "uniform"})
 FORMER = MappingProxyType({"mesh.element": "MITC4", **EVEN})

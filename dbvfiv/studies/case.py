@@ -14,7 +14,6 @@ from typing import Any, Self
 
 from pydantic import create_model, model_validator
 
-from ..case.changes import Changes, change_case
 from ..case.load import key_path, read_case_file
 from ..case.model import Case as PhysicsCase
 from ..case.reference import page
@@ -118,11 +117,6 @@ THESIS = {
 }
 
 
-def thesis_case(changes: Changes = ()) -> Case:
-    """The 12-inch valve as the thesis computes it, ``cases/dbv12.toml``, with some keys changed."""
-    return change_case(Case().replace(THESIS), changes)
-
-
 def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> Case:
     """Read and check a case file.
 
@@ -146,6 +140,19 @@ def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> 
     case = read_case_file(Case, path, overrides)
     case._replace_list_by_pressure({key_path(override.partition("=")[0]) for override in overrides})
     return case
+
+
+def thesis_case(changes: Mapping[str, Any] | Iterable[str] = ()) -> Case:
+    """The 12-inch valve as the thesis computes it, ``cases/dbv12.toml``.
+
+    Parameters
+    ----------
+    changes : mapping or texts
+        Keys to change, ``{"fluid.density": 10}``, or overrides as `load_case` takes them.
+    """
+    overrides = () if isinstance(changes, Mapping) else changes
+    case = load_case(None, (*(f"{key}={value}" for key, value in THESIS.items()), *overrides))
+    return case.replace(changes) if isinstance(changes, Mapping) else case
 
 
 if __name__ == "__main__":

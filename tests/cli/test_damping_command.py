@@ -9,9 +9,10 @@ import pytest
 import dbvfiv
 from dbvfiv.drawing.damping import damping_figure
 from dbvfiv.studies.case import thesis_case
+from tests.small_valves import THESIS_SET
 
 LOSS = ("--set", "damping.model=loss factor")
-COARSE = ("--set", "mesh.around=6", "--set", "mesh.along=10")
+COARSE = (*THESIS_SET, "--set", "mesh.around=6", "--set", "mesh.along=10")
 
 
 def test_loss_factors_of_the_12_inch_valve(command_line):
@@ -38,9 +39,9 @@ def test_json_holds_the_same_from_python(command_line):
 
 
 def test_rayleigh_damping_over_frequency(command_line):
-    outcome = command_line("damping", "--set", "damping.alpha=0", "--at", "1,10")
+    outcome = command_line("damping", *THESIS_SET, "--set", "damping.alpha=0", "--at", "1,10")
     assert outcome.status == 0 and outcome.out.startswith("Rayleigh damping, alpha = 0 1/s, beta = 0.003 s.")
-    document = json.loads(command_line("damping", "--set", "damping.alpha=0", "--json").out)
+    document = json.loads(command_line("damping", *THESIS_SET, "--set", "damping.alpha=0", "--json").out)
     np.testing.assert_allclose(
         document["rayleigh_ratio"], 0.003 * np.pi * np.array(document["frequencies"]), rtol=1e-12
     )

@@ -8,8 +8,9 @@ import pytest
 
 import dbvfiv
 from tests.child import start
+from tests.small_valves import THESIS_SET
 
-COARSE = ("--set", "mesh.around=8", "--set", "mesh.along=16", "--set", "damping.alpha=0")
+COARSE = (*THESIS_SET, "--set", "mesh.around=8", "--set", "mesh.along=16", "--set", "damping.alpha=0")
 
 
 def test_modes_json(command_line):

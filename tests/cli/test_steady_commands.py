@@ -11,8 +11,9 @@ import pytest
 import dbvfiv
 from dbvfiv.studies.session import Session
 from tests.child import start
+from tests.small_valves import THESIS_SET
 
-COARSE = ("--set", "mesh.around=8", "--set", "mesh.along=16")
+COARSE = (*THESIS_SET, "--set", "mesh.around=8", "--set", "mesh.along=16")
 KEYS = {
     "pressure",
     "mass_flow",

@@ -17,6 +17,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.flow import Channel, FlowMotion, Stream
+from dbvfiv.studies.case import thesis_case
 from tests.flow.test_channel import FLOOR, passage
 
 ROOT = Path(__file__).parents[2]
@@ -164,7 +165,7 @@ def test_two_files_are_all_it_takes(tmp_path):
         "import dbvfiv\n"
         "for loss in (0.0, 0.5):\n"
         "    case = {'mesh.around': 6, 'mesh.along': 8, 'fluid.lip_loss': loss}\n"
-        "    state = dbvfiv.load(None, case).steady(pressure=6e3)\n"
+        "    state = dbvfiv.load(thesis_case(), case).steady(pressure=6e3)\n"
         "    print(state.mass_flow, state.outlet_area)\n"
     )
     done = subprocess.run(
@@ -176,7 +177,7 @@ def test_two_files_are_all_it_takes(tmp_path):
         check=True,
     )
     free, mouth, lossy, wider = (float(number) for number in done.stdout.split())
-    small = dbvfiv.load(None, {"mesh.around": 6, "mesh.along": 8})
+    small = dbvfiv.load(thesis_case(), {"mesh.around": 6, "mesh.along": 8})
     assert free == pytest.approx(small.steady(pressure=6e3).mass_flow, rel=1e-12)
     assert wider > mouth
     # the inlet's velocity head counts for 1 % here

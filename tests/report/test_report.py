@@ -13,8 +13,10 @@ import pytest
 from PIL import Image
 
 from dbvfiv.studies.case import load_case
+from tests.small_valves import THESIS_SET
 
 SMALL = (
+    *THESIS_SET,
     "--set",
     "mesh.around=8",
     "--set",

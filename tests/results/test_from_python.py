@@ -15,7 +15,7 @@ COARSE = {"mesh.around": 4, "mesh.along": 6, "drive.pressure": 2e3, "fluid.densi
 
 @pytest.fixture(scope="module")
 def valve():
-    return dbvfiv.load(None, COARSE)
+    return dbvfiv.load(thesis_case(), COARSE)
 
 
 RUNS = {
@@ -82,7 +82,7 @@ def test_arrays_and_single_texts(valve):
 def test_what_the_package_offers():
     public = {"Valve", "load", "load_result", "resume", "CaseError", "SolveError", "Observer"}
     assert public <= set(dir(dbvfiv)) and public == set(dbvfiv.__all__)
-    assert isinstance(dbvfiv.load(None, COARSE), dbvfiv.Valve) and issubclass(dbvfiv.CaseError, ValueError)
+    assert isinstance(dbvfiv.load(thesis_case(), COARSE), dbvfiv.Valve) and issubclass(dbvfiv.CaseError, ValueError)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_changes_as_people_write_them(tmp_path, changes, key, value):
 )
 def test_changes_that_are_none(changes, words, one_sentence):
     with pytest.raises(CaseError) as caught:
-        dbvfiv.load(None, changes)
+        dbvfiv.load(thesis_case(), changes)
     assert one_sentence(str(caught.value)) and words in str(caught.value)
 
 

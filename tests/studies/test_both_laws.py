@@ -8,16 +8,17 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case import CaseError
+from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.onset.other_law import disagreements
 from dbvfiv.studies.stability.laws import compare_ranges, compare_states
 
 SMALL = {"mesh.around": 6, "mesh.along": 8, "damping.alpha": 0.0, "drive.pressure": "6 kPa", "fluid.density": 60.0}
 BOTH = {"modes.continuity": "both", "onset.continuity": "both", "onset.coarse_mesh": 0, "onset.normal_form": False}
-OPTIONS = [f"--set={key}={value}" for key, value in SMALL.items()]
+OPTIONS = [f"--set={key}={value}" for key, value in (THESIS | SMALL).items()]
 
 
 def load(**changes):
-    return dbvfiv.load(None, SMALL | {key.replace("__", "."): value for key, value in changes.items()})
+    return dbvfiv.load(thesis_case(), SMALL | {key.replace("__", "."): value for key, value in changes.items()})
 
 
 def test_modes_under_both_laws_are_those_of_each(command_line):

@@ -11,18 +11,18 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.measured import DISCHARGE, read_measured
 from dbvfiv.case.quantity import GRAVITY
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.steady.comparison import draw
 from dbvfiv.studies.steady.measured import against
 from tests.small_valves import make_valve
 
 SMALL = {"mesh.around": 6, "mesh.along": 8}
-OPTIONS = [f"--set={key}={value}" for key, value in SMALL.items()]
+OPTIONS = [f"--set={key}={value}" for key, value in (THESIS | SMALL).items()]
 PRESSURES = ["2 kPa", "6 kPa", "12 kPa", "18 kPa"]
 
 
 def load(**changes):
-    return dbvfiv.load(None, SMALL | {key.replace("__", "."): value for key, value in changes.items()})
+    return dbvfiv.load(thesis_case(), SMALL | {key.replace("__", "."): value for key, value in changes.items()})
 
 
 def results(valve, pressures=PRESSURES):

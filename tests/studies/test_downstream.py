@@ -26,7 +26,7 @@ def load(*keys):
     changes = dict(SMALL)
     for some in keys:
         changes |= some
-    return dbvfiv.load(None, changes)
+    return dbvfiv.load(thesis_case(), changes)
 
 
 def test_heads_along_the_pipe():

@@ -11,6 +11,7 @@ import dbvfiv
 from dbvfiv.cfd.flow_case import FlowCase
 from dbvfiv.errors import CaseError
 from dbvfiv.record.whole_valve import WholeValve
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.measured.sections import WallSections, distances
 
 FLAT = {
@@ -28,7 +29,7 @@ FLAT = {
 def run(tmp_path_factory):
     """Two states and their file."""
     path = tmp_path_factory.mktemp("flat") / "flat.h5"
-    return dbvfiv.load(None, FLAT).steady(pressure=[2e3, 4e3], output=path), path
+    return dbvfiv.load(thesis_case(), FLAT).steady(pressure=[2e3, 4e3], output=path), path
 
 
 @pytest.fixture(scope="module")
@@ -95,20 +96,20 @@ def test_measured_points_of_either_lip_are_held_against_the_section(run):
 def test_all_figures_are_drawn(run, modes, tmp_path):
     assert len(run[0].plot(tmp_path / "steady")) > 5
     assert len(modes.plot(tmp_path / "modes")) > 3
-    assert dbvfiv.load(None, FLAT).plot(tmp_path / "valve")
+    assert dbvfiv.load(thesis_case(), FLAT).plot(tmp_path / "valve")
 
 
 @pytest.mark.slow
 def test_the_energy_of_a_run_in_time_balances():
     keys = {"transient.step": 5e-4, "transient.start": "kick", "transient.kick_opening": 1e-3, "damping.beta": 0.0}
-    run = dbvfiv.load(None, FLAT | keys).transient(duration=0.05)
+    run = dbvfiv.load(thesis_case(), FLAT | keys).transient(duration=0.05)
     h = run.history
     assert np.abs(h["balance"]).max() < 2e-3 * np.ptp(h["strain_energy"])
 
 
 @pytest.mark.slow
 def test_it_shuts_under_back_pressure():
-    found = dbvfiv.load(None, FLAT | {"closure.symmetry": "all"}).closure([1e3, 3e3])
+    found = dbvfiv.load(thesis_case(), FLAT | {"closure.symmetry": "all"}).closure([1e3, 3e3])
     assert all(state.closed for state in found.states)
     said = json.loads(json.dumps(found.summary()))
     assert [part["symmetry"] for part in said["classes"]] == ["A"]
@@ -121,7 +122,8 @@ def test_the_onset_of_the_half_of_a_symmetric_valve_is_that_of_the_quarter():
     keys = {"mesh.around": 8, "mesh.along": 16, "onset.normal_form": False, "onset.coarse_mesh": 0}
     keys |= {"damping.alpha": 0, "damping.beta": 0.003, "drive.pressure": 6e3}
     found = [
-        dbvfiv.load(None, keys | {"mesh.part": part}).onset(over="density=10:200:4:log") for part in ("auto", "half")
+        dbvfiv.load(thesis_case(), keys | {"mesh.part": part}).onset(over="density=10:200:4:log")
+        for part in ("auto", "half")
     ]
     edges = [[point for point in one.summary()["points"] if point["edge"]] for one in found]
     assert len(edges[0]) == 1

@@ -17,6 +17,7 @@ from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.equilibria import find_equilibrium, rest_state
 from dbvfiv.model.memory_forms import ValveMemoryForms
 from dbvfiv.model.symmetry import SYMMETRIES
+from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.stability.place import Place, is_surrounding
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import EVEN, make_valve
@@ -32,7 +33,7 @@ def load(*keys):
     changes = dict(SMALL)
     for some in keys:
         changes |= some
-    return dbvfiv.load(None, changes)
+    return dbvfiv.load(thesis_case(), changes)
 
 
 @pytest.mark.slow
@@ -94,7 +95,7 @@ def test_three_routes(keys, pressure):
 def test_energies_balance():
     keys = SMALL | DOWN | {"transient.start": "rest", "transient.duration": 0.03, "transient.step": 2e-4}
     keys |= {"transient.numerical_damping": 0.0, "drive.pressure": 4e3, "damping.alpha": 0.0}
-    history = dbvfiv.load(None, keys).transient().history
+    history = dbvfiv.load(thesis_case(), keys).transient().history
     turned_over = np.abs(np.diff(history["pressure_work"])).sum()
     assert np.abs(history["weight_energy"]).max() > 1e-3 * turned_over
     off = np.abs(history["balance"]).max()
@@ -190,5 +191,5 @@ def test_a_map_over_the_density():
 @pytest.mark.slow
 def test_back_pressure_says_that_nothing_weighs(command_line):
     keys = SMALL | DOWN | {"closure.pressures": "[100]"}
-    out = command_line("closure", *(f"--set={key}={value}" for key, value in keys.items()))
+    out = command_line("closure", *(f"--set={key}={value}" for key, value in (THESIS | keys).items()))
     assert out.status == 0 and "Gravity has no part" in out.out + out.err

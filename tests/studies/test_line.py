@@ -8,6 +8,7 @@ import pytest
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.quantity import GRAVITY
+from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.stability.place import Place, is_surrounding
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import FORMER
@@ -22,7 +23,7 @@ def load(*keys):
     changes = dict(SMALL)
     for some in keys:
         changes |= some
-    return dbvfiv.load(None, changes)
+    return dbvfiv.load(thesis_case(), changes)
 
 
 @pytest.mark.parametrize("at", ["reservoir", "line"])
@@ -55,17 +56,19 @@ def test_equilibria_do_not_depend_on_density():
 
 
 def test_printed_pressures_say_where_they_are(command_line):
-    options = [f"--set={key}={value}" for key, value in (SMALL | FRICTION).items()]
+    options = [f"--set={key}={value}" for key, value in (THESIS | SMALL | FRICTION).items()]
     out = command_line("steady", *options, "-p", "18 kPa").out
     assert "reservoir" in out and "at the flange" in out and "line loss" in out and "Supply" in out
     out = command_line("steady", *options, "--set=drive.at=line", "-p", "18 kPa").out
     assert "far end" in out
-    out = command_line("steady", *(f"--set={key}={value}" for key, value in SMALL.items()), "-p", "18 kPa").out
+    out = command_line(
+        "steady", *(f"--set={key}={value}" for key, value in (THESIS | SMALL).items()), "-p", "18 kPa"
+    ).out
     assert "reservoir" not in out and "line loss" not in out
 
 
 def test_verdicts_name_the_continuity_law(command_line):
-    options = [f"--set={key}={value}" for key, value in (SMALL | LIGHT | LINE).items()]
+    options = [f"--set={key}={value}" for key, value in (THESIS | SMALL | LIGHT | LINE).items()]
     for law in ("quasi-steady", "storage"):
         out = command_line("modes", *options, f"--set=fluid.continuity={law}").out
         assert f"table under {law} continuity: " in out

@@ -106,7 +106,7 @@ def test_back_pressure_takes_no_discharge(tmp_path):
     ):
         thesis_case([f"closure.measured={file}"])
     with pytest.raises(CaseError, match=r"closure\.measured is given as .*, which holds a discharge"):
-        dbvfiv.load(None, SMALL | {"closure.measured": str(file)}).closure(["2 kPa"])
+        dbvfiv.load(thesis_case(), SMALL | {"closure.measured": str(file)}).closure(["2 kPa"])
 
 
 def test_several_files(tmp_path):
@@ -165,7 +165,7 @@ PRESSURES = (4e3, 8e3, 16e3)
 
 @pytest.fixture(scope="module")
 def states():
-    return dbvfiv.load(None, SMALL).steady(pressure=list(PRESSURES)).states
+    return dbvfiv.load(thesis_case(), SMALL).steady(pressure=list(PRESSURES)).states
 
 
 def write_all(folder, states, lip=1.0):
@@ -196,7 +196,7 @@ def runs(states, tmp_path_factory):
     kept = []
     for angle in (54, 40):
         changes = {"steady.measured": files, "steady.pressures": PRESSURES, "layers.2.angle": angle}
-        session = dbvfiv.load(None, SMALL | changes).session
+        session = dbvfiv.load(thesis_case(), SMALL | changes).session
         kept.append(session.perform("steady", folder / f"{angle}.h5").path)
     for name in files:
         (folder / name).unlink()
@@ -264,7 +264,7 @@ def pressed(tmp_path_factory):
     """Two runs under back pressure, the second with a wall of 0.9, held against the first one's passage and section."""
     folder = tmp_path_factory.mktemp("pressed")
     changes = SMALL | {"closure.max_step": "2 kPa", "closure.pressures": ["2 kPa", "4 kPa"]}
-    first = dbvfiv.load(None, changes).closure(output=folder / "plain.h5")
+    first = dbvfiv.load(thesis_case(), changes).closure(output=folder / "plain.h5")
     state = first.states[-1]
     areas, shapes = folder / "areas.csv", folder / "shapes.csv"
     rows = "".join(f"{s.pressure}, {1e6 * s.least_opening + 3}\n" for s in first.states)
@@ -276,7 +276,7 @@ def pressed(tmp_path_factory):
     kept = []
     for factor in (1.0, 0.9):
         more = {"closure.measured": [str(areas), str(shapes)], "valve.thickness_factor": factor}
-        kept.append(dbvfiv.load(None, changes | more).closure(output=folder / f"{factor}.h5").path)
+        kept.append(dbvfiv.load(thesis_case(), changes | more).closure(output=folder / f"{factor}.h5").path)
     return kept
 
 

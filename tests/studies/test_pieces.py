@@ -7,6 +7,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case import CaseError
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.sensitivity.derivatives import parameters_of
 from tests.verification.test_transient_modes import check_three_routes, three_routes
 
@@ -27,7 +28,7 @@ def load(*keys):
     changes = dict(SMALL)
     for some in keys:
         changes |= some
-    return dbvfiv.load(None, changes)
+    return dbvfiv.load(thesis_case(), changes)
 
 
 def with_waves(keys):

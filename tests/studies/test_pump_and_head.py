@@ -11,7 +11,7 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.case import THESIS, thesis_case
 
 SMALL = {
     "mesh.around": 6,
@@ -29,7 +29,7 @@ def load(*keys):
     changes = SMALL | DAMPED
     for some in keys:
         changes = changes | some
-    return dbvfiv.load(None, changes)
+    return dbvfiv.load(thesis_case(), changes)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def test_a_list_of_pressures_is_what_was_asked_for(operating):
 
 def test_the_command_line_gives_the_operating_point(command_line, operating, tmp_path):
     (tmp_path / "pump.csv").write_text("flow [L/s], head [m]\n0, 3\n30, 2.6\n60, 1.8\n100, 0.3\n")
-    options = [f"--set={key}={value}" for key, value in (SMALL | DAMPED).items()]
+    options = [f"--set={key}={value}" for key, value in (THESIS | SMALL | DAMPED).items()]
     out = command_line("steady", *options, f"--set=upstream.pump={tmp_path / 'pump.csv'}").out
     assert f"{operating.pressure / 1e3:.6g}" in out
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.studies.case import thesis_case
 
 MESH = {"mesh.around": 8, "mesh.along": 12}
 LINE = {"upstream.length": 6.0, "upstream.wave_speed": 600.0, "upstream.loss": 1.5, "upstream.elements": 3}
@@ -16,7 +17,7 @@ def load(*keys):
     changes = MESH | LINE | LIGHT
     for some in keys:
         changes = changes | some
-    return dbvfiv.load(None, changes)
+    return dbvfiv.load(thesis_case(), changes)
 
 
 def leading(*keys):

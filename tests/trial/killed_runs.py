@@ -23,6 +23,7 @@ from dbvfiv.api import Valve
 from dbvfiv.errors import CaseError
 from dbvfiv.record.record import GrowingRecord, Record
 from dbvfiv.studies import KINDS
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.columns import valid_rows
 from dbvfiv.studies.study import find_study
 
@@ -76,7 +77,9 @@ class Child:
             return
         try:
             told(wire)
-            dbvfiv.resume(path) if path.exists() and path.stat().st_size else RUNS[kind](dbvfiv.load(None, CASE), path)
+            dbvfiv.resume(path) if path.exists() and path.stat().st_size else RUNS[kind](
+                dbvfiv.load(thesis_case(), CASE), path
+            )
             os._exit(0)
         except BaseException:
             traceback.print_exc()

@@ -14,8 +14,9 @@ from dbvfiv.record.files import check_writable
 from dbvfiv.record.lock import WriterLock
 from dbvfiv.studies.session import Session
 from tests.child import start
+from tests.small_valves import THESIS_SET
 
-COARSE = ("--set", "mesh.around=4", "--set", "mesh.along=6", "--set", "fluid.density=10")
+COARSE = (*THESIS_SET, "--set", "mesh.around=4", "--set", "mesh.along=6", "--set", "fluid.density=10")
 LONG = ("steady", *COARSE, "-p", "1 kPa:30 kPa:4000")
 
 

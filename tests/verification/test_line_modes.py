@@ -187,6 +187,6 @@ def test_a_hundred_random_installations():
 
 
 def test_a_line_without_length_is_none():
-    bare, none = (dbvfiv.load(None, SMALL | WATER | keys) for keys in ({}, LINE | {"upstream.length": 0.0}))
+    bare, none = (dbvfiv.load(thesis_case(), SMALL | WATER | keys) for keys in ({}, LINE | {"upstream.length": 0.0}))
     assert none.model.line is None
     assert none.steady(pressure=500.0).mass_flow == bare.steady(pressure=500.0).mass_flow

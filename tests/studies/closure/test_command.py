@@ -7,8 +7,9 @@ import json
 import pytest
 
 from dbvfiv.studies.session import load_result
+from tests.small_valves import THESIS_SET
 
-COARSE = ("--set", "mesh.around=6", "--set", "mesh.along=10", "--set", "closure.max_step=5 kPa")
+COARSE = (*THESIS_SET, "--set", "mesh.around=6", "--set", "mesh.along=10", "--set", "closure.max_step=5 kPa")
 
 
 def test_one_json_document(command_line):

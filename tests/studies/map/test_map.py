@@ -27,7 +27,7 @@ from dbvfiv.studies.modes.run import run_modes
 from dbvfiv.studies.session import load_result
 from eigen import SingularShiftError
 from eigen.phase_count import PhaseCounts
-from tests.small_valves import FORMER
+from tests.small_valves import FORMER, THESIS_SET
 
 from .axes import AXES
 
@@ -152,7 +152,7 @@ def test_json_and_figures(case, tmp_path, capsys):
     arguments = [
         f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()
     ]
-    mesh = ["--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0"]
+    mesh = [*THESIS_SET, "--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0"]
     assert (
         run(["map", *arguments, *mesh, "--x", "pressure=3 kPa:8 kPa:3", "--json", "--plots", str(tmp_path / "figures")])
         == 0
@@ -166,7 +166,7 @@ def test_json_and_figures(case, tmp_path, capsys):
 
 
 def test_the_command_says_what_is_fixed(command_line, one_sentence, tmp_path):
-    mesh = ["--set=mesh.around=6", "--set=mesh.along=10", "--set=map.checks=0", "--set=map.curve=false"]
+    mesh = [*THESIS_SET, "--set=mesh.around=6", "--set=mesh.along=10", "--set=map.checks=0", "--set=map.curve=false"]
     axes = ["--x", "density=1:100:3:log", "--y", "beta=0.001:0.004:3"]
     path = tmp_path / "map.h5"
     outcome = command_line("map", *mesh, *axes, "-p", "4 kPa", "-o", path)
@@ -194,7 +194,7 @@ def test_killed_run_resumes(case, whole, tmp_path):
     settings = [
         f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()
     ]
-    mesh = ["--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0"]
+    mesh = [*THESIS_SET, "--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0"]
     process = subprocess.Popen([sys.executable, str(script), "map", *settings, *mesh, "-o", str(path)], cwd=os.getcwd())
     deadline = time.time() + 240
     while time.time() < deadline:

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 
+from dbvfiv.studies.case import THESIS
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.session import load_result
 
@@ -29,7 +30,7 @@ def test_two_mpi_processes_find_the_same_map(coarse_case, tmp_path):
     path = tmp_path / "map.h5"
     changes = [
         f"--set={key}={str(value).lower() if isinstance(value, bool) else value}"
-        for key, value in (SETTINGS | MESH).items()
+        for key, value in (THESIS | SETTINGS | MESH).items()
     ]
     command = [
         "mpiexec",

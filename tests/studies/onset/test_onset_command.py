@@ -6,6 +6,7 @@ import pytest
 
 from dbvfiv.cli import run
 from dbvfiv.studies.session import load_result
+from tests.small_valves import THESIS_SET
 
 SETTINGS = [
     "--set=mesh.around=8",
@@ -75,7 +76,7 @@ def test_figure(outcome):
 
 def test_the_command_says_what_is_fixed(command_line, one_sentence, outcome):
     asked = ["onset", "--over", "alpha=0:40:3", "--set=onset.normal_form=false", "--set=onset.coarse_mesh=0"]
-    mesh = ["--set=mesh.around=6", "--set=mesh.along=10"]
+    mesh = [*THESIS_SET, "--set=mesh.around=6", "--set=mesh.along=10"]
     done = command_line(*asked, *mesh, "-p", "4 kPa", "--density", 10)
     assert done.status == 0, done.err
     assert done.out.startswith("At 4 kPa static, 10 kg/m³, quasi-steady, β = 0.003 s:")

@@ -17,6 +17,7 @@ from dbvfiv.api import Valve
 from dbvfiv.cli import run
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
+from dbvfiv.studies.case import THESIS
 from dbvfiv.studies.onset.point import OnsetPoint, OnsetSample
 from dbvfiv.studies.session import load_result
 from tests.small_valves import FORMER
@@ -166,7 +167,7 @@ def test_a_killed_run_goes_on(whole, tmp_path):
     path, script = tmp_path / "onset.h5", tmp_path / "go.py"
     script.write_text(_RUN)
     settings = [
-        *(f"{k}={v}" for k, v in FORMER.items()),
+        *(f"{k}={v}" for k, v in (THESIS | FORMER).items()),
         "mesh.around=8",
         "mesh.along=16",
         "damping.alpha=0",

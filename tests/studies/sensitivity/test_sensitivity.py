@@ -8,7 +8,7 @@ import pytest
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.case import THESIS, thesis_case
 
 CHANGES = {"mesh.around": 8, "mesh.along": 14, "damping.alpha": 0, "fluid.density": 10, "drive.pressure": 6e3}
 NAMES = ["pressure", "beta", "layer 3 angle", "alpha"]
@@ -72,7 +72,9 @@ def test_an_interrupted_run_goes_on_with_the_same_digits(valve, found, tmp_path)
 
 
 def test_command(command_line, found, one_sentence):
-    settings = [f"--set={key}={value}" for key, value in CHANGES.items() if key[:5] not in ("drive", "fluid")]
+    settings = [
+        f"--set={key}={value}" for key, value in (THESIS | CHANGES).items() if key[:5] not in ("drive", "fluid")
+    ]
     asked = [word for name in NAMES for word in ("--of", name)]
     outcome = command_line("sensitivity", *settings, "-p", "6 kPa", "--density", 10, *asked, "--json")
     assert outcome.status == 0, outcome.err

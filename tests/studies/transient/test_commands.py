@@ -5,11 +5,13 @@ import json
 import numpy as np
 import pytest
 
+from tests.small_valves import THESIS_SET
+
 SMALL = [
     w
     for key in ("mesh.around=6", "mesh.along=8", "transient.duration=0.02", "transient.save_every=0.005")
     for w in ("--set", key)
-]
+] + [*THESIS_SET]
 
 
 def test_transient_and_what_reads_it(command_line, tmp_path):
