@@ -287,7 +287,13 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
 
 
 def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str]:
-    """Sentences about the states found: the worst of those in which a rubber is no longer stable."""
-    judged = [material_stability(model, state.q, state.pressure) for state in states]
-    if judged and not (worst := min(judged, key=lambda found: found.margin)).holds:
-        yield worst.sentence
+    """Sentences about the states found: the worst of those in which a rubber is not stable, and which they are."""
+    lost = [found for state in states if not (found := material_stability(model, state.q, state.pressure)).holds]
+    if lost:
+        yield min(lost, key=lambda found: found.margin).sentence
+    if len(lost) > 1:
+        pressures = [found.pressure for found in lost]
+        yield (
+            f"The rubber's constants are unstable in {len(lost)} of {len(states)} states, from {min(pressures):.6g} to "
+            f"{max(pressures):.6g} Pa."
+        )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,9 @@ from dbvfiv.materials import (
     strain_levels,
     uniaxial_stress,
 )
+from tests.pages import agrees
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "materials.md"
 
 # Th. Table 3-3, MPa: for each level the three-constant set, then the two-constant set.
 TABLE_3_3 = {
@@ -99,6 +104,26 @@ def test_stable_constants_are_the_least_squares(name):
         fit, law = fit_rubber([_curve(name, level)], form_of("softening")), rubber(name, level)
         np.testing.assert_allclose(fit.constants, [law.mu_inf, law.mu_0, law.c], rtol=1e-5)
         assert fit.exponents[0] == pytest.approx(law.x_0, rel=1e-5)
+
+
+def test_the_documented_fits_are_true():
+    """docs/materials.md: constants, R^2 and largest error beyond 2 % strain, to the digits printed."""
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in DOCUMENT.read_text().splitlines()]
+    rows = [row for row in rows if row[0] in FOUND and len(row) == 9]
+    assert len(rows) == 12
+    for name, level, published, modulus, *cells in rows:
+        level = float(level.split()[0]) / 100
+        law, test = rubber(name, level), _curve(name, level)
+        fit = fit_rubber([test], form_of("softening"))
+        assert published == f"{published_rubber(name, level).small_strain_shear_modulus / 1e6:.3f} MPa"
+        assert modulus == f"{law.small_strain_shear_modulus / 1e6:.3f} MPa"
+        error = np.abs(fit.residuals / test.stress)[test.strain >= 0.02].max()
+        found = (law.mu_inf / 1e6, law.x_0, law.c / 1e6, fit.r_squared, 100 * error)
+        assert all(agrees(cell.split()[0], value) for cell, value in zip(cells, found, strict=True)), (
+            name,
+            level,
+            found,
+        )
 
 
 def test_stable_constants_between_levels():
