@@ -166,8 +166,8 @@ IN_VACUO = {
 @pytest.mark.slow
 def test_layered_valve_in_vacuo():
     """On rows of the thesis's cases. With the averaged mass 28 x 48 has the frequencies within 0.15 % of those of 56 x
-    96, for 0.6 %; on 14 x 24 the fifth is 1.3 % too low, where it is 1.5 % too high with the consistent mass. The isotropic valve on 56 x 96: 0.13,
-    0.11, 0.22, 0.07 and 0.02 % over other codes, for 0.15, 0.14, 0.29, 0.14 and 0.08.
+    96, for 0.6 %; on 14 x 24 the fifth is 1.3 % too low, where it is 1.5 % too high with the consistent mass. The
+    isotropic valve on 56 x 96: 0.13, 0.11, 0.22, 0.07 and 0.02 % over other codes, for 0.15, 0.14, 0.29, 0.14, 0.08.
     """
     found = {given: in_vacuo(*given) for given in IN_VACUO}
     for given, values in found.items():
