@@ -58,7 +58,7 @@ class Mesh(Section):
     inertia: Literal["parabolic", "linear"] = key(
         "parabolic",
         "Course between rows of the pressure by which the fluid resists being accelerated: the parabola that straight "
-        "courses of the velocity make (parabolic), or straight (linear, the thesis).",
+        "courses of the velocity make (parabolic), or straight (linear, the thesis); straight with fluid.sound_speed.",
     )
 
     def check_positions(self, length: float) -> None:

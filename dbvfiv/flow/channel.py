@@ -8,7 +8,7 @@ program (App. A). U is the inlet velocity. Continuity is blended between two law
 moving walls. Terms add losses and inertances: see `dbvfiv.flow.term`. The thesis leaves gravity out; here `levels` has
 what it does to a valve that stands upright.
 
-Equations (T.9), (T.10), (T.11) and (T.32) of docs/theory.md.
+Equations (T.9), (T.10), (T.11) and (T.31) of docs/theory.md.
 """
 
 from __future__ import annotations

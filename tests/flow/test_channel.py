@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from dbvfiv.flow import Channel, FlowMotion, UniformLoad
+from dbvfiv.flow.term import wall_share
 
 FLOOR = 1e-5
 
@@ -86,10 +88,10 @@ def test_higher_derivatives():
 
 
 @pytest.mark.parametrize("storage", [0.0, 0.5, 1.0])
-@pytest.mark.parametrize("unsteady", [True, False])
-def test_operators_at_a_moving_state(storage, unsteady):
+@pytest.mark.parametrize("unsteady, bowed", [(True, False), (True, True), (False, False)])
+def test_operators_at_a_moving_state(storage, unsteady, bowed):
     z, area = passage()
-    channel = Channel(z, FLOOR, storage, unsteady)
+    channel = Channel(z, FLOOR, storage, unsteady, bowed=bowed)
     generator = np.random.default_rng(3)
     rate, acceleration = generator.standard_normal(len(z)) * 0.02, generator.standard_normal(len(z)) * 0.5
     velocity, velocity_rate = 1.7, 4.0
@@ -161,6 +163,24 @@ def test_storage_conserves_volume():
         flow_rate = area * speed_rate
         growth = 0.5 * np.diff(z) * (acceleration[1:] + acceleration[:-1])
         assert flow_rate[1:] - flow_rate[:-1] == pytest.approx(storage * growth, rel=1e-5, abs=1e-7)
+
+
+def test_integral_of_the_speed_between_stations():
+    """Of speeds that run straight it is a parabola, whose mean over a section lies h (U_b - U_a)/12
+    from that of a straight course; stations take it by the lengths of their sections, the ends keep their own.
+    """
+    z, _ = passage()
+    speed, step = np.random.default_rng(5).uniform(1, 9, len(z)), np.diff(z)
+    fine = np.linspace(0.0, 1.0, 20001)
+    missed = []
+    for h, a, b in zip(step, speed, speed[1:]):
+        psi = h * (b * (1 - fine) + 0.5 * (a - b) * (1 - fine) ** 2)  # from the side of the inlet
+        missed.append(trapezoid(psi - np.interp(fine, [0, 1], psi[[0, -1]]), fine))
+    missed = np.array(missed)
+    assert missed == pytest.approx(step * np.diff(speed) / 12, rel=1e-6)
+    share = np.asarray(wall_share(step, speed))
+    assert share[1:-1] * (step[1:] + step[:-1]) == pytest.approx((step * missed)[1:] + (step * missed)[:-1], rel=1e-6)
+    assert share[0] == share[-1] == 0.0
 
 
 def test_added_mass_only_with_storage():

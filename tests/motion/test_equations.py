@@ -13,7 +13,11 @@ from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.trial import Trial
 
-LAWS = [{"fluid.continuity": "quasi-steady"}, {"fluid.continuity": "storage"}]
+LAWS = [
+    {"fluid.continuity": "quasi-steady"},
+    {"fluid.continuity": "storage"},
+    {"fluid.continuity": "storage", "mesh.inertia": "parabolic"},
+]
 
 
 @pytest.mark.parametrize("law", LAWS + [{"fluid.unsteady": False}])

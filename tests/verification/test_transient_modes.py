@@ -150,11 +150,13 @@ def test_three_routes(law, pressure, density, sign):
     assert off[1] < 0.3 * off[0]
 
 
-def test_three_routes_with_the_averaged_mass():
-    """The mass is one and the same in spectra and in time; it moves the eigenvalue by more than these differ."""
+def test_three_routes_with_the_default_mesh():
+    """Mass and inertia of the fluid are the same in spectra and in time; they move the eigenvalue by more than these
+    differ.
+    """
     law, pressure, density, _ = STATES[0]
-    found = three_routes(law, pressure, density, further={"shell.mass": "averaged"})
-    check_three_routes(found, "averaged mass")
+    found = three_routes(law, pressure, density, further={"shell.mass": "averaged", "mesh.inertia": "parabolic"})
+    check_three_routes(found, "averaged mass, parabolic inertia")
     changes = {"mesh.around": 8, "mesh.along": 12, "damping.alpha": 0.0, "damping.beta": BETA}
     valve = dbvfiv.load(thesis_case(), changes | {"fluid.density": density, "drive.pressure": pressure})
     consistent = next(m for m in valve.modes(count=8).modes if m.frequency > 0)
