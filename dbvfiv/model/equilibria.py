@@ -11,6 +11,7 @@ from ..errors import SolveError
 from ..geometry.divisions import grading
 from ..materials.stability import stability_margin
 from ..observer import Observer
+from .layer_strains import beyond_levels
 from .load_steps import LoadStepOptions, LoadSteps, Way
 from .loading import Loading
 from .newton import NewtonOptions
@@ -287,7 +288,8 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
 
 
 def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str]:
-    """Sentences about the states found: strains at which a rubber law is no longer stable."""
+    """Sentences about the states found: strains beyond settled levels, or at which a rubber law is no longer stable."""
+    yield from beyond_levels(model, states)
 
     section = model.shell.section
     worst: dict[str, tuple[float, float]] = {}
