@@ -92,6 +92,7 @@ def test_a_smooth_skin_goes_through_its_profiles_and_needs_no_row_on_them(tmp_pa
             a, b = 15.0 - 5.0 * np.sin(np.pi * z / 1.12), 1.0 + 9.0 * np.sin(np.pi * z / 1.12) ** 2
             file.writelines(f"{a * np.sin(t):.12f}; {b * np.cos(t):.12f}; {z:.12f}\n" for t in angle)
     given = {"valve.key_points": str(tmp_path / "ellipses.csv"), "mesh.along": 16, "mesh.around": 8}
+    given["mesh.rows"] = "graded"  # the spline through the profiles is worst next to the lip, where areas are least
     case = Case().replace(given | {"valve.key_point_skin": "smooth"})
     mesh = valve_mesh(case.valve, case.mesh)
     assert mesh.shape == (8, 16)

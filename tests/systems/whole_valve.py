@@ -71,7 +71,7 @@ def whole_valve(model: ValveModel, q: np.ndarray, inlet: float) -> Whole:
             quarter.thickness[valve.cell[own]],
             directors=quarter.directors[valve.node] * valve.sign,
         )
-        shell = Shell(surface, wall, free, model.shell.metric, model.shell.element)
+        shell = Shell(surface, wall, free, model.shell.metric, model.shell.element, mass_kind=model.shell.mass_kind)
         state, dofs = shell.dofs.restrict(full), shell.dofs
         mass = mass + dofs.matrix(shell.mass(state))
         structure = structure + dofs.matrix(shell.force_and_tangent(state)[1])
