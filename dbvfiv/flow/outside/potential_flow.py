@@ -1,7 +1,8 @@
 """Potential flow outside a moving surface: what pressure its motion makes.
 
-Sources on all panels, of strengths that vary smoothly along a surface; their normal velocities are those of the surfaces, zero on rigid ones, and on open
-panels the potential vanishes instead. Panels that never move are eliminated once.
+Sources on all panels, of strengths that vary smoothly along a surface; their normal velocities are those of the
+surfaces, zero on rigid ones, and on open panels the potential vanishes instead. Panels that never move are eliminated
+once.
 
 Equation (T.19) of docs/theory.md.
 """
