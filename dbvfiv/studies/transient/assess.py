@@ -15,8 +15,8 @@ from ..stability.verdict import Verdict as StabilityVerdict
 
 #: Columns of a history by name.
 Columns = Mapping[str, np.ndarray]
-#: Smallest area over that at rest up to which a valve is closed: under a pressure that drives fluid out, of which a
-#: shut one lets no more pass than leaks through, and where nothing drives fluid out.
+#: Smallest area over that of the lip gap at rest up to which a valve is closed: where the pressure drives fluid out,
+#: and where nothing does.
 SHUT, UNOPENED = 0.5, 2.0
 #: Pascal; no fluid's pressure falls further below that of the surroundings.
 ATMOSPHERE = 101_325.0

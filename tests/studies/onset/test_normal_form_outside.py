@@ -21,11 +21,17 @@ WATER = {
 
 @pytest.mark.slow
 def test_an_onset_with_water_outside_is_soft_or_hard(monkeypatch):
-    """Here the change of the added mass turns a hard onset into a soft one, so it cannot be left out."""
+    """The change of the added mass is most of what makes this onset soft, so it cannot be left out.
+
+    Moved when the strengths of sources outside came to vary over panels, on a mesh whose panels are wide: l1 was
+    -0.387e-6, and +0.670e-6 without that change, whose share stays.
+    """
     (found,) = dbvfiv.load(thesis_case(), WATER).onset("beta=1.5e-3:4e-3:3:log").points
     assert found["criticality"] == "super" and not found["note"] and found["crossing_speed"] < 0
     nothing = lambda forms, *directions: np.zeros_like(forms.q)  # noqa: E731
     monkeypatch.setattr(OutsideForms, "second", nothing)
     monkeypatch.setattr(OutsideForms, "third", nothing)
     (left_out,) = dbvfiv.load(thesis_case(), WATER).onset("beta=1.5e-3:4e-3:3:log").points
-    assert left_out["value"] == found["value"] and left_out["criticality"] == "sub"
+    assert left_out["value"] == found["value"]
+    share = found["first_lyapunov_coefficient"] - left_out["first_lyapunov_coefficient"]
+    assert share == pytest.approx(-1.054e-6, rel=0.02) and share < 0.5 * found["first_lyapunov_coefficient"]
