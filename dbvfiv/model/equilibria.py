@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import SolveError
 from ..geometry.divisions import grading
 from ..observer import Observer
+from .layer_strains import beyond_levels
 from .load_steps import LoadStepOptions, LoadSteps, Way
 from .loading import Loading
 from .material_stability import material_stability
@@ -287,7 +288,8 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
 
 
 def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str]:
-    """Sentences about the states found: the worst of those in which a rubber is not stable, and which they are."""
+    """Sentences about the states found: strains beyond settled levels, and where a rubber is not stable."""
+    yield from beyond_levels(model, states)
     lost = [found for state in states if not (found := material_stability(model, state)).holds]
     if lost:
         yield min(lost, key=lambda found: found.margin).sentence

@@ -4,9 +4,8 @@ The constants of a tested rubber hold up to the strain they were fitted over, so
 occurs (Eq. 7.1 guesses it for all rubbers from the arc of the lip). Here it is found: with the constants of a level the
 valve is solved, what its layers strain is the next level, until both agree.
 
-A place's strain is that of a tension test with the same first invariant. As Eq. 7.1 asks for the largest strain, the
-next level of a rubber is what 99 % of the volume of its layer stays below: the last hundredth lies in the fold of the
-side edge, where it grows with every finer mesh. The mean that is reported too is weighted with the energy stored.
+As Eq. 7.1 asks for the largest strain, the next level of a rubber is the peak of its layers (`layer_strains`).
+`agree_levels` does that at one pressure, `settle_levels` for all that is asked of a case.
 """
 
 from __future__ import annotations
@@ -20,10 +19,9 @@ import numpy as np
 from ..case.materials import HIGHEST_LEVEL, LOWEST_LEVEL, RUBBERS
 from ..case.model import Case
 from ..errors import SolveError
-from ..materials.incompressible import plane_stress_invariants
-from ..materials.law import MOONEY_RIVLIN
 from ..observer import Observer
 from .equilibria import LoadPath, SteadyOptions
+from .layer_strains import LayerLevel, layer_levels
 from .operating_point import operating_pressure
 from .state import SteadyState
 from .valve import ValveModel
@@ -46,32 +44,6 @@ CLOSED = {
     "supports.contact": "faces",
     "supports.contact_stiffness": 1e8,
 }
-#: Share of a layer's volume that strains less than its peak.
-PEAK = 0.99
-
-
-@dataclass(frozen=True)
-class LayerLevel:
-    """A layer of rubber at one state.
-
-    Attributes
-    ----------
-    number : int
-        From inside to outside, from 1.
-    material : str
-    level : float
-        Strain level whose constants it has; NaN of rubbers that have no levels.
-    peak : float
-        Strain that `PEAK` of its volume does not reach: the next level.
-    mean : float
-        Mean strain, weighted with the energy stored.
-    """
-
-    number: int
-    material: str
-    level: float
-    peak: float
-    mean: float
 
 
 @dataclass(frozen=True)
@@ -343,50 +315,9 @@ def _bounded(name: str, level: float, peak: float, where: str) -> str:
     )
 
 
-def layer_levels(model: ValveModel, q: np.ndarray, levels: Mapping[str, float]) -> Iterator[LayerLevel]:
-    """Strains of the layers of rubber at displacements."""
-    shell, section = model.shell, model.shell.section
-    strains, each = shell.strains(q), section.points_per_layer
-    weights = shell.at_rest.points[..., 1]
-    weights = weights if weights.ndim == 1 else weights[:, None]
-    volume = (shell.geometry.thickness[:, None] * shell.geometry.area)[:, :, None] * weights
-    for i, layer in enumerate(section.layers):
-        if layer.law.kind != MOONEY_RIVLIN:
-            continue
-        own = slice(i * each, (i + 1) * each)
-        e = np.moveaxis(strains[:, :, own], -1, 0)
-        strain = tension_of(plane_stress_invariants(e).i1_minus_3)
-        energy = np.maximum(layer.law.energy(e), 0.0) * volume[:, :, own]
-        mean = float(np.average(strain, weights=energy)) if energy.sum() > 0 else 0.0
-        order = np.argsort(strain, axis=None)
-        filled = np.cumsum(volume[:, :, own].ravel()[order])
-        peak = float(strain.ravel()[order][np.searchsorted(filled, PEAK * filled[-1])])
-        yield LayerLevel(i + 1, layer.name, levels.get(layer.name, np.nan), peak, mean)
-
-
 def _next_levels(layers: tuple[LayerLevel, ...], names: list[str]) -> dict[str, float]:
     """Next level of each rubber: the largest peak of its layers, as far as the tests go."""
     return {
         name: float(np.clip(max(x.peak for x in layers if x.material == name), LOWEST_LEVEL, HIGHEST_LEVEL))
         for name in names
     }
-
-
-def tension_of(i1_minus_3: np.ndarray) -> np.ndarray:
-    """Engineering strain of the tension test with a first invariant: the root of stretch^2 + 2/stretch = I1 above 1.
-
-    Examples
-    --------
-    >>> stretch = 1.25
-    >>> round(float(tension_of(stretch**2 + 2 / stretch - 3)), 12)
-    0.25
-    """
-    excess = np.maximum(i1_minus_3, 0.0)
-    i1 = 3.0 + excess
-    stretch = 2.0 * np.sqrt(i1 / 3.0) * np.cos(np.arccos(-((3.0 / i1) ** 1.5)) / 3.0)
-    strain = np.where(excess < 1e-4, np.sqrt(excess / 3.0), stretch - 1.0)  # the cosine loses half the digits near rest
-    for _ in range(2):
-        rest = strain**2 * (3.0 + strain) / (1.0 + strain) - excess
-        slope = 2.0 * (1.0 + strain) - 2.0 / (1.0 + strain) ** 2
-        strain = strain - np.divide(rest, slope, out=np.zeros_like(rest), where=slope > 0)
-    return np.maximum(strain, 0.0)

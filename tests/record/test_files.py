@@ -83,14 +83,8 @@ def test_files_of_the_case_travel_with_the_result(tmp_path, coarse_run, monkeypa
     stress = 2 * (stretch - stretch**-2) * (law.parameters[0] + law.parameters[1] / stretch)
     data = tmp_path / "tension.csv"
     data.write_text("strain,stress\n" + "".join(f"{s - 1:.6f},{p:.6e}\n" for s, p in zip(stretch, stress)))
-    case = dbvfiv.load(
-        changes={
-            "mesh.around": 8,
-            "mesh.along": 16,
-            "materials.own": {"kind": "fit", "path": str(data), "density": 1300},
-            "layers.0.material": "own",
-        }
-    ).case
+    own = {"kind": "fit", "path": str(data), "density": 1300, "loss_factor": "CR"}
+    case = Case().replace({"mesh.around": 8, "mesh.along": 16, "materials.own": own, "layers.0.material": "own"})
     monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "cache"))
     with h5py.File(tmp_path / "h.h5", "w") as file:
         write_header(file, Header.of("steady", case))

@@ -15,7 +15,7 @@ COARSE = {"mesh.around": 4, "mesh.along": 6, "drive.pressure": 2e3, "fluid.densi
 
 @pytest.fixture(scope="module")
 def valve():
-    return dbvfiv.load(thesis_case(), COARSE)
+    return dbvfiv.Valve(thesis_case(COARSE), "dbv12")
 
 
 RUNS = {

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.write import case_toml
-from dbvfiv.model.strain_level import settle_levels, tension_of
+from dbvfiv.model.layer_strains import tension_of
+from dbvfiv.model.strain_level import settle_levels
 from dbvfiv.studies.case import load_case, thesis_case
 
 COARSE = {"mesh.around": 8, "mesh.along": 14}
@@ -59,6 +60,13 @@ def test_auto_settles_once_at_the_largest_pressure_of_the_case(found):
         assert one.frequency == pytest.approx(two.frequency, rel=1e-9)
     given = dbvfiv.load(modes.case).steady(pressure=6e3)
     assert given.mass_flow == pytest.approx(state.mass_flow, rel=1e-9)
+
+
+def test_a_state_beyond_the_settled_levels_is_told():
+    """Settled at 6 kPa, asked at 36 kPa, where CR strains by some 16 to 18 %."""
+    valve = dbvfiv.load(thesis_case(), AUTO | {"drive.pressure": 6e3})
+    assert any(sentence.startswith("CR strains by up to 1") for sentence in valve.steady([36e3]).warnings)
+    assert not any("strains by up to" in sentence for sentence in valve.steady([7e3]).warnings)
 
 
 def test_pressures_at_which_levels_settle():

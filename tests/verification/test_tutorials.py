@@ -65,8 +65,9 @@ def test_quick_start(capsys):
 def test_own_valve():
     follow("own-valve")
     thin, thick = dbvfiv.load_result("six.h5"), dbvfiv.load_result("thick.h5")
-    assert thin.states[1].lip_opening == pytest.approx(0.026, abs=0.002)
-    assert 1e3 * thin.states[1].mass_flow / thin.case.fluid.density == pytest.approx(11.4, abs=0.5)
+    assert thin.states[1].lip_opening == pytest.approx(0.028, abs=0.002)  # 0.026 m and 11.4 L/s with 10 % constants
+    assert 1e3 * thin.states[1].mass_flow / thin.case.fluid.density == pytest.approx(12.6, abs=0.5)
+    assert thin.record.settled.startswith("Strain levels of the rubbers: CR 24.2 %, SBR 10.5 %, EPDM 13.3 %")
     assert all(b.mass_flow < a.mass_flow for a, b in zip(thin.states, thick.states))
     assert Path("both.png").exists()
 

@@ -46,7 +46,8 @@ def tell(file: Path, as_json: bool, case: bool) -> None:
         ("layers", ", ".join(result.mesh.layer_titles()) + " (inside to outside)"),
         ("load", load),
     )
-    lines = [f"{name:<10}{value}" for name, value in facts] + ["", *result.lines()]
+    settled = [result.record.settled] if result.record.settled else []
+    lines = [f"{name:<10}{value}" for name, value in facts] + ["", *result.lines(), *settled]
     notes = [("Warning", text) for text in result.warnings] + [("Failure", text) for text in result.failures]
     lines += [""] * bool(notes) + [f"{kind}: {text}" for kind, text in notes]
     print("\n".join(lines))

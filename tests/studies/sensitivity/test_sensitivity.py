@@ -72,9 +72,8 @@ def test_an_interrupted_run_goes_on_with_the_same_digits(valve, found, tmp_path)
 
 
 def test_command(command_line, found, one_sentence):
-    settings = [
-        f"--set={key}={value}" for key, value in (THESIS | CHANGES).items() if key[:5] not in ("drive", "fluid")
-    ]
+    given = {key: value for key, value in CHANGES.items() if key[:5] not in ("drive", "fluid")}
+    settings = [f"--set={key}={value}" for key, value in (THESIS | given).items()]
     asked = [word for name in NAMES for word in ("--of", name)]
     outcome = command_line("sensitivity", *settings, "-p", "6 kPa", "--density", 10, *asked, "--json")
     assert outcome.status == 0, outcome.err
