@@ -288,9 +288,7 @@ def model_warnings(model: ValveModel) -> Iterator[str]:
 
 
 def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str]:
-    """Sentences about the states found: the worst of those in which a rubber is not stable, and which they are;
-    and strains beyond settled levels.
-    """
+    """Sentences about the states found: strains beyond settled levels, and where a rubber is not stable."""
     yield from beyond_levels(model, states)
     lost = [found for state in states if not (found := material_stability(model, state.q, state.pressure)).holds]
     if lost:

@@ -18,7 +18,7 @@ def command(
         typer.Option(
             "--of",
             metavar="PARAMETER",
-            help="pressure, density, ..., or 'layer 3 angle', 'layer 2 c10'; may be repeated; all without it.",
+            help="pressure, density, ..., or 'layer 3 angle', 'layer 2 mu_0'; may be repeated; all without it.",
         ),
     ] = None,
     pressure: PressureOption = None,

@@ -68,7 +68,7 @@ def parameters_of(model: ValveModel) -> tuple[str, ...]:
     """Every parameter an eigenvalue of this valve can be differentiated by.
 
     Those of `dbvfiv.case.parameters` that it has, and the layers, which count from 1, inside to outside: "layer 3
-    angle", "layer 1 thickness" (its share of the wall), "layer 1 c10" (a constant of its law).
+    angle", "layer 1 thickness" (its share of the wall), "layer 1 mu_0" (a constant of its law).
     """
     names = [name for name in PARAMETERS if _has(model, name)]
     for i, layer in enumerate(model.shell.section.layers, 1):
@@ -102,7 +102,7 @@ def unit_of(name: str) -> str:
     if name in PARAMETERS:
         return PARAMETERS[name].quantity.si
     _, quantity = _layer(name)
-    if quantity.startswith(("nu", "poisson")):
+    if quantity.startswith(("nu", "poisson", "x_0")):
         return ""
     return {"thickness": "m", "angle": "deg", "density": "kg/m^3"}.get(quantity, "Pa")
 
@@ -189,6 +189,8 @@ def _with_common_times(*pencils: CoupledPencil) -> list[CoupledPencil]:
 
 def _inward(name: str, value: float, h: float) -> int:
     """+1 at the lower end of a parameter that ends there, -1 at the upper end, 0 elsewhere."""
+    if name.split()[-1] in ("mu_inf", "mu_0", "c") and value < h:  # constants of a softening layer, none negative
+        return 1
     if name == "thickness" or name not in (*DESIGN, "loss_factor"):
         return 0
     row = PARAMETERS[name]
