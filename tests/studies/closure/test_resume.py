@@ -16,7 +16,7 @@ from dbvfiv.api import load
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.resuming import resume
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.session import load_result
 from tests.small_valves import FORMER
 
@@ -151,7 +151,7 @@ def test_a_walk_that_is_stopped_beyond_a_limit_meets_it_again(tmp_path):
 @pytest.mark.slow
 def test_a_killed_run_has_lost_no_finished_state(whole, tmp_path):
     path = tmp_path / "run.h5"
-    words = [f"--set={key}={value}" for key, value in COARSE.items()]
+    words = [f"--set={key}={value}" for key, value in (THESIS | COARSE).items()]
     command = [
         sys.executable,
         "-m",
