@@ -43,9 +43,7 @@ class ColumnSolver:
             self._last = FamilyReduction(family, self._static, self._stiffened, self._structures)
         return self._last
 
-    def solve(
-        self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False, spectra=None
-    ) -> Column:
+    def solve(self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False, spectra=None) -> Column:
         """All conditions at one state.
 
         Parameters

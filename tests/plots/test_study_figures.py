@@ -11,6 +11,7 @@ from dbvfiv.studies.map import figures as map_figures
 from dbvfiv.studies.map.column import MapPlan
 from dbvfiv.studies.onset import figures as onset_figures
 from dbvfiv.studies.onset.intervals import known_intervals, uncertain_intervals
+from dbvfiv.studies.stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 
 
 def texts(figure):
@@ -140,6 +141,8 @@ def map_result(certified=None):
     unstable = np.where(growth > 0, 2, 0)
     grids = {"growth_rate": growth, "frequency": 40.0 + 0.1 * growth, "unstable": unstable}
     grids["certified"] = np.ones(shape, bool) if certified is None else np.broadcast_to(certified, shape)
+    decided = np.where(unstable > 0, OUTCOMES.index(FLUTTERS), OUTCOMES.index(STABLE))
+    grids["outcome"] = np.where(grids["certified"], decided, OUTCOMES.index(UNDECIDED))
     x = np.full(9, 6500.0) + np.linspace(-500, 500, 9)
     curve = SimpleNamespace(law=0, x=x, y=np.geomspace(1, 1000, 9), frequency=np.linspace(36, 52, 9), exact=True)
     return SimpleNamespace(
@@ -173,6 +176,25 @@ def test_words_of_a_map_stand_within_their_region_on_a_ground_of_their_own():
     border = axes.transData.transform((6.5, 10))[0]  # kPa
     assert words["unstable"].get_window_extent().x1 < border < words["stable"].get_window_extent().x0
     assert all(t.get_bbox_patch() is not None for t in words.values())
+
+
+def test_cells_that_are_not_valid_are_hatched_named_and_in_no_colour_scale():
+    result = map_result()
+    grid = result.grid
+    invalid = np.zeros(grid("outcome").shape, bool)
+    invalid[..., :2] = True
+    changed = {
+        "outcome": np.where(invalid, OUTCOMES.index(NOT_VALID), grid("outcome")),
+        "certified": grid("certified") & ~invalid,
+        "unstable": np.where(invalid, -1, grid("unstable")),
+        "growth_rate": np.where(invalid, np.nan, grid("growth_rate")),
+    }
+    result.grid = lambda name: changed.get(name, grid(name))
+    figure = map_figures.stability_map(result)
+    axes = figure.axes[0]
+    assert {t.get_text() for t in axes.texts} >= {"not valid", "stable"}
+    assert sum(bool(c.get_hatch()) for c in axes.collections) == 10
+    assert any("constants of the rubber are unstable there" in text for text in texts(figure))
 
 
 def test_cells_without_a_certificate_are_hatched_and_not_called_stable():

@@ -65,7 +65,7 @@ def lossy_valve():
     return model, q, leading_modes(linearise(model, q, 6e3).pencil(LOSSY), 2, options).mode(0)
 
 
-@pytest.mark.parametrize("name", ["loss_factor", "pressure", "density", "thickness", "layer 2 c10", "layer 3 angle"])
+@pytest.mark.parametrize("name", ["loss_factor", "pressure", "density", "thickness", "layer 2 mu_0", "layer 3 angle"])
 def test_derivative_of_a_wall_that_relaxes_is_that_of_the_eigenvalue(lossy_valve, name):
     """Through the change that the equilibrium makes to what relaxes, too."""
     model, q, mode = lossy_valve
