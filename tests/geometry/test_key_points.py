@@ -11,7 +11,7 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.key_points import read_key_points
 from dbvfiv.geometry import key_point_table, surface_of, valve_mesh
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import Case, thesis_case
 
 WIDE = {
     "valve.lip_half_width": 0.18,
@@ -57,7 +57,7 @@ def test_the_parametric_shape_comes_back(more, tmp_path):
 
 def test_a_wide_bill_by_points_and_by_parameters_is_one_valve(tmp_path):
     """Flow, opening and modes of a bill 1.86 times as wide as its pipe agree to 1e-10."""
-    case = Case().replace(WIDE | {"steady.tolerance": 1e-12})
+    case = thesis_case(WIDE | {"steady.tolerance": 1e-12})
     again = by_points(case, tmp_path, 65)
     states = [dbvfiv.Valve(c).steady(pressure=5e3) for c in (case, again)]
     one, two = states

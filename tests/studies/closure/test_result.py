@@ -10,6 +10,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.api import load
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.curves import supports_compared
 from dbvfiv.studies.session import Session, load_result
 
@@ -26,7 +27,7 @@ COARSE = {
 def run(tmp_path_factory):
     """A result in memory and the file it was written to."""
     path = tmp_path_factory.mktemp("closure") / "run.h5"
-    return load(None, COARSE).closure(["2 kPa", 9e3], output=path), path
+    return load(thesis_case(), COARSE).closure(["2 kPa", 9e3], output=path), path
 
 
 def test_a_file_reads_back_as_the_result(run):
@@ -83,12 +84,12 @@ def test_figures(run, tmp_path):
 def test_python_interface_takes_one_pressure_or_several(given, monkeypatch):
     asked = []
     monkeypatch.setattr(Session, "perform", lambda session, *_, **__: asked.append(session.case.closure.pressures))
-    load(None, COARSE).closure(given)
+    load(thesis_case(), COARSE).closure(given)
     assert asked == [(2e3,)]
 
 
 def test_one_pressure_gives_a_result():
-    valve = load(None, COARSE | {"closure.start": "rest"})
+    valve = load(thesis_case(), COARSE | {"closure.start": "rest"})
     single, listed = valve.closure("2 kPa"), valve.closure([2e3])
     assert [state.pressure for state in single.states] == [2e3]
     assert np.array_equal(single.states[0].nodal, listed.states[0].nodal)
@@ -106,4 +107,4 @@ def test_the_states_of_the_flow_can_be_asked(run):
 
 def test_python_interface_refuses_what_is_no_pressure():
     with pytest.raises(dbvfiv.errors.CaseError, match="pressure"):
-        load(None, COARSE).closure(["7 mm"])
+        load(thesis_case(), COARSE).closure(["7 mm"])

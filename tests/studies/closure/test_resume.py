@@ -16,6 +16,7 @@ from dbvfiv.api import load
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.resuming import resume
+from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.session import load_result
 from tests.small_valves import FORMER
 
@@ -45,7 +46,7 @@ class StopAfter(Observer):
 
 @pytest.fixture(scope="module")
 def whole():
-    return load(None, COARSE).closure(PRESSURES)
+    return load(thesis_case(), COARSE).closure(PRESSURES)
 
 
 def agree(result, whole):
@@ -61,7 +62,7 @@ def agree(result, whole):
 
 def test_an_interrupted_run_goes_on_as_if_it_had_not_been(whole, tmp_path):
     path = tmp_path / "run.h5"
-    first = load(None, COARSE).closure(PRESSURES, output=path, observer=StopAfter(1))
+    first = load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=StopAfter(1))
     assert not first.complete and len(load_result(path).states) == 1
     assert len(load_result(path).walk) > len(
         [p for p in whole.walk if p.pressure <= PRESSURES[0]]
@@ -73,7 +74,7 @@ def test_an_interrupted_run_goes_on_as_if_it_had_not_been(whole, tmp_path):
 
 def test_a_run_interrupted_before_its_first_state_begins_anew(whole, tmp_path):
     path = tmp_path / "run.h5"
-    load(None, COARSE).closure(PRESSURES, output=path, observer=StopAfter(0))
+    load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=StopAfter(0))
     assert not load_result(path).states
     agree(resume(path), whole)
 
@@ -96,14 +97,14 @@ class StopAt(Observer):
 
 def test_a_flow_that_is_turned_back_goes_on_from_its_last_state(whole, tmp_path):
     path = tmp_path / "run.h5"
-    load(None, COARSE).closure(PRESSURES, output=path, observer=StopAt("steady state at", 4))
+    load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=StopAt("steady state at", 4))
     assert len(load_result(path).opened) == 3
     agree(resume(path), whole)
 
 
 def test_a_file_may_be_taken_up_twice(whole, tmp_path):
     path = tmp_path / "run.h5"
-    load(None, COARSE).closure(PRESSURES, output=path, observer=StopAt("equilibrium at 1050 Pa", 1))
+    load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=StopAt("equilibrium at 1050 Pa", 1))
     assert not load_result(path).states and load_result(path).walk
     again = resume(path, observer=StopAfter(2))
     assert not again.complete and len(again.states) == 2
@@ -120,7 +121,7 @@ def test_supports_to_compare_with_and_the_turn_in_time_are_taken_up_too(tmp_path
     }
 
     def ask(**further):
-        return load(None, changes).closure([4e3, 14e3], in_time=True, compare=True, **further)
+        return load(thesis_case(), changes).closure([4e3, 14e3], in_time=True, compare=True, **further)
 
     complete = ask()
     first = ask(output=path, observer=StopAt("0.00", 3))
@@ -139,8 +140,8 @@ def test_a_walk_that_is_stopped_beyond_a_limit_meets_it_again(tmp_path):
     thin = {"mesh.around": 8, "mesh.along": 14, "valve.thickness_factor": 0.4, "closure.max_step": "0.5 kPa"} | dict(
         FORMER
     )
-    complete = load(None, thin).closure([3e3, 8e3])
-    first = load(None, thin).closure([3e3, 8e3], output=path, observer=StopAt("arclength point", 4))
+    complete = load(thesis_case(), thin).closure([3e3, 8e3])
+    first = load(thesis_case(), thin).closure([3e3, 8e3], output=path, observer=StopAt("arclength point", 4))
     assert not first.complete and len(first.states) == 1
     last = resume(path)
     assert json.dumps(last.summary()) == json.dumps(complete.summary())
@@ -150,7 +151,7 @@ def test_a_walk_that_is_stopped_beyond_a_limit_meets_it_again(tmp_path):
 @pytest.mark.slow
 def test_a_killed_run_has_lost_no_finished_state(whole, tmp_path):
     path = tmp_path / "run.h5"
-    words = [f"--set={key}={value}" for key, value in COARSE.items()]
+    words = [f"--set={key}={value}" for key, value in (THESIS | COARSE).items()]
     command = [
         sys.executable,
         "-m",
