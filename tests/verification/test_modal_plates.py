@@ -13,6 +13,7 @@ import pytest
 from scipy.sparse.linalg import eigsh
 
 from dbvfiv.shell import Shell, ShellMesh
+from dbvfiv.shell.mass import AVERAGED, CONSISTENT
 from tests.shell.structures import grid, isotropic_section
 
 # thickness, frequencies with the edge layer resolved, and as quoted
@@ -31,7 +32,7 @@ REFERENCE = {
 }
 
 
-def frequencies(support: str, n: int) -> np.ndarray:
+def frequencies(support: str, n: int, mass_kind: str) -> np.ndarray:
     """Lowest frequencies, Hz, on n by n elements; rigid-body modes left out, in-plane motion held."""
     h, exact, _ = REFERENCE[support]
     # finer towards the edges: twisting moments fall to zero within about a thickness of a free edge, and a regular mesh
@@ -48,7 +49,7 @@ def frequencies(support: str, n: int) -> np.ndarray:
             free[nodes, 2] = False
             free[nodes, tangential] = False
     mesh = ShellMesh.build(patch.nodes, patch.quads, h, material_axis=(1.0, 0, 0))
-    shell = Shell(mesh, isotropic_section(200e9, 0.3, h, 8000.0), free)
+    shell = Shell(mesh, isotropic_section(200e9, 0.3, h, 8000.0), free, mass_kind=mass_kind)
     stiffness = shell.dofs.matrix(shell.force_and_tangent(np.zeros(shell.size))[1]).tocsc()
     mass = shell.dofs.matrix(shell.mass()).tocsc()
     count = len(exact) + (3 if support == "free" else 0)
@@ -59,14 +60,15 @@ def frequencies(support: str, n: int) -> np.ndarray:
     return np.sqrt(values) / (2 * np.pi)
 
 
+@pytest.mark.parametrize("mass_kind", [AVERAGED, CONSISTENT])
 @pytest.mark.parametrize("support", sorted(REFERENCE))
-def test_plate_frequencies(support):
+def test_plate_frequencies(support, mass_kind):
     """0.6 % on 48 x 48 elements; the error falls with the square of the element size; extrapolated within 0.02 %, and
     0.15 % of quoted values.
     """
     _, exact, quoted = REFERENCE[support]
     exact = np.array(exact)
-    coarse, fine = frequencies(support, 24), frequencies(support, 48)
+    coarse, fine = (frequencies(support, n, mass_kind) for n in (24, 48))
     limit = fine + (fine - coarse) / 3
     print(f"\n{support}")
     for row in zip(coarse, fine, limit, exact, quoted):
@@ -75,4 +77,8 @@ def test_plate_frequencies(support):
     assert limit == pytest.approx(exact, rel=2e-4)
     assert limit == pytest.approx(quoted, rel=1.5e-3)
     # second order: the error falls by four, a little less where the corners of the clamped edge count
-    assert (coarse - exact) / (fine - exact) == pytest.approx(4.0, abs=0.4)
+    falls = (coarse - exact) / (fine - exact)
+    if mass_kind == CONSISTENT:
+        assert falls == pytest.approx(4.0, abs=0.4)
+    else:  # errors of mass and stiffness nearly cancel in two modes, which fall by 4.7 and 4.8 then
+        assert (falls > 3.6).all() and np.median(falls) == pytest.approx(4.0, abs=0.1)
