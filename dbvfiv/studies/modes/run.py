@@ -80,6 +80,9 @@ class FoundModes:
         Eigenvalues, vectors, residuals and both counts of the unstable ones.
     claimed : float, Hz
         Frequency up to which the search speaks for the state.
+    searched : (k,) bool array
+        Modes in the region that every study searches; of walls with loss factors slow and strongly damped ones lie
+        beside it.
     shapes : (k, nn, c) complex
         Displacements and rotations of the nodes, the largest displacement being 1 and real.
     areas, pressures : (k, m) complex
@@ -97,6 +100,7 @@ class FoundModes:
     in_vacuo: bool
     certified: CertifiedSpectrum
     claimed: float
+    searched: np.ndarray
     shapes: np.ndarray
     areas: np.ndarray
     pressures: np.ndarray
@@ -118,7 +122,7 @@ class FoundModes:
         """Stability of the state in this symmetry class."""
         found, count = self.certified, self.certified.count
         verdict = Verdict.of(
-            self.eigenvalues,
+            self.eigenvalues[self.searched],
             found.unstable_count,
             found.unstable_count_independent,
             found.certificate.certain,
@@ -202,7 +206,8 @@ def run_modes(
     notes = (*notes, *certified.spectrum.notes)
     if symmetry.of_equilibria and not (model.mesh.part.is_quarter or without_fluid):
         notes = (*notes, _NO_PLUG)
-    result = _described(model, state, conditions, without_fluid, certified, search, pencil, linear, notes, symmetry)
+    reach = search.claimed, family.is_searched(certified.spectrum.eigenvalues, conditions, search.band)
+    result = _described(model, state, conditions, without_fluid, certified, reach, pencil, linear, notes, symmetry)
     observer.item(result)
     if result.stable is None:
         observer.warn(result.verdict.reason)
@@ -211,7 +216,7 @@ def run_modes(
 
 
 def _described(
-    model, state, conditions, in_vacuo, certified: CertifiedSpectrum, search, pencil, linear, notes, symmetry
+    model, state, conditions, in_vacuo, certified: CertifiedSpectrum, reach, pencil, linear, notes, symmetry
 ) -> FoundModes:
     """Shapes, areas and pressures of the eigenvectors, scaled to a largest displacement of 1."""
     spectrum = certified.spectrum
@@ -229,7 +234,7 @@ def _described(
         conditions,
         in_vacuo,
         certified,
-        search.claimed,
+        *reach,
         shapes=np.array(shapes, complex).reshape(len(spectrum), *model.shell.dofs.free.shape),
         areas=(change / scale).T,
         pressures=(pressure / scale).T,

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, Workspace, lowest_frequencies
+from eigen.creep import edge_of
+from eigen.family import Reach
 
 from ...model.dynamics import Conditions, LinearisedState
 from ...model.leading import LeadingSearch, select_search
@@ -81,6 +83,14 @@ class ValveFamily(PencilFamily):
             resolved = np.inf if in_vacuo else self.linear.model.flow.resolved(line)
             self._searches[key] = select_search(asked, conditions, self._lowest, self.modes, resolved)
         return self._searches[key]
+
+    def is_searched(self, values: np.ndarray, conditions: Conditions, band: float) -> np.ndarray:
+        """Eigenvalues in the region that every study searches, (k,) bool: beside it lie relaxations of the wall, and
+        modes of it that are slow and strongly damped; `band` is in Hz.
+        """
+        if not conditions.loss_factor:
+            return np.ones(len(values), bool)
+        return Reach(-np.inf, 2 * np.pi * band, edge_of(self.relaxation(conditions.loss_factor))).is_mode(values)
 
     def relaxation(self, loss: float) -> Relaxation | None:
         """What relaxes with a factor on the loss factors of all materials."""
