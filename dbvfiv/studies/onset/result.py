@@ -17,16 +17,11 @@ from ..stability.classes import NOTE as CLASS_NOTE
 from ..stability.crossings import WATCHED
 from ..stability.laws import compare_ranges
 from ..stability.place import describe_fixed, fixed_conditions
-from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict
+from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict, lowered
 from . import classes, figures, other_law
 from .intervals import Interval, common_stretches, joined_stretches, known_intervals, uncertain_intervals
 from .point import FINE, OnsetSample
 from .rows import read_points, read_samples
-
-
-def _lowered(text: str) -> str:
-    return f"{text[:1].lower()}{text[1:]}"
-
 
 CRITICALITY = {"super": "supercritical", "sub": "subcritical"}
 
@@ -225,7 +220,7 @@ class OnsetResult(StudyResult):
         sure, outcomes = sum(self.leading["certified"]), [verdict.outcome for verdict in self.verdicts]
         invalid = outcomes.count(NOT_VALID)
         if outcomes and invalid == len(outcomes):
-            return f"Not valid {scanned}: {_lowered(self.verdicts[0].reason)}"
+            return f"Not valid {scanned}: {lowered(self.verdicts[0].reason)}"
         if not all(self.leading["certified"]) or len(set(outcomes)) != 1 or UNDECIDED in outcomes:
             but = f" {invalid} of them are not valid: the constants of the rubber do not hold." if invalid else ""
             return (

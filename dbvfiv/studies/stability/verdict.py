@@ -135,7 +135,7 @@ class Verdict:
         ratios = [part.damping_ratio for part in parts.values() if np.isfinite(part.damping_ratio)]
         return replace(
             parts[worst],
-            reason=" ".join(f"In {name}: {_lowered(part.reason)}" for name, part in parts.items()),
+            reason=" ".join(f"In {name}: {lowered(part.reason)}" for name, part in parts.items()),
             damping_ratio=min(ratios, default=np.nan),
             certain=all(part.certain for part in parts.values()),
         )
@@ -153,7 +153,7 @@ class Verdict:
     def sentence(self, conditions: str = "") -> str:
         """One sentence for people, with the words behind the outcome that say under which conditions."""
         words = f"{self.outcome[0].upper()}{self.outcome[1:]} {conditions}".rstrip()
-        return f"{words}: {_lowered(self.reason)}" + "".join(f" {said}" for said in (self.margin,) if said)
+        return f"{words}: {lowered(self.reason)} {self.margin}".rstrip()
 
     @property
     def margin(self) -> str:
@@ -213,7 +213,8 @@ def not_valid_at(parameter: str, unsound: Mapping[float, str]) -> str:
     return f"Not valid at {where}: {unsound[values[0]]}"
 
 
-def _lowered(sentence: str) -> str:
+def lowered(sentence: str) -> str:
+    """Sentence to go on with after a colon."""
     return f"{sentence[:1].lower()}{sentence[1:]}"
 
 
