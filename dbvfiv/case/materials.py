@@ -88,13 +88,14 @@ class Yeoh(Relaxing):
 
 
 class Softening(Relaxing):
-    """Incompressible W = 1/2 [mu_inf x + 2 mu_0 x_0 (sqrt(1 + x/x_0) - 1) + c x^2/2] with x = I1 - 3."""
+    """Incompressible W = 1/2 [mu_inf x + 2 mu_0 x_0 (sqrt(1 + x/x_0) - 1) + c x^2/2 + c_3 x^3/3] with x = I1 - 3."""
 
     kind: Literal["softening"] = key(..., "Incompressible rubber with a knee at small strain.")
     mu_inf: Modulus = key(0.0, "Shear modulus beyond the knee; from mu_0/200 on every state is stable.", ge=0, le=1e12)
     mu_0: Modulus = key(..., "What the shear modulus at small strain exceeds mu_inf by.", gt=0, le=1e12)
     x_0: Number = key(..., "I1 - 3 at the knee, about 3 times the square of its strain in tension.", gt=0, le=1e6)
     c: Modulus = key(0.0, "Stiffening at large strains.", ge=0, le=1e12)
+    c_3: Modulus = key(0.0, "Stiffening at larger ones, with the square of x.", ge=0, le=1e13)
     density: Density = _density(...)
 
 

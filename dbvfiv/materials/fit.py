@@ -56,7 +56,7 @@ class RubberFit:
     form : Form
     tests : tuple of TensionTest
     constants : numpy.ndarray, shape (terms,)
-        Those that W is linear in, Pa: mu_inf, mu_0 and c of the softening rubber, the C_ij, or Ogden's mu_p.
+        Those that W is linear in, Pa: mu_inf, mu_0, c and c_3 of the softening rubber, the C_ij, or Ogden's mu_p.
     exponents : numpy.ndarray, shape (terms,), (1,) or (0,)
         Those that it is not linear in: Ogden's alpha_p, x_0 of the softening rubber.
     residuals : numpy.ndarray, shape (n,)
@@ -139,9 +139,9 @@ class RubberFit:
                 f"The wall has no law of the form {self.form.name}; it takes {' and '.join(TAKEN)}. "
                 "The fit is for comparison."
             )
-        first, second, third = (*(float(c) for c in self.constants), 0.0, 0.0)[:3]
+        first, second, third, fourth = (*(float(c) for c in self.constants), 0.0, 0.0, 0.0)[:4]
         if self.form.softens:
-            return SofteningRubber(first, second, float(self.exponents[0]), third, density)
+            return SofteningRubber(first, second, float(self.exponents[0]), third, density, fourth)
         return (Yeoh if self.form.name == "yeoh" else MooneyRivlin)(first, second, third, density)
 
 

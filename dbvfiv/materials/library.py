@@ -52,7 +52,7 @@ SHIPPED = {"stable": rubber, "published": published_rubber}
 _LAWS: dict[str, Callable[[Any], Law]] = {
     "mooney-rivlin": lambda c: MooneyRivlin(c.c10, c.c01, c.c11, c.density),
     "yeoh": lambda c: Yeoh(c.c10, c.c20, c.c30, c.density),
-    "softening": lambda c: SofteningRubber(c.mu_inf, c.mu_0, c.x_0, c.c, c.density),
+    "softening": lambda c: SofteningRubber(c.mu_inf, c.mu_0, c.x_0, c.c, c.density, c.c_3),
     "neo-hookean": lambda c: MooneyRivlin.neo_hookean(c.shear_modulus, c.density),
     "isotropic": lambda c: IsotropicElastic(c.youngs_modulus, c.poisson_ratio, c.density),
     "orthotropic": lambda c: OrthotropicPly(c.e1, c.e2, c.nu12, c.g12, c.g13, c.g23, c.density),

@@ -5,7 +5,7 @@ stress of each pulled direction is P = (dW/d(ln l1) - dW/d(ln l3))/l with l3 = l
 W = sum C_ij (I1 - 3)^i (I2 - 3)^j that is linear in the C_ij; with Ogden's W = sum mu_p/alpha_p (l1^alpha_p +
 l2^alpha_p + l3^alpha_p - 3) it is linear in the mu_p, not in the alpha_p (Treloar 1975, The physics of rubber
 elasticity; Yeoh 1993, Rubber Chem. Technol. 66, 754; Ogden 1972, Proc. R. Soc. A 326, 565). The softening rubber (see
-`softening`) is linear in mu_inf, mu_0 and c, not in x_0.
+`softening`) is linear in mu_inf, mu_0, c and c_3, not in x_0.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Form:
     def names(self) -> tuple[str, ...]:
         """Of the constants that W is linear in, as the case file writes them."""
         if self.softens:
-            return "mu_inf", "mu_0", "c"
+            return "mu_inf", "mu_0", "c", "c_3"
         if not self.powers:
             return tuple(f"mu{p + 1}" for p in range(self.terms))
         return tuple(f"c{i}{j}" for i, j in self.powers)
@@ -92,8 +92,8 @@ class Form:
         """Hill moduli per unit of each constant, (..., terms, 5, 5)."""
         if self.softens:
             knee = moduli_of(log_stretches, knee_slopes(invariants(log_stretches)[0], exponents[0]))
-            linear, square = np.moveaxis(hill_moduli(log_stretches, ((1, 0), (2, 0))), -3, 0)
-            return np.stack([0.5 * linear, knee, 0.25 * square], axis=-3)
+            linear, square, cube = np.moveaxis(hill_moduli(log_stretches, ((1, 0), (2, 0), (3, 0))), -3, 0)
+            return np.stack([0.5 * linear, knee, 0.25 * square, cube / 6.0], axis=-3)
         return hill_moduli(log_stretches, self.powers) if self.powers else ogden_moduli(log_stretches, exponents)
 
 
@@ -105,7 +105,7 @@ _POWERS = {
     "ogden": (),
 }
 #: Numbers of terms of each form, the usual one first.
-TERMS = {"neo-hookean": (1,), "softening": (3,), "mooney-rivlin": (2, 3), "yeoh": (3, 2), "ogden": (2, 1, 3)}
+TERMS = {"neo-hookean": (1,), "softening": (4,), "mooney-rivlin": (2, 3), "yeoh": (3, 2), "ogden": (2, 1, 3)}
 
 
 def form_of(name: str, terms: int | None = None) -> Form:
@@ -130,7 +130,7 @@ def form_of(name: str, terms: int | None = None) -> Form:
 def all_forms() -> tuple[Form, ...]:
     """Every form with every number of terms that is worth comparing."""
     several = (("mooney-rivlin", 2), ("mooney-rivlin", 3), ("yeoh", 3), ("ogden", 2), ("ogden", 3))
-    return tuple(form_of(*pair) for pair in (("neo-hookean", 1), ("softening", 3), *several))
+    return tuple(form_of(*pair) for pair in (("neo-hookean", 1), ("softening", 4), *several))
 
 
 def _invariants_of(mode: str, strain) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -161,9 +161,9 @@ def first_invariant(mode: str, strain) -> np.ndarray:
 
 
 def softening_columns(mode: str, strain, knee: float) -> np.ndarray:
-    """Nominal stress per unit of mu_inf, mu_0 and c, (n, 3), at x_0."""
+    """Nominal stress per unit of mu_inf, mu_0, c and c_3, (n, 4), at x_0."""
     first, _, i1, _ = _invariants_of(mode, strain)
-    return 0.5 * first[:, None] * np.stack([np.ones_like(i1), 1.0 / np.sqrt(1.0 + i1 / knee), i1], axis=-1)
+    return 0.5 * first[:, None] * np.stack([np.ones_like(i1), 1.0 / np.sqrt(1.0 + i1 / knee), i1, i1**2], axis=-1)
 
 
 def softening_slopes(mode: str, strain, knee: float) -> np.ndarray:

@@ -1,9 +1,9 @@
 """Incompressible rubber that softens at small strain and stiffens at large ones, stable in every state.
 
-    W = 1/2 [mu_inf x + 2 mu_0 x_0 (sqrt(1 + x/x_0) - 1) + c x^2/2],     x = I1 - 3
+    W = 1/2 [mu_inf x + 2 mu_0 x_0 (sqrt(1 + x/x_0) - 1) + c x^2/2 + c_3 x^3/3],     x = I1 - 3
 
 in plane stress: a neo-Hookean term, a power law with the exponent 1/2 (Knowles 1977, Int. J. Fracture 13, 611), the
-largest softening with which the shear stress still rises everywhere, and Yeoh's second term. The knee at small strain
+largest softening with which the shear stress still rises everywhere, and Yeoh's second and third terms. The knee at small strain
 is that of filled rubber (Payne, Mullins). Hill's condition (see `stability`) holds at all strains for constants that
 are not negative with mu_inf >= mu_0/200, whatever x_0 is.
 """
@@ -40,6 +40,8 @@ class SofteningRubber:
         Stiffening, Pa; not negative.
     density : float
         Reference density, kg/m3.
+    c_3 : float
+        Stiffening that grows with the square of x, Pa; not negative.
 
     Raises
     ------
@@ -59,9 +61,10 @@ class SofteningRubber:
     x_0: float
     c: float
     density: float
+    c_3: float = 0.0
 
     def __post_init__(self) -> None:
-        name, moduli = "Softening rubber", {"mu_inf": self.mu_inf, "mu_0": self.mu_0, "c": self.c}
+        name, moduli = "Softening rubber", {"mu_inf": self.mu_inf, "mu_0": self.mu_0, "c": self.c, "c_3": self.c_3}
         require_finite(name, **moduli)
         require_positive(name, x_0=self.x_0, density=self.density)
         for key, value in moduli.items():
@@ -72,8 +75,8 @@ class SofteningRubber:
 
     @property
     def parameters(self) -> np.ndarray:
-        """``[mu_inf/2, 0, 0, c/4, 0, mu_0, x_0, 0]``, Pa but for x_0."""
-        return padded(0.5 * self.mu_inf, 0.0, 0.0, 0.25 * self.c, 0.0, self.mu_0, self.x_0)
+        """``[mu_inf/2, 0, 0, c/4, c_3/6, mu_0, x_0, 0]``, Pa but for x_0."""
+        return padded(0.5 * self.mu_inf, 0.0, 0.0, 0.25 * self.c, self.c_3 / 6.0, self.mu_0, self.x_0)
 
     @property
     def small_strain_shear_modulus(self) -> float:

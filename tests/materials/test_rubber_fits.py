@@ -35,7 +35,7 @@ LAWS = [
     ("mooney-rivlin", [-2.0e6, 2.6e6, 0.9e6], ()),
     ("yeoh", [0.18e6, -1.4e3], ()),
     ("yeoh", [0.18e6, -1.4e3, 39.0], ()),
-    ("softening", [0.2e6, 0.5e6, 1e4], [0.3]),
+    ("softening", [0.2e6, 0.5e6, 1e4, 1e2], [0.3]),
     ("ogden", [0.4e6], [1.7]),
     ("ogden", [0.62e6, -0.01e6], [1.3, -2.0]),
     ("ogden", [1180.0, 0.62e6, -9800.0], [5.0, 1.3, -2.0]),
@@ -54,7 +54,7 @@ def _energy(form, constants, exponents, ln):
     if form.name == "softening":
         x = jnp.sum(jnp.exp(2 * ln)) - 3
         knee = 2 * exponents[0] * (jnp.sqrt(1 + x / exponents[0]) - 1)
-        return (constants[0] * x + constants[1] * knee + constants[2] * x**2 / 2) / 2
+        return (constants[0] * x + constants[1] * knee + constants[2] * x**2 / 2 + constants[3] * x**3 / 3) / 2
     if not form.powers:
         return sum(m / a * (jnp.sum(jnp.exp(a * ln)) - 3) for m, a in zip(constants, exponents))
     i1, i2 = jnp.sum(jnp.exp(2 * ln)) - 3, jnp.sum(jnp.exp(-2 * ln)) - 3
