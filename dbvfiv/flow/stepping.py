@@ -62,10 +62,10 @@ class MovingFluid:
         for k in range(count):
             self._upstream[k, k:-1] += 0.5 * channel.step[k:]
             self._upstream[k, k + 1 :] += 0.5 * channel.step[k:]
-        self._momentum = self._upstream
+        self._bow = np.zeros((count, count))
         if channel.bowed:
-            share = jax.vmap(lambda speed: wall_share(channel.step, speed), 1, 1)
-            self._momentum = self._upstream + np.asarray(share(np.eye(count)))
+            self._bow = np.asarray(jax.vmap(lambda speed: wall_share(channel.step, speed), 1, 1)(np.eye(count)))
+        self._momentum = self._upstream + self._bow
         self._parameters = channel.values({"inlet": 0.0, "density": self.density})
 
     def _open(self, area: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -221,6 +221,12 @@ class MovingFluid:
     def integrate(self, values: np.ndarray) -> np.ndarray:
         """Integral from the inlet to each station of speeds (m,) or of each column (m, l), as the wall feels it."""
         return self._momentum @ values
+
+    def momenta(self, psi: np.ndarray, speed: np.ndarray) -> np.ndarray:
+        """Momentum per density and area of the fluid between stations (m - 1,), m2/s, by psi and the speeds; without
+        what a bow of psi, which the wall feels, takes from one section and gives to the next.
+        """
+        return -np.diff(psi - self._bow @ speed)
 
     def pressure_slopes(
         self, mid: tuple, new: tuple, speed: float, new_speed: float, theta: float, velocity: float, psi_weight: float

@@ -3,9 +3,9 @@
     W = 1/2 [mu_inf x + 2 mu_0 x_0 (sqrt(1 + x/x_0) - 1) + c x^2/2 + c_3 x^3/3],     x = I1 - 3
 
 in plane stress: a neo-Hookean term, a power law with the exponent 1/2 (Knowles 1977, Int. J. Fracture 13, 611), the
-largest softening with which the shear stress still rises everywhere, and Yeoh's second and third terms. The knee at small strain
-is that of filled rubber (Payne, Mullins). Hill's condition (see `stability`) holds at all strains for constants that
-are not negative with mu_inf >= mu_0/200, whatever x_0 is.
+largest softening with which the shear stress still rises everywhere, and Yeoh's second and third terms. The knee at
+small strain is that of filled rubber (Payne, Mullins). Hill's condition (see `stability`) holds at all strains for
+constants that are not negative with mu_inf >= mu_0/200, whatever x_0 is.
 """
 
 from __future__ import annotations

@@ -171,6 +171,10 @@ class ValveMotion:
             return np.zeros(self.stations)
         return self.fluid.state(*self._passage(self.model.nodal(state.q), state.v), state.speed).speed
 
+    def momenta(self, psi: np.ndarray, speed: np.ndarray) -> np.ndarray:
+        """Momentum per density and area of the fluid between stations (m - 1,), m2/s."""
+        return self.fluid.momenta(psi, speed) if self.moving_fluid else -np.diff(psi)
+
     def _position(self, nodal):
         out = nodal.copy()
         out[:, :3] += self.model.shell.mesh.nodes

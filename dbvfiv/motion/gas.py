@@ -49,6 +49,9 @@ class GasMotion(ValveMotion):
     def speeds(self, state) -> np.ndarray:
         return self.model.flow.own_velocities(state.gas.inner)
 
+    def momenta(self, psi, speed):
+        return -np.diff(psi)
+
     @property
     def eliminated(self) -> bool:
         return True

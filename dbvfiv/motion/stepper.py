@@ -145,16 +145,17 @@ class Stepper:
         StepFailure
         """
         before = (self.residuals, self.solves, self.factorisations)
-        outward = _outward(self.motion.speeds(state))
+        speeds = self.motion.speeds(state)
+        outward, momenta = _outward(speeds), self.motion.momenta(state.psi, speeds)
         scheme = self.scheme if outward else self._inward
-        for robust in (self.options.backward or not (outward and self._smooth(state, h)), True):
+        for robust in (self.options.backward or not (outward and self._smooth(state, momenta, h)), True):
             trial = Trial(self.motion, scheme, state, h, self.pressure, robust)
             self.motion.begin_step(state, h, trial.fluid.inlet)
             try:
                 self._iterate(trial)
             except SingularMatrix as error:
                 raise StepFailure(str(error)) from error
-            if robust or self._kept_momentum(trial):
+            if robust or self._kept_momentum(trial, momenta):
                 break
             self._factored = None
         turn = self.motion.turn(trial.q - state.q)
@@ -171,21 +172,20 @@ class Stepper:
         return StepResult(new, trial.load, *self._works(trial), *work, error, *taken)
 
     @staticmethod
-    def _smooth(state: MotionState, h: float) -> bool:
+    def _smooth(state: MotionState, momenta: np.ndarray, h: float) -> bool:
         """Whether the fluid flowed outwards before the last step, and the momentum of its sections changed little in
         that.
 
         Sections, as what one loses another may gain; before too, as flow that has just turned round rings.
         """
-        now, change = _sections(state.psi), h * _sections(state.psi_rate)
-        return bool(np.abs(change).sum() <= 0.34 * np.abs(now).sum()) and _outward(now - change)
+        change = -h * np.diff(state.psi_rate)
+        return bool(np.abs(change).sum() <= 0.34 * np.abs(momenta).sum()) and _outward(momenta - change)
 
-    @staticmethod
-    def _kept_momentum(trial: Trial) -> bool:
+    def _kept_momentum(self, trial: Trial, old: np.ndarray) -> bool:
         """Whether the fluid's sections kept most of their momentum in a step and none turned round; if not, its
         equations are better met at the end.
         """
-        new, old = _sections(trial.load.psi), _sections(trial.old.psi)
+        new = self.motion.momenta(trial.load.psi, trial.load.speed)
         return bool(np.clip(old - new, 0.0, old).sum() <= 0.5 * old.sum()) and _outward(trial.load.speed)
 
     def _works(self, trial: Trial) -> tuple[float, float]:
@@ -305,11 +305,6 @@ class Stepper:
     def _solve(self, trial: Trial) -> np.ndarray:
         self.solves += 1
         return self.motion.solve(-trial.residual, -trial.load.outlet)[0]
-
-
-def _sections(psi: np.ndarray) -> np.ndarray:
-    """Integral of the speed over each section between stations (m - 1,), m2/s: its momentum per density and area."""
-    return -np.diff(psi)
 
 
 def _outward(speed: np.ndarray) -> bool:

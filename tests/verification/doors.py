@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 
 from dbvfiv.errors import CaseError, NotValidError, SolveError
+from dbvfiv.model.equilibria import SteadyOptions
 from dbvfiv.model.state import SteadyState
+from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.start import steady_positions
+from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import Case, load_case
 from dbvfiv.studies.map.run import run_map
@@ -21,17 +25,19 @@ from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.verdict import UNDECIDED, Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk
 from dbvfiv.studies.sweep.run import SweepOptions, run_sweep
+from dbvfiv.studies.transient.run import Runner
+from tests.verification.test_transient_modes import ringing
 
-#: Case files, and elements of their coarse meshes.
-VALVES = {
-    "cases/dbv12-in-line.toml": (6, 10),
-    "cases/dbv18.toml": (6, 10),
-    "cases/dbv6.toml": (6, 10),
-    "cases/dbv36.toml": (6, 10),
-    "cases/dbv4-wide.toml": (6, 10),
-    "cases/loss-factor.toml": (6, 10),
-    "cases/dbv12.toml": (6, 10),
-}
+#: Case files.
+VALVES = (
+    "cases/dbv12-in-line.toml",
+    "cases/dbv18.toml",
+    "cases/dbv6.toml",
+    "cases/dbv36.toml",
+    "cases/dbv4-wide.toml",
+    "cases/loss-factor.toml",
+    "cases/dbv12.toml",
+)
 #: Relative step to the neighbours that a map, an onset and a sweep have beside the state.
 STEP = 1e-3
 #: Length of pipe in front where there is one, m.
@@ -73,14 +79,17 @@ class Asked:
         )
 
 
-def random_cases(number: int, seed: int, valves=tuple(VALVES), each: int = 10) -> Iterator[tuple[int, Case]]:
+def random_cases(
+    number: int, seed: int, valves=VALVES, each: int = 10, mesh: tuple[int, int] = (6, 10)
+) -> Iterator[tuple[int, Case]]:
     """Random cases: 0.05 to 50 kPa, 0.5 to 2000 kg/m3, loss factors scaled by 0.2 to 3 or Rayleigh damping, both flow
-    models, with and without 20 m of pipe; `each` of them share a valve and a pressure.
+    models, with and without 20 m of pipe, on `mesh` elements around and along; `each` of them share a valve and a
+    pressure.
     """
     rng = np.random.default_rng(seed)
     for first in range(0, number, each):
         path = valves[(first // each) % len(valves)]
-        base = _settled(path)
+        base = _settled(path, mesh)
         pipe = rng.random() < 0.5
         line = {"upstream.length": PIPE, "upstream.diameter": 2.2 * base.valve.flange_radius}
         base = base.replace(line if pipe else {"upstream": {}})
@@ -90,9 +99,9 @@ def random_cases(number: int, seed: int, valves=tuple(VALVES), each: int = 10) -
 
 
 @cache
-def _settled(path: str) -> Case:
-    """A case on its coarse mesh, with its strain levels settled."""
-    around, along = VALVES[path]
+def _settled(path: str, mesh: tuple[int, int]) -> Case:
+    """A case on a coarse mesh, with its strain levels settled."""
+    around, along = mesh
     return Session(load_case(path, [f"mesh.around={around}", f"mesh.along={along}"])).settle().case
 
 
@@ -156,3 +165,27 @@ def _walk(case: Case, model, here: Place, state: SteadyState) -> StabilityWalk:
 def load_axis(case: Case, over: str):
     """Axis of a sweep."""
     return case.replace({"sweep.over": over}).sweep.axis
+
+
+def rates_in_time(case: Case, frequency: float, push: float = 1e-8) -> tuple[complex, complex]:
+    """Eigenvalue (1/s) of the mode that a small kick (m) follows, and that of the ringing in time after it, with the
+    error of the steps removed.
+    """
+    rings, period = [], 1.0 / frequency
+    kick = {"transient.start": "kick", "transient.kick_opening": push}
+    for count in (50, 100):
+        step = period / count
+        session = Session(case.replace(kick | {"transient.step": step, "transient.duration": 1.25 * period}))
+        options = replace(RunOptions.of(session.model.case), step=StepOptions(tolerance=1e-8, floor=1e-13))
+        run = Runner(session.model, options).start()
+        assert not run.failures
+        away = run.history["lip_displacement"] - _steady_lip(session.model, case.drive.pressure)
+        rings.append(ringing(away / push, step))
+    first, second = (complex(r.real, abs(r.imag)) for r in rings)
+    return run.progress.eigenvalue, second + (second - first) / 3.0
+
+
+def _steady_lip(model, pressure: float) -> float:
+    """Displacement of the middle of the lip in the steady state, m."""
+    q = steady_positions(model, pressure, SteadyOptions.of(model.case))
+    return float(q[model.shell.dofs.index[model.mesh.rows[0, 0], 1]])

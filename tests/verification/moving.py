@@ -54,6 +54,9 @@ class Motion:
     def speeds(self, state):
         return NONE
 
+    def momenta(self, psi, speed):
+        return NONE
+
     def turn(self, dq):
         return 0.0
 

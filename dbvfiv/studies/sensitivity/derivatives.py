@@ -189,7 +189,9 @@ def _with_common_times(*pencils: CoupledPencil) -> list[CoupledPencil]:
 
 def _inward(name: str, value: float, h: float) -> int:
     """+1 at the lower end of a parameter that ends there, -1 at the upper end, 0 elsewhere."""
-    if name.split()[-1] in ("mu_inf", "mu_0", "c", "c_3") and value < h:  # constants of a softening layer, none negative
+    if (
+        name.split()[-1] in ("mu_inf", "mu_0", "c", "c_3") and value < h
+    ):  # constants of a softening layer, none negative
         return 1
     if name == "thickness" or name not in (*DESIGN, "loss_factor"):
         return 0
