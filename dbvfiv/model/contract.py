@@ -1,4 +1,4 @@
-"""What a model is: the waist between the valve and the numerics.
+"""Contracts between a model of the valve and the numerics.
 
 Three contracts, each the least that its users ask for:
 
@@ -63,7 +63,7 @@ class EquilibriumModel(Protocol):
         ...
 
     def force_scale(self, q: np.ndarray, pressure: float) -> float:
-        """What residuals are measured against, N."""
+        """Force to which residuals are relative, N."""
         ...
 
 

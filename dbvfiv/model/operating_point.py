@@ -1,4 +1,4 @@
-"""Where the valve's own curve of flow over pressure meets that of a pump."""
+"""Operating point: intersection of the valve's flow curve over pressure with the pump curve."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the fluid outside resists motions of second and third order: derivatives of its added mass by the shape.
+"""Forms of second and third order of the fluid outside: derivatives of its added mass by the shape.
 
 Its kinetic energy is rho v' M_a(q) v / 2, so by Lagrange's equations it resists with
 
