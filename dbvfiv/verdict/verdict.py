@@ -12,7 +12,7 @@ NAMES = ("steady", "decaying", "limit cycle", "growing", "closed", "irregular", 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a series does in the end.
+    """Final behaviour of a time series.
 
     Attributes
     ----------
