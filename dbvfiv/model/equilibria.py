@@ -108,7 +108,7 @@ class LoadPath(LoadSteps):
 
     @property
     def _at_rest(self) -> bool:
-        """True for a wall with weight that stands without load or without a flow, so that the path cannot start from there.
+        """True for a wall with weight at a state without load or without a flow, where the path starts again from rest.
 
         The state without load is no equilibrium of such a wall. From the wall that hangs without a flow, lips that all
         but touch open less surely than from rest.

@@ -23,7 +23,7 @@ KINDS = (AREA, SHAPE)
 
 @dataclass(frozen=True)
 class MeasuredClosure:
-    """What was measured under back pressure, each None where it was not.
+    """Measurements under back pressure; None for a quantity that was not measured.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class MeasuredClosure:
 
 
 def measured_closure(result: ClosureResult) -> MeasuredClosure:
-    """What a result holds of measured data, against its states and the path between them."""
+    """Measured data of a result, against its states and the path between them."""
     tables = kept_tables(result.record)
     areas = joined(tables, AREA, "pressure", "area")
     points = joined(tables, SHAPE, "pressure", "z", "face", "x", "y")

@@ -1,4 +1,4 @@
-"""How far a valve under back pressure is from its first limit."""
+"""Safety factor of a valve under back pressure: margin to its first limit."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _rising(result: ClosureResult) -> list[Any]:
 
 
 def _lost_seal(rising: list[Any]) -> np.ndarray:
-    """Where no section is shut although one was before; everywhere if none ever was."""
+    """Mask of points where no section is shut although one was before; True everywhere if none ever was."""
     shut = np.array([point.sealed_length > 0 for point in rising])
     return ~shut & np.maximum.accumulate(shut) if shut.any() else np.ones(len(shut), bool)
 

@@ -26,14 +26,14 @@ _ACCURACY = 1e-5
 
 @dataclass(frozen=True)
 class Cracking:
-    """Where the passage has grown to a multiple of that at rest.
+    """Cracking pressure: that at which the passage has grown to a multiple of its area at rest.
 
     Attributes
     ----------
     area_ratio : float
         The multiple.
     pressure : float or None, Pa
-        What drives the flow there over the pressure downstream; None where no state is open so far.
+        Driving pressure there, over the pressure downstream; None where no state is open so far.
     head : float or None, m
         The same as a head of the fluid.
     """
