@@ -178,7 +178,7 @@ class GasChannel(AroundChannel):
         return sigma.at[0].set(sigma[1])
 
     def sources(self, area, area_rate, inner, parameters):
-        """By what their rates are balanced (2 m - 1,), m2/s2 and m3/s; traceable."""
+        """Sources (2 m - 1,) that balance the rates of `stored`, m2/s2 and m3/s; traceable."""
         channel = self.channel
         speed, sigma = self.split(inner, parameters)
         open_ = above_floor(area, self.floor)

@@ -2,8 +2,8 @@
 
 A law relates m station pressures to the areas of a passage, their first two rates, and l unknowns of its own, which l
 equations fix. `FlowLaw.equations` writes this down once, in jax. Steady flow, linearised operators and second and third
-derivatives follow from it in `dbvfiv.flow.derivatives`, for any law. What a time step evaluates thousands of times has
-faster forms beside it (`dbvfiv.flow.stepping`), tested against it.
+derivatives follow from it in `dbvfiv.flow.derivatives`, for any law. Time steps evaluate the law thousands of times and
+have faster forms of it (`dbvfiv.flow.stepping`), tested against it.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ class FitReport:
         return float(np.mean(known)) if known else None
 
     def lines(self, name: str, density: float) -> list[str]:
-        """For people."""
+        """Lines of the report as text."""
         return [
             *self._of_tests(),
             "",

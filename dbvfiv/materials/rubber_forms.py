@@ -73,7 +73,7 @@ class Form:
 
     @property
     def title(self) -> str:
-        """As it stands in tables and figures."""
+        """Title of the form for tables and figures."""
         return self.name if len(TERMS[self.name]) == 1 else f"{self.name} {self.terms}"
 
     def columns(self, mode: str, strain, exponents=()) -> np.ndarray:

@@ -116,9 +116,9 @@ def select_search(
     Parameters
     ----------
     options : SearchOptions
-        What was asked for.
+        Search options as asked for.
     conditions : Conditions
-        Of which only the stiffness damping and the factor on the loss factors matter.
+        Only the stiffness damping and the factor on the loss factors matter.
     structural_frequencies : callable
         From a number to that many lowest frequencies of the undamped structure in vacuo at the state, Hz, ascending;
         fewer where there are no more; not called where a band was asked for. `eigen.lowest_frequencies` computes them.

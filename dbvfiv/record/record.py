@@ -280,7 +280,7 @@ class StoredRecord(Record):
             self.header = replace(read_header(file, case_model), complete=self.complete)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All of it, read from the file: a copy can be asked where there is no such file."""
+        """State with all columns read from the file: a copy can be asked where there is no such file."""
         for name, table in self.tables.items():
             for column in table.columns:
                 self.column(name, column.name)

@@ -12,8 +12,8 @@ _HELD = (signal.SIGINT, signal.SIGTERM)
 class Shield:
     """Context that defers Ctrl-C (SIGINT) and SIGTERM until it is left; not to be nested or shared.
 
-    Python hears signals in its main thread alone, so elsewhere it does nothing; and nothing for signals that this
-    process ignores, or that end it without Python's help.
+    Python handles signals in its main thread alone, so in other threads the context does nothing. Nor does it for
+    signals that this process ignores or that end it without a Python handler.
     """
 
     def __init__(self):

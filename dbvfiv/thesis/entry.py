@@ -91,7 +91,7 @@ class Entry:
 
     @property
     def label(self) -> str:
-        """As the thesis calls it."""
+        """Name of the figure or table in the thesis."""
         return f"Table {self.name[1:]}" if self.name.startswith("T") else f"Fig. {self.name}"
 
     def part(self, outcome: Outcome) -> Part:

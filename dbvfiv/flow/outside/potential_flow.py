@@ -97,7 +97,7 @@ class Impedance(LinearOperator):
     _transpose = _adjoint
 
     def matrix(self) -> np.ndarray:
-        """All of it (wet, wet)."""
+        """Dense matrix (wet, wet), 1/m, of the impedance."""
         (potential, _), *others = self._terms
         for other, carried in others:
             potential = potential - other @ carried

@@ -40,7 +40,7 @@ class MeasuredClosure:
         return (part for part in (self.passage, self.shapes) if part is not None)
 
     def sentences(self) -> list[str]:
-        """For people, one of each."""
+        """Sentences that compare each measured quantity with the computed one."""
         return [part.sentence() for part in self]
 
     def summary(self) -> dict[str, Any]:

@@ -56,7 +56,7 @@ class SafetyFactor:
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """Sentence on the factor of safety and the limit that it refers to."""
         rated = f"over the rated {self.rated_pressure / 1e3:.6g} kPa"
         if self.at_least:
             seal = "its seal is an assumption of the supports," if self.seal_assumed else "does not lose its seal,"

@@ -62,7 +62,7 @@ class MeasuredCurve:
         return plain_rows(names, rows)
 
     def sentence(self) -> str:
-        """For people."""
+        """Sentence on the deviation of the computed from the measured points."""
         known = self.difference[np.isfinite(self.difference)]
         begin = f"Measured: {len(self.pressure)} point{'s' * (len(self.pressure) > 1)} of {self.what}"
         if not len(known):
@@ -118,7 +118,7 @@ class MeasuredTaps:
         return plain_rows(("pressure", "z", "tap", "computed_tap", "difference"), rows)
 
     def sentence(self) -> str:
-        """For people."""
+        """Sentence on the deviation of the computed from the measured pressures along the axis."""
         known = np.isfinite(self.share)
         begin = f"Measured: {len(self.z)} pressure{'s' * (len(self.z) > 1)} along the axis"
         if not known.any():

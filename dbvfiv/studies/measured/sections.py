@@ -196,7 +196,7 @@ class MeasuredShapes:
         return [section.summary() for section in self.sections]
 
     def sentence(self) -> str:
-        """For people."""
+        """Sentence on the deviation of the computed from the measured sections."""
         known = 1e3 * self.distance[np.isfinite(self.distance)]
         count, sections = len(self.distance), len(self.sections)
         begin = f"Measured: {count} point{'s' * (count > 1)} of the wall in {sections} section{'s' * (sections > 1)}"

@@ -47,7 +47,7 @@ class Cracking:
         return asdict(self)
 
     def sentence(self, highest: float) -> str:
-        """For people; `highest` is the highest pressure among the states, Pa."""
+        """Sentence on the cracking pressure; `highest` is the highest pressure among the states, Pa."""
         grown = f"{self.area_ratio:g} times the passage at rest"
         if self.pressure is None:
             return f"Cracking: not up to {highest / 1e3:.4g} kPa, where the lips leave less than {grown}."

@@ -52,7 +52,7 @@ class MeasuredStates:
         return (part for part in (self.discharge, self.area, self.shapes, self.taps) if part is not None)
 
     def sentences(self) -> list[str]:
-        """For people, one of each."""
+        """Sentences that compare each measured quantity with the computed one."""
         return [part.sentence() for part in self]
 
     def summary(self) -> dict[str, Any]:
