@@ -75,7 +75,7 @@ class Parameter:
 
     @property
     def surrounding(self) -> bool:
-        """Whether it leaves the steady state and the linearised structure as they are."""
+        """True for a parameter that leaves the steady state and the linearised structure as they are."""
         return not self.moves_equilibrium
 
     @property

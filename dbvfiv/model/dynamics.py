@@ -31,12 +31,12 @@ from .valve import ValveModel
 
 @dataclass(frozen=True)
 class Conditions:
-    """What surrounds the structure.
+    """Parameters of fluid, damping and pipes that act on the structure's dynamics.
 
     Attributes
     ----------
     density : float
-        Of the fluid, kg/m3.
+        Density of the fluid, kg/m3.
     alpha : float
         Rayleigh mass damping, 1/s.
     beta : float
@@ -44,12 +44,12 @@ class Conditions:
     loss_factor : float
         Factor on the loss factors of all materials; zero leaves them elastic.
     pipe_length : float, optional
-        Of the line in front, m; the case's own where it is not given, and of no effect without a line. Pipes in series
-        are stretched alike.
+        Length of the upstream pipe, m; the case's own by default, and of no effect without a pipe. Pipes in series are
+        stretched alike.
     tail_length : float, optional
-        Of the pipe behind, m; likewise.
+        Length of the downstream pipe, m; likewise.
     wave_speed : float, optional
-        In an elastic line, m/s; likewise. Of pipes in series that of the first one in which waves run.
+        Wave speed in an elastic upstream pipe, m/s; likewise. For pipes in series that of the first elastic one.
     """
 
     density: float
@@ -152,12 +152,12 @@ class LinearisedState:
         return (self.forces, self.slope) if self.added is None else self.added.coupling(self.forces, self.slope)
 
     def fluid_parts(self, density: float, storage: float | None = None, line: Mapping[str, float] = {}):
-        """What the unsteady fluid answers to `slope`, as `fluid_parts`."""
+        """Matrices of the unsteady fluid's response to `slope`, see `fluid_parts` of this module."""
         self.check_pump()
         return fluid_parts(self.model.flow, self.area, self.inlet, density, storage, line)
 
     def steady_parts(self) -> dict[str, np.ndarray]:
-        """The same of a fluid without inertia."""
+        """Matrix of the response of a fluid without inertia to `slope`."""
         return {"A0": self.model.flow.steady_operator(self.area, self.inlet)[1]}
 
     def nodal(self, q: np.ndarray) -> np.ndarray:
@@ -165,7 +165,7 @@ class LinearisedState:
         return self.model.nodal(q)
 
     def relaxation(self, loss_factor: float) -> Relaxation | None:
-        """What relaxes of the stiffness with a factor on all loss factors; None where nothing does."""
+        """Viscoelastic part of the stiffness, with a factor on all loss factors; None for an elastic wall."""
         return self.model.relaxation.stiffness(loss_factor, lambda: self.relaxing)
 
     def damped(self, alpha: float, beta: float, loss_factor: float = 0.0) -> CoupledPencil:

@@ -1,4 +1,4 @@
-"""Which equations a valve moves by."""
+"""Choice of the equations of motion of a valve."""
 
 from __future__ import annotations
 

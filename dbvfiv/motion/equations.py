@@ -249,7 +249,7 @@ class ValveMotion:
 
     @property
     def eliminated(self) -> bool:
-        """Whether pressures follow from the wall's motion alone, so that a step has no unknown of the fluid."""
+        """True where pressures follow from the wall's motion alone, so that a step has no unknown of the fluid."""
         return not self.moving_fluid
 
     def _pressure_slope(self, area: np.ndarray, load: Load, weights: Weights) -> np.ndarray:
@@ -294,7 +294,7 @@ class ValveMotion:
 
     @property
     def factored(self) -> bool:
-        """Whether there are factors to solve with."""
+        """True where a factorisation to solve with exists."""
         return self._factor is not None and self._factor.factorisations > 0
 
     def _solver(self, inner: int) -> CoupledFactor:

@@ -35,7 +35,7 @@ RUNS = {
 
 @dataclass(frozen=True)
 class Runs:
-    """How much is computed for a report.
+    """Amount of computation for a report.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Runs:
     workers : int
         Processes that share the columns of the map.
     leave_out : tuple of str
-        Of `RUNS` those that are not wanted.
+        Names among `RUNS` that are not wanted.
     """
 
     cells: int = 20

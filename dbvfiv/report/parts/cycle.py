@@ -1,4 +1,4 @@
-"""What the vibration grows into."""
+"""Part of the report on the limit cycle that the vibration grows into."""
 
 from __future__ import annotations
 

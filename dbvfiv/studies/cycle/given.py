@@ -1,4 +1,4 @@
-"""Where a branch of cycles starts: a motion that a result file holds."""
+"""Start of a branch of cycles from a motion in a result file."""
 
 from __future__ import annotations
 

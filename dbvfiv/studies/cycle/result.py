@@ -47,7 +47,7 @@ class Point:
 
     @property
     def stable(self) -> bool | None:
-        """Whether all perturbations of the model's symmetry decay; None where that was not asked for."""
+        """True where all perturbations of the model's symmetry decay; None where stability was not asked for."""
         return None if self.unstable < 0 else bool(self.unstable == 0)
 
     @property

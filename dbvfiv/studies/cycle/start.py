@@ -1,4 +1,4 @@
-"""Where a branch of cycles starts: the onset of a scan."""
+"""Start of a branch of cycles from an onset (Hopf bifurcation) of a scan."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a branch of cycles is followed and kept."""
+"""Run of the cycle study: follows a branch of cycles and keeps it in a record."""
 
 from __future__ import annotations
 

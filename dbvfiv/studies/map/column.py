@@ -50,13 +50,13 @@ class ColumnTask(NamedTuple):
 
     @property
     def key(self) -> tuple[float, int]:
-        """What tells it from other columns."""
+        """Key that identifies the column among the others."""
         return self.value, self.level
 
 
 @dataclass(frozen=True)
 class MapPlan:
-    """Which cells a map has, and in which order they are found.
+    """Plan of a map: its cells, and the order in which they are computed.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class MapPlan:
     laws : tuple of float
         Blends of the continuity laws, one picture each.
     refine : int
-        How often columns are halved where the number of onsets changes.
+        Number of times that columns are halved where the number of onsets changes.
     """
 
     case: Case
@@ -84,7 +84,7 @@ class MapPlan:
 
     @property
     def transposed(self) -> bool:
-        """Whether columns run along x: where only y changes the steady state."""
+        """True where columns run along x, since y alone changes the steady state."""
         return is_surrounding(self.case, self.x.parameter) and not is_surrounding(self.case, self.y.parameter)
 
     @property
@@ -174,7 +174,7 @@ class MapColumn:
         return cls(task.value, task.level, cells, np.zeros((0, 5)), np.nan, sentence, seconds)
 
     def has(self, law: int) -> bool:
-        """Whether it was solved under a continuity law."""
+        """True where the column was solved under a continuity law, given by its number."""
         how = self.cells.get("how")
         return not self.failure and (how is None or bool((how[law] != MISSING).any()))
 
@@ -277,7 +277,7 @@ def _law(
 
 
 def shared_place(plan: MapPlan, value: float) -> Place | None:
-    """Where the steady state of a column lies; None if its cells have states of their own."""
+    """Parameter point whose steady state all cells of a column share; None if cells have states of their own."""
     if not is_surrounding(plan.case, plan.along.parameter):
         return None
     return plan.place(value, plan.along.values[0], plan.laws[0])

@@ -137,7 +137,7 @@ class FoundModes:
 
     @property
     def stable(self) -> bool | None:
-        """Whether all modes decay; None where that is not known."""
+        """True where all modes decay; None where that is not known."""
         return self.verdict.stable
 
 

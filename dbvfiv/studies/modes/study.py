@@ -1,4 +1,4 @@
-"""How leading modes of a steady state are found and kept."""
+"""Run of the modes study: finds leading modes of a steady state and keeps them in a record."""
 
 from __future__ import annotations
 

@@ -300,7 +300,7 @@ class OnsetSearch:
         return spectrum.mode(int(np.argmin(apart)))
 
     def _side(self, value: float, eigenvalue: complex) -> tuple[Side, Certificate]:
-        """What the full pencil says at a value, and what vouches for it."""
+        """Stability at a value by the full model, and the certificate of its eigenvalue count."""
         cell = self.walk.column([self.place(value)])
         values, certificate = cell.leading[0], cell.certificate(0)
         crossing = complex(values[int(np.argmin(np.abs(values - eigenvalue)))])

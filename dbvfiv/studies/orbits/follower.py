@@ -146,12 +146,10 @@ class Follower:
     def begin(
         self, onset: Onset, values: Sequence[float], tell: Callable[[CyclePoint], None]
     ) -> tuple[CycleTracer, list[str]]:
-        """What follows the branch of an onset through ascending values, its first cycles found and told of: two small
-        ones, and those at the values nearer to the onset; and why some of the latter were not found.
+        """Tracer of the branch of an onset through ascending values, with its first cycles found and reported.
 
-        Raises
-        ------
-        SolveError
+        The first cycles are two small ones, and those at the values nearer to the onset. The second value returned is
+        why some of the latter were not found.
         """
         rest, first, second = self.from_onset(onset)
         ends, cycles, missed = sorted((onset.value, second.mu[self.name])), [first, second], []
@@ -169,7 +167,7 @@ class Follower:
         return tracer, missed
 
     def tracer(self, values: Sequence[float], first: PeriodicMotion) -> CycleTracer:
-        """What follows a branch that has a motion `first` on it through ascending values of the parameter."""
+        """Tracer of a branch through ascending values of the parameter; `first` is a motion on the branch."""
         asked = self.case.cycle
         swing = np.sqrt(2.0) * np.linalg.norm(first.coefficients[1:3, self.lip])
         whole = np.linalg.norm(first.coefficients[1:] / self.system.scales)
@@ -190,7 +188,7 @@ class Follower:
         return CycleTracer(self.solver, self.name, options, events)
 
     def orbit(self, cycle: Cycle) -> Orbit:
-        """What is looked at of a cycle."""
+        """Orbit of a cycle, from which its results are taken."""
         return Orbit(self.system.model(cycle.mu), cycle.mu, cycle.motion)
 
 

@@ -1,4 +1,4 @@
-"""How an eigenvalue answers to a parameter: of the load, of the surroundings, of the wall.
+"""Derivatives of an eigenvalue with respect to parameters of the load, the surroundings and the wall.
 
 d lambda = - w^H dT x / (w^H T' x) with left and right vectors of the coupled pencil (`eigen.eigenvalue_derivative`).
 The change of the pencil is taken through the equilibrium: parameters that move it are stepped by a small amount to
@@ -78,7 +78,7 @@ def parameters_of(model: ValveModel) -> tuple[str, ...]:
 
 
 def _has(model: ValveModel, name: str) -> bool:
-    """Whether anything in a valve depends on a parameter of the table in one way."""
+    """True where a parameter of the table acts on the valve and has one value there."""
     if name in ("density", "storage"):
         return model.flow.has_fluid and model.flow.unsteady
     if name == "angle":  # of all plies at once

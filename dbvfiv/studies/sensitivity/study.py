@@ -1,4 +1,4 @@
-"""How derivatives of an eigenvalue are found and kept."""
+"""Run of the sensitivity study: finds derivatives of an eigenvalue and keeps them in a record."""
 
 from __future__ import annotations
 

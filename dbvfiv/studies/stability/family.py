@@ -64,18 +64,18 @@ class ValveFamily(PencilFamily):
         return self._frequencies[:count]
 
     def search(self, condition: Condition) -> SearchOptions:
-        """What is searched in the spectrum: the rule that every study follows."""
+        """Search options for the spectrum, by the rule that every study follows."""
         return self.leading(condition).options
 
     def leading(self, condition: Condition) -> LeadingSearch:
-        """The same, with the frequency up to which the search speaks for the state."""
+        """Search for the leading modes, with the frequency up to which it is a verdict on the state."""
         line = law_parts(condition.law)[1]
         return self.leading_under(
             Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss, **line)
         )
 
     def leading_under(self, conditions: Conditions, in_vacuo: bool = False) -> LeadingSearch:
-        """The same under conditions by their names, with the fluid or in vacuo."""
+        """Search for the leading modes under conditions given by their names, with the fluid or in vacuo."""
         line = conditions.of_line
         key = conditions.beta, conditions.loss_factor, in_vacuo, *line.values()  # nothing else decides
         if key not in self._searches:
@@ -93,7 +93,7 @@ class ValveFamily(PencilFamily):
         return Reach(-np.inf, 2 * np.pi * band, edge_of(self.relaxation(conditions.loss_factor))).is_mode(values)
 
     def relaxation(self, loss: float) -> Relaxation | None:
-        """What relaxes with a factor on the loss factors of all materials."""
+        """Viscoelastic part of the stiffness, with a factor on all loss factors; None for an elastic wall."""
         loss = float(loss)
         if loss not in self._relaxations:
             if len(self._relaxations) > _KEPT:

@@ -90,7 +90,7 @@ class Place:
         return Condition(self.density, self.alpha, self.beta, law, self.loss_factor)
 
     def under(self, condition: Condition) -> Place:
-        """The same steady state under another condition."""
+        """Parameter point of the same steady state under another condition."""
         density, alpha, beta, law, loss_factor = condition
         storage, line = law_parts(law)
         line = dict.fromkeys(OF_LINE, 0.0) | line
@@ -98,7 +98,7 @@ class Place:
 
     @property
     def conditions(self) -> Conditions:
-        """What surrounds the structure there."""
+        """Parameters of fluid, damping and pipes at the parameter point."""
         return Conditions(self.density, self.alpha, self.beta, self.loss_factor, **self.line)
 
     def value(self, name: str) -> float:
@@ -133,7 +133,7 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
 
 
 def describe_fixed(case: Case, *moved: str) -> str:
-    """The same in words, "6 kPa static, 10 kg/m³, quasi-steady, α = 0 1/s, β = 0.003 s"."""
+    """Fixed conditions of a case in words, "6 kPa static, 10 kg/m³, quasi-steady, α = 0 1/s, β = 0.003 s"."""
     words = []
     for name, value in fixed_conditions(case, *moved).items():
         text = value if isinstance(value, str) else PARAMETERS[name].text(value)
@@ -142,7 +142,7 @@ def describe_fixed(case: Case, *moved: str) -> str:
 
 
 def is_surrounding(case: Case, name: str) -> bool:
-    """Whether a parameter leaves the steady state and the linearised structure of a case as they are."""
+    """True where a parameter leaves the steady state and the linearised structure of a case as they are."""
     return PARAMETERS[name].surrounding and not why_it_moves(case, name)
 
 

@@ -99,7 +99,7 @@ class StabilityWalk:
         return _Built(model, path, ColumnSolver(), {})
 
     def _key(self, place: Place) -> tuple:
-        """What a model has to be built anew for: the design, and what of the surroundings moves the steady state."""
+        """Key of the model of a parameter point: the design, and those conditions that move the steady state."""
         design = dict(place.design)
         design |= {name: place.value(name) for name, own in self._moving.items() if place.value(name) != own}
         return tuple(sorted(design.items()))
@@ -188,7 +188,7 @@ class StabilityWalk:
         return self._last[1]
 
     def search(self, place: Place) -> LeadingSearch:
-        """What is searched in the spectrum of a place, and up to which frequency the search speaks for it.
+        """Search for the leading modes at a parameter point, with the frequency up to which it is a verdict.
 
         Raises
         ------

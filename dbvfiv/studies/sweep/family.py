@@ -49,14 +49,14 @@ COUNTED = 0.999
 
 @dataclass(frozen=True)
 class Check:
-    """What was verified at one value.
+    """Verification of eigenvalues and their count at one value of the parameter.
 
     Attributes
     ----------
     value : float
     error : float
-        Largest relative difference of the leading eigenvalues between basis and full pencil; largest residual where
-        every value is solved in full.
+        Largest relative difference of the leading eigenvalues between reduced-order and full model; largest residual
+        where every value is solved in full.
     unstable_count, unstable_count_independent : int
         Both eigenvalues of a pair count.
     agrees : bool

@@ -78,7 +78,7 @@ class SweepOptions:
 
 @dataclass(frozen=True)
 class SweepPoint:
-    """What is known at one value as soon as it is solved."""
+    """Eigenvalues, 1/s, and unstable count at one value, as soon as it is solved."""
 
     value: float
     eigenvalues: np.ndarray
@@ -302,7 +302,7 @@ class _Run:
 
 
 def _with_gaps(branches: Branches, sound: np.ndarray, values: np.ndarray) -> Branches:
-    """The same branches over more values, those left out not being there."""
+    """Branches over more values, with NaN at values that were left out."""
     eigenvalues = np.full((len(branches.ids), len(values)), complex(np.nan, np.nan))
     confidence = np.full(eigenvalues.shape, np.nan)
     at = np.flatnonzero(np.isin(values, sound))

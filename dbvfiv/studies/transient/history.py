@@ -1,4 +1,4 @@
-"""What is read off every step: rows of `dbvfiv.studies.transient.tables.HISTORY`."""
+"""Quantities computed at every step: rows of `dbvfiv.studies.transient.tables.HISTORY`."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ from .tables import tables_of
 
 @dataclass
 class TransientRun:
-    """What a run found, besides what its record keeps.
+    """Result of a run, besides its record.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class TransientRun:
     failures : list of str
     interrupted : bool
     stopped : bool
-        Whether the verdict ended it.
+        True where the verdict ended the run.
     residuals, solves, factorisations, halvings : int
         Work done, of this part of the run if it was resumed.
     """
