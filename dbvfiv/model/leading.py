@@ -10,7 +10,7 @@ import numpy as np
 
 from eigen import CLEAR, SearchOptions
 
-from .dynamics import Conditions
+from ..case.parameters import Mu
 
 #: Room above the highest structural frequency that a band is made for.
 ROOM = 1.05
@@ -101,7 +101,7 @@ def growth_floor(beta: float) -> float:
 
 def select_search(
     options: SearchOptions,
-    conditions: Conditions,
+    mu: Mu,
     structural_frequencies: Callable[[int], np.ndarray],
     count: int,
     resolved: float = np.inf,
@@ -117,7 +117,7 @@ def select_search(
     ----------
     options : SearchOptions
         Search options as asked for.
-    conditions : Conditions
+    mu : Mu
         Only the stiffness damping and the factor on the loss factors matter.
     structural_frequencies : callable
         From a number to that many lowest frequencies of the undamped structure in vacuo at the state, Hz, ascending;
@@ -133,23 +133,23 @@ def select_search(
 
     Examples
     --------
-    >>> found = select_search(SearchOptions(), Conditions(10.0, 0.0, 0.0), lambda n: np.array([14.0, 20.0]), 2)
+    >>> found = select_search(SearchOptions(), Mu(density=10.0), lambda n: np.array([14.0, 20.0]), 2)
     >>> round(found.band, 6), found.origin.value
     (21.0, 'structure')
-    >>> select_search(SearchOptions(), Conditions(10.0, 0.0, 0.003), lambda n: np.zeros(0), 2).options.limit_point
+    >>> select_search(SearchOptions(), Mu(density=10.0, beta=0.003), lambda n: np.zeros(0), 2).options.limit_point
     -333.3333333333333
     """
-    found = _select(options, conditions, structural_frequencies, count)
+    found = _select(options, mu, structural_frequencies, count)
     if found.band > resolved:
         found = replace(found, options=replace(found.options, max_frequency=resolved), origin=BandOrigin.LINE)
     return replace(found, claimed=min(found.claimed, found.band, resolved))
 
 
-def _select(options: SearchOptions, conditions: Conditions, structural_frequencies, count: int) -> LeadingSearch:
+def _select(options: SearchOptions, mu: Mu, structural_frequencies, count: int) -> LeadingSearch:
     """As `select_search`, whatever is resolved."""
     asked = BandOrigin.NONE if options.max_frequency is None else BandOrigin.ASKED
-    creeps = conditions.loss_factor > 0
-    limit = None if creeps else limit_point(conditions.beta)
+    creeps = mu.loss_factor > 0
+    limit = None if creeps else limit_point(mu.beta)
     if asked is BandOrigin.ASKED:
         options = options if limit is None else replace(options, limit_point=limit)
         return LeadingSearch(options, asked, creeps=creeps)

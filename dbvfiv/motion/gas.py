@@ -30,7 +30,7 @@ class GasMotion(ValveMotion):
         A gas is soft. The water hammer of a liquid hits stiff walls as an incompressible fluid does.
         """
         law = self.model.flow
-        return self.conditions.density * law.sound_speed**2 / law.ratio < GAS
+        return self.mu.density * law.sound_speed**2 / law.ratio < GAS
 
     def fluid_step(self, old: GasState, h: float, rate: float, inlet: float) -> GasStep:
         """The fluid in a step of length h, s; see `GasStep`."""

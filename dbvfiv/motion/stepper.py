@@ -192,7 +192,7 @@ class Stepper:
     def _works(self, trial: Trial) -> tuple[float, float]:
         """Work of the pressure and dissipation of a step, by the scheme's own weights."""
         way = trial.q - trial.old.q
-        alpha = self.motion.conditions.alpha
+        alpha = self.motion.mu.alpha
         lost = trial.damping @ way
         if alpha:
             lost += alpha * (self.motion.momentum(trial.q_mid, trial.v_mid) @ way)

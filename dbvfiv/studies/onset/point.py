@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ...case.parameters import Mu
 from ..case import Case
-from ..stability.place import Place
 from ..stability.verdict import Verdict
 
 #: Meshes of a run: that of the case, and the coarser one for the uncertainty.
@@ -109,7 +109,7 @@ class OnsetPoint:
         Direct eigenvalues on both sides.
     confirmed : bool
         Both sides agree with the crossing, and both counts agree on each side.
-    place : Place
+    place : Mu
     bracket : (2,) tuple of float
         Neighbouring values of the scan that it lies between.
     ahead : int
@@ -136,7 +136,7 @@ class OnsetPoint:
     below: Side
     above: Side
     confirmed: bool
-    place: Place
+    place: Mu
     bracket: tuple[float, float]
     ahead: int = 0
     criticality: str | None = None
@@ -190,6 +190,6 @@ class OnsetPoint:
                 "above": Side.of(summary["above"]),
                 "bracket": tuple(summary["bracket"]),
                 "note": summary["note"] or "",
-                "place": Place.of(case).at(**{summary["parameter"]: summary["value"]}),
+                "place": Mu.of(case).at(**{summary["parameter"]: summary["value"]}),
             }
         )

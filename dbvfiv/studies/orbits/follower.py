@@ -14,12 +14,12 @@ from continuation.cycles import Cycle, CycleOptions, CycleSolver
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
 
-from ...case.parameters import PARAMETERS
+from ...case.parameters import PARAMETERS, Mu
 from ...errors import SolveError
 from ...model.system import ValveSystem
 from ...motion.periodic import PeriodicValve
 from ..case import Case
-from ..stability.place import Place, rebuilder
+from ..stability.place import rebuilder
 from ..stability.walk import StabilityWalk
 from .onset import Onset
 from .orbit import Orbit
@@ -44,7 +44,7 @@ class Follower:
     case : Case
         Its section `cycle` says how.
     walk : StabilityWalk
-    place : Place
+    place : Mu
         Parameters at the start.
     parameter : str
         The one to move.
@@ -57,13 +57,13 @@ class Follower:
         If the equations of periodic motions do not cover the case.
     """
 
-    def __init__(self, case: Case, walk: StabilityWalk, place: Place, parameter: str, spectrum):
+    def __init__(self, case: Case, walk: StabilityWalk, place: Mu, parameter: str, spectrum):
         self.case, self.walk, self.place, self.parameter = case, walk, place, parameter
-        system = ValveSystem(walk.built(Place.of(case)).model, rebuilder(case))
-        self.system = PeriodicValve(system.model, place.mu())
+        system = ValveSystem(walk.built(Mu.of(case)).model, rebuilder(case))
+        self.system = PeriodicValve(system.model, place.for_system())
         self.solver = CycleSolver(self.system, _basis(self.system, spectrum), CycleOptions())
         self.name = PARAMETERS[parameter].system_name or parameter
-        model = self.system.model(place.mu())
+        model = self.system.model(place.for_system())
         #: Number of the displacement in y of the lip at x = z = 0 among the unknowns.
         self.lip = int(model.shell.dofs.index[model.mesh.centre_line[0], 1])
 
@@ -75,7 +75,7 @@ class Follower:
         ------
         SolveError
         """
-        mu, h, mode = onset.place.mu(), Harmonics(HARMONICS), onset.mode
+        mu, h, mode = onset.place.for_system(), Harmonics(HARMONICS), onset.mode
         model = self.system.model(mu)
         q, amplitude = self.walk.equilibrium(onset.place), self.case.cycle.amplitude
         inner = model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)
@@ -136,7 +136,7 @@ class Follower:
         SolveError
         """
         try:
-            found = self.solver.solve(guess, self.place.mu() | {self.name: value})
+            found = self.solver.solve(guess, self.place.for_system() | {self.name: value})
         except ContinuationError as error:
             raise SolveError(f"No cycle was found at {self.parameter} = {value:.6g}: {error}") from error
         if np.linalg.norm(found.motion.coefficients[1:]) < 0.2 * np.linalg.norm(guess.coefficients[1:]):

@@ -140,7 +140,7 @@ class Runner:
 
     def _judge_rubber(self, state: MotionState, inlet: float) -> None:
         """Note where the constants of rubbers with loss factors do not hold at the state that is kicked."""
-        loss = self.motion.conditions.loss_factor
+        loss = self.motion.mu.loss_factor
         found = material_stability(self.model, state.q, inlet, loss) if loss else None
         if found is not None and not found.holds:
             self.record.note(REFUSAL, text=found.sentence)
