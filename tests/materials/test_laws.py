@@ -90,7 +90,9 @@ def test_softening_energy_is_its_formula():
     for e in STRAINS:
         x = plane_stress_invariants(e).i1_minus_3
         knee = 2 * law.mu_0 * law.x_0 * (np.sqrt(1 + x / law.x_0) - 1)
-        assert law.energy(e) == pytest.approx((law.mu_inf * x + knee + law.c * x**2 / 2 + law.c_3 * x**3 / 3) / 2, rel=1e-12)
+        assert law.energy(e) == pytest.approx(
+            (law.mu_inf * x + knee + law.c * x**2 / 2 + law.c_3 * x**3 / 3) / 2, rel=1e-12
+        )
 
 
 def test_rubber_without_a_knee_has_finite_derivatives_by_its_constants():

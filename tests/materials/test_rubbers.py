@@ -92,7 +92,12 @@ def _curve(name, level):
 def test_stable_constants_follow_the_published_curves(name):
     for level, (r_squared, error) in zip(strain_levels(), FOUND[name]):
         test, law = _curve(name, level), rubber(name, level)
-        stress = form_of("softening").columns("uniaxial", test.strain, [law.x_0]) @ [law.mu_inf, law.mu_0, law.c, law.c_3]
+        stress = form_of("softening").columns("uniaxial", test.strain, [law.x_0]) @ [
+            law.mu_inf,
+            law.mu_0,
+            law.c,
+            law.c_3,
+        ]
         left = test.stress - stress
         assert 1 - np.sum(left**2) / np.sum((test.stress - test.stress.mean()) ** 2) >= r_squared
         assert np.abs(left / test.stress)[test.strain >= 0.02].max() <= error
