@@ -65,7 +65,7 @@ def test_quick_start(capsys):
 def test_own_valve():
     follow("own-valve")
     thin, thick = dbvfiv.load_result("six.h5"), dbvfiv.load_result("thick.h5")
-    # by the stable constants; 0.028 m, 12.6 L/s and other levels by the published ones, before stable ones were the default
+    # by the stable constants, the default; 0.028 m, 12.6 L/s and other levels by the published ones before
     assert thin.states[1].lip_opening == pytest.approx(0.0363, abs=0.002)
     assert 1e3 * thin.states[1].mass_flow / thin.case.fluid.density == pytest.approx(15.9, abs=0.5)
     assert thin.record.settled.startswith("Strain levels of the rubbers: CR 28.4 %, SBR 12.5 %, EPDM 15.8 %")
