@@ -12,42 +12,48 @@ from dbvfiv.studies.modes.run import ModesOptions, run_modes
 from dbvfiv.studies.session import Session
 from tests.verification.doors import Asked, ask_all, random_cases, rates_in_time
 
-#: Share of states that some study may leave undecided.
-OPEN = 0.1
 #: Elements around and along on which many states are asked in short time; where a valve is stable depends on the mesh,
 #: the agreement of the studies does not.
 COARSE = (4, 6)
 
 
-def judge(asked: list[Asked]) -> None:
-    """Everything that is asked of a sample of random states."""
+def judge(asked: list[Asked], few: int) -> None:
+    """Check one outcome by all studies, and that few states are left open or lead with different modes."""
     failed = [a for a in asked if a.failure]
     decided = [a for a in asked if not a.failure]
     print(f"\n{len(asked)} states, {len(failed)} without a steady state, {sum(a.left_open for a in decided)} left open")
     assert len(failed) <= 0.05 * len(asked), "\n".join(map(str, failed))
     assert all(a.agree for a in decided), "\n".join(str(a) for a in decided if not a.agree)
-    assert sum(a.left_open for a in decided) <= OPEN * len(decided), [str(a) for a in decided if a.left_open]
-    for a in decided:
-        verdicts = [v for v in a.verdicts.values() if v.certain and np.isfinite(v.growth_rate)]
-        rates = np.array([v.growth_rate for v in verdicts])
-        size = 2 * np.pi * np.array([v.frequency for v in verdicts])
-        assert np.ptp(rates) <= 1e-4 * max(1.0, float(np.hypot(rates, size).max())) if rates.size else True, str(a)
+    assert sum(a.left_open for a in decided) <= few, [str(a) for a in decided if a.left_open]
+    differing = [a for a in decided if not lead_alike(a)]
+    assert len(differing) <= few, "\n".join(map(str, differing))
     assert not any(v.outcome == "not valid" for a in decided if not is_published(a) for v in a.verdicts.values())
 
 
+def lead_alike(asked: Asked) -> bool:
+    """True where the leading modes of all studies that are certain have one growth rate."""
+    verdicts = [v for v in asked.verdicts.values() if v.certain and np.isfinite(v.growth_rate)]
+    rates = np.array([v.growth_rate for v in verdicts])
+    size = np.hypot(rates, 2 * np.pi * np.array([v.frequency for v in verdicts])).max(initial=1.0)
+    return not verdicts or bool(np.ptp(rates) <= 1e-4 * size)
+
+
 def is_published(asked: Asked) -> bool:
-    """Whether the rubbers have the thesis's constants, which are unstable in such states."""
+    """True where the rubbers have the thesis's constants, which are unstable in such states."""
     return asked.case.materials.constants == "published"
 
 
-def test_every_study_gives_one_outcome():
+@pytest.mark.parametrize("group", range(20))
+def test_every_study_gives_one_outcome(group):
+    """A hundred states, five of a valve, a line and a pressure in each group."""
     valves = "cases/dbv18.toml", "cases/dbv6.toml", "cases/dbv12-in-line.toml", "cases/dbv12.toml"
-    judge(list(ask_all(random_cases(100, seed=5, valves=valves, each=25, mesh=COARSE))))
+    judge(list(ask_all(random_cases(5, seed=100 + group, valves=(valves[group % 4],), each=5, mesh=COARSE))), few=0)
 
 
 @pytest.mark.slow
 def test_every_study_gives_one_outcome_on_many_valves():
-    judge(list(ask_all(random_cases(100, seed=6))) + list(ask_all(random_cases(900, seed=7, mesh=COARSE))))
+    fine, coarse = random_cases(100, seed=6), random_cases(900, seed=7, mesh=COARSE)
+    judge([*ask_all(fine), *ask_all(coarse)], few=10)
 
 
 def check_kicks(number: int, seed: int) -> None:

@@ -73,12 +73,12 @@ def test_a_small_push_grows_at_the_eigenvalues_rate(law, pressure, density):
 
 
 #: Continuity law, pressure (Pa), bracket of densities (kg/m3) around the onset at which stability is lost or regained;
-#: on even rows.
+#: on even rows. The thesis's constants at 6 kPa, stable ones above, where these have lost material stability.
 ONSETS = [
     (QUASI, 6e3, (800.0, 1200.0)),
-    (QUASI, 12e3, (1.2, 2.6)),
+    (QUASI, 25e3, (120.0, 240.0)),
     (STORAGE, 6e3, (200.0, 260.0)),
-    (STORAGE, 12e3, (70.0, 90.0)),
+    (STORAGE, 12e3, (5.0, 10.0)),
 ]
 
 
@@ -88,7 +88,8 @@ def test_the_onset_lies_where_the_sign_changes_in_time(law, pressure, bracket):
     """A little below and above the onset a push decays on one side and grows on the other, at rates that vanish where
     the eigenvalue's does.
     """
-    changes = dict(FORMER) | {
+    valve = dict(FORMER) | ({"materials.constants": "stable"} if pressure > 6e3 else {})
+    changes = valve | {
         "mesh.around": 6,
         "mesh.along": 8,
         "fluid.continuity": law,
@@ -102,7 +103,7 @@ def test_the_onset_lies_where_the_sign_changes_in_time(law, pressure, bracket):
     onset, limits = found[0]["value"], []
     densities = onset * np.array([0.98, 1.02])
     for density in densities:
-        value, rings = two_routes(law, pressure, float(density), further=FORMER)
+        value, rings = two_routes(law, pressure, float(density), further=valve)
         assert abs(value.imag) / (2 * np.pi) == pytest.approx(found[0]["frequency"], rel=0.02)
         limits.append((rings[1] + (rings[1] - rings[0]) / 3.0).real)
     crossing = densities[0] - limits[0] * (densities[1] - densities[0]) / (limits[1] - limits[0])

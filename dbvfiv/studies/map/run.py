@@ -182,7 +182,9 @@ def _ordered(found) -> tuple[MapColumn, ...]:
 
 def _outside(case: Case, ordered) -> list[str]:
     """A sentence where leading modes leave the frequencies at which loss factors hold."""
-    sentence = outside_band(case, [f for c in ordered if not c.failure for f in c.cells["frequency"].ravel()])
+    sentence = outside_band(
+        case, [f for c in ordered if not c.failure for f in c.cells["oscillating_frequency"].ravel()]
+    )
     return [] if sentence is None else [sentence]
 
 

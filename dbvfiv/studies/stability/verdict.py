@@ -37,7 +37,8 @@ class Verdict:
     growth_rate, frequency : float, 1/s, Hz
         Of the leading oscillating mode, of a valve that diverges those of the motion that does (0 Hz); NaN if unknown.
     damping_ratio : float
-        Of the least damped oscillating mode that is listed; NaN if unknown.
+        Of the least damped oscillating mode that is listed, of more modes by `modes` than by studies over parameters;
+        NaN if unknown.
     critical_damping_factor : float
         Factor on the loss factors, or on beta, at which flutter would begin; NaN where it was not asked for or where
         no factor in reach makes the difference.
@@ -100,15 +101,15 @@ class Verdict:
         statement = statement or describe_counts(unstable, counted, certain, line, band)
         if not values.size:
             return cls(UNDECIDED, f"No mode was found in the search, which says nothing of the state. {statement}")
-        swings = values[values.imag != 0]
+        oscillates = np.abs(values.imag) > NEUTRAL * np.abs(values)
         growing = values.real > np.maximum(line, NEUTRAL * np.abs(values))
-        still = values[growing & (values.imag == 0)]
-        measures = {"certain": bool(agrees), "band": float(band)} | _of_modes(swings)
+        still = values[growing & ~oscillates]
+        measures = {"certain": bool(agrees), "band": float(band)} | _of_modes(values[oscillates])
         if growing.any() and (agrees or proven):
             if still.size:
                 rate = float(still.real.max())
                 measures |= {"growth_rate": rate, "frequency": 0.0}
-                also = " An oscillating mode grows besides." if (growing & (values.imag != 0)).any() else ""
+                also = " An oscillating mode grows besides." if (growing & oscillates).any() else ""
                 reason = f"A motion grows by {rate:.4g} 1/s without oscillating.{also} {statement}"
                 return cls(DIVERGES, reason, **measures)
             return cls(FLUTTERS, statement, **measures)
@@ -180,15 +181,15 @@ class Verdict:
         return cls(**given | missing)
 
 
-def _of_modes(swings: np.ndarray) -> dict[str, float]:
+def _of_modes(modes: np.ndarray) -> dict[str, float]:
     """Growth rate and frequency of the leading oscillating mode, and the least damping ratio."""
-    if not swings.size:
+    if not modes.size:
         return {}
-    leading = swings[int(np.argmax(swings.real))]
+    leading = modes[int(np.argmax(modes.real))]
     return {
         "growth_rate": float(leading.real),
         "frequency": float(abs(leading.imag) / (2 * np.pi)),
-        "damping_ratio": float((-swings.real / np.abs(swings)).min()),
+        "damping_ratio": float((-modes.real / np.abs(modes)).min()),
     }
 
 
