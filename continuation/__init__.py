@@ -2,8 +2,8 @@
 
 A model fulfils `System` (or is written once as a `JaxSystem`); `continue_branch` follows its
 equilibria, finds and locates folds, branch points and Hopf points; `switch_branch`,
-`continue_fold` and `continue_hopf` go on from those; `continuation.orbits` holds periodic
-orbits.
+`continue_fold`, `continue_hopf` and `orbits_from_hopf` go on from those; `find_orbit` and
+`continue_orbits` serve periodic orbits, by harmonic balance.
 
 Examples
 --------
@@ -61,6 +61,8 @@ __all__ = [
     "NotABifurcation",
     "NotConverged",
     "Observer",
+    "Orbit",
+    "OrbitOptions",
     "OutOfDomain",
     "Parameters",
     "SingularSystem",
@@ -71,17 +73,35 @@ __all__ = [
     "continue_branch",
     "continue_fold",
     "continue_hopf",
+    "continue_orbits",
     "equilibrium",
+    "find_orbit",
     "fold_coefficient",
     "hopf_normal_form",
+    "orbit_at",
+    "orbits_from_hopf",
     "resume",
     "resume_curve",
+    "resume_orbits",
+    "special_orbit",
     "switch_branch",
 ]
 
+_LATE = {
+    "JaxSystem": "continuation.jax_system",
+    "Orbit": "continuation.orbits",
+    "OrbitOptions": "continuation.orbits",
+    "find_orbit": "continuation.orbits",
+    "continue_orbits": "continuation.orbit_branches",
+    "orbit_at": "continuation.orbit_branches",
+    "orbits_from_hopf": "continuation.orbit_branches",
+    "resume_orbits": "continuation.orbit_branches",
+    "special_orbit": "continuation.orbit_branches",
+}
+
 
 def __getattr__(name):
-    # JAX takes long to import and not every system is written in it.
-    if name == "JaxSystem":
-        return import_module("continuation.jax_system").JaxSystem
+    # JAX and compiled kernels take long to import, and not everyone needs them.
+    if name in _LATE:
+        return getattr(import_module(_LATE[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -43,6 +43,8 @@ class CycleTracer:
     special : list of SpecialCycle
     reason : str
         Why the branch ended.
+    next_step : float
+        Arclength step that the step control takes next.
     """
 
     def __init__(
@@ -55,7 +57,7 @@ class CycleTracer:
         self.solver, self.parameter, self.options, self.events = solver, parameter, options, dict(events)
         self.points: list[CyclePoint] = []
         self.special: list[SpecialCycle] = []
-        self.reason = "running"
+        self.reason, self.next_step = "running", options.step
         self._origin: list[CyclePoint] = []
         self._weight = 1.0 / (np.asarray(solver.system.scales) * options.motion_scale) ** 2
 
@@ -96,12 +98,14 @@ class CycleTracer:
             replace(p, tests={name: float(event(p.cycle)) for name, event in self.events.items()}) for p in points
         ]
 
-    def run(self, tell: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None) -> str:
+    def run(
+        self, tell: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None, step: float | None = None
+    ) -> str:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
-        is found; why it ended.
+        is found; the reason of the end. `step` is the first step where it is not that of the options.
         """
         options = self.options
-        step = options.step
+        step = options.step if step is None else step
         while len(self.points) < options.max_points:
             if len(self.points) > 1 and self._is_over():
                 self.reason = f"limit of {self.parameter} reached"
@@ -113,6 +117,7 @@ class CycleTracer:
                     tell(special)
                 self.reason = again
                 return self.reason
+            self.next_step = step
             if self._turned():
                 del self.points[-1]
                 self.reason = f"the cycles shrink to nothing beyond {self.parameter} = {self.points[-1].value:.6g}"
@@ -281,12 +286,12 @@ class CycleTracer:
     def _fold(self, before: CyclePoint, a: CyclePoint, b: CyclePoint) -> SpecialCycle:
         """The extreme value of the parameter of a parabola through points, renewed until it stays."""
         near, value, located = [before, a, b], a.value, False
-        for _ in range(6):
+        for _ in range(12):
             s = np.array([p.arclength for p in near])
             fit = np.polyfit(s - s[1], [p.value for p in near], 2)
             at = -0.5 * fit[1] / fit[0]
             new = float(np.polyval(fit, at))
-            located = abs(new - value) <= 1e-6 * max(abs(value), self.options.scale)
+            located = abs(new - value) <= max(1e-4 * self.options.located, 1e-12) * max(abs(value), self.options.scale)
             value = new
             if located:
                 break
@@ -350,7 +355,7 @@ class CycleTracer:
         width, located = b.arclength - a.arclength, False
         low, high, flow, fhigh = a, b, fa, fb
         met = [(fa, a), (fb, b)]
-        for _ in range(8):
+        for _ in range(16):
             s = (low.arclength * fhigh - high.arclength * flow) / (fhigh - flow)
             point = self._interpolated([low, high], s)
             if point is None:
@@ -363,9 +368,9 @@ class CycleTracer:
                 flow, high, fhigh = 0.5 * flow, point, f
             if low.arclength > high.arclength:
                 low, high, flow, fhigh = high, low, fhigh, flow
-            if min(abs(f) for f, _ in met) <= 1e-3 * max(abs(fa), abs(fb)) or high.arclength - low.arclength <= (
-                self.options.located * width
-            ):
+            if min(abs(f) for f, _ in met) <= 0.1 * self.options.located * max(
+                abs(fa), abs(fb)
+            ) or high.arclength - low.arclength <= (self.options.located * width):
                 located = True
                 break
         met.sort(key=lambda one: abs(one[0]))

@@ -235,6 +235,51 @@ class CycleSolver:
         return found[:most][sizes[:most] > share * whole].T
 
 
+def cycles_beside_onset(
+    solver: CycleSolver, small: PeriodicMotion, mu: Mapping[str, float], parameter: str, row: np.ndarray, ratio: float
+) -> tuple[Cycle, Cycle, Cycle]:
+    """Equilibrium at a Hopf point as a cycle at rest, and two small cycles beside it.
+
+    To leading order parameter, frequency and mean change with the square of the amplitude, as the normal form has it,
+    and harmonic k with its power k: the guess of the second cycle follows from the first.
+
+    Parameters
+    ----------
+    small : PeriodicMotion
+        The equilibrium and the critical mode with the amplitude of the first cycle.
+    mu : mapping
+        Parameters at the Hopf point.
+    parameter : str
+        The one that is free while the amplitude is held.
+    row : (2 H + 1, n) array
+        Functional of coefficients that measures the amplitude; zero for the mean.
+    ratio : float
+        Amplitude of the second cycle over that of the first.
+
+    Raises
+    ------
+    NotConverged
+    """
+    h, amplitude = small.harmonics, float(np.vdot(row, small.coefficients))
+    free = np.zeros(len(solver.unknowns((parameter,))))
+
+    def of_amplitude(guess, mu, value):
+        return solver.solve(guess, mu, (parameter,), (Condition(row, free, value),))
+
+    first = of_amplitude(small, mu, amplitude)
+    change = first.motion.coefficients - small.coefficients
+    powers = np.append(2.0, np.repeat(np.arange(1.0, h.count + 1), 2))[:, None]
+    guess = PeriodicMotion(
+        h,
+        small.coefficients * np.append(1.0, np.full(h.size - 1, ratio))[:, None] + change * ratio**powers,
+        small.omega + (first.motion.omega - small.omega) * ratio**2,
+    )
+    value = mu[parameter] + (first.mu[parameter] - mu[parameter]) * ratio**2
+    still = small.coefficients * (np.arange(h.size) == 0)[:, None]
+    rest = Cycle(PeriodicMotion(h, still, small.omega), dict(mu), 0.0, 0, 0)
+    return rest, first, of_amplitude(guess, dict(mu) | {parameter: value}, ratio * amplitude)
+
+
 def _updated(change: np.ndarray, steps: list[np.ndarray], units: np.ndarray) -> np.ndarray:
     """A correction by a linearisation elsewhere, with what the corrections before it say of the difference: Broyden's
     method, by the steps alone (Kelley 1995, ch. 7). It matters where a perturbation is nearly neutral. Added to the

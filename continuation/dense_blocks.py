@@ -31,8 +31,9 @@ class DenseBlocks:
             return cls(np.eye(len(stack)), stack, rows)
         weights, sizes, parts = la.svd(stack.reshape(len(stack), -1), full_matrices=False)
         kept = sizes >= tolerance * sizes[0]
-        parts = (sizes[:, None] * parts)[kept].reshape(-1, *stack.shape[1:])
-        return cls(np.ascontiguousarray(weights[:, kept]), parts, rows)
+        parts, weights = (sizes[:, None] * parts)[kept].reshape(-1, *stack.shape[1:]), weights[:, kept]
+        rows = None if rows is None else np.tensordot(weights.T, rows, 1).astype(rows.dtype)
+        return cls(np.ascontiguousarray(weights), parts, rows)
 
     @cached_property
     def stack(self) -> np.ndarray:

@@ -65,3 +65,25 @@ def as_observers(observers) -> list[Observer]:
     if isinstance(observers, Observer) or callable(observers):
         observers = [observers]
     return [o if isinstance(o, Observer) else Calling(o) for o in observers]
+
+
+def run_observed(branch, observers: list[Observer], steps: Callable[[], str]):
+    """Run the steps of a branch between its first and last call of the observers; the branch itself.
+
+    The steps return why they ended.  An interruption ends the branch; an error goes on to the caller, with the branch
+    so far as its attribute ``branch``.
+    """
+    for observer in observers:
+        observer.started(branch)
+    try:
+        branch.reason = steps()
+    except KeyboardInterrupt:
+        branch.reason = "interrupted"
+    except Exception as error:
+        branch.reason = f"error: {error}"
+        error.branch = branch
+        raise
+    finally:
+        for observer in observers:
+            observer.ended(branch)
+    return branch

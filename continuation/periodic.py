@@ -27,6 +27,8 @@ from continuation.harmonics import Harmonics, Rates
 
 #: Least size over the largest of parts that projections of terms through few numbers are sums of.
 TAKEN = 1e-8
+#: The same of small dense matrices at each sample: rounding alone, N matrices of r x r are sums of at most r^2.
+EXACT = 1e-15
 
 Filter = Callable[[np.ndarray], np.ndarray] | int
 
@@ -174,7 +176,7 @@ def _projected(blocks, basis: np.ndarray, known: DenseBlocks | None, rough: bool
     if isinstance(blocks, SparseBlocks):
         return blocks.projected(basis, known, rough)
     rows = np.stack([basis.T @ block for block in blocks])
-    return DenseBlocks.of_stack(rows @ basis, rows.astype(np.float32) if rough else None)
+    return DenseBlocks.of_stack(rows @ basis, rows.astype(np.float32) if rough else None, EXACT)
 
 
 def _times(blocks, samples: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from continuation.branch import Branch
 from continuation.errors import NotConverged, SingularSystem
 from continuation.here import Here
-from continuation.observers import as_observers
+from continuation.observers import as_observers, run_observed
 from continuation.problem import Local, Problem, correct
 
 
@@ -125,23 +125,8 @@ class Tracer:
         return here
 
     def run(self, branch: Branch, here: Here, step: float) -> Branch:
-        """Add points to ``branch`` from ``here`` on until something ends it.
-
-        An interruption ends the branch; an error of the model goes on to the caller, with
-        the branch so far as its attribute ``branch``.
-        """
-        self._tell("started", branch)
-        try:
-            branch.reason = self._steps(branch, here, step)
-        except KeyboardInterrupt:
-            branch.reason = "interrupted"
-        except Exception as error:
-            branch.reason = f"error: {error}"
-            self._tell("ended", branch)
-            error.branch = branch
-            raise
-        self._tell("ended", branch)
-        return branch
+        """Add points to ``branch`` from ``here`` on until something ends it; see `run_observed`."""
+        return run_observed(branch, self.observers, lambda: self._steps(branch, here, step))
 
     def _steps(self, branch, here, step) -> str:
         options = self.options
@@ -187,9 +172,6 @@ class Tracer:
     def _remember(self, branch, step):
         branch.next_step = float(step)
         branch.restart = {"frame": self.frame}
-        own = getattr(self.problem.system, "restart_data", None)
-        if own is not None:
-            branch.restart.update(own())
         condition = self.problem.condition
         if condition is not None:
             branch.restart.update(p=condition.p, q=condition.q)
