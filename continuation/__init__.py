@@ -27,21 +27,22 @@ from importlib import import_module
 from continuation.branch import Branch, CurvePoint, SpecialPoint
 from continuation.branches import continue_branch, resume, switch_branch
 from continuation.curves import continue_fold, continue_hopf, resume_curve
-from continuation.errors import (
+from continuation.event_location import Event
+from continuation.linear import MatrixLinearisation
+from continuation.newton import Deflation, NewtonResult, equilibrium
+from continuation.normal_form import HopfNormalForm, fold_coefficient, hopf_normal_form
+from continuation.options import (
     ContinuationError,
+    ContinuationOptions,
     DerivativeMissing,
+    NewtonOptions,
     NotABifurcation,
     NotConverged,
     OutOfDomain,
     SingularSystem,
 )
-from continuation.events import Event
-from continuation.linear import MatrixLinearisation
-from continuation.newton import Deflation, NewtonResult, equilibrium
-from continuation.normal_form import HopfNormalForm, fold_coefficient, hopf_normal_form
-from continuation.observers import Checkpoint, Observer
-from continuation.options import ContinuationOptions, NewtonOptions
 from continuation.system import Linearisation, Parameters, Spectrum, System, SystemBase
+from continuation.tracer import Checkpoint, Observer
 
 __all__ = [
     "Branch",

@@ -1,15 +1,118 @@
-"""Sparse matrices of one pattern, one for each sample of a period, as linearisations about motions have them."""
+"""Matrices at the samples of a period, as sums of few: sparse ones of one pattern, and their dense projections.
+
+``A_i = sum_k w_ik A_k``: the matrices of a linearisation about a smooth motion are combinations of a few.  Reading few
+matrices once, in single precision, and summing entries where they are used takes half the time of reading one for each
+sample, which is bound by memory.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
+import numba
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
-from continuation.dense_blocks import DenseBlocks
 from continuation.harmonics import Harmonics
-from continuation.sparse_products import LANES, TOGETHER, add_products, add_products_of_one, padded
+
+#: Matrices that are summed at once: the number of them is filled up to a multiple of this with zeros.
+TOGETHER = 4
+#: Samples that are taken at once: likewise.
+LANES = 8
+
+
+def padded(array: np.ndarray, axis: int, multiple: int) -> np.ndarray:
+    """An array with zeros behind it, so that its length is a multiple of a number.
+
+    Examples
+    --------
+    >>> padded(np.ones((1, 3)), 1, 4).tolist()
+    [[1.0, 1.0, 1.0, 0.0]]
+    """
+    missing = -array.shape[axis] % multiple
+    return np.pad(array, [(0, missing if k == axis else 0) for k in range(array.ndim)])
+
+
+@numba.njit(cache=True, fastmath={"contract"}, error_model="numpy")
+def add_products(indptr, indices, values, weights, x, out):
+    """Add to out (n, v, N) the products of sum_k weights[k, t] B_k with x (m, v, N) at each sample t.
+
+    values (nnz, k) holds entries of the B_k, weights (k, N), of one type; k is a multiple of `TOGETHER`.
+    """
+    count, samples = weights.shape
+    entry = np.empty(samples, values.dtype)
+    for i in range(len(indptr) - 1):
+        for p in range(indptr[i], indptr[i + 1]):
+            j = indices[p]
+            a, b, c, d = values[p, 0], values[p, 1], values[p, 2], values[p, 3]
+            for t in range(samples):
+                entry[t] = a * weights[0, t] + b * weights[1, t] + c * weights[2, t] + d * weights[3, t]
+            for k in range(4, count, 4):
+                a, b, c, d = values[p, k], values[p, k + 1], values[p, k + 2], values[p, k + 3]
+                for t in range(samples):
+                    entry[t] += (
+                        a * weights[k, t] + b * weights[k + 1, t] + c * weights[k + 2, t] + d * weights[k + 3, t]
+                    )
+            for v in range(x.shape[1]):
+                for t in range(samples):
+                    out[i, v, t] += entry[t] * x[j, v, t]
+
+
+@numba.njit(cache=True, fastmath={"contract"}, error_model="numpy")
+def add_products_of_one(indptr, indices, values, weights, x, out):
+    """`add_products` with one matrix, k = 1."""
+    samples = weights.shape[1]
+    total = np.empty(samples)
+    for i in range(len(indptr) - 1):
+        for v in range(x.shape[1]):
+            total[:] = 0.0
+            for p in range(indptr[i], indptr[i + 1]):
+                a, j = values[p, 0], indices[p]
+                for t in range(samples):
+                    total[t] += a * x[j, v, t]
+            for t in range(samples):
+                out[i, v, t] += weights[0, t] * total[t]
+
+
+class DenseBlocks:
+    """N matrices that are sums of a few.
+
+    Parameters
+    ----------
+    weights : (N, k) array
+    parts : (k, r, r) array
+    rows : (k', r, n) array, optional
+        V^T A of the first of the full matrices that these are projections of, in single precision.
+    """
+
+    def __init__(self, weights: np.ndarray, parts: np.ndarray, rows: np.ndarray | None = None):
+        self.weights, self.parts, self.rows = weights, parts, rows
+
+    @classmethod
+    def of_stack(cls, stack: np.ndarray, rows: np.ndarray | None = None, tolerance: float = 0.0) -> DenseBlocks:
+        """Of the matrices (N, r, r) themselves, or of those of their combinations above a share of the largest."""
+        if not tolerance:
+            return cls(np.eye(len(stack)), stack, rows)
+        weights, sizes, parts = la.svd(stack.reshape(len(stack), -1), full_matrices=False)
+        kept = sizes >= tolerance * sizes[0]
+        parts, weights = (sizes[:, None] * parts)[kept].reshape(-1, *stack.shape[1:]), weights[:, kept]
+        rows = None if rows is None else np.tensordot(weights.T, rows, 1).astype(rows.dtype)
+        return cls(np.ascontiguousarray(weights), parts, rows)
+
+    @cached_property
+    def stack(self) -> np.ndarray:
+        """(N, r, r)."""
+        return np.tensordot(self.weights, self.parts, 1)
+
+    def __len__(self) -> int:
+        return len(self.weights)
+
+    def between_harmonics(self, h: Harmonics) -> np.ndarray:
+        """(k, 2 H + 1, 2 H + 1): what the weight of each part makes of coefficients."""
+        return np.matmul(h.basis.T, self.weights.T[:, :, None] * h.basis) / h.samples
+
 
 #: Size over the largest of those combinations of the matrices that are left out.
 LEFT_OUT = 1e-6

@@ -1,20 +1,30 @@
-"""Branches and curves as result objects: points, special points, files, figures, JSON."""
+"""Branches and curves as results: points, special points, HDF5 files, JSON.
+
+One HDF5 file holds a branch: the attribute ``header`` (JSON) with names, parameters and the reason of the end; ``z``
+and ``tangent`` of shape (points, unknowns); one dataset per number; ragged eigenvalues padded with nan; one group per
+special point.
+"""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+import os
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
 
-from continuation import storage
 from continuation.plots import plot_branch
+
+#: Version of the layout of files.
+FORMAT = 1
 
 
 @dataclass
 class SpecialPoint:
-    """A point where something happens on a branch.
+    """Special point of a branch: a bifurcation, or an event of the user's own.
 
     Attributes
     ----------
@@ -49,22 +59,25 @@ class SpecialPoint:
     values: dict = field(default_factory=dict)
     vectors: dict = field(default_factory=dict)
 
+    def plain_values(self) -> dict:
+        """`values` as strings and Python numbers."""
+        return {k: v if isinstance(v, str) else float(v) for k, v in self.values.items()}
+
     def to_dict(self) -> dict:
-        """Without the vectors."""
-        values = {k: v if isinstance(v, str) else float(v) for k, v in self.values.items()}
+        """Contents without the vectors, ready for ``json.dumps``."""
         return {
             "kind": self.kind,
             "index": self.index,
             "mu": self.mu,
             "located": self.located,
             "reason": self.reason,
-            **values,
+            **self.plain_values(),
         }
 
 
 @dataclass
 class CurvePoint:
-    """One point of a curve.
+    """Point of a curve.
 
     Attributes
     ----------
@@ -73,6 +86,7 @@ class CurvePoint:
     step : float
         Arclength step that led here (0 at the start).
     iterations : int
+        Corrections spent on it.
     residual : float
     tests : dict of str to float
         Test functions.
@@ -80,21 +94,31 @@ class CurvePoint:
         Unstable eigenvalues among those asked for; -1 if not known.
     eigenvalues : ndarray, complex
         Converged eigenvalues with non-negative imaginary part.
+    local : continuation.problem.Local or None
+        Linearisation at the point while the run is on.
+    data : dict
+        Notes of the monitors while the run is on.
     """
 
     z: np.ndarray
     tangent: np.ndarray
-    step: float
-    iterations: int
-    residual: float
+    step: float = 0.0
+    iterations: int = 0
+    residual: float = np.nan
     tests: dict = field(default_factory=dict)
     unstable: int = -1
     eigenvalues: np.ndarray = field(default_factory=lambda: np.empty(0, complex))
+    local: Any = None
+    data: dict = field(default_factory=dict)
+
+    def recorded(self) -> CurvePoint:
+        """Copy for a result: without linearisation and notes."""
+        return replace(self, tests=dict(self.tests), local=None, data={})
 
 
 @dataclass
 class Branch:
-    """A computed curve; everything accepted is kept whatever ended the run.
+    """Computed branch or curve; everything accepted is kept whatever ended the run.
 
     Attributes
     ----------
@@ -162,7 +186,7 @@ class Branch:
         return [s for s in self.special if s.kind == kind and (s.located or not located)]
 
     def to_dict(self) -> dict:
-        """Everything but states and vectors, ready for ``json.dumps``."""
+        """Contents without states and vectors, ready for ``json.dumps``."""
         columns = (*self.names, *self.extra_names)
         return {
             "kind": self.kind,
@@ -186,18 +210,87 @@ class Branch:
         """One JSON document; numbers that are not finite become null."""
         return json.dumps(_finite(self.to_dict()), allow_nan=False)
 
+    def reopened(self) -> Branch:
+        """Copy with lists of its own, for a run that goes on from the last point."""
+        return replace(
+            self, points=list(self.points), special=list(self.special), reason="running", restart=dict(self.restart)
+        )
+
     def save(self, path: str | Path) -> None:
         """Write HDF5; the file is replaced only when the new one is complete."""
-        storage.save(self, Path(path))
+        path = Path(path)
+        partial = path.with_name(path.name + ".partial")
+        with h5py.File(partial, "w") as file:
+            _write(file, self)
+        os.replace(partial, path)
 
     @classmethod
     def load(cls, path: str | Path) -> Branch:
-        """Read what `save` wrote."""
-        return storage.load(Path(path), cls, CurvePoint, SpecialPoint)
+        """Read a file that `save` wrote.
+
+        Raises
+        ------
+        ValueError
+            The file is not one of these, or of an unknown format.
+        """
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("format") != FORMAT:
+                raise ValueError(f"{path} is not a branch file of format {FORMAT}.")
+            header = json.loads(file.attrs["header"])
+            header["names"], header["extra_names"] = tuple(header["names"]), tuple(header["extra_names"])
+            restart = {name: item[()] for name, item in file.get("restart", {}).items()}
+            special = [_read_special(item) for item in file["special"].values()]
+            return cls(**header, points=_read_points(file), special=special, restart=restart)
 
     def plot(self, observable=None, ax=None):
         """Branch diagram; see `continuation.plots.plot_branch`."""
         return plot_branch(self, observable, ax)
+
+
+def _write(file, branch: Branch) -> None:
+    points, names = branch.points, ("kind", "size", "names", "extra_names", "fixed", "reason", "next_step")
+    file.attrs["format"] = FORMAT
+    file.attrs["header"] = json.dumps({name: getattr(branch, name) for name in names})
+    for name in _NUMBERS:
+        file[name] = np.array([getattr(p, name) for p in points])
+    padded = np.full((len(points), max((p.eigenvalues.size for p in points), default=0)), np.nan + 0j)
+    for row, point in zip(padded, points):
+        row[: point.eigenvalues.size] = point.eigenvalues
+    file["eigenvalues"] = padded
+    tests = file.create_group("tests")
+    for name in sorted({name for p in points for name in p.tests}):
+        tests[name] = np.array([p.tests.get(name, np.nan) for p in points])
+    for name, array in branch.restart.items():
+        file[f"restart/{name}"] = array
+    group = file.create_group("special")
+    for number, special in enumerate(branch.special):
+        item = group.create_group(f"{number:06d}")
+        header = {name: getattr(special, name) for name in ("kind", "index", "mu", "located", "reason")}
+        item.attrs["header"] = json.dumps(header | {"values": special.plain_values()})
+        item["u"], item["z"], item["tangent"] = special.u, special.z, special.tangent
+        for name, vector in special.vectors.items():
+            item[f"vectors/{name}"] = vector
+
+
+def _read_points(file) -> list[CurvePoint]:
+    columns = {name: file[name][()] for name in _NUMBERS}
+    tests = {name: item[()] for name, item in file["tests"].items()}
+    points = []
+    for i, values in enumerate(file["eigenvalues"][()]):
+        own = {name: column[i] if column.ndim > 1 else column[i].item() for name, column in columns.items()}
+        noted = {name: float(column[i]) for name, column in tests.items() if not np.isnan(column[i])}
+        points.append(CurvePoint(**own, tests=noted, eigenvalues=values[~np.isnan(values.real)]))
+    return points
+
+
+def _read_special(item) -> SpecialPoint:
+    arrays = {name: item[name][()] for name in ("u", "z", "tangent")}
+    vectors = {name: vector[()] for name, vector in item.get("vectors", {}).items()}
+    return SpecialPoint(**json.loads(item.attrs["header"]), **arrays, vectors=vectors)
+
+
+#: Arrays and numbers of a point that files hold, one dataset each.
+_NUMBERS = ("z", "tangent", "step", "iterations", "residual", "unstable")
 
 
 def _finite(value):

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from continuation.bordered import Bordered, bordered
-from continuation.multilinear import Derivatives
+from continuation.linear import Bordered, bordered
+from continuation.system import Derivatives
 
 
 def unit_last(size, dtype=float):

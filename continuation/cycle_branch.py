@@ -7,22 +7,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from continuation.bordered_cycle import Condition
-from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions, CyclePoint, SpecialCycle
-from continuation.cycle_prediction import POINTS, by_arclength, by_parameter, parameter_is_better
-from continuation.cycle_zeros import (
+from continuation.cycle_linearisation import Condition
+from continuation.cycle_points import (
+    DOUBLING,
+    FOLD,
+    POINTS,
+    TORUS,
+    CycleBranchOptions,
+    CyclePoint,
+    SpecialCycle,
+    by_arclength,
+    by_parameter,
     change_between,
     crossing_of,
     growth_of_crossing,
     lagrange,
+    parameter_is_better,
     value_at_zero,
     zero_ahead,
 )
 from continuation.cycles import Cycle, CycleSolver
-from continuation.errors import ContinuationError, NotConverged
 from continuation.harmonics import Harmonics
 from continuation.hill import floquet_exponents
-from continuation.options import require
+from continuation.options import ContinuationError, NotConverged, require
 from continuation.periodic import PeriodicMotion
 
 

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from continuation.bordered_cycle import FREQUENCY, Condition, CycleLinearisation, moved, values_of
-from continuation.errors import NotConverged
-from continuation.options import require
+from continuation.cycle_linearisation import FREQUENCY, Condition, CycleLinearisation, moved, values_of
+from continuation.options import NotConverged, require
 from continuation.periodic import PeriodicMotion
 
 #: Directions of a motion itself that belong to the basis: those above this share of the largest.

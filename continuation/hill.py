@@ -88,7 +88,7 @@ def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-3, r
     ----------
     solver : continuation.cycles.CycleSolver
         Its basis grows by what perturbations miss.
-    linear : continuation.bordered_cycle.CycleLinearisation
+    linear : continuation.cycle_linearisation.CycleLinearisation
         At the motion itself.
     count : int
         Exponents wanted.

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from continuation.errors import NotConverged, OutOfDomain, SingularSystem
-from continuation.options import NewtonOptions, require
+from continuation.options import NewtonOptions, NotConverged, OutOfDomain, SingularSystem, require
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,11 @@ from continuation.branch import Branch, CurvePoint, SpecialPoint
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import FOLD, TORUS, CycleBranchOptions, CyclePoint, SpecialCycle
 from continuation.cycles import Cycle, cycles_beside_onset
-from continuation.errors import NotABifurcation, NotConverged
 from continuation.harmonics import Harmonics
-from continuation.observers import as_observers, run_observed
-from continuation.options import ContinuationOptions, require
+from continuation.options import ContinuationOptions, NotABifurcation, NotConverged, require
 from continuation.orbits import Orbit, OrbitOptions, orbit_of, orbit_solver
 from continuation.periodic import PeriodicMotion
+from continuation.tracer import as_observers, run_observed
 
 #: Largest amplitude of the second orbit of a branch over that of the first.
 SECOND = 2.0
@@ -208,7 +207,7 @@ class _Follower:
 
     def restore(self, branch: Branch) -> None:
         """Take the points of a branch; the last one with its exponents."""
-        self.branch = replace(branch, points=list(branch.points), special=list(branch.special), reason="running")
+        self.branch = branch.reopened()
         lengths = np.cumsum([point.step for point in branch.points])
         points = []
         for i, (point, length) in enumerate(zip(branch.points, lengths)):

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from continuation.cycles import Cycle, CycleOptions, CycleSolver
-from continuation.errors import NotConverged
 from continuation.harmonics import Harmonics
 from continuation.hill import Exponents, floquet_exponents
-from continuation.options import require
+from continuation.options import NotConverged, require
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
 
 

@@ -21,8 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from continuation.blocks import SparseBlocks, sum_of_products
-from continuation.dense_blocks import DenseBlocks
+from continuation.blocks import DenseBlocks, SparseBlocks, sum_of_products
 from continuation.harmonics import Harmonics, Rates
 
 #: Least size over the largest of parts that projections of terms through few numbers are sums of.
@@ -138,7 +137,7 @@ class Term:
 
     def reduced(self, basis: np.ndarray, known: Term | None = None, rough: bool = False) -> Term:
         """Its projection on a basis (n, r), dense at each sample; `known` is that on the first columns of the basis,
-        `rough` asks for what `continuation.left_projection` needs.
+        `rough` asks for what `continuation.cycle_linearisation` needs.
         """
         if not self.narrow:
             before = [None] * len(self.middle) if known is None else [blocks for _, blocks in known.middle]
@@ -245,7 +244,7 @@ class PeriodicOperator:
 
     def reduced(self, basis: np.ndarray, known: ReducedOperator | None = None, rough: bool = False) -> ReducedOperator:
         """Projection on a basis (n, r) at every sample; `known` is that on the first columns of the basis, `rough` asks
-        for what `continuation.left_projection` needs.
+        for what `continuation.cycle_linearisation` needs.
         """
         before = [None] * len(self._coarse) if known is None else known.terms
         terms = [term.reduced(basis, old, rough) for term, old in zip(self._coarse, before)]

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from continuation.bordered import bordered
-from continuation.errors import OutOfDomain, SingularSystem
+from continuation.linear import bordered
 from continuation.newton import residual_norm
+from continuation.options import OutOfDomain, SingularSystem
 
 
 class Problem:

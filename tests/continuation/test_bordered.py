@@ -6,9 +6,8 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from continuation.bordered import Bordered, bordered
-from continuation.errors import SingularSystem
-from continuation.linear import DenseSolver, solver_for
+from continuation.linear import Bordered, DenseSolver, bordered, solver_for
+from continuation.options import SingularSystem
 
 
 def singular(rng, n, smallest=0.0, complex_numbers=False):

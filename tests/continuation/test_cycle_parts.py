@@ -9,10 +9,10 @@ import scipy.sparse as sp
 
 from continuation import blocks, hill
 from continuation.blocks import BlockRows, SparseBlocks
-from continuation.cycle_prediction import by_arclength, by_parameter, parameter_is_better
+from continuation.cycle_linearisation import LeftProjection
+from continuation.cycle_points import by_arclength, by_parameter, parameter_is_better
 from continuation.cycles import CycleOptions, CycleSolver
 from continuation.harmonics import Harmonics
-from continuation.left_projection import LeftProjection
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
 from tests.systems import periodic
 

@@ -7,11 +7,11 @@ from scipy.integrate import solve_ivp
 
 from continuation import NotConverged, OutOfDomain
 from continuation.cycle_branch import CycleTracer
+from continuation.cycle_linearisation import gmres
 from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions
 from continuation.cycles import CycleOptions, CycleSolver
 from continuation.harmonics import Harmonics, Rates
 from continuation.hill import floquet_exponents
-from continuation.krylov import gmres
 from continuation.orbits import find_orbit
 from continuation.periodic import PeriodicMotion
 from tests.systems import periodic

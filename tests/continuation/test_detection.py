@@ -6,10 +6,10 @@ import pytest
 
 from continuation import ContinuationOptions, Spectrum, continue_branch
 from continuation.branches import branch_tracer
+from continuation.event_location import safeguarded
 from continuation.jax_system import JaxSystem
-from continuation.locate import safeguarded
-from continuation.modes import count_unstable, match_modes
 from continuation.normal_form import hopf_normal_form
+from continuation.spectra import count_unstable, match_modes
 from tests.systems.brusselator import brusselator, brusselator_1d
 from tests.systems.normal_forms import (
     bogdanov_takens,
@@ -223,9 +223,7 @@ def test_only_products_and_solves_are_used():
     assert np.isclose(
         hidden.values["first_lyapunov_coefficient"], shown.values["first_lyapunov_coefficient"], rtol=1e-7
     )
-    form = hopf_normal_form(
-        system, hidden.u, hidden.mu, hidden.values["omega"], hidden.vectors["right"], hidden.vectors["left"], "l"
-    )
+    form = hopf_normal_form(system, hidden.u, hidden.mu, hidden.values["omega"], hidden.vectors["right"], "l")
     assert np.isclose(form.l1, hidden.values["first_lyapunov_coefficient"], rtol=1e-9)
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from continuation.errors import SingularSystem
 from continuation.linear import MatrixLinearisation, solver_for
+from continuation.options import SingularSystem
 from continuation.spectra import dense_spectrum, shift_invert_spectrum
 from continuation.system import Spectrum
 

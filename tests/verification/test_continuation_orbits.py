@@ -73,9 +73,7 @@ def hopf_form(system, u, mu, parameter, low, high):
         ContinuationOptions(eigenvalues=3, step=0.2, max_step=2.0, limits={parameter: (low, high)}),
     )
     (point,) = branch.of_kind("hopf")
-    return point, hopf_normal_form(
-        system, point.u, point.mu, point.values["omega"], point.vectors["right"], point.vectors["left"], parameter
-    )
+    return point, hopf_normal_form(system, point.u, point.mu, point.values["omega"], point.vectors["right"], parameter)
 
 
 def swing(system, start, mu, time, functional):
