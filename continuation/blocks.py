@@ -21,14 +21,16 @@ from continuation.harmonics import Harmonics
 TOGETHER = 4
 #: Samples that are taken at once: likewise.
 LANES = 8
+#: Size over the largest of combinations of small dense matrices that are rounding.
+ROUNDING = 1e-15
 
 
-def padded(array: np.ndarray, axis: int, multiple: int) -> np.ndarray:
-    """An array with zeros behind it, so that its length is a multiple of a number.
+def pad_to_multiple(array: np.ndarray, axis: int, multiple: int) -> np.ndarray:
+    """Fill an array up with zeros, so that its length is a multiple of a number.
 
     Examples
     --------
-    >>> padded(np.ones((1, 3)), 1, 4).tolist()
+    >>> pad_to_multiple(np.ones((1, 3)), 1, 4).tolist()
     [[1.0, 1.0, 1.0, 0.0]]
     """
     missing = -array.shape[axis] % multiple
@@ -91,10 +93,8 @@ class DenseBlocks:
         self.weights, self.parts, self.rows = weights, parts, rows
 
     @classmethod
-    def of_stack(cls, stack: np.ndarray, rows: np.ndarray | None = None, tolerance: float = 0.0) -> DenseBlocks:
-        """Of the matrices (N, r, r) themselves, or of those of their combinations above a share of the largest."""
-        if not tolerance:
-            return cls(np.eye(len(stack)), stack, rows)
+    def of_stack(cls, stack: np.ndarray, rows: np.ndarray | None = None, tolerance: float = ROUNDING) -> DenseBlocks:
+        """Combinations of matrices (N, r, r) above a share of the largest; there are at most r^2."""
         weights, sizes, parts = la.svd(stack.reshape(len(stack), -1), full_matrices=False)
         kept = sizes >= tolerance * sizes[0]
         parts, weights = (sizes[:, None] * parts)[kept].reshape(-1, *stack.shape[1:]), weights[:, kept]
@@ -235,7 +235,7 @@ class SparseBlocks:
         return len(self.weights)
 
     def _in_turn(self):
-        """The combinations; one matrix that changes, for it is dear to make."""
+        """Yield the combinations; one matrix whose data change, for it is dear to make."""
         matrix = sp.csr_matrix((self.values[0], *self._pattern), shape=self.shape, copy=False)
         for row in self.values:
             matrix.data = row
@@ -247,8 +247,10 @@ class SparseBlocks:
         """
         if self._entries is None:
             multiple = TOGETHER if len(self.values) > 1 else 1
-            self._entries = np.ascontiguousarray(padded(self.values, 0, multiple).T, SINGLE)
-            self._lanes = padded(padded(np.ascontiguousarray(self.weights.T, SINGLE), 0, multiple), 1, LANES)
+            self._entries = np.ascontiguousarray(pad_to_multiple(self.values, 0, multiple).T, SINGLE)
+            self._lanes = pad_to_multiple(
+                pad_to_multiple(np.ascontiguousarray(self.weights.T, SINGLE), 0, multiple), 1, LANES
+            )
         indices, indptr = self._pattern
         add = add_products if len(self._lanes) > 1 else add_products_of_one
         add(indptr, indices, self._entries, self._lanes, x, out)
@@ -258,7 +260,7 @@ class SparseBlocks:
         if np.iscomplexobj(samples):
             return self.times(samples.real) + 1j * self.times(samples.imag)
         x = np.moveaxis(samples.reshape(*samples.shape[:2], -1), 0, 2)
-        x = padded(np.ascontiguousarray(x), 2, LANES)
+        x = pad_to_multiple(np.ascontiguousarray(x), 2, LANES)
         out = np.zeros((self.shape[0], *x.shape[1:]))
         self.add_to(out, x)
         return np.moveaxis(out[..., : len(samples)], 2, 0).reshape(len(samples), -1, *samples.shape[2:])
@@ -287,7 +289,7 @@ class SparseBlocks:
 
 def sum_of_products(h: Harmonics, blocks: Sequence[SparseBlocks], motions: Sequence[np.ndarray]) -> np.ndarray:
     """Coefficients (v, 2 H + 1, n) of the sum of matrices times real motions (v, 2 H + 1, m), one set for each."""
-    lanes, count = padded(h.basis, 0, LANES), len(motions[0])
+    lanes, count = pad_to_multiple(h.basis, 0, LANES), len(motions[0])
     out = np.zeros((blocks[0].shape[0], count, len(lanes)))
     x = np.empty((blocks[0].shape[1], count, len(lanes)))
     last = None

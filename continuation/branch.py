@@ -1,4 +1,4 @@
-"""Branches and curves as results: points, special points, HDF5 files, JSON.
+"""Branches and curves as results: points, special points, HDF5 files.
 
 One HDF5 file holds a branch: the attribute ``header`` (JSON) with names, parameters and the reason of the end; ``z``
 and ``tangent`` of shape (points, unknowns); one dataset per number; ragged eigenvalues padded with nan; one group per
@@ -59,21 +59,6 @@ class SpecialPoint:
     values: dict = field(default_factory=dict)
     vectors: dict = field(default_factory=dict)
 
-    def plain_values(self) -> dict:
-        """`values` as strings and Python numbers."""
-        return {k: v if isinstance(v, str) else float(v) for k, v in self.values.items()}
-
-    def to_dict(self) -> dict:
-        """Contents without the vectors, ready for ``json.dumps``."""
-        return {
-            "kind": self.kind,
-            "index": self.index,
-            "mu": self.mu,
-            "located": self.located,
-            "reason": self.reason,
-            **self.plain_values(),
-        }
-
 
 @dataclass
 class CurvePoint:
@@ -111,7 +96,7 @@ class CurvePoint:
     local: Any = None
     data: dict = field(default_factory=dict)
 
-    def recorded(self) -> CurvePoint:
+    def record(self) -> CurvePoint:
         """Copy for a result: without linearisation and notes."""
         return replace(self, tests=dict(self.tests), local=None, data={})
 
@@ -185,32 +170,7 @@ class Branch:
         """Special points of one kind, located ones only unless told otherwise."""
         return [s for s in self.special if s.kind == kind and (s.located or not located)]
 
-    def to_dict(self) -> dict:
-        """Contents without states and vectors, ready for ``json.dumps``."""
-        columns = (*self.names, *self.extra_names)
-        return {
-            "kind": self.kind,
-            "parameters": list(self.names),
-            "fixed": {k: v for k, v in self.fixed.items() if k not in self.names},
-            "reason": self.reason,
-            "points": [
-                {
-                    **dict(zip(columns, map(float, point.z[self.size :]))),
-                    "residual": float(point.residual),
-                    "iterations": int(point.iterations),
-                    "unstable_count": None if point.unstable < 0 else int(point.unstable),
-                    "eigenvalues": [[float(x.real), float(x.imag)] for x in point.eigenvalues],
-                }
-                for point in self.points
-            ],
-            "special": [special.to_dict() for special in self.special],
-        }
-
-    def to_json(self) -> str:
-        """One JSON document; numbers that are not finite become null."""
-        return json.dumps(_finite(self.to_dict()), allow_nan=False)
-
-    def reopened(self) -> Branch:
+    def reopen(self) -> Branch:
         """Copy with lists of its own, for a run that goes on from the last point."""
         return replace(
             self, points=list(self.points), special=list(self.special), reason="running", restart=dict(self.restart)
@@ -265,8 +225,9 @@ def _write(file, branch: Branch) -> None:
     group = file.create_group("special")
     for number, special in enumerate(branch.special):
         item = group.create_group(f"{number:06d}")
+        values = {name: v if isinstance(v, str) else float(v) for name, v in special.values.items()}
         header = {name: getattr(special, name) for name in ("kind", "index", "mu", "located", "reason")}
-        item.attrs["header"] = json.dumps(header | {"values": special.plain_values()})
+        item.attrs["header"] = json.dumps(header | {"values": values})
         item["u"], item["z"], item["tangent"] = special.u, special.z, special.tangent
         for name, vector in special.vectors.items():
             item[f"vectors/{name}"] = vector
@@ -291,19 +252,3 @@ def _read_special(item) -> SpecialPoint:
 
 #: Arrays and numbers of a point that files hold, one dataset each.
 _NUMBERS = ("z", "tangent", "step", "iterations", "residual", "unstable")
-
-
-def _finite(value):
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
-    if isinstance(value, (bool, str, int)) or value is None:
-        return value
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    if isinstance(value, np.integer):
-        return int(value)
-    if isinstance(value, (complex, np.complexfloating)):
-        return [_finite(value.real), _finite(value.imag)]
-    return value

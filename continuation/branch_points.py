@@ -6,7 +6,7 @@ import numpy as np
 
 from continuation.branch import CurvePoint
 from continuation.conditions import BranchPointCondition, generic_borders, null_pair
-from continuation.event_location import safeguarded, solve_augmented, special_at
+from continuation.event_location import locate_zero, solve_augmented, special_at
 from continuation.linear import Bordered
 from continuation.options import SingularSystem
 from continuation.system import SystemBase
@@ -90,7 +90,7 @@ class BranchPointMonitor:
             result = self.solve(tracer, guess, borders)
             return result if isinstance(result, str) else (result.z[:-1], result)
 
-        result, guess, reason = safeguarded(tracer, before, after, indicator, attempt)
+        result, guess, reason = locate_zero(tracer, before, after, indicator, attempt)
         if result is None:
             if sizes[-1] > max(abs(g0), abs(g1)):
                 return []  # The test function went through infinity: no branch point.

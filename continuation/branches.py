@@ -81,7 +81,7 @@ def continue_branch(
     direction = np.zeros(u.size + 1)
     direction[-1] = options.direction
     point = tracer.start(tracer.problem.pack(u, mu), direction)
-    branch = Branch("equilibria", system.size, (parameter,), (), mu, [point.recorded()])
+    branch = Branch("equilibria", system.size, (parameter,), (), mu, [point.record()])
     return tracer.run(branch, point, options.step)
 
 
@@ -154,7 +154,7 @@ def switch_branch(
             gap = gap / problem.norm(gap)
             known = special.tangent / problem.norm(special.tangent)
             if abs(problem.dot(gap, direction)) > abs(problem.dot(gap, known)):
-                branch = Branch("equilibria", system.size, (parameter,), (), dict(special.mu), [point.recorded()])
+                branch = Branch("equilibria", system.size, (parameter,), (), dict(special.mu), [point.record()])
                 return tracer.run(branch, point, step)
             reason = "the corrector fell back to the known branch"
         step *= options.shrink

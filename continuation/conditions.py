@@ -56,7 +56,7 @@ class FoldCondition:
 
     def adapt(self, value):
         """Turn the borders to the null vectors found, so that they stay near."""
-        self.__init__(value.w, value.v)
+        self.p, self.q = value.w / np.linalg.norm(value.w), value.v / np.linalg.norm(value.v)
 
 
 class FoldValue:
@@ -74,7 +74,7 @@ class FoldValue:
         return np.array([-self.w @ self._derivatives.jacobian_along(self.v, du, dmu)])
 
 
-class HopfCondition:
+class HopfCondition(FoldCondition):
     """Real and imaginary part of ``g``: ``F_u - i omega B`` is singular.
 
     Parameters
@@ -86,14 +86,8 @@ class HopfCondition:
     extra, count = 1, 2
     extra_names = ("omega",)
 
-    def __init__(self, p, q):
-        self.p, self.q = p / np.linalg.norm(p), q / np.linalg.norm(q)
-
     def evaluate(self, system, u, mu, names, linear, extra):
         return HopfValue(self, Derivatives(system, u, mu), linear, float(extra[0]))
-
-    def adapt(self, value):
-        self.__init__(value.w, value.v)
 
 
 class HopfValue:

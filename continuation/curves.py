@@ -172,7 +172,6 @@ class HopfCurveMonitor:
         return point
 
 
-_KINDS = {"fold curve": FoldCondition, "hopf curve": HopfCondition}
 #: Kinds of points that curves start from.
 _STARTS = {
     "fold curve": ("fold", "bogdanov-takens", "cusp"),
@@ -214,7 +213,8 @@ def continue_fold(
         The point is no located fold.
     """
     borders = _borders("fold curve", special)
-    tracer = _tracer("fold curve", system, special.mu, parameters, borders, options, observers, spectrum)
+    monitors = [FoldCurveMonitor(), CountMonitor(spectrum)]
+    tracer = _tracer(system, special.mu, parameters, FoldCondition(*borders), options, observers, monitors)
     return _start("fold curve", tracer, special)
 
 
@@ -251,7 +251,8 @@ def continue_hopf(
         The point is no located Hopf point.
     """
     borders = _borders("hopf curve", special)
-    tracer = _tracer("hopf curve", system, special.mu, parameters, borders, options, observers, spectrum, lyapunov)
+    monitors = [HopfCurveMonitor(lyapunov), CountMonitor(spectrum)]
+    tracer = _tracer(system, special.mu, parameters, HopfCondition(*borders), options, observers, monitors)
     return _start("hopf curve", tracer, special)
 
 
@@ -264,10 +265,12 @@ def resume_curve(
     spectrum=None,
 ) -> Branch:
     """Go on from the last point of a fold or Hopf curve, e.g. one loaded from a file."""
-    if branch.kind not in _KINDS:
+    if branch.kind not in _STARTS:
         raise ValueError(f"This resumes fold and Hopf curves, not {branch.kind}.")
-    borders = branch.restart["p"], branch.restart["q"]
-    tracer = _tracer(branch.kind, system, branch.fixed, branch.names, borders, options, observers, spectrum, lyapunov)
+    fold = branch.kind == "fold curve"
+    condition = (FoldCondition if fold else HopfCondition)(branch.restart["p"], branch.restart["q"])
+    monitors = [FoldCurveMonitor() if fold else HopfCurveMonitor(lyapunov), CountMonitor(spectrum)]
+    tracer = _tracer(system, branch.fixed, branch.names, condition, options, observers, monitors)
     return tracer.resume(branch)
 
 
@@ -281,15 +284,12 @@ def _borders(kind, special):
     return special.vectors["left"], special.vectors["right"]
 
 
-def _tracer(kind, system, mu, parameters, borders, options, observers, spectrum, lyapunov=True):
+def _tracer(system, mu, parameters, condition, options, observers, monitors):
     options = options or ContinuationOptions()
     if len(set(parameters)) != 2:
-        raise ValueError(f"A {kind} needs two different parameters, not {parameters}.")
-    condition = _KINDS[kind](*borders)
+        raise ValueError(f"A curve needs two different parameters, not {parameters}.")
     problem = Problem(system, mu, parameters, condition, options.state_scale, options.parameter_scales)
-    monitor = FoldCurveMonitor() if kind == "fold curve" else HopfCurveMonitor(lyapunov)
-    monitors = [monitor, CountMonitor(spectrum)] if options.eigenvalues else [monitor]
-    return Tracer(problem, options, monitors, observers)
+    return Tracer(problem, options, monitors if options.eigenvalues else monitors[:1], observers)
 
 
 def _start(kind, tracer, special):
@@ -309,5 +309,5 @@ def _start(kind, tracer, special):
     direction = np.zeros(z.size)
     direction[n + 1] = tracer.options.direction
     point = tracer.start(z, direction, frame)
-    branch = Branch(kind, n, problem.names, problem.condition.extra_names, dict(special.mu), [point.recorded()])
+    branch = Branch(kind, n, problem.names, problem.condition.extra_names, dict(special.mu), [point.record()])
     return tracer.run(branch, point, tracer.options.step)

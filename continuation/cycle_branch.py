@@ -16,13 +16,13 @@ from continuation.cycle_points import (
     CycleBranchOptions,
     CyclePoint,
     SpecialCycle,
-    by_arclength,
-    by_parameter,
     change_between,
     crossing_of,
     growth_of_crossing,
     lagrange,
-    parameter_is_better,
+    parameter_predicts_better,
+    predict_by_arclength,
+    predict_by_parameter,
     value_at_zero,
     zero_ahead,
 )
@@ -34,7 +34,7 @@ from continuation.periodic import PeriodicMotion
 
 
 class CycleTracer:
-    """Follows a branch of cycles.
+    """Follow a branch of cycles.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class CycleTracer:
     points : list of CyclePoint
     special : list of SpecialCycle
     reason : str
-        Why the branch ended.
+        Reason of the end.
     next_step : float
         Arclength step that the step control takes next.
     """
@@ -71,16 +71,16 @@ class CycleTracer:
     # -- the branch
     # ----
 
-    def start(self, first: Cycle, second: Cycle, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
+    def start(self, first: Cycle, second: Cycle, report: Callable[[CyclePoint], None] = lambda item: None) -> None:
         """Begin with two cycles; the branch goes on from the second, away from the first."""
-        self.begin(first, False, tell)
-        self.extend(second, False, tell)
+        self.begin(first, False, report)
+        self.extend(second, False, report)
 
     def begin(
         self,
         first: Cycle,
         asked: bool,
-        tell: Callable[[CyclePoint], None] = lambda item: None,
+        report: Callable[[CyclePoint], None] = lambda item: None,
         origin: Cycle | None = None,
     ) -> None:
         """Begin with one cycle; `extend` gives the way to go.
@@ -92,11 +92,11 @@ class CycleTracer:
         if origin is not None:
             length = -self._distance(point, origin)
             self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
-        tell(point)
+        report(point)
 
-    def extend(self, cycle: Cycle, asked: bool, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
+    def extend(self, cycle: Cycle, asked: bool, report: Callable[[CyclePoint], None] = lambda item: None) -> None:
         """Take a cycle as the next point."""
-        tell(self._accept(cycle, asked))
+        report(self._accept(cycle, asked))
 
     def restore(self, points: Sequence[CyclePoint]) -> None:
         """Go on from points that are known; `extend` where there is but one."""
@@ -106,7 +106,7 @@ class CycleTracer:
         ]
 
     def run(
-        self, tell: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None, step: float | None = None
+        self, report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None, step: float | None = None
     ) -> str:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
         is found; the reason of the end. `step` is the first step where it is not that of the options.
@@ -121,28 +121,28 @@ class CycleTracer:
             if done is None:
                 for special in self._ahead():
                     self.special.append(special)
-                    tell(special)
+                    report(special)
                 self.reason = again
                 return self.reason
             self.next_step = step
-            if self._turned():
+            if self._has_turned_back():
                 del self.points[-1]
                 self.reason = f"the cycles shrink to nothing beyond {self.parameter} = {self.points[-1].value:.6g}"
                 return self.reason
             for special in self._between(self.points[-2], self.points[-1]):
                 self.special.append(special)
-                tell(special)
-            tell(self.points[-1])
+                report(special)
+            report(self.points[-1])
         self.reason = f"limit of {self.parameter} reached" if self._is_over() else "points used up"
         return self.reason
 
     def _is_over(self) -> bool:
-        """Whether the branch has left the range, or reached its end."""
+        """True when the branch has left the range, or reached its end."""
         (low, high), ahead, value = self.options.limits, self._direction(), self.points[-1].value
         return bool((value <= low and ahead < 0) or (value >= high and ahead > 0))
 
-    def _turned(self) -> bool:
-        """Whether the last motion is opposite to the one before: between them the branch has met an onset, and goes
+    def _has_turned_back(self) -> bool:
+        """True when the last motion is opposite to the one before: between them the branch has met an onset, and goes
         back on itself with the phase turned by half a period.
         """
         a, b = (p.motion for p in self.points[-2:])
@@ -168,11 +168,11 @@ class CycleTracer:
 
     def _target(self, step: float) -> float | None:
         """The next value that is asked for, or the limit, where it lies within the step."""
-        here, ahead = self.points[-1].value, self._direction()
-        reach = (self._value_at(step) - here) * ahead
+        now, ahead = self.points[-1].value, self._direction()
+        reach = (self._value_at(step) - now) * ahead
         wanted = [v for v in (*self.options.values, *self.options.limits) if np.isfinite(v)]
-        wanted = [v for v in wanted if 1e-9 * self.options.scale < (v - here) * ahead <= 1.5 * reach]
-        return min(wanted, key=lambda v: abs(v - here)) if wanted else None
+        wanted = [v for v in wanted if 1e-9 * self.options.scale < (v - now) * ahead <= 1.5 * reach]
+        return min(wanted, key=lambda v: abs(v - now)) if wanted else None
 
     def _value_at(self, step: float) -> float:
         """The parameter a step ahead, by the polynomial through the last points."""
@@ -200,7 +200,7 @@ class CycleTracer:
         last = self.points[-1]
         if target is not None:
             return self._solved(self._expected(target, step), last.cycle.mu | {self.parameter: target}, (), ())
-        motion, value = by_arclength(self._last(), last.arclength + step, self._series()), self._value_at(step)
+        motion, value = predict_by_arclength(self._last(), last.arclength + step, self._series()), self._value_at(step)
         mu = last.cycle.mu | {self.parameter: value}
         return self._solved(motion, mu, (self.parameter,), (self._plane(motion, value),))
 
@@ -222,14 +222,16 @@ class CycleTracer:
 
     def _expected(self, target: float, step: float) -> PeriodicMotion:
         """The motion at a value about a step ahead."""
-        if parameter_is_better(self.points, self._weight):
-            motion = by_parameter(self.points, target, self._series(), self._weight)
+        if parameter_predicts_better(self.points, self._weight):
+            motion = predict_by_parameter(self.points, target, self._series(), self._weight)
             if motion is not None:
                 return motion
-        return by_arclength(self._last(), self.points[-1].arclength + self._way_to(target, step), self._series())
+        return predict_by_arclength(
+            self._last(), self.points[-1].arclength + self._way_to(target, step), self._series()
+        )
 
     def _series(self) -> Harmonics:
-        """Of the next motion: longer where the last one nearly needed it."""
+        """Series of the next motion: longer where the last one nearly needed it."""
         last, options = self.points[-1].motion, self.options
         if last.tail > 0.4 * options.tail and last.harmonics.count + 2 <= options.max_harmonics:
             return Harmonics(last.harmonics.count + 2)
@@ -250,11 +252,11 @@ class CycleTracer:
 
     def _accept(self, cycle: Cycle, asked: bool) -> CyclePoint:
         """Take a cycle as the next point, with the phase of the one before."""
-        point = self.described(cycle, asked)
+        point = self.describe(cycle, asked)
         self.points.append(point)
         return point
 
-    def described(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
+    def describe(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
         """A cycle with its exponents and what events make of it; `after` is the point it follows, the last without."""
         after = self.points[-1] if after is None and self.points else after
         exponents = None
@@ -313,7 +315,7 @@ class CycleTracer:
     def _interpolated(self, near: Sequence[CyclePoint], arclength: float) -> CyclePoint | None:
         """A cycle between points, at an arclength; None where it is not found."""
         h = max((p.motion.harmonics for p in near), key=lambda h: h.count)
-        guess = by_arclength(near, arclength, h)
+        guess = predict_by_arclength(near, arclength, h)
         c, weights = guess.coefficients, lagrange([p.arclength for p in near], arclength)
         value = float(sum(w * p.value for w, p in zip(weights, near)))
         first, last = near[0], near[-1]
@@ -326,7 +328,7 @@ class CycleTracer:
             cycle = self._solved(guess, mu, (self.parameter,), (condition,))
         except ContinuationError:
             return None
-        point = self.described(cycle, after=first)
+        point = self.describe(cycle, after=first)
         return CyclePoint(cycle, point.value, arclength, point.exponents, False, point.tests)
 
     def _ahead(self) -> list[SpecialCycle]:

@@ -39,16 +39,16 @@ class Condition:
     value: float
 
     def miss(self, coefficients: np.ndarray, free: np.ndarray) -> float:
-        """What is left of it."""
+        """Residual of the condition."""
         return float(np.vdot(self.row, coefficients) + self.extra @ free - self.value)
 
 
-def values_of(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence[str]) -> np.ndarray:
+def free_values(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence[str]) -> np.ndarray:
     """Values (k,) of the free unknowns."""
     return np.array([motion.omega if name == FREQUENCY else mu[name] for name in free], float)
 
 
-def moved(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence[str], change: np.ndarray):
+def apply_change(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence[str], change: np.ndarray):
     """Motion and parameters after a change of coefficients and free unknowns, one vector."""
     size = motion.coefficients.size
     step = dict(zip(free, change[size:].tolist()))
@@ -69,7 +69,7 @@ class CycleLinearisation:
     basis : (n, r) array
         Orthonormal in unknowns over their scales.
     rough : bool
-        Whether it is for corrections, which a rough one serves.
+        True for corrections, which a rough linearisation serves.
     smoother : callable, optional
         That of a motion nearby with as many harmonics.
     """
@@ -85,10 +85,10 @@ class CycleLinearisation:
 
     def _column(self, name: str, force: np.ndarray) -> np.ndarray:
         """Derivative (2 H + 1, n) of the residual, `force` at the motion, by a free unknown."""
-        at = values_of(self.motion, self.mu, (name,))[0]
+        at = free_values(self.motion, self.mu, (name,))[0]
         step = _STEP * max(abs(at), 1e-6)
         still = np.zeros(self.motion.coefficients.size)
-        motion, mu = moved(self.motion, self.mu, (name,), np.append(still, step))
+        motion, mu = apply_change(self.motion, self.mu, (name,), np.append(still, step))
         return (motion.harmonics.project(self.system.residual(motion, mu)) - force) / step
 
     @property
@@ -157,7 +157,7 @@ class CycleLinearisation:
         return np.append(force.ravel(), [np.vdot(c.row, rows) + c.extra @ extra for c in self.conditions])
 
     def _on_basis(self, rows: np.ndarray) -> np.ndarray:
-        """What the operator makes of coefficients, on the basis."""
+        """Operator applied to coefficients, projected on the basis."""
         if not self._by_rows:
             return self.operator.apply(rows) @ self._v
         if self._rough is None:
@@ -189,7 +189,7 @@ class CycleLinearisation:
     @property
     def units(self) -> np.ndarray:
         """Sizes that changes of coefficients and free unknowns are measured in."""
-        free = np.maximum(np.abs(values_of(self.motion, self.mu, self.free)), 1e-9)
+        free = np.maximum(np.abs(free_values(self.motion, self.mu, self.free)), 1e-9)
         c = self.motion.coefficients
         whole = max(float(np.abs(c[1:] / self.scale).max()), 1e-300)
         return np.append(np.tile(whole * self.scale, len(c)), free)

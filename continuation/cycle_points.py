@@ -79,7 +79,7 @@ class CyclePoint:
     arclength : float
     exponents : Exponents or None
     asked : bool
-        Whether it lies at a value that was asked for.
+        True at a value that was asked for.
     tests : dict
         Values of the events' functions.
     """
@@ -110,7 +110,7 @@ class SpecialCycle:
     frequency : float
         Of the perturbation that becomes neutral, Hz; zero for a fold.
     located : bool
-        Whether it was found as closely as asked for.
+        True when it was found as closely as asked for.
     """
 
     kind: str
@@ -157,7 +157,7 @@ def crossing_of(exponents: Exponents) -> complex:
 
 
 def change_between(a: Exponents, b: Exponents) -> str | None:
-    """What kind of bifurcation lies between two cycles, None if none."""
+    """Kind of the bifurcation between two cycles, None if there is none."""
     if a.unstable == b.unstable:
         return None
     few, many = sorted((a, b), key=lambda e: e.unstable)
@@ -189,14 +189,16 @@ POINTS = 4
 GROWTH = 50.0
 
 
-def by_arclength(points: Sequence[CyclePoint], arclength: float, h: Harmonics) -> PeriodicMotion:
+def predict_by_arclength(points: Sequence[CyclePoint], arclength: float, h: Harmonics) -> PeriodicMotion:
     """The motion at an arclength, by the polynomial through points."""
     weights = lagrange([p.arclength for p in points], arclength)
     coefficients = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, points))
     return PeriodicMotion(h, coefficients, float(sum(w * p.motion.omega for w, p in zip(weights, points))))
 
 
-def by_parameter(points: Sequence[CyclePoint], value: float, h: Harmonics, weight: np.ndarray) -> PeriodicMotion | None:
+def predict_by_parameter(
+    points: Sequence[CyclePoint], value: float, h: Harmonics, weight: np.ndarray
+) -> PeriodicMotion | None:
     """The motion at a value of the parameter, by polynomials in it through the last points; None where these do not
     lead one way to it.
 
@@ -234,12 +236,12 @@ def by_parameter(points: Sequence[CyclePoint], value: float, h: Harmonics, weigh
     return PeriodicMotion(h, coefficients, float(weights @ omegas))
 
 
-def parameter_is_better(points: Sequence[CyclePoint], weight: np.ndarray) -> bool:
-    """Whether the last point would have been met closer by the parameter than by the arclength."""
+def parameter_predicts_better(points: Sequence[CyclePoint], weight: np.ndarray) -> bool:
+    """True when the last point would have been met closer by the parameter than by the arclength."""
     last, before = points[-1], points[:-1]
     h, c = last.motion.harmonics, last.motion.coefficients
-    one = by_parameter(before, last.value, h, weight)
+    one = predict_by_parameter(before, last.value, h, weight)
     if one is None:
         return len(before) < 2
-    other = by_arclength(before[-POINTS:], last.arclength, h)
+    other = predict_by_arclength(before[-POINTS:], last.arclength, h)
     return bool(np.sum((one.coefficients - c) ** 2 * weight) <= np.sum((other.coefficients - c) ** 2 * weight))

@@ -18,7 +18,7 @@ from continuation.normal_form import fold_coefficient
 from continuation.options import DerivativeMissing, SingularSystem
 from continuation.problem import Problem, correct
 
-#: How far outside its bracket, in chord lengths, a located point may lie.
+#: Largest distance of a located point from its bracket, in chord lengths.
 SLACK = 0.02
 #: Halvings of a bracket, after which an event stays bracketed.
 HALVINGS = 16
@@ -75,7 +75,7 @@ def solve_augmented(tracer, condition, z, frame, names=None, system=None, mu=Non
     return result if result.converged else f"Newton's method on the augmented system: {result.reason}"
 
 
-def safeguarded(tracer, before, after, indicator, attempt):
+def locate_zero(tracer, before, after, indicator, attempt):
     """Newton from a guess in the bracket; if it leaves the bracket, halve that and try again.
 
     Parameters
@@ -144,7 +144,7 @@ class FoldMonitor:
             result = solve_fold(tracer, guess)
             return result if isinstance(result, str) else (result.z, result)
 
-        result, guess, reason = safeguarded(tracer, before, after, lambda point: point.tangent[problem.n], attempt)
+        result, guess, reason = locate_zero(tracer, before, after, lambda point: point.tangent[problem.n], attempt)
         if result is None:
             return [special_at(tracer, "fold", guess, index, False, reason)]
         local = result.local

@@ -33,10 +33,8 @@ class JaxSystem(SystemBase):
         None is the identity; a matrix is a constant ``B``; a callable ``mass(u, mu, v)``
         returns ``B(u, mu) v`` (linear in ``v``) and is differentiated too.
     sparsity : None or sparse matrix, shape (n, n)
-        Where ``dF/du`` may be non-zero; given, Jacobians are assembled sparse from a few
+        Pattern of ``dF/du``, and of a callable mass; given, Jacobians are assembled sparse from a few
         coloured directional derivatives.  None assembles them dense.
-    mass_sparsity : None or sparse matrix
-        The same for a callable mass; default ``sparsity``.
 
     Examples
     --------
@@ -52,17 +50,15 @@ class JaxSystem(SystemBase):
         size: int,
         mass=None,
         sparsity: sp.spmatrix | None = None,
-        mass_sparsity: sp.spmatrix | None = None,
     ):
         self.size = int(size)
         self._callable_mass = mass if callable(mass) else None
         self._constant_mass = None if callable(mass) else mass
         self.constant_mass, self.identity_mass = not callable(mass), mass is None
         self._colouring = None if sparsity is None else ColouredJacobian(sparsity)
-        pattern = sparsity if mass_sparsity is None else mass_sparsity
         self._mass_colouring = None
-        if self._callable_mass and pattern is not None:
-            self._mass_colouring = ColouredJacobian(pattern)
+        if self._callable_mass:
+            self._mass_colouring = self._colouring
 
         def f(u, mu):
             return jnp.asarray(residual(u, mu), dtype=jnp.float64)

@@ -22,6 +22,8 @@ from continuation.options import SingularSystem
 #: A zero pivot is replaced by this fraction of the matrix norm.  Bordered solves with
 #: refinement against the true matrix remove the perturbation again.
 PIVOT_REPAIR = 1e-14
+#: Largest number of refinement steps against the true bordered matrix.
+REFINEMENTS = 2
 
 
 class DenseSolver:
@@ -115,7 +117,7 @@ def _parity(permutation) -> int:
     return -1 if (permutation.size - count) % 2 else 1
 
 
-def solver_for(matrix):
+def factorise(matrix):
     """A factorised solver for a dense or sparse matrix."""
     return SparseSolver(matrix) if sp.issparse(matrix) else DenseSolver(np.asarray(matrix))
 
@@ -152,7 +154,7 @@ class MatrixLinearisation:
     @property
     def _factors(self):
         if self._solver is None:
-            self._solver = solver_for(self.jacobian)
+            self._solver = factorise(self.jacobian)
         return self._solver
 
     def matvec(self, x):
@@ -180,7 +182,7 @@ class MatrixLinearisation:
     def shifted(self, shift):
         """A solver for ``A - shift B``; real arithmetic for a real shift."""
         shift = complex(shift)
-        return solver_for(self.jacobian - (shift.real if shift.imag == 0 else shift) * self.mass)
+        return factorise(self.jacobian - (shift.real if shift.imag == 0 else shift) * self.mass)
 
     def to_dense(self):
         """``(A, B)`` as dense arrays; for small problems and tests."""
@@ -200,8 +202,6 @@ class Bordered:
         ``b`` and ``c``.
     corner : complex
         ``d``.
-    refinements : int
-        Largest number of refinement steps against the true bordered matrix.
 
     Raises
     ------
@@ -209,12 +209,11 @@ class Bordered:
         The bordered matrix itself is singular, or a solve gave no finite numbers.
     """
 
-    def __init__(self, inner, column, row, corner=0.0, refinements: int = 2):
+    def __init__(self, inner, column, row, corner=0.0):
         self.inner = inner
         self.b = np.asarray(column)
         self.c = np.asarray(row)
         self.d = corner
-        self.refinements = refinements
         self.size = self.b.size + 1
         with np.errstate(all="ignore"):
             self._v = inner.solve(self.b)
@@ -265,7 +264,7 @@ class Bordered:
         defect = rhs - apply(z)
         size = np.abs(defect).max()
         floor = 4 * np.finfo(float).eps * np.abs(rhs).max(initial=0.0)
-        for _ in range(self.refinements):
+        for _ in range(REFINEMENTS):
             if not size > floor:
                 break
             better = z + eliminate(defect)
@@ -279,7 +278,7 @@ class Bordered:
         return z
 
 
-def bordered(inner, columns, rows, refinements: int = 2):
+def bordered(inner, columns, rows):
     """Nest ``k`` borders around ``A``.
 
     Parameters
@@ -301,5 +300,5 @@ def bordered(inner, columns, rows, refinements: int = 2):
     for i, column in enumerate(columns):
         order = n + i
         above = np.concatenate([column, rows[:i, order]])
-        solver = Bordered(solver, above, rows[i, :order], rows[i, order], refinements)
+        solver = Bordered(solver, above, rows[i, :order], rows[i, order])
     return solver

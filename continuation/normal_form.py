@@ -6,16 +6,16 @@ equilibrium alone,
 
     sum T(s_i) a_i exp(s_i t) + 1/2 sum d2[(s_i, a_i), (s_j, a_j)] exp((s_i + s_j) t) + ...,
 
-so that one derivation serves ``B(u) u' = F(u)``, with ``T(s) = s B - A``, and viscoelastic systems, whose internal
+so that one derivation serves ``B(u) u' = F(u)``, with ``T(s) = A - s B``, and viscoelastic systems, whose internal
 variables are no part of the state: kernels that are sums of exponentials make that exact.
 
-Normalisation: ``q* q = 1`` and ``p* T' q = 1``, ``p* B q = 1`` without memory; ``l1 = Re c1 / omega``.  ``l1`` scales
-with ``|q|^2``; its sign, the amplitude of the motion and the orbit do not depend on it.
+Normalisation: ``q* q = 1`` and ``p* T' q = 1``, or ``p* B q = 1`` for ``B u' = F``; ``l1 = Re c1 / omega``.  It
+scales with ``|q|^2``; its sign, the amplitude of the motion and the orbit do not depend on it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -34,7 +34,7 @@ class HopfNormalForm:
     omega : float
         Angular frequency.
     q, p : ndarray, complex, shape (n,)
-        Right and left eigenvectors, ``q* q = 1``, ``p* T' q = 1``.
+        Right and left eigenvectors, ``q* q = 1``, ``p* B q = 1`` or ``p* T' q = 1``.
     c1 : complex
         Cubic coefficient.
     l1 : float
@@ -154,27 +154,8 @@ class MotionForms(Protocol):
         """Derivative of ``T(s) a``, shape (n,), by a parameter at a fixed state."""
 
 
-class _Negated:
-    """``-A`` for a solver ``A``."""
-
-    def __init__(self, solver):
-        self._solver = solver
-
-    def matvec(self, x):
-        return -self._solver.matvec(x)
-
-    def rmatvec(self, x):
-        return -self._solver.rmatvec(x)
-
-    def solve(self, rhs):
-        return -self._solver.solve(rhs)
-
-    def solve_transpose(self, rhs):
-        return -self._solver.solve_transpose(rhs)
-
-
 class SystemForms:
-    """`MotionForms` of ``B(u, mu) u' - F(u, mu)``.
+    """`MotionForms` of ``F(u, mu) - B(u, mu) u'``.
 
     Parameters
     ----------
@@ -190,29 +171,29 @@ class SystemForms:
         self._d, self._linear = Derivatives(system, u, self._mu), system.linear(u, self._mu)
 
     def pencil(self, s):
-        return _Negated(self._linear.shifted(s) if s else self._linear)
+        return self._linear.shifted(s) if s else self._linear
 
     def slope(self, motion):
-        return self._linear.mass_matvec(motion.vector)
+        return -self._linear.mass_matvec(motion.vector)
 
     def second(self, a, b):
         mass = self._d.mass_d(a.rate * a.vector, b.vector) + self._d.mass_d(b.rate * b.vector, a.vector)
-        return mass - self._d.d2(a.vector, b.vector)
+        return self._d.d2(a.vector, b.vector) - mass
 
     def third(self, a, b, c):
         d = self._d
         mass = sum(d.mass_d2(x.rate * x.vector, y.vector, z.vector) for x, y, z in ((a, b, c), (b, a, c), (c, a, b)))
-        return mass - d.d3(a.vector, b.vector, c.vector)
+        return d.d3(a.vector, b.vector, c.vector) - mass
 
     def state(self, motion):
         return motion.vector
 
     def parameter_slope(self, name):
-        return -self._system.d_parameter(self.rest, self._mu, name)
+        return self._system.d_parameter(self.rest, self._mu, name)
 
     def mixed(self, motion, name):
         d = self._d
-        return motion.rate * d.mass_parameter(name, motion.vector) - d.d2_parameter(name, motion.vector)
+        return d.d2_parameter(name, motion.vector) - motion.rate * d.mass_parameter(name, motion.vector)
 
 
 def hopf_normal_form(system, u, mu, omega: float, q, parameter: str | None = None) -> HopfNormalForm:
@@ -237,7 +218,8 @@ def hopf_normal_form(system, u, mu, omega: float, q, parameter: str | None = Non
         ``i omega`` is not a simple eigenvalue, or the frequency is zero.
     """
     _require_frequency(omega)
-    return hopf_normal_form_of(SystemForms(system, u, mu), omega, q, parameter)
+    form = hopf_normal_form_of(SystemForms(system, u, mu), omega, q, parameter)
+    return replace(form, p=-form.p)  # T' = -B
 
 
 def hopf_normal_form_of(

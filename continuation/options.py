@@ -40,7 +40,7 @@ class NotABifurcation(ContinuationError):
 
 
 class OutOfDomain(ContinuationError):
-    """For a model to raise where it cannot be evaluated; the step is then tried shorter."""
+    """Model cannot be evaluated at a state; models raise it, and the step is then tried shorter."""
 
 
 def require(condition: bool, sentence: str) -> None:
@@ -88,7 +88,7 @@ class NewtonOptions:
 
 @dataclass(frozen=True)
 class ContinuationOptions:
-    """How a branch or curve is followed.
+    """Options of a branch or curve.
 
     Lengths are measured in ``ds^2 = sum w_i (du_i / state_scale)^2 + sum (dmu / scale)^2``
     with weights ``w_i = 1/n`` unless the system has its own ``state_weights``.

@@ -18,7 +18,7 @@ from continuation.cycle_points import FOLD, TORUS, CycleBranchOptions, CyclePoin
 from continuation.cycles import Cycle, cycles_beside_onset
 from continuation.harmonics import Harmonics
 from continuation.options import ContinuationOptions, NotABifurcation, NotConverged, require
-from continuation.orbits import Orbit, OrbitOptions, orbit_of, orbit_solver
+from continuation.orbits import Orbit, OrbitOptions, add_exponents, orbit_solver
 from continuation.periodic import PeriodicMotion
 from continuation.tracer import as_observers, run_observed
 
@@ -156,7 +156,7 @@ def special_orbit(system, branch: Branch, special: SpecialPoint, discretisation:
 def _orbit(system, u, mu, options):
     options = options or OrbitOptions()
     cycle = Cycle(_motion(u, system.size), mu, 0.0, 0, 0)
-    return orbit_of(orbit_solver(system, options), cycle, options)
+    return add_exponents(orbit_solver(system, options), cycle, options)
 
 
 def _motion(u: np.ndarray, size: int) -> PeriodicMotion:
@@ -207,14 +207,14 @@ class _Follower:
 
     def restore(self, branch: Branch) -> None:
         """Take the points of a branch; the last one with its exponents."""
-        self.branch = branch.reopened()
+        self.branch = branch.reopen()
         lengths = np.cumsum([point.step for point in branch.points])
         points = []
         for i, (point, length) in enumerate(zip(branch.points, lengths)):
             motion = _motion(point.z[: branch.size], self.tracer.solver.system.size)
             cycle = Cycle(motion, branch.mu(i), point.residual, point.iterations, 0)
             points.append(CyclePoint(cycle, cycle.mu[self.parameter], float(length), None))
-        points[-1] = replace(points[-1], exponents=self.tracer.described(points[-1].cycle, after=points[-1]).exponents)
+        points[-1] = replace(points[-1], exponents=self.tracer.describe(points[-1].cycle, after=points[-1]).exponents)
         self.tracer.restore(points)
         self.tracer.options = replace(self.tracer.options, max_points=len(points) + self.options.max_points)
 

@@ -91,7 +91,7 @@ class FirstOrderSystem:
         return PeriodicOperator(motion, [Term([(0, slopes), (1, np.array([mass for _, mass in pairs]))])])
 
     def smoother(self, operator: PeriodicOperator, mu: Mapping[str, float]) -> None:
-        """None: the basis is all of the space."""
+        """No smoother: the basis is all of the space."""
 
 
 def orbit_solver(system, options: OrbitOptions) -> CycleSolver:
@@ -222,7 +222,7 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
             raise NotConverged("The guess shrank to an equilibrium.", "equilibrium", cycle)
         count = cycle.motion.harmonics.count
         if cycle.motion.tail <= options.tail:
-            return orbit_of(solver, cycle, options)
+            return add_exponents(solver, cycle, options)
         if count >= options.max_harmonics:
             raise NotConverged(
                 f"{count} harmonics are too few: the last two hold {cycle.motion.tail:.2g} of the orbit.", "harmonics"
@@ -230,7 +230,7 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
         guess = cycle.motion.resized(min(count + max(count // 2, 2), options.max_harmonics))
 
 
-def orbit_of(solver: CycleSolver, cycle: Cycle, options: OrbitOptions) -> Orbit:
+def add_exponents(solver: CycleSolver, cycle: Cycle, options: OrbitOptions) -> Orbit:
     """Add Floquet exponents to a cycle."""
     count = min(options.exponents, max(solver.system.size - 1, 1))
     linear = solver.linearise(cycle.motion, cycle.mu)

@@ -23,7 +23,7 @@ from continuation.options import OutOfDomain, SingularSystem
 
 
 class Problem:
-    """What is continued or located.
+    """Equations of a curve that is continued or of a point that is located.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ import numpy as np
 from continuation.branch import CurvePoint
 from continuation.branch_points import BranchPointMonitor
 from continuation.conditions import HopfCondition, null_pair
-from continuation.event_location import SLACK, safeguarded, solve_augmented, special_at
+from continuation.event_location import SLACK, locate_zero, solve_augmented, special_at
 from continuation.normal_form import hopf_normal_form
 from continuation.options import ContinuationError, DerivativeMissing
 from continuation.spectra import count_unstable, match_modes, mode_distance
@@ -201,7 +201,7 @@ class SpectrumMonitor:
             result = search.solve(tracer, guess, (vector, vector))
             return result if isinstance(result, str) else (result.z[:-1], result)
 
-        result, guess, reason = safeguarded(
+        result, guess, reason = locate_zero(
             tracer, before, after, lambda point: mode_at(point)[0][0].real - limit, attempt
         )
         if result is None:
@@ -267,7 +267,7 @@ class SpectrumMonitor:
                     return "Newton's method found the same point again"
             return result.z[:-1], result
 
-        result, guess, reason = safeguarded(
+        result, guess, reason = locate_zero(
             tracer, before, after, lambda point: mode_at(point)[0][0].real - limit, attempt
         )
         if result is None:

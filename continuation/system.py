@@ -14,7 +14,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from continuation.options import DerivativeMissing
-from continuation.spectra import Spectrum, spectrum_of
+from continuation.spectra import Spectrum, compute_spectrum
 
 Parameters = Mapping[str, float]
 
@@ -120,7 +120,7 @@ class SystemBase:
     """
 
     size: int = 0
-    #: Whether ``mass_d`` vanishes, and whether ``B`` is the identity; spares some work.
+    #: True where ``mass_d`` vanishes, and where ``B`` is the identity; spares some work.
     constant_mass: bool = True
     identity_mass: bool = False
     #: Relative step for the central differences in parameters.
@@ -168,7 +168,7 @@ class SystemBase:
         return np.zeros(self.size)
 
     def spectrum(self, u, mu, count, near=None):
-        return spectrum_of(self.linear(u, mu), count, near)
+        return compute_spectrum(self.linear(u, mu), count, near)
 
 
 def expand(function, *vectors):

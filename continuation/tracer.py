@@ -125,22 +125,18 @@ class Tracer:
     def correct(self, z, normal):
         return correct(self.problem, z, self.frame, self.options.newton, normal, self.options.location_tolerance)
 
-    def described(self, correction, reference, measure=True) -> CurvePoint:
-        """A corrected point with tangent (to the side of ``reference``) and tests."""
+    def corrected_point(self, correction, reference) -> CurvePoint:
+        """Corrected point with its tangent, to the side of ``reference``."""
         local = correction.local
-        result = CurvePoint(
+        return CurvePoint(
             correction.z,
             local.tangent(reference),
             iterations=correction.iterations,
             residual=float(local.size),
             local=local,
         )
-        if measure:
-            for monitor in self.monitors:
-                monitor.measure(self, result)
-        return result
 
-    def at(self, before: CurvePoint, after: CurvePoint, fraction: float, measure=False) -> CurvePoint | None:
+    def at(self, before: CurvePoint, after: CurvePoint, fraction: float) -> CurvePoint | None:
         """The point of the curve over a fraction of the chord, or None if not reached."""
         chord = after.z - before.z
         normal = self.problem.weights * chord
@@ -148,22 +144,22 @@ class Tracer:
         correction = self.correct(before.z + fraction * chord, normal / scale)
         if not correction.converged:
             return None
-        return self.described(correction, chord, measure)
+        return self.corrected_point(correction, chord)
 
     def fraction(self, before: CurvePoint, after: CurvePoint, z) -> tuple[float, float]:
-        """Where ``z`` lies along the chord, and its distance from it in chord lengths."""
+        """Position of ``z`` along the chord, and its distance from it, both in chord lengths."""
         chord = after.z - before.z
         length2 = max(self.problem.dot(chord, chord), 1e-300)
         s = self.problem.dot(z - before.z, chord) / length2
         away = self.problem.norm(z - before.z - s * chord) / np.sqrt(length2)
         return s, away
 
-    def root(self, before: CurvePoint, after: CurvePoint, function, tolerance=1e-10, steps=60) -> CurvePoint | None:
+    def root(self, before: CurvePoint, after: CurvePoint, function, tolerance=1e-10) -> CurvePoint | None:
         """Zero of a function of points between two of opposite sign (Illinois)."""
         a, b = 0.0, 1.0
         fa, fb = function(before), function(after)
         best, side = None, 0
-        for _ in range(steps):
+        for _ in range(60):
             s = (a * fb - b * fa) / (fb - fa)
             width = b - a
             s = min(max(s, a + 1e-3 * width), b - 1e-3 * width)
@@ -211,7 +207,7 @@ class Tracer:
                 correction.reason,
                 correction,
             )
-        point = self.described(correction, direction, measure=False)
+        point = self.corrected_point(correction, direction)
         self.frame = self.problem.frame(point.local.basis)
         point.local = Local(self.problem, point.z, self.frame)
         point.tangent = point.local.tangent(point.tangent)
@@ -224,7 +220,7 @@ class Tracer:
         options, last = self.options, branch.points[-1]
         start = self.start(last.z, last.tangent, branch.restart.get("frame"))
         step = float(np.clip(branch.next_step or options.step, options.min_step, options.max_step))
-        return self.run(branch.reopened(), start, step)
+        return self.run(branch.reopen(), start, step)
 
     def run(self, branch: Branch, before: CurvePoint, step: float) -> Branch:
         """Add points to ``branch`` from a point on until something ends it; see `run_observed`."""
@@ -247,11 +243,11 @@ class Tracer:
             if last:
                 branch.special += found
                 for special in found:
-                    self._tell("found", branch, special)
+                    self._notify("found", branch, special)
                 return f"stopped at: {last[0].kind}"
             # In the order in which the branch meets them.
             found.sort(key=lambda s: (s.index, self.fraction(before, after, s.z)[0]))
-            branch.points.append(after.recorded())
+            branch.points.append(after.record())
             branch.special += found
             self.frame = self.problem.frame(after.local.basis)
             if self.problem.condition is not None:
@@ -259,9 +255,9 @@ class Tracer:
             closed = options.detect_closed and self._closed(branch, first, before, after)
             before = after
             self._remember(branch, step)
-            self._tell("accepted", branch)
+            self._notify("accepted", branch)
             for special in found:
-                self._tell("found", branch, special)
+                self._notify("found", branch, special)
             stopping = [s.kind for s in found if s.kind in options.stop_at or s.values.get("stop")]
             if stopping:
                 return f"stopped at: {stopping[0]}"
@@ -291,7 +287,7 @@ class Tracer:
                 trouble = correction.reason
             else:
                 try:
-                    after = self.described(correction, before.tangent, measure=False)
+                    after = self.corrected_point(correction, before.tangent)
                 except SingularSystem:
                     trouble = "singular"
             if trouble is None:
@@ -305,7 +301,7 @@ class Tracer:
                     trouble = "the corrector went far from the prediction"
             if trouble is None:
                 break
-            self._tell("refused", branch, trouble, used)
+            self._notify("refused", branch, trouble, used)
             if used <= options.min_step * (1 + 1e-9):
                 return f"step below its minimum: {trouble}"
             step = max(used * options.shrink, options.min_step)
@@ -326,7 +322,7 @@ class Tracer:
         return after, step, ending
 
     def _jumped(self, before, after, prediction) -> bool:
-        """Whether the correction is too long for the step: likely another branch."""
+        """True when the correction is too long for the step: likely another branch."""
         share = max(0.5, np.tan(self.options.max_angle))
         correction = self.problem.norm(after.z - prediction)
         return correction > share * self.problem.norm(prediction - before.z)
@@ -379,6 +375,6 @@ class Tracer:
         same_way = self.problem.dot(first.tangent, after.tangent) > 0.9
         return 0.0 < s <= 1.0 and away < 0.1 and same_way
 
-    def _tell(self, hook, *arguments):
+    def _notify(self, hook, *arguments):
         for observer in self.observers:
             getattr(observer, hook)(*arguments)

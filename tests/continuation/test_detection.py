@@ -6,7 +6,7 @@ import pytest
 
 from continuation import ContinuationOptions, Spectrum, continue_branch
 from continuation.branches import branch_tracer
-from continuation.event_location import safeguarded
+from continuation.event_location import locate_zero
 from continuation.jax_system import JaxSystem
 from continuation.normal_form import hopf_normal_form
 from continuation.spectra import count_unstable, match_modes
@@ -86,9 +86,9 @@ def test_a_located_point_outside_of_its_bracket_is_refused():
         x = -fold if len(calls) < 3 else fold  # the other fold, at first
         return np.array([x, x**3 - x]), x
 
-    result, _, reason = safeguarded(tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, attempt)
+    result, _, reason = locate_zero(tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, attempt)
     assert result == fold and len(calls) == 3 and reason == ""
-    never, guess, reason = safeguarded(
+    never, guess, reason = locate_zero(
         tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, lambda *_: (np.array([-fold, 0.0]), 0.0)
     )
     assert never is None and "left the bracket" in reason
