@@ -7,11 +7,11 @@ from time import process_time
 
 import numpy as np
 
-from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk
 from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, Workspace, leading_modes
@@ -47,12 +47,12 @@ def modes():
     structure = wet.shell.dofs.matrix(wet.structure(q)[1])
 
     def pairs(model):
-        pencil = linearise(model, q, 6e3).pencil(Conditions(1000.0, 0.0, BETA))
+        pencil = linearise(model, q, 6e3).pencil(Mu(density=1000.0, alpha=0.0, beta=BETA))
         return leading_modes(pencil, 10, SearchOptions(limit_point=-1 / BETA), workspace=workspace)
 
     def column(model):
         case = model.case.replace({"damping.alpha": 0.0, "damping.beta": BETA})
-        walk, place = StabilityWalk(case, model=model), Place.of(case).at(pressure=6e3)
+        walk, place = StabilityWalk(case, model=model), Mu.of(case).at(pressure=6e3)
         walk.equilibrium(place)
         return walk.column([place.at(density=d) for d in np.geomspace(1.0, 1000.0, 64)])
 

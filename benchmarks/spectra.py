@@ -6,7 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from dbvfiv.model import Conditions, ValveModel, linearise, select_search
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.studies.case import thesis_case
 from eigen import Relaxation, SearchOptions, Workspace, certified_spectrum, leading_modes, lowest_frequencies, sweep
@@ -16,8 +17,8 @@ from .statics import model_of, refactorisation
 
 #: Light stiffness damping, so that ten modes lie right of the limit point at -1/beta, and the reference damping, where
 #: six do.
-LIGHT = Conditions(10.0, 5.0, 3e-4)
-REFERENCE = Conditions(10.0, 0.0, 3e-3)
+LIGHT = Mu(density=10.0, alpha=5.0, beta=3e-4)
+REFERENCE = Mu(density=10.0, alpha=0.0, beta=3e-3)
 
 
 @benchmark("modes")
@@ -61,7 +62,7 @@ def modes_behind_a_line():
     """Ten leading coupled pairs behind an elastic line against those behind its rigid column, water at 18 kPa, in the
     band that the line resolves; the certificate likewise.
     """
-    conditions, times, found = Conditions(1000.0, 0.0, 4e-4), {}, {}
+    conditions, times, found = Mu(density=1000.0, alpha=0.0, beta=4e-4), {}, {}
     for name, keys in (("rigid", {}), ("elastic", {"upstream.wave_speed": 1000.0})):
         model = ValveModel(thesis_case(LINE | keys))
         pencil = linearise(model, find_equilibria(model, [18e3]).states[0].q, 18e3).pencil(conditions)
@@ -95,11 +96,11 @@ def modes_that_relax():
     for pressure in (6e3, 20e3):
         linear = linearise(model, find_equilibria(model, [pressure]).states[0].q, pressure)
         relaxation = Relaxation([share * linear.structure for share in SHARES], STRENGTHS, TIMES)
-        structure = linear.pencil(Conditions(10.0, 0.0, 0.0), fluid=False).replace(relaxation=relaxation)
+        structure = linear.pencil(Mu(density=10.0, alpha=0.0, beta=0.0), fluid=False).replace(relaxation=relaxation)
         workspaces = Workspace(), Workspace()
 
         def band():
-            low = Conditions(10.0, 0.0, 0.0, 1.0)
+            low = Mu(density=10.0, alpha=0.0, beta=0.0, loss_factor=1.0)
             return select_search(
                 SearchOptions(), low, lambda n: lowest_frequencies(structure, n, workspaces[1]), 10
             ).options
@@ -107,8 +108,8 @@ def modes_that_relax():
         searches = SearchOptions(limit_point=-1 / LIGHT.beta), band()
         for density, (law, storage) in product((10.0, 1000.0), LAWS.items()):
             pencils = (
-                linear.pencil(Conditions(density, LIGHT.alpha, LIGHT.beta), storage=storage),
-                linear.pencil(Conditions(density, 0.0, 0.0), storage=storage).replace(relaxation=relaxation),
+                linear.pencil(Mu(density=density, alpha=LIGHT.alpha, beta=LIGHT.beta, storage=storage)),
+                linear.pencil(Mu(density=density, alpha=0.0, beta=0.0, storage=storage)).replace(relaxation=relaxation),
             )
 
             def solve(i, solver=leading_modes):
@@ -154,13 +155,13 @@ def modes_at_any_state():
 
     def solve(conditions, storage):
         search = select_search(SearchOptions(), conditions, lambda n: lowest_frequencies(structure, n, workspace), 10)
-        pencil = linear.pencil(conditions, storage=storage)
+        pencil = linear.pencil(conditions.at(storage=storage))
         return leading_modes(pencil, 10, search.options, workspace=workspace)
 
     for density in DENSITIES:
         for law, storage in LAWS.items():
             for beta in BETAS:
-                conditions = Conditions(density, 0.0, beta)
+                conditions = Mu(density=density, alpha=0.0, beta=beta)
                 times = medians({"lu": factor.refactor, "search": lambda: solve(conditions, storage)}, 3)
                 found = solve(conditions, storage)
                 yield Row(
@@ -185,7 +186,7 @@ def density_sweep():
     workspace = Workspace()
 
     def at(density):
-        return state.pencil(Conditions(density, REFERENCE.alpha, REFERENCE.beta))
+        return state.pencil(Mu(density=density, alpha=REFERENCE.alpha, beta=REFERENCE.beta))
 
     single = medians({"one": lambda: leading_modes(at(10.0), 6, options, workspace=workspace)}, 5)["one"]
     densities = np.geomspace(1.0, 1000.0, 100)

@@ -72,21 +72,19 @@ ALL = (
     ),
     Made(
         "rubber",
-        "dbvfiv map cases/dbv12.toml --set 'damping.model=\"loss factor\"' --x pressure=300:36000:40:log "
-        "--y density=0.5:2000:40:log --both",
+        "dbvfiv map cases/dbv12-default.toml --x pressure=300:36000:40:log --y density=0.5:2000:40:log --both",
         {"stability-map.png": "stability-map-loss-factors.png"},
     ),
     Made(
         "line-length",
-        "dbvfiv map cases/dbv12-in-line.toml --set materials.constants=published --set mesh.around=14 "
-        "--set mesh.along=24 --set upstream.roughness=0 --set upstream.loss=1.52 --x pressure=0.5e3:40e3:10:log "
-        "--y pipe_length=0.5:100:16:log --both",
+        "dbvfiv map cases/dbv12-in-line.toml --set mesh.around=14 --set mesh.along=24 --set upstream.roughness=0 "
+        "--set upstream.loss=1.52 --x pressure=0.5e3:40e3:10:log --y pipe_length=0.5:100:16:log --both",
         {"stability-map.png": "in-line-length.png"},
     ),
     Made(
         "line-loss",
-        "dbvfiv map cases/dbv12-in-line.toml --set materials.constants=published --set mesh.around=14 "
-        "--set mesh.along=24 --x pressure=0.5e3:40e3:10:log --y loss_factor=0.25:3:16:log --both",
+        "dbvfiv map cases/dbv12-in-line.toml --set mesh.around=14 --set mesh.along=24 --x pressure=0.5e3:40e3:10:log "
+        "--y loss_factor=0.25:3:8:log --both",
         {"stability-map.png": "in-line-loss-factors.png"},
     ),
     Made(

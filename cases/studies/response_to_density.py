@@ -2,6 +2,8 @@
 hysteresis?
 
 The densities are gone through downwards, from the steady state with a small kick, and upwards again; each run starts
+from dbvfiv.case.parameters import Mu
+from dbvfiv.case.parameters import Mu
 from the state in which the one before ended, or from a kick where that one had come to rest. Every run is kept in a
 file of the folder: a study that is started again reads those that are finished and goes on with the one that is not.
 The table (CSV) and the figure are written anew after each run. `--theory` adds the Hopf onset, its normal form and the
@@ -185,14 +187,14 @@ def _theory(base, path: Path) -> dict:
         return json.loads(path.read_text())
     from scipy.optimize import brentq
 
+    from dbvfiv.case.parameters import Mu
     from dbvfiv.studies.onset.normal_form import normal_form
-    from dbvfiv.studies.stability.place import Place
     from dbvfiv.studies.stability.walk import StabilityWalk
 
     walk = StabilityWalk(base)
 
     def leading(density: float) -> complex:
-        return complex(walk.spectrum(Place.of(base).at(density=density)).eigenvalues[0])
+        return complex(walk.spectrum(Mu.of(base).at(density=density)).eigenvalues[0])
 
     values = np.unique(np.concatenate([np.geomspace(1.2, 100, 40), np.linspace(50, 60, 11)]))
     found = [leading(v) for v in values]
@@ -203,7 +205,7 @@ def _theory(base, path: Path) -> dict:
             f"for one onset."
         )
     onset = brentq(lambda v: leading(v).real, values[lost[0]], values[lost[0] + 1], rtol=1e-10)
-    place = Place.of(base).at(density=onset)
+    place = Mu.of(base).at(density=onset)
     form = normal_form(base, walk, place, walk.spectrum(place).mode(0), "density")
     model = dbvfiv.load(base).model
     lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]

@@ -72,7 +72,7 @@ def _plain(value: Any) -> Any:
 
 
 def _read(value: Any) -> Any:
-    """What a text says that is TOML, such as "8" or "[1e3, 2e3]"; None if it is no such text."""
+    """Value of a text that is TOML, such as "8" or "[1e3, 2e3]"; None for any other text."""
     if not isinstance(value, str):
         return None
     try:

@@ -1,4 +1,4 @@
-"""How the wall damps: materials that relax, or Rayleigh's two constants."""
+"""Damping of the wall: viscoelastic materials, or Rayleigh's two constants."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class Damping(Section):
 
     @property
     def relaxes(self) -> bool:
-        """Whether the materials relax."""
+        """True where the materials are viscoelastic (loss factors) instead of Rayleigh damped."""
         return self.model == "loss factor"
 
     @property

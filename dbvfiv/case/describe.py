@@ -1,4 +1,4 @@
-"""What a field declaration says, as words: the source of messages, ``--explain`` and the reference page."""
+"""Description of a field declaration in words: the source of messages, ``--explain`` and the reference page."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def _strip_none(annotation: Any) -> Any:
 
 
 def allowed_words(field: FieldInfo) -> str:
-    """What a field allows, completing "it must be ..."."""
+    """Values that a field allows, as words that complete "it must be ..."."""
     described = description_of(field)
     if described:
         return described.allowed

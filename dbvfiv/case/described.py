@@ -29,7 +29,7 @@ class Described:
 
 
 def description_of(field: FieldInfo) -> Described | None:
-    """What a field is marked with, the alternatives of a union included."""
+    """Mark that describes a field, also where it is on an alternative of a union; None without one."""
     found = next((m for m in field.metadata if isinstance(m, Described)), None)
     return found or _inner(field.annotation)
 

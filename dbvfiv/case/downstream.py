@@ -1,4 +1,4 @@
-"""What the valve discharges into."""
+"""Surroundings that the valve discharges into: free discharge or a downstream pipe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where on the valve something of limited extent is: a rectangle of axial position and share of the section."""
+"""Region of limited extent on the valve: a rectangle of axial position and share of the section's length."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Extent(Section):
 
     @property
     def is_limited(self) -> bool:
-        """Whether it leaves out any part of the wall."""
+        """True where the region leaves out any part of the wall."""
         return any(x is not None for x in (self.begin, self.end, self.around_from, self.around_to))
 
     @property
@@ -56,7 +56,7 @@ class Extent(Section):
         return tuple(s for s in (self.around_from, self.around_to) if s is not None)
 
     def covers(self, z: float, s: float) -> bool:
-        """Whether the place at the axial position z, m, and the share s of the section belongs to it."""
+        """True where the point at axial position z, m, and share s of the section's length lies in the region."""
         along = (self.begin or 0.0) <= z and (self.end is None or z < self.end)
         end = 2.0 if self.around_to in (None, 1.0) else self.around_to
         around = (self.around_from or 0.0) <= s < end
@@ -75,7 +75,7 @@ class Extent(Section):
                 raise BrokenRule(name, f"{place:g} m", f"the valve ends at {length:g} m")
 
     def enlarged(self, factor: float) -> Self:
-        """The same with all lengths multiplied."""
+        """Copy with all lengths multiplied by a factor."""
         return self.model_copy(
             update={name: factor * getattr(self, name) for name in ("begin", "end") if getattr(self, name) is not None}
         )

@@ -43,7 +43,7 @@ class Gravity(Section):
 
     @property
     def is_there(self) -> bool:
-        """Whether anything weighs."""
+        """True where gravity has a direction, so that wall and fluid have weight."""
         return self.direction != "none"
 
     @property

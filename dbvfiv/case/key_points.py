@@ -89,7 +89,7 @@ def key_point_inlet(path: Path) -> float | None:
 
 
 def has_whole_sections(path: Path) -> bool:
-    """Whether the profiles of a file of key points run from side edge to side edge; not where it cannot be read."""
+    """True where the profiles of a file of key points run from side edge to side edge; False for an unreadable file."""
     try:
         return is_whole(read_key_points(path)[0])
     except ValueError:
@@ -97,7 +97,7 @@ def has_whole_sections(path: Path) -> bool:
 
 
 def is_whole(profile: KeyProfile) -> bool:
-    """Whether a profile runs from side edge to side edge, and not from the centre."""
+    """True where a profile runs from side edge to side edge instead of from the centre."""
     size = max(max(abs(x), abs(y)) for x, y, _ in profile.points)
     return profile.points[0][0] < -_ON_PLANE * size
 

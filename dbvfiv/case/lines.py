@@ -1,4 +1,4 @@
-"""Where a key stands in a TOML file.
+"""Line number of a key in a TOML file.
 
 The standard parser gives no positions. This scan knows table headers, keys at
 the beginning of a line and multi-line strings, which is all that an error

@@ -53,7 +53,7 @@ class LipSizes:
 
     @property
     def height(self) -> float:
-        """Of the mid-surface at the centre above the closing plane, m."""
+        """Height of the mid-surface at the centre above the closing plane, m."""
         return self.radius * math.cos(self.turn) + self.rise
 
     @property

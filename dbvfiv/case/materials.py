@@ -295,11 +295,11 @@ class Materials(Section):
         return {name: card.strain_level for name, card in cards.items() if isinstance(card, ShippedRubber)}
 
     def is_built_in(self, name: str) -> bool:
-        """Whether a name stands for a built-in material and not for a table that replaces it."""
+        """True where a name stands for a built-in material that no table of the case file replaces."""
         return name in BUILT_IN and isinstance(self.named.get(name, BuiltIn()), BuiltIn)
 
     def loss(self, name: str) -> Relaxing | None:
-        """How a material relaxes: as its table says, else the value shipped for what it is; None where neither is."""
+        """Viscoelastic data of a material: those of its table, else the shipped loss factor; None without either."""
         card = self.named.get(name, BuiltIn())
         if card.ways:
             return card
@@ -325,7 +325,7 @@ class Materials(Section):
 
 
 class _Ply(Section):
-    """What a layer is made of."""
+    """Material, thickness and angle of one layer of the wall."""
 
     material: StrictStr = key(..., "Name of its material.", min_length=1)
     thickness: Length = key(..., "Thickness before all layers are scaled to the local wall thickness.", gt=0, le=10)

@@ -66,7 +66,7 @@ class MeasuredTable:
 
     @property
     def holds(self) -> frozenset[str]:
-        """Which of `DISCHARGE`, `AREA`, `SHAPE`, `TAPS` it has the columns of."""
+        """Kinds of measurement (`DISCHARGE`, `AREA`, `SHAPE`, `TAPS`) that the table has the columns of."""
         return frozenset(kind for kind in _NEEDED if _makes(kind, set(self.columns)))
 
 
@@ -106,7 +106,7 @@ def read_measured(path: Path, density: float | None = None) -> MeasuredTable:
 
 
 def _makes(kind: str, names: set[str]) -> bool:
-    """Whether columns of these names are a table of a kind, perhaps with another one beside it."""
+    """True where these column names are the columns of a kind of table, with or without its optional ones."""
     beside = {"mass_flow", "area"} if kind in (DISCHARGE, AREA) else set(_OTHERWISE.get(kind, ()))
     return _NEEDED[kind] <= names <= _NEEDED[kind] | beside
 
@@ -146,7 +146,7 @@ def _column(called: str, unit: str, density: float) -> tuple[str, str, Quantity]
 
 
 def _measures(quantity: Quantity, unit: str, density: float) -> bool:
-    """Whether a unit is one of a quantity."""
+    """True where a unit belongs to a quantity."""
     try:
         quantity.parse(f"1 {unit}", density if quantity is _PRESSURE else None)
     except ValueError:

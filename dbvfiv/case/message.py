@@ -116,7 +116,7 @@ def _elsewhere(key: str, case: type[Section]) -> str | None:
 
 
 def _show(value: Any) -> str:
-    """What was given, short and on one line."""
+    """Given value, short and on one line, for an error message."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, dict):

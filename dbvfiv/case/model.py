@@ -184,12 +184,12 @@ class Case(Section):
 
     @property
     def has_line(self) -> bool:
-        """Whether fluid comes through a pipe in front of the valve."""
+        """True where fluid comes through an upstream pipe."""
         return self.drive.kind == "flow" and self.upstream.whole_length > 0
 
     @property
     def is_compressed(self) -> bool:
-        """Whether the fluid in the valve is compressible."""
+        """True where the fluid in the valve is compressible."""
         return self.drive.kind == "flow" and self.fluid.sound_speed is not None
 
     @property
@@ -201,7 +201,7 @@ class Case(Section):
 
     @property
     def has_tail(self) -> bool:
-        """Whether the jet runs into a pipe behind the valve."""
+        """True where the jet runs into a downstream pipe."""
         return self.drive.kind == "flow" and self.downstream.pipe_diameter is not None
 
     @property
@@ -211,22 +211,22 @@ class Case(Section):
 
     @property
     def level_pressure(self) -> float:
-        """By how much the fluid's levels raise it, Pa: weight of the fluid up to an outlet that is higher."""
+        """Hydrostatic pressure, Pa, of the fluid up to an outlet above the inlet; negative for an outlet below it."""
         return self.fluid.density * self.gravity.along * self.valve.length if self.drive.kind == "flow" else 0.0
 
     @property
     def has_waves(self) -> bool:
-        """Whether that pipe is elastic."""
+        """True where the upstream pipe is elastic and carries pressure waves."""
         return self.has_line and self.upstream.is_elastic
 
     @property
     def has_pump(self) -> bool:
-        """Whether a pump feeds that pipe."""
+        """True where a pump feeds the upstream pipe."""
         return self.has_line and self.upstream.pump is not None
 
     @property
     def seeks_operating_point(self) -> bool:
-        """Whether the pressure is that at which valve and pump meet, and not known yet."""
+        """True where no drive.pressure is given, so that the operating point of valve and pump has to be found."""
         return self.has_pump and "pressure" not in self.drive.model_fields_set
 
     @property
@@ -240,7 +240,7 @@ class Case(Section):
 
     @property
     def seeks_levels(self) -> bool:
-        """Whether strain levels of rubbers are to agree with the strains of layers, and are not known yet."""
+        """True where strain levels of built-in rubbers are to be iterated until they agree with the layers' strains."""
         used = {layer.material for layer in self.layers}
         return self.materials.strain_level == AUTO and any(
             name in used and self.materials.is_built_in(name) for name in RUBBERS
@@ -248,7 +248,7 @@ class Case(Section):
 
     @property
     def pressure_at(self) -> str:
-        """Where drive.pressure is, as words behind its number: "static", "in the reservoir"."""
+        """Location of drive.pressure, in words that follow its number: "static", "in the reservoir"."""
         if not self.has_line:
             return "static"
         return "in the reservoir" if self.drive.at == "reservoir" else "static at the far end of the line"

@@ -61,7 +61,7 @@ class Outside(Section):
 
     @property
     def is_there(self) -> bool:
-        """Whether there is fluid outside."""
+        """True where fluid surrounds the valve."""
         return self.fluid != "none"
 
     def density(self, inside: float) -> float:
@@ -75,7 +75,7 @@ class Outside(Section):
 
     @property
     def words(self) -> str:
-        """What is outside, as words behind a sentence's subject; empty where nothing is."""
+        """Description of the surrounding fluid, in words that follow a sentence's subject; empty without any."""
         if not self.is_there:
             return ""
         fluid = "the same fluid" if self.fluid == "same" else f"fluid of {self.fixed_density:g} kg/m3"

@@ -7,8 +7,9 @@ parameter is one row here and what it does in the model.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from .quantity import Quantity
 
@@ -75,7 +76,7 @@ class Parameter:
 
     @property
     def surrounding(self) -> bool:
-        """Whether it leaves the steady state and the linearised structure as they are."""
+        """True for a parameter that leaves the steady state and the linearised structure as they are."""
         return not self.moves_equilibrium
 
     @property
@@ -269,14 +270,124 @@ _TABLE = (
 PARAMETERS = {row.name: row for row in _TABLE}
 #: Names of those along which modes are tracked.
 SWEPT = tuple(row.name for row in _TABLE if row.swept)
-#: Names of those of load and surroundings, which a model takes without being built anew.
-CONDITIONS = tuple(row.name for row in _TABLE if not row.design)
-#: Their names in `dbvfiv.model.system.ValveSystem`.
-SYSTEM_NAMES = tuple(PARAMETERS[name].system_name for name in CONDITIONS)
+#: Names in `dbvfiv.model.system.ValveSystem` of those of load and surroundings, for which no model is built anew.
+SYSTEM_NAMES = tuple(row.system_name for row in _TABLE if not row.design)
 #: Names of those that leave the steady state as it is.
 SURROUNDINGS = tuple(row.name for row in _TABLE if row.surrounding)
 #: Names of those for which the model is built anew.
 DESIGN = tuple(row.name for row in _TABLE if row.design)
+#: Names of those of the pipes in front of the valve and behind it.
+PIPES = ("pipe_length", "tail_length", "wave_speed")
+#: Density of the fluid outside where it is fixed, kg/m3: part of a parameter point, and no parameter to move.
+OUTSIDE = "outside"
+
+
+class Mu(Mapping[str, float]):
+    """Parameter point: values in SI units by the names of the table; immutable and hashable.
+
+    A value reads as an item or an attribute. A parameter that the valve does not have is not held (a pipe that is not
+    there, loss factors of an elastic wall), and reads as 0 as an attribute; one of the design is held only where it is
+    not the case's own.
+
+    Parameters
+    ----------
+    values : mapping, optional
+    named : float
+        Further values by their names.
+
+    Raises
+    ------
+    ValueError
+        For a name that is not in the table.
+
+    Examples
+    --------
+    >>> mu = Mu(density=1000.0, beta=3e-3)
+    >>> mu.at(density=1.2).density, mu["beta"], mu.pipe_length
+    (1.2, 0.003, 0.0)
+    """
+
+    __slots__ = ("_hash", "_values")
+
+    def __init__(self, values: Mapping[str, float] | None = None, /, **named: float):
+        given = {**(values or {}), **named}
+        unknown = [name for name in given if name not in PARAMETERS and name != OUTSIDE]
+        if unknown:
+            raise ValueError(f"{unknown[0]!r} is no parameter; known are {', '.join((*PARAMETERS, OUTSIDE))}.")
+        object.__setattr__(self, "_values", {name: float(value) for name, value in given.items()})
+        object.__setattr__(self, "_hash", hash(frozenset(self._values.items())))
+
+    @classmethod
+    def of(cls, case: Any) -> Mu:
+        """Parameter point of a case."""
+        fluid, damping = case.fluid, case.damping
+        given = {
+            "pressure": case.drive.pressure,
+            "density": fluid.density,
+            "storage": float(fluid.continuity == "storage"),
+            "alpha": damping.alpha,
+            "beta": damping.beta,
+            "loss_factor": damping.loss_factor,
+        }
+        there = {
+            "pipe_length": case.upstream.whole_length if case.has_line else None,
+            "tail_length": case.downstream.length if case.has_tail else None,
+            "wave_speed": case.upstream.first_wave_speed if case.has_waves else None,
+            OUTSIDE: case.outside.fixed_density,
+        }
+        return cls(given | {name: value for name, value in there.items() if value})
+
+    def at(self, **values: float) -> Mu:
+        """Parameter point with some values changed."""
+        return Mu(self._values, **values)
+
+    def only(self, *names: str) -> Mu:
+        """Part of the parameter point under some names; those not held are left out."""
+        return Mu({name: self._values[name] for name in names if name in self._values})
+
+    @property
+    def pipes(self) -> dict[str, float]:
+        """Parameters of the pipes in front and behind that are held."""
+        return {name: self._values[name] for name in PIPES if name in self._values}
+
+    @property
+    def design(self) -> dict[str, float]:
+        """Parameters of the design that are not the case's own."""
+        return {name: value for name, value in self._values.items() if name in DESIGN}
+
+    def for_system(self) -> dict[str, float]:
+        """Parameters by the names of `dbvfiv.model.system.ValveSystem`, 0 for what the valve does not have."""
+        own = {PARAMETERS[name].system_name or name: value for name, value in self._values.items() if name != OUTSIDE}
+        return dict.fromkeys(SYSTEM_NAMES, 0.0) | own
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __getattr__(self, name: str) -> float:
+        if name in PARAMETERS or name == OUTSIDE:
+            return self._values.get(name, 0.0)
+        raise AttributeError(name)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError("A parameter point does not change; `at` gives another one.")
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Mu) and self._values == other._values
+
+    def __reduce__(self):
+        return Mu, (self._values,)
+
+    def __repr__(self) -> str:
+        return f"Mu({', '.join(f'{name}={value!r}' for name, value in self._values.items())})"
 
 
 def listed(names: Iterable[str] = tuple(PARAMETERS), notes: bool = False) -> str:

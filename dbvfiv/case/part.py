@@ -1,5 +1,6 @@
-"""Which part of the valve is computed: what lies between its planes of symmetry. Every factor from part to whole valve
-is taken from here.
+"""Computed part of the valve, cut at its planes of symmetry.
+
+Every factor from the part to the whole valve is taken from here.
 """
 
 from __future__ import annotations
@@ -40,17 +41,17 @@ class Part:
 
     @property
     def copies(self) -> int:
-        """How many of it the whole valve is."""
+        """Number of copies of the part, mirror images included, that make up the whole valve."""
         return len(self.images)
 
     @property
     def walls(self) -> int:
-        """How many of it one lip is: each meets its mirror image in the closing plane y = 0."""
+        """Number of copies of the part that make up one lip; each meets its mirror image in the closing plane y = 0."""
         return self.copies // 2
 
     @property
     def quarters(self) -> int:
-        """How many quarters of the valve it is."""
+        """Number of quarters of the valve that the part covers."""
         return QUARTER.copies // self.copies
 
     @property
@@ -60,12 +61,12 @@ class Part:
 
     @property
     def is_quarter(self) -> bool:
-        """Whether it begins in the plane x = 0."""
+        """True where the part begins in the plane of symmetry x = 0."""
         return self.begin == 0.0
 
     @property
     def middle(self) -> str:
-        """Where the middle of the lips and what is behind it lies, in words."""
+        """Location of the middle of the lips and of the sections behind it, in words."""
         return "x = 0" if self.is_quarter else "the middle of the lips"
 
     @property
@@ -74,7 +75,7 @@ class Part:
         return (0, 0 if self.is_quarter else 1), (-1, 1)
 
     def centre(self, columns: int) -> int:
-        """Which of so many columns of nodes is the centre's."""
+        """Index of the column of nodes at the centre, out of a number of columns."""
         return 0 if self.is_quarter else columns // 2
 
 

@@ -190,7 +190,7 @@ class Drive(Section):
 
 
 class Supports(Section):
-    """What keeps the lips from crossing: one-sided stops, or contact of the inner faces."""
+    """Contact condition of the lips: one-sided stops, or contact of the inner faces."""
 
     contact: Literal["stops", "faces"] = key(
         "stops",

@@ -38,5 +38,5 @@ def read_pressures(given: Iterable[Any], name: str, density: float | None = None
 
 
 def is_single(pressure: Any) -> bool:
-    """Whether it is one pressure and not several."""
+    """True for one pressure, False for several."""
     return isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0

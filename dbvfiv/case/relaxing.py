@@ -132,7 +132,7 @@ Series = Annotated[
 
 
 class Relaxing(Section):
-    """How a material relaxes beyond its slow law; one way at a time."""
+    """Viscoelasticity of a material beyond its long-term (equilibrium) law, given in one of several ways."""
 
     loss_factor: LossFactor | None = key(
         None,
@@ -155,7 +155,7 @@ class Relaxing(Section):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
-        """What makes a material stands before what makes it relax."""
+        """Put the keys of the elastic law before those of viscoelasticity."""
         super().__pydantic_init_subclass__(**options)
         fields = cls.__pydantic_fields__
         for name in Relaxing.model_fields:
@@ -181,5 +181,5 @@ class Relaxing(Section):
 
     @property
     def ways(self) -> tuple[str, ...]:
-        """Which of the ways is given: one at most."""
+        """Names of the keys by which viscoelasticity is given: one at most in a valid table."""
         return tuple(name for name in WAYS if getattr(self, name) is not None)

@@ -1,4 +1,4 @@
-"""What every table of a case file has in common, and the one way to declare a key."""
+"""Base class of every table of a case file, and the function that declares a key."""
 
 from __future__ import annotations
 

@@ -131,17 +131,17 @@ class Upstream(Pipe):
 
     @property
     def first_wave_speed(self) -> float | None:
-        """That of the first pipe in which waves run, m/s; None where none do."""
+        """Wave speed of the first elastic pipe, m/s; None where no pipe is elastic."""
         return next((pipe.wave_speed for pipe in self.pipes if pipe.wave_speed is not None), None)
 
     @property
     def is_elastic(self) -> bool:
-        """Whether waves run in the line."""
+        """True where pressure waves run in the upstream pipe."""
         return self.whole_length > 0 and self.first_wave_speed is not None
 
     @property
     def has_friction(self) -> bool:
-        """Whether more length loses more head."""
+        """True where some pipe segment has wall friction, so that head loss grows with length."""
         return any(pipe.friction > 0 or pipe.roughness > 0 for pipe in self.pipes)
 
     def check_pipes(self, inlet: float) -> None:

@@ -163,7 +163,7 @@ class Valve(Section):
 
     @property
     def is_double_symmetric(self) -> bool:
-        """Whether it is symmetric about x = 0, the middle of its lips, besides about y = 0, the plane of their slit."""
+        """True for symmetry about x = 0, the middle of the lips, besides that about y = 0, the plane of their slit."""
         return self.bill_offset == 0.0 and not (self.key_points is not None and has_whole_sections(self.key_points))
 
     @property

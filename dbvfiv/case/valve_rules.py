@@ -1,4 +1,4 @@
-"""What a valve's shape and wall must fulfil; every rule is broken in one sentence."""
+"""Rules for a valve's shape and wall; each violation is reported in one sentence."""
 
 from __future__ import annotations
 

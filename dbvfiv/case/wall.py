@@ -18,7 +18,7 @@ class WallStep(Section):
     thickness: Length = key(..., "Wall thickness of the piece.", gt=0, le=10)
 
     def enlarged(self, factor: float) -> WallStep:
-        """The same with all lengths multiplied."""
+        """Copy with all lengths multiplied by a factor."""
         return self.model_copy(update={"to": factor * self.to, "thickness": factor * self.thickness})
 
 
@@ -40,7 +40,7 @@ class WallPatch(Extent):
         return self.thickness if self.thickness is not None else thickness + self.extra
 
     def enlarged(self, factor: float) -> Self:
-        """The same with all lengths multiplied."""
+        """Copy with all lengths multiplied by a factor."""
         sizes = {name: getattr(self, name) for name in ("thickness", "extra")}
         larger = {name: factor * size for name, size in sizes.items() if size is not None}
         return super().enlarged(factor).model_copy(update=larger)

@@ -86,7 +86,7 @@ def _defaults_said(case: Section) -> str:
 
 
 def _differs(section: Any, usual: Any, key: str) -> bool:
-    """Whether a key of a section, or a list in its place, was set to something else than usual."""
+    """True where a key of a section, or a list in its place, differs from its usual value."""
     if not key:
         return section != usual
     return key not in getattr(section, "following", ()) and getattr(section, key) != getattr(usual, key)

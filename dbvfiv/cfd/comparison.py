@@ -19,11 +19,11 @@ SETTLED = 0.01
 
 @dataclass(frozen=True)
 class FlowComparison:
-    """What a run says of a state.
+    """Comparison of a computed 3-D flow (CFD) with the flow law, for one steady state.
 
-    Pressures are in Pa over that at the wall of the pipe (or in the room) beside the lip, which is what the law's zero
-    is. They go with the square of the flow, all but exactly at these Reynolds numbers, so the rows are given at the
-    pressure of the law at the flange.
+    Pressures are in Pa over that at the wall of the pipe (or in the room) beside the lip, which is the zero of the flow
+    law. They scale with the square of the flow, nearly exactly at these Reynolds numbers, so the rows are given at the
+    flow law's pressure at the flange.
 
     Attributes
     ----------

@@ -27,15 +27,15 @@ FAR_INNER, FAR_OUTER = 0.5, 0.68
 
 @dataclass(frozen=True)
 class Domain:
-    """What is meshed.
+    """Region of fluid that is meshed: valve, and the pipe or room around it.
 
     Attributes
     ----------
     faces : WallFaces
     radius : float, m
-        Of the pipe downstream, or of the room.
+        Radius of the downstream pipe, or of the room.
     free : bool
-        Whether it is a room.
+        True for a room (free discharge), False for a pipe.
     fineness : float
         Cells in each direction over the usual number.
     """

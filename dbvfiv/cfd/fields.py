@@ -1,4 +1,4 @@
-"""What a run left: pressure and velocity in the cells, and how the inlet pressure settled."""
+"""Results of an OpenFOAM run: pressure and velocity in the cells, and the history of the inlet pressure."""
 
 from __future__ import annotations
 

@@ -60,12 +60,12 @@ class FlowCase:
 
     @cached_property
     def faces(self) -> WallFaces:
-        """Of the deformed wall."""
+        """Faces of the deformed wall."""
         return WallFaces.of(self.mesh, self.state.nodal)
 
     @cached_property
     def domain(self) -> Domain:
-        """What is meshed.
+        """Region of fluid that is meshed.
 
         Raises
         ------
@@ -115,7 +115,7 @@ class FlowCase:
 
     @property
     def question(self) -> dict[str, Any]:
-        """What two runs must share for one to go on where the other ended."""
+        """Quantities in which two runs must agree for one to continue the other."""
         shape = hashlib.sha256(np.round(self.state.nodal, 9).tobytes() + self.mesh.nodes.tobytes()).hexdigest()[:16]
         return {
             "shape": shape,

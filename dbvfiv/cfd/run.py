@@ -19,7 +19,7 @@ _STEP = re.compile(r"^Time = (\d+)", re.MULTILINE)
 
 
 def has_openfoam() -> bool:
-    """Whether simpleFoam is on the path."""
+    """True where simpleFoam is on the path."""
     return shutil.which("simpleFoam") is not None
 
 

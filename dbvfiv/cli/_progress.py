@@ -1,4 +1,4 @@
-"""What a run shows while it goes on: a bar on standard error, rows on standard output, warnings as they come."""
+"""Display of a running study: a bar on standard error, rows on standard output, warnings as they come."""
 
 from __future__ import annotations
 

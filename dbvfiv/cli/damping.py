@@ -24,7 +24,7 @@ def command(
     overrides: Override = None,
     as_json: AsJson = False,
 ) -> None:
-    """How much the wall damps: materials, fits of their loss factors with errors, damping ratio over frequency.
+    """Damping of the wall: materials, fits of their loss factors with errors, damping ratio over frequency.
 
     dbvfiv damping my.toml --set damping.model="loss factor" --at 5,40 --plots figures
     """

@@ -33,14 +33,14 @@ class Constraint(StrEnum):
 
 
 class Weighting(StrEnum):
-    """What a fit makes small."""
+    """Error that a fit minimises."""
 
     ABSOLUTE = "absolute"
     RELATIVE = "relative"
 
 
 class Cycle(StrEnum):
-    """Which loading is fitted."""
+    """Load cycle that is fitted."""
 
     FIRST = "first"
     LAST = "last"

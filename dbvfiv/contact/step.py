@@ -27,14 +27,14 @@ _SMALL = 1e-5
 
 @dataclass(frozen=True)
 class Rebound:
-    """What parting faces get back.
+    """Energy that the contact gives back to parting faces.
 
     Attributes
     ----------
     share : float
-        Of the stored energy, 0 to 1.
+        Share of the stored energy that is given back, 0 to 1.
     speed : float, m/s
-        Of parting, from which on the rest is lost.
+        Parting speed from which on the rest is lost.
     """
 
     share: float = 1.0

@@ -1,1 +1,1 @@
-"""How figures look and are written, and views of the valve that several studies share."""
+"""Style and output of figures, and views of the valve that several studies share."""

@@ -1,4 +1,4 @@
-"""How figures look: fonts, colours, sizes; drawn without a display."""
+"""Style of figures: fonts, colours, sizes; drawn without a display."""
 
 from __future__ import annotations
 
@@ -97,14 +97,14 @@ def driven(case: Case, pressure: float) -> str:
 
 
 def pressure_name(case: Case) -> str:
-    """The same as the name of an axis or legend, without a number."""
+    """Name of the driving pressure for an axis or legend, without a number."""
     if not case.has_line:
         return PARAMETERS["pressure"].title
     return "Pressure in the reservoir" if case.drive.at == "reservoir" else "Static pressure at the far end"
 
 
 def pressure_heading(case: Case) -> str:
-    """The same over a narrow legend."""
+    """Name of the driving pressure over a narrow legend, on several lines."""
     return textwrap.fill(pressure_name(case).lower(), 15)
 
 

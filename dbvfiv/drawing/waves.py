@@ -1,4 +1,4 @@
-"""How much of an oscillation along a line travels, and which way."""
+"""Share of a travelling wave in an oscillation along a line, and its direction."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ FORMATS = ("stl", "step")
 
 
 def state_name(name: str, pressure: float) -> str:
-    """How files of a state begin: ``dbv12-36kPa``."""
+    """Beginning of the names of a state's files: ``dbv12-36kPa``."""
     return f"{name}-{kilopascals(pressure).replace(' ', '')}"
 
 

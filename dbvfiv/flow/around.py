@@ -1,4 +1,4 @@
-"""What laws that are made around a channel take over from it."""
+"""Base class of flow laws that extend a channel and take its properties over."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from .law import FlowLaw
 
 
 class AroundChannel(FlowLaw):
-    """A law of a channel with more to it.
+    """Flow law that extends a channel, as by an elastic line or a compressible fluid.
 
     Attributes
     ----------
     channel : Channel
-        Its stations, levels and blend of the continuity laws are the law's.
+        Gives the law its stations, levels and blend of the continuity laws.
     """
 
     channel: Channel
@@ -23,22 +23,22 @@ class AroundChannel(FlowLaw):
 
     @property
     def terms(self):
-        """Those of the channel."""
+        """Loss and inertance terms of the channel."""
         return self.channel.terms
 
     @property
     def back(self) -> float:
-        """That of the channel."""
+        """Driving pressure at which nothing flows, Pa; that of the channel."""
         return self.channel.back
 
     @property
     def level(self) -> float:
-        """That of the channel."""
+        """Hydrostatic pressure between the ends of the passage, Pa; that of the channel."""
         return self.channel.level
 
     @property
     def static(self):
-        """That of the channel."""
+        """Hydrostatic pressures (m,) across the wall at the stations, Pa; those of the channel."""
         return self.channel.static
 
     @property

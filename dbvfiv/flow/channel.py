@@ -128,7 +128,7 @@ class Channel(FlowLaw):
 
     @property
     def viscous(self) -> bool:
-        """Whether the fluid has a viscosity, so that steady flow depends on its density."""
+        """True where the fluid has a viscosity, so that steady flow depends on its density."""
         return any(term.viscous for term in self.terms)
 
     def at_unit_density(self) -> dict[str, float]:
@@ -229,7 +229,7 @@ class Channel(FlowLaw):
         return pressure, jnp.where(ratio > 0, speed, jnp.inf)[None]
 
     def without_drives(self) -> Channel:
-        """The same channel with the terms that steady flow sees."""
+        """Copy of the channel with only those terms that act on steady flow."""
         leaves, kept = self._flatten()
         leaves[self.DATA.index("terms")] = self.losses
         return self._unflatten(kept, leaves)

@@ -113,7 +113,10 @@ class ElasticLine(Traceable):
 
     @property
     def places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where velocities and pressures are, from the far end (0) to the flange (1); the flange's velocity is last."""
+        """Positions of the velocities and of the pressures along the line, from the far end (0) to the flange (1).
+
+        The last velocity is that at the flange.
+        """
         one, ends = element(), np.zeros((self.elements, 2))
         first, distance = 0, 0.0
         for part, count in zip(self.line.parts, self.counts):
@@ -207,7 +210,7 @@ class LineChannel(AroundChannel):
 
     @property
     def terms(self):
-        """Those of the rigid column."""
+        """Loss and inertance terms of the rigid column of fluid."""
         return self.rigid.terms
 
     @property
@@ -242,7 +245,7 @@ class LineChannel(AroundChannel):
         return p, jnp.concatenate([outlet, density * momentum[:-1], density * continuity])
 
     def steady(self, area, parameters):
-        """That of the rigid column, with a uniform velocity in the line."""
+        """Steady flow of the rigid column of fluid, with a uniform velocity in the line."""
         p, velocity = self.rigid.steady(area, parameters)
         k = self.line.size // 2
         pressure = self.line.steady_pressure(velocity[0], area[-1], parameters)

@@ -90,7 +90,7 @@ class GasChannel(AroundChannel):
 
     @property
     def unsteady(self) -> bool:
-        """That of the channel."""
+        """True for the unsteady flow law, with the fluid's inertia; as in the channel."""
         return self.channel.unsteady
 
     @property
@@ -155,8 +155,10 @@ class GasChannel(AroundChannel):
     # ----
 
     def stored(self, area, area_rate, inner, parameters):
-        """What the balances hold (2 m - 1,): velocities integrated over the cells and the terms' momentum at the
-        flange, m2/s; mass per density outside of the cells, m3; traceable.
+        """Quantities (2 m - 1,) whose rates the balances of momentum and mass contain; traceable.
+
+        Velocities integrated over the cells and the terms' momentum at the flange, m2/s; mass over the outside density
+        in the cells, m3.
         """
         channel = self.channel
         speed, sigma = self.split(inner, parameters)
@@ -176,7 +178,7 @@ class GasChannel(AroundChannel):
         return sigma.at[0].set(sigma[1])
 
     def sources(self, area, area_rate, inner, parameters):
-        """By what their rates are balanced (2 m - 1,), m2/s2 and m3/s; traceable."""
+        """Sources (2 m - 1,) that balance the rates of `stored`, m2/s2 and m3/s; traceable."""
         channel = self.channel
         speed, sigma = self.split(inner, parameters)
         open_ = above_floor(area, self.floor)
@@ -208,7 +210,7 @@ class GasChannel(AroundChannel):
         return c * jnp.exp(0.5 * (parameters["heat_capacity_ratio"] - 1.0) * liquid / c)
 
     def scales(self, area, parameters):
-        """What turns the balances (2 m - 1,) into Pa; traceable."""
+        """Factors (2 m - 1,) that turn the balances into Pa; traceable."""
         density = parameters["density"]
         momentum = jnp.full(self.count, density)
         mass = jnp.full(self.count - 1, density * parameters["sound_speed"]) / above_floor(area[-1], self.floor)
@@ -252,7 +254,7 @@ class GasChannel(AroundChannel):
         return jnp.where(still, rest, pressure), jnp.where(still, 0.0, inner)
 
     def _without_drives(self) -> GasChannel:
-        """The same law with the terms that steady flow sees."""
+        """Copy of the law with only those terms that act on steady flow."""
         leaves, kept = self._flatten()
         leaves[self.DATA.index("channel")] = self.channel.without_drives()
         return self._unflatten(kept, leaves)
@@ -261,12 +263,18 @@ class GasChannel(AroundChannel):
         return np.append(inner[1 : self.count], inner[0])
 
     def steady_velocities(self, area, inlet, density):
-        """Of a fluid of another density than the own one, that which is compressed alike by a pressure."""
+        """Steady velocities (m,), m/s, of a fluid of any density, kg/m3, by similarity.
+
+        The fluid is compressed by a pressure as much as the law's own one is.
+        """
         own = self.own_velocities(self.steady_inner(area, self._driven(inlet)))
         return own * np.sqrt(self.density / density)
 
     def inlet_density(self, area, inlet, density):
-        """Likewise."""
+        """Density at the inlet, kg/m3, of a fluid of given density around the jet.
+
+        It is compressed by a pressure as much as the law's own fluid is.
+        """
         inner = self.steady_inner(area, self._driven(inlet))
         return density * float(np.exp(inner[-1] / self.sound_speed))
 
@@ -276,7 +284,7 @@ class GasChannel(AroundChannel):
 
 @jax.jit
 def _left(law: GasChannel, area, parameters, inner):
-    """What the equations leave (l,), Pa, in a passage at rest."""
+    """Residual of the equations (l,), Pa, in a passage whose walls are at rest."""
     return law.scales(area, parameters) * law.sources(area, jnp.zeros_like(area), inner, parameters)
 
 

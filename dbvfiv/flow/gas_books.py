@@ -63,7 +63,7 @@ class Instant(NamedTuple):
 
 
 class _Stations(NamedTuple):
-    """What stations (m,) have at an instant; of the mass that is stored `thick`, `mass`, `held` and `within`."""
+    """Flow at the stations (m,) at an instant; `thick`, `mass`, `held` and `within` belong to the stored mass."""
 
     area: jnp.ndarray
     open: jnp.ndarray
@@ -105,7 +105,7 @@ def energy(law: GasChannel, parameters, area, inner):
 
 @jax.jit
 def powers(law: GasChannel, parameters, area, area_rate, inner):
-    """What is taken in at the flange, leaves through the lips and is lost in the passage (3,), W of the part."""
+    """Power taken in at the flange, leaving through the lips and lost in the passage (3,), W of the computed part."""
     at = _stations(law, parameters, area, inner)
     head = law.sources(area, area_rate, inner, parameters)[: law.count - 1]
     lost = _mean(at.flow) * (head - (at.head[:-1] - at.head[1:]))  # what the cells take besides Bernoulli's heads
@@ -114,7 +114,7 @@ def powers(law: GasChannel, parameters, area, area_rate, inner):
 
 @jax.jit
 def step_books(law: GasChannel, parameters, old: Instant, new: Instant, h, weight):
-    """What a step adds to the books (6,), J of the part.
+    """Energy budget of one time step (6,), J of the computed part; see `BOOKS`.
 
     Parameters
     ----------

@@ -296,7 +296,7 @@ def _pressures(law, parameters, inner):
 
 @jax.jit
 def _instant(law, parameters, area, area_rate, inner):
-    """What is stored (l,), its sources (l,), and which of it can change with the unknowns."""
+    """Stored quantities (l,), their sources (l,), and a mask (l,) of those that change with the unknowns."""
     by_inner = jax.jacfwd(lambda x: law.stored(area, area_rate, x, parameters))(inner)
     sources = law.sources(area, area_rate, inner, parameters)
     return law.stored(area, area_rate, inner, parameters), sources, jnp.any(by_inner != 0.0, axis=1)

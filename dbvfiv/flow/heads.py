@@ -1,4 +1,4 @@
-"""What speeds cost: velocity heads between the inlet and each station, as pressure over density, m2/s2.
+"""Velocity heads between the inlet and each station, as pressure over density, m2/s2.
 
 The two choices agree where all speeds are outward. Traceable; `dbvfiv.flow.reversed` holds the evaluators of a time
 step.

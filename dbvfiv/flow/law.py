@@ -1,9 +1,9 @@
-"""What every flow law is: one traceable definition, and what callers ask of it.
+"""Base class of flow laws: one traceable definition, and the methods that callers use.
 
 A law relates m station pressures to the areas of a passage, their first two rates, and l unknowns of its own, which l
 equations fix. `FlowLaw.equations` writes this down once, in jax. Steady flow, linearised operators and second and third
-derivatives follow from it in `dbvfiv.flow.derivatives`, for any law. What a time step evaluates thousands of times has
-faster forms beside it (`dbvfiv.flow.stepping`), tested against it.
+derivatives follow from it in `dbvfiv.flow.derivatives`, for any law. Time steps evaluate the law thousands of times and
+have faster forms of it (`dbvfiv.flow.stepping`), tested against it.
 """
 
 from __future__ import annotations
@@ -193,7 +193,7 @@ class FlowLaw(Traceable, ABC):
         return self.equations(FlowMotion.still(area, inner), parameters)
 
     def steady_start(self, area, parameters: Mapping[str, Any]):
-        """Where the search for the steady inner unknowns (l,) starts; traceable."""
+        """Initial guess of the steady inner unknowns (l,); traceable."""
         return jnp.ones(self.inner)
 
     def steady(self, area, parameters: Mapping[str, Any]) -> tuple[Any, Any]:

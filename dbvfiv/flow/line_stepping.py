@@ -113,11 +113,11 @@ class LineWaves:
         return out
 
     def inertia(self, rate: np.ndarray) -> np.ndarray:
-        """What rates (k + 1,) of the velocities need, m2/s2."""
+        """Inertia term (k + 1,) of the rates (k + 1,) of the velocities, m2/s2."""
         return self._sum(self.ratio * self.length * (rate[self.nodes] @ self._mass.T)) + self._rigid * rate
 
     def push(self, pressure: np.ndarray) -> np.ndarray:
-        """What pressures (k,) push the nodes by, m2/s2."""
+        """Driving term (k + 1,) of the pressures (k,) at the velocity nodes, m2/s2."""
         return self._sum(self.ratio * self.speed * ((self._weights * pressure.reshape(self.count, -1)) @ self._slope))
 
     def stretch(self, velocity: np.ndarray) -> np.ndarray:
@@ -144,7 +144,7 @@ class LineWaves:
         return head + GRAVITY * (lift - self.pump.reference), slope + GRAVITY * falling * per_velocity
 
     def _source(self, velocity: float, inlet: float) -> tuple[float, float]:
-        """The same under the pressure of steady flow."""
+        """Total pressure over the density ahead of any pump, m2/s2, and its derivative by the velocity, m/s."""
         speed = self._first_ratio * velocity
         gained = min(speed, 0.0) if self.reservoir else speed
         return inlet / self.density + 0.5 * gained**2, self._first_ratio * gained

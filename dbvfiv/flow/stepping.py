@@ -182,7 +182,7 @@ class MovingFluid:
         return inlet - channel.back - self.density * (self._whole_head(flow) + psi_rate) + channel.static
 
     def _driving(self, inlet: float) -> float:
-        """What drives the flow, as pressure over density, m2/s2."""
+        """Driving pressure over density, m2/s2."""
         return (inlet - self.channel.back) / self.density
 
     def _whole_head(self, flow: FlowState) -> np.ndarray:
@@ -190,7 +190,7 @@ class MovingFluid:
         return head + flow.lost if self.channel.terms else head
 
     def head(self, speed: np.ndarray) -> np.ndarray:
-        """What speeds (m,) cost on the way from the inlet to each station: pressure over density (m,), m2/s2."""
+        """Velocity head between the inlet and each station (m,), m2/s2, of speeds (m,): pressure over density."""
         return 0.5 * (speed * speed - speed[-1] ** 2)
 
     def head_slope(self, speed: np.ndarray, change: np.ndarray) -> np.ndarray:

@@ -75,12 +75,12 @@ class FlowTerm(Traceable):
 
 
 def wall_share(step, speed):
-    """What the wall feels of the integral of speeds (m,) from the inlet beyond its values at the stations, m2/s;
-    traceable.
+    """Correction (m,), m2/s, of the integral of speeds (m,) from the inlet, for the pressure on the wall; traceable.
 
-    A speed that runs straight over a section of length h, from U_a to U_b, makes a parabola of its integral, which lies
-    by h (U_b - U_a)/12 from a straight course with the same moments; stations take what lies on their sections by the
-    lengths of these. The outlet, whose pressure is given, and the inlet keep their own.
+    The integral is known at the stations. A speed that varies linearly over a section of length h, from U_a to U_b,
+    makes a parabola of it. With the same moments, the parabola lies h (U_b - U_a)/12 from a straight line; stations
+    take their parts from adjacent sections by the lengths of these. The outlet, whose pressure is given, and the inlet
+    keep their own values.
     """
     bow = step**2 * (speed[1:] - speed[:-1]) / 12.0
     inner = (bow[1:] + bow[:-1]) / (step[1:] + step[:-1])

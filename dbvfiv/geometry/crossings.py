@@ -40,7 +40,7 @@ def check_profiles(profiles: Sequence[Profile], part: Part = QUARTER) -> None:
 
 
 def crossing(points: np.ndarray) -> np.ndarray | None:
-    """Where a polygon through points (k, 2) first crosses itself, (2,); None if it does not."""
+    """Point (2,) at which a polygon through points (k, 2) first crosses itself; None if it does not."""
     begin, way = points[:-1], np.diff(points, axis=0)
     gap = begin[None] - begin[:, None]
     across = _cross(way[:, None], way[None])

@@ -1,4 +1,4 @@
-"""Where the rows and columns of the valve's mesh go: on every break of shape, wall and load, closer at joints."""
+"""Division of the mesh into rows and columns: on every break of shape, wall and load, finer at joints."""
 
 from __future__ import annotations
 
@@ -160,8 +160,9 @@ def _share(lengths: np.ndarray, count: int) -> np.ndarray:
 
 
 def _row_law(mesh: Mesh, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """How many rows lie up to an axial position: `mesh.row_grading` is their length at a full kink, which the lip may
-    count as, over that away.
+    """Number of rows, up to a factor, from the lip to axial positions: (z, count), each (k,), z in m.
+
+    `mesh.row_grading` is the length of a row at a full kink over that away from it. The lip may count as a full kink.
     """
     z = np.linspace(surface.breaks[0], surface.breaks[-1], _FINE)
     density, reach = np.ones_like(z), REACH * (z[-1] - z[0])

@@ -1,4 +1,4 @@
-"""What the wall takes of the flow sections (Th. 4.12-4.14), patches included."""
+"""Cross-sectional area that the wall takes from the flow sections (Th. 4.12-4.14), patches included."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
 
 
 def _even_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
-    """That of a wall without patches."""
+    """Area (k,), m2, that a wall without patches takes from the sections at z (k,), m."""
     place = np.asarray(z, float)
     share = np.clip((place - valve.duckbill_length) / valve.saddle_length, 0.0, 1.0)
     quarters = surface.part.quarters

@@ -1,4 +1,4 @@
-"""How the materials of a case relax, fitted over the band in which their loss factors hold."""
+"""Viscoelasticity of a case's materials: Prony series fitted over the band in which their loss factors hold."""
 
 from __future__ import annotations
 
@@ -58,19 +58,19 @@ class ShippedLoss:
 
 @dataclass(frozen=True)
 class MaterialDamping:
-    """How one material of a case relaxes.
+    """Viscoelasticity of one material of a case.
 
     Attributes
     ----------
     name : str
     source : str
-        Where it is from, in words.
+        Origin of the data, in words.
     prony : Prony
-        As it is, without the case's factor on all loss factors.
+        Series without the case's factor on all loss factors.
     fit : PronyFit or None
-        How well the series meets what was given; None for a series that was given outright.
+        Error of the series against the given data; None for a series that was given outright.
     data : tuple of arrays, or None
-        Frequencies, Hz, and tan delta that were given or measured; None for a relaxing modulus or a series.
+        Frequencies, Hz, and tan delta that were given or measured; None for a relaxation modulus or a series.
     """
 
     name: str
@@ -115,13 +115,13 @@ def shipped_loss(name: str) -> ShippedLoss:
 
 
 def relaxation_from_case(case: Case, name: str) -> Prony | None:
-    """How a material of a case relaxes.
+    """Prony series of a material of a case.
 
     Parameters
     ----------
     case : Case
     name : str
-        Of a material.
+        Name of the material.
 
     Returns
     -------
@@ -131,13 +131,13 @@ def relaxation_from_case(case: Case, name: str) -> Prony | None:
     Raises
     ------
     CaseError
-        For a name that the case does not know, a material of which nothing is said, or data that cannot be used.
+        For a name that the case does not know, a material without any viscoelastic data, or data that cannot be used.
     """
     return damping_of(case, name).prony if case.damping.relaxes else None
 
 
 def damping_of(case: Case, name: str) -> MaterialDamping:
-    """How a material relaxes by what the case says of it, under either model; see `relaxation_from_case`."""
+    """Viscoelasticity of a material of a case, under either damping model; see `relaxation_from_case`."""
     if name not in case.materials.names:
         raise CaseError(
             f"{name!r} is no material of this case; it must be one of {', '.join(case.materials.names)}.",

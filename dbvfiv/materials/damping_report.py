@@ -1,4 +1,4 @@
-"""What a case says about damping, as numbers: material by material, over frequency, and as Rayleigh's constants."""
+"""Report on a case's damping: numbers by material and over frequency, and Rayleigh constants that match them."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class DampingReport:
         }
 
     def lines(self, at: tuple[float, float] | None = None) -> list[str]:
-        """The same for people."""
+        """Lines of the report as text; `at` adds the Rayleigh constants that match at two frequencies, Hz."""
         damping = self.case.damping
         low, high = damping.band
         if damping.relaxes:
@@ -173,7 +173,7 @@ class DampingReport:
 
 
 def describe_damping(case: Case) -> DampingReport:
-    """What a case says about damping.
+    """Report on the damping of a case.
 
     Raises
     ------
@@ -186,13 +186,13 @@ def describe_damping(case: Case) -> DampingReport:
 
 
 def outside_band(case: Case, frequencies: Iterable[float]) -> str | None:
-    """Whether frequencies leave the band in which the loss factors of a case hold.
+    """Warning where frequencies leave the band in which the loss factors of a case hold.
 
     Parameters
     ----------
     case : Case
     frequencies : iterable of float
-        Hz; what does not oscillate (0) and what is not finite is left out.
+        Hz; zero (no oscillation) and non-finite values are left out.
 
     Returns
     -------

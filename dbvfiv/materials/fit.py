@@ -233,7 +233,7 @@ def _search_knee(problem: _Problem) -> np.ndarray:
 
 
 def _weights(stress: np.ndarray, error: str) -> np.ndarray:
-    """Of the residuals: one, or one over the measured stress."""
+    """Weights of the residuals (k,): one, or one over the measured stress, 1/Pa."""
     if error == "absolute":
         return np.ones_like(stress)
     size = np.abs(stress)

@@ -1,4 +1,4 @@
-"""What tests of a rubber give: every form of the energy compared, one of them in full, and its table to paste."""
+"""Report on fits to tests of a rubber: all energy forms compared, one of them in full, and its table to paste."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class FitReport:
         return float(np.mean(known)) if known else None
 
     def lines(self, name: str, density: float) -> list[str]:
-        """For people."""
+        """Lines of the report as text."""
         return [
             *self._of_tests(),
             "",

@@ -31,7 +31,7 @@ class Slopes(NamedTuple):
 
 
 def polynomial_slopes(i1, i2, power: tuple[int, int]) -> Slopes:
-    """Those of (I1 - 3)^i (I2 - 3)^j, at I1 - 3 and I2 - 3."""
+    """Derivatives of (I1 - 3)^i (I2 - 3)^j by I1 and I2, at I1 - 3 and I2 - 3."""
     i, j = power
     return Slopes(
         _power(i1, i, 1) * i2**j,
@@ -43,14 +43,14 @@ def polynomial_slopes(i1, i2, power: tuple[int, int]) -> Slopes:
 
 
 def knee_slopes(i1, x0: float) -> Slopes:
-    """Those of x0 (sqrt(1 + (I1 - 3)/x0) - 1), at I1 - 3."""
+    """Derivatives of x0 (sqrt(1 + (I1 - 3)/x0) - 1) by I1 and I2, at I1 - 3."""
     first = 0.5 / np.sqrt(1.0 + i1 / x0)
     none = np.zeros_like(first)
     return Slopes(first, none, -0.5 * first / (x0 + i1), none, none)
 
 
 def rubber_slopes(parameters, i1, i2) -> Slopes:
-    """Those of a rubber by its parameters (see `law.Law`), at I1 - 3 and I2 - 3."""
+    """Derivatives of a rubber's energy by I1 and I2, Pa, from its parameters (see `law.Law`), at I1 - 3 and I2 - 3."""
     parts = [(c, polynomial_slopes(i1, i2, power)) for c, power in zip(parameters, RUBBER_POWERS) if c != 0.0]
     if parameters[5] != 0.0:
         parts.append((parameters[5], knee_slopes(i1, parameters[6])))

@@ -1,4 +1,4 @@
-"""What every material law offers, and one traceable energy that serves them all.
+"""Base class of material laws, and one traceable strain energy that serves them all.
 
 A law is a strain energy per unit reference volume in five Green-Lagrange strains
 

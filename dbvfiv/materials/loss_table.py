@@ -136,7 +136,7 @@ def _read(path: str | Path, wanted: tuple[str, ...], temperature: float | None) 
 
 
 def _meaning(title: str, wanted: tuple[str, ...]) -> str | None:
-    """Which of the columns a title names."""
+    """Name of the wanted column that a title stands for; None for a title that is not known."""
     bare = re.sub(r"\s*[\[(<{][^\])>}]*[\])>}]\s*$", "", title) if not title.strip().endswith("(t)") else title
     plain = " ".join(re.sub(r"[_,]", " ", bare).replace("′", "'").replace("″", "''").lower().split())
     return next((name for name in (*wanted, "temperature") if plain in _NAMES[name]), None)

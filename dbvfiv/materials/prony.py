@@ -1,4 +1,4 @@
-"""How a material relaxes: a Prony series over its slow law.
+"""Prony series of a viscoelastic material over its long-term (equilibrium) law.
 
 Equations (T.7) and (T.8) of docs/theory.md.
 """
@@ -70,7 +70,7 @@ class Prony:
 
     @property
     def elastic(self) -> bool:
-        """Whether nothing relaxes."""
+        """True where all strengths are zero, so that the material is elastic."""
         return not any(self.strengths)
 
     def modulus(self, s):

@@ -42,7 +42,7 @@ class Form:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the constants that W is linear in, as the case file writes them."""
+        """Names of the constants that W is linear in, as the case file writes them."""
         if self.softens:
             return "mu_inf", "mu_0", "c", "c_3"
         if not self.powers:
@@ -51,14 +51,14 @@ class Form:
 
     @property
     def exponent_names(self) -> tuple[str, ...]:
-        """Of the constants that W is not linear in: Ogden's exponents, x_0 of the softening rubber."""
+        """Names of the constants that W is not linear in: Ogden's exponents, x_0 of the softening rubber."""
         if self.softens:
             return ("x_0",)
         return () if self.powers else tuple(f"alpha{p + 1}" for p in range(self.terms))
 
     @property
     def softens(self) -> bool:
-        """Whether it is that of the softening rubber, whose constants are such that it is stable in every state."""
+        """True for the form of the softening rubber, whose constants make it stable in every state."""
         return self.name == "softening"
 
     @property
@@ -73,7 +73,7 @@ class Form:
 
     @property
     def title(self) -> str:
-        """As it stands in tables and figures."""
+        """Title of the form for tables and figures."""
         return self.name if len(TERMS[self.name]) == 1 else f"{self.name} {self.terms}"
 
     def columns(self, mode: str, strain, exponents=()) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Where a rubber's constants stop describing a stable material, slowly strained or in an instant.
+"""Loss of material stability of a rubber, under slow and under instantaneous strain.
 
 Criterion: Hill's inequality (Drucker's postulate for an elastic solid), d tau : D > 0 for every
 isochoric stretching D, with tau the Kirchhoff stress and its co-rotational rate. It does not

@@ -99,7 +99,7 @@ class Curve:
 
 
 def told_of(curves: list[Curve]) -> str:
-    """What a table holds, in words."""
+    """Description of a table's test curves: deformation modes and load cycles."""
     return ", ".join(c.test.mode + ("" if c.cycle is None else f" (cycle {c.cycle})") for c in curves)
 
 

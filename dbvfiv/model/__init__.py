@@ -1,12 +1,13 @@
 """The coupled valve and its exact linearisation."""
 
-from .dynamics import Conditions, LinearisedState, dynamic_residual, linearise
+from ..case.parameters import Mu
+from .dynamics import LinearisedState, dynamic_residual, linearise
 from .leading import BandOrigin, LeadingSearch, growth_floor, limit_point, select_search
 from .valve import Tangent, ValveModel
 
 __all__ = [
     "BandOrigin",
-    "Conditions",
+    "Mu",
     "LeadingSearch",
     "LinearisedState",
     "Tangent",

@@ -125,7 +125,7 @@ class AnalyticResidual:
         return self._remainder_form(motion, parameters, *map(self._shaped, directions))
 
     def _remainder_form(self, motion, parameters, *directions) -> np.ndarray:
-        """The same of what has its shape; with what a fluid outside adds."""
+        """Form (n + l,) as `remainder_form` for motions in shape, with contact and the added mass of fluid outside."""
         out = np.array(_form_of_remainder(motion, parameters, directions, self._arrays))
         if self.model.contact is not None:
             out[self._forces] += self.model.contact.form(motion[0], *(direction[0] for direction in directions))

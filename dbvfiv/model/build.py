@@ -52,7 +52,7 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
 
 
 def layer_zones(case: Case, mesh: ValveMesh) -> Zones:
-    """Which layers the elements of a case have, by where their centres are."""
+    """Zones of a case's elements by the layers that cover their centres."""
     layers = [layer.enlarged(case.valve.scale) for layer in case.layers]
     shares = grading(mesh.element_columns.mean(axis=1), case.mesh.grading)
     return Zones.of([[layer.covers(z, s) for layer in layers] for z, s in zip(mesh.element_z, shares)])

@@ -89,7 +89,7 @@ def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Sy
 
 
 def shell_of_class(shell: Shell, free: np.ndarray, nodal: np.ndarray) -> Shell:
-    """The same shell with other free unknowns (nn, 5), counted from a state (nn, 5)."""
+    """Copy of a shell with other free unknowns (nn, 5), which count from a state (nn, 5)."""
     kept = shell.__dict__.setdefault("_classes", {})
     key = free.tobytes()
     if key not in kept:

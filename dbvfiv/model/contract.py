@@ -1,13 +1,13 @@
-"""What a model is: the waist between the valve and the numerics.
+"""Contracts between a model of the valve and the numerics.
 
-Three contracts, each the least that its users ask for:
+Each of the three asks for no more than its users need:
 
-- `EquilibriumModel` serves Newton's method and load steps: residual, exact tangent and its factors at rest.
-- `MotionForms` serves normal forms and sensitivities: the residual in motion and its multilinear forms.
-- `continuation.System` serves branches, bifurcations and orbits. `dbvfiv.model.system.ValveSystem` makes it from the
-  two above, as a test problem with two unknowns does by hand. Parameters may hold `loss_factor`, a factor on the loss
-  factors of all materials: spectra know it, equilibria do not depend on it, and what would need the memory of a wall
-  that relaxes is refused.
+- `EquilibriumModel` serves Newton's method and load steps: residual, exact tangent and its factors at rest. -
+`MotionForms` serves normal forms and sensitivities: the residual in motion and its multilinear forms. -
+`continuation.System` serves branches, bifurcations and orbits. `dbvfiv.model.system.ValveSystem` makes it from the two
+above; a test problem with two unknowns implements it by hand. Parameters may hold `loss_factor`, a factor on the loss
+factors of all materials. Spectra depend on it, equilibria do not. Methods that would need the internal variables of a
+viscoelastic wall refuse it.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class EquilibriumModel(Protocol):
         ...
 
     def force_scale(self, q: np.ndarray, pressure: float) -> float:
-        """What residuals are measured against, N."""
+        """Force to which residuals are relative, N."""
         ...
 
 

@@ -23,58 +23,14 @@ import numpy as np
 from eigen import CoupledPencil, Relaxation
 from eigen.pencil import FLUID_PARTS
 
+from ..case.parameters import Mu
 from ..errors import SolveError
 from ..flow import FlowLaw, FlowMotion
 from .outside import AddedMass
 from .valve import ValveModel
 
 
-@dataclass(frozen=True)
-class Conditions:
-    """What surrounds the structure.
-
-    Attributes
-    ----------
-    density : float
-        Of the fluid, kg/m3.
-    alpha : float
-        Rayleigh mass damping, 1/s.
-    beta : float
-        Rayleigh stiffness damping, s.
-    loss_factor : float
-        Factor on the loss factors of all materials; zero leaves them elastic.
-    pipe_length : float, optional
-        Of the line in front, m; the case's own where it is not given, and of no effect without a line. Pipes in series
-        are stretched alike.
-    tail_length : float, optional
-        Of the pipe behind, m; likewise.
-    wave_speed : float, optional
-        In an elastic line, m/s; likewise. Of pipes in series that of the first one in which waves run.
-    """
-
-    density: float
-    alpha: float
-    beta: float
-    loss_factor: float = 0.0
-    pipe_length: float | None = None
-    tail_length: float | None = None
-    wave_speed: float | None = None
-
-    @classmethod
-    def of(cls, case) -> Conditions:
-        damping, length = case.damping, case.upstream.whole_length if case.has_line else None
-        behind = case.downstream.length if case.has_tail else None
-        speed = case.upstream.first_wave_speed if case.has_waves else None
-        return cls(case.fluid.density, damping.alpha, damping.beta, damping.loss_factor, length, behind, speed)
-
-    @property
-    def of_line(self) -> dict[str, float]:
-        """Parameters of what is in front of the valve and behind it by their names; those not given left out."""
-        given = {"pipe_length": self.pipe_length, "tail_length": self.tail_length, "wave_speed": self.wave_speed}
-        return {name: value for name, value in given.items() if value is not None}
-
-
-def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q, v, a, inner, inner_rate):
+def dynamic_residual(model: ValveModel, mu: Mu, inlet: float, q, v, a, inner, inner_rate):
     """Residual of the coupled equations of motion.
 
     Parameters
@@ -97,14 +53,10 @@ def dynamic_residual(model: ValveModel, conditions: Conditions, inlet: float, q,
     force, structure = model.structure(q)
     force += model.contact_force(q)
     mass = matrix(model.mass(q))
-    force += (
-        mass @ (a + conditions.alpha * v)
-        + conditions.beta * (matrix(structure) @ v)
-        + model.shell.convective_inertia(q, v)
-    )
+    force += mass @ (a + mu.alpha * v) + mu.beta * (matrix(structure) @ v) + model.shell.convective_inertia(q, v)
     slope = model.rows.jacobian(nodal)
     passage = model.rows.areas(nodal), slope @ v, slope @ a + model.rows.second(nodal_rate, nodal_rate)
-    given = {"inlet": inlet, "density": conditions.density}
+    given = {"inlet": inlet, "density": mu.density}
     p, rest = model.flow.evaluate(FlowMotion(*passage, inner, inner_rate), given)
     return force - model.pressure_force(nodal, p), rest
 
@@ -152,12 +104,12 @@ class LinearisedState:
         return (self.forces, self.slope) if self.added is None else self.added.coupling(self.forces, self.slope)
 
     def fluid_parts(self, density: float, storage: float | None = None, line: Mapping[str, float] = {}):
-        """What the unsteady fluid answers to `slope`, as `fluid_parts`."""
+        """Matrices of the unsteady fluid's response to `slope`, see `fluid_parts` of this module."""
         self.check_pump()
         return fluid_parts(self.model.flow, self.area, self.inlet, density, storage, line)
 
     def steady_parts(self) -> dict[str, np.ndarray]:
-        """The same of a fluid without inertia."""
+        """Matrix of the response of a fluid without inertia to `slope`."""
         return {"A0": self.model.flow.steady_operator(self.area, self.inlet)[1]}
 
     def nodal(self, q: np.ndarray) -> np.ndarray:
@@ -165,7 +117,7 @@ class LinearisedState:
         return self.model.nodal(q)
 
     def relaxation(self, loss_factor: float) -> Relaxation | None:
-        """What relaxes of the stiffness with a factor on all loss factors; None where nothing does."""
+        """Viscoelastic part of the stiffness, with a factor on all loss factors; None for an elastic wall."""
         return self.model.relaxation.stiffness(loss_factor, lambda: self.relaxing)
 
     def damped(self, alpha: float, beta: float, loss_factor: float = 0.0) -> CoupledPencil:
@@ -197,25 +149,24 @@ class LinearisedState:
                 f"{1e3 * pump.flow[0]:.4g} to {1e3 * pump.flow[-1]:.4g} L/s."
             )
 
-    def pencil(self, conditions: Conditions, fluid: bool = True, storage: float | None = None) -> CoupledPencil:
+    def pencil(self, mu: Mu, fluid: bool = True) -> CoupledPencil:
         """Pencil of small motions.
 
         Parameters
         ----------
-        conditions : Conditions
+        mu : Mu
+            Fluid, damping and pipes; where the flow model (storage) or a pipe is not held, the law's own is taken.
         fluid : bool
             False leaves the flow out: motions of the stressed structure, the steady pressures kept as follower loads,
             in vacuo or in the fluid outside.
-        storage : float, optional
-            Blend of the continuity laws, 0 quasi-steady to 1 storage; the law's own by default.
         """
-        damped = self.damped(conditions.alpha, conditions.beta, conditions.loss_factor)
+        damped = self.damped(mu.alpha, mu.beta, mu.loss_factor)
         flowing = fluid and self.model.flow.has_fluid
         if not flowing and self.added is None:
             return CoupledPencil(damped.M, damped.C, damped.K, relaxation=damped.relaxation)
-        parts = self.flow_parts(conditions.density, storage, conditions.of_line) if flowing else {}
+        parts = self.flow_parts(mu.density, mu.get("storage"), mu.pipes) if flowing else {}
         if self.added is not None:
-            density = self.model.case.outside.density(conditions.density)
+            density = self.model.case.outside.density(mu.density)
             parts = self.added.parts(parts or self.no_flow(), density)
         return damped.replace(**parts)
 
@@ -239,7 +190,7 @@ def fluid_parts(
     storage: float | None = None,
     line: Mapping[str, float] = {},
 ) -> dict[str, np.ndarray]:
-    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow; `line` as `Conditions.of_line`."""
+    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow; `line` as `Mu.pipes`."""
     given = {"inlet": inlet, "density": density, **line}
     return flow.linearise_still(area, given if storage is None else given | {"storage": storage}).parts()
 

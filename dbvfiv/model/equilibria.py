@@ -108,8 +108,10 @@ class LoadPath(LoadSteps):
 
     @property
     def _at_rest(self) -> bool:
-        """Whether the walk stands where nothing loads a wall that weighs, which is no equilibrium, or where it hangs
-        without a flow: lips that all but touch open from rest more surely than from there.
+        """True for a wall with weight at a state without load or without a flow, where the path starts again from rest.
+
+        The state without load is no equilibrium of such a wall. From the wall that hangs without a flow, lips that all
+        but touch open less surely than from rest.
         """
         still = self.pressure == self.model.flow.back
         return self.model.weight is not None and (still or not np.any(self.q))

@@ -105,6 +105,6 @@ def face_contact(case: Case, mesh: ValveMesh, shell: Shell) -> FaceContact | Non
 
 
 def _inside(case: Case, gap: float) -> float:
-    """By how much the faces that meet stand inside those of the duckbill's wall without patches, m."""
+    """Distance, m, of the faces in contact inside those of the duckbill's wall without patches."""
     valve = case.valve
     return valve.duckbill_wall_deduction - gap - 0.5 * valve.thickness_at(0.0)

@@ -1,4 +1,4 @@
-"""What an installer reads off a steady flow: heads, loss, coefficients."""
+"""Hydraulic results of a steady flow: heads, head loss, loss and flow coefficients (K, Kv, Cv)."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ CV_OVER_KV = 1.156
 
 @dataclass(frozen=True)
 class Behind:
-    """What follows the valve; that of a free discharge without anything given.
+    """Flow downstream of the valve; the defaults are those of a free discharge.
 
     Attributes
     ----------
     pressure : float, Pa
-        Static, around the jet, over that of the surroundings.
+        Static pressure around the jet, over that of the surroundings.
     jet_velocity : float, m/s
         NaN where it is not known.
     recovered : float, Pa
-        By which the pressure rises where the jet has widened to a pipe; 0 where its energy is lost.
+        Pressure rise where the jet has widened to a pipe; 0 where its energy is lost.
     velocity : float, m/s
-        In that pipe; 0 without one.
+        Velocity in that pipe; 0 without one.
     loss : float, m
         Head lost in that pipe up to its far end.
     """
@@ -38,16 +38,18 @@ class Behind:
 
 @dataclass(frozen=True)
 class Hydraulics:
-    """Of a valve that discharges freely all of the head ends in its jet; in a pipe behind it the jet gives back a part.
+    """Heads, head loss and coefficients of the valve in a steady flow.
+
+    The whole head of a valve that discharges freely ends in its jet. In a downstream pipe the jet gives back a part.
 
     Attributes
     ----------
     flange_velocity : float, m/s
     total_head : float, m
-        At the flange, static and velocity head, of the fluid, over that of the surroundings.
+        Total head at the flange, static and velocity head, of the fluid, over that of the surroundings.
     head_loss : float, m
         Total head that ends in the valve and its jet: from the flange to the fluid at rest around a free discharge, or
-        to the pipe behind where the jet has widened.
+        to the downstream pipe where the jet has widened.
     loss_coefficient : float
         K, the loss over the velocity head at the flange; infinite without a flow.
     discharge_coefficient : float
@@ -57,14 +59,14 @@ class Hydraulics:
     cv : float, US gallons a minute
         The same at 1 psi.
     line_loss : float, m
-        Head lost by friction and fittings of a line in front; 0 without one.
+        Head lost by friction and fittings of an upstream pipe; 0 without one.
     supply_head : float, m
-        Total head at the far end of the line, or at the flange without one.
+        Total head at the far end of the upstream pipe, or at the flange without one.
     jet_velocity : float, m/s
     recovered_pressure, recovered_head : float, Pa, m
-        What the jet gives back in a pipe behind the valve.
+        Pressure and head that the jet gives back in a downstream pipe.
     tail_loss : float, m
-        Head lost in that pipe.
+        Head lost in the downstream pipe.
     downstream_head : float, m
         Static head at its far end, or around a free discharge, over that of the surroundings.
     """

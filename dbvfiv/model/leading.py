@@ -1,4 +1,4 @@
-"""Which modes of the valve count as leading: one rule for every study that searches a spectrum."""
+"""Rule for the leading modes of the valve, shared by every study that searches a spectrum."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from eigen import CLEAR, SearchOptions
 
-from .dynamics import Conditions
+from ..case.parameters import Mu
 
 #: Room above the highest structural frequency that a band is made for.
 ROOM = 1.05
@@ -22,7 +22,7 @@ CREEP = (
 
 
 class BandOrigin(Enum):
-    """Where the band that a search covers comes from."""
+    """Origin of the frequency band that a search covers."""
 
     NONE = "none"  #: no band: stiffness damping orders the modes
     ASKED = "asked"  #: named by who asks
@@ -32,7 +32,7 @@ class BandOrigin(Enum):
 
 @dataclass(frozen=True)
 class LeadingSearch:
-    """How leading modes are searched for under given conditions.
+    """Search for the leading modes under given conditions.
 
     Attributes
     ----------
@@ -42,10 +42,10 @@ class LeadingSearch:
     frequencies : int
         Structural frequencies in vacuo that a band of the origin STRUCTURE holds.
     creeps : bool
-        Whether materials relax, so that creep has to be told from modes.
+        True for viscoelastic materials, whose relaxation spectrum has to be told from modes.
     claimed : float, Hz
-        Frequency up to which a search speaks for a state: the band, or without one what holds as many structural
-        frequencies as modes are wanted. Models of few vectors resolve no modes above it, whatever they count.
+        Frequency up to which the search is a verdict on the state: the band, or without one a band that holds as many
+        structural frequencies as modes are wanted. Reduced-order models resolve no modes above it, whatever they count.
     """
 
     options: SearchOptions
@@ -66,7 +66,7 @@ class LeadingSearch:
 
     @property
     def note(self) -> str | None:
-        """What a reader of the result has to know about the band, in a sentence."""
+        """Sentence on the origin and limits of the band, for the reader of a result; None where it needs none."""
         if self.origin is BandOrigin.LINE:
             return (
                 f"The elements of the line, or the rows of the mesh in a fluid that is compressed, resolve waves up to "
@@ -101,12 +101,12 @@ def growth_floor(beta: float) -> float:
 
 def select_search(
     options: SearchOptions,
-    conditions: Conditions,
+    mu: Mu,
     structural_frequencies: Callable[[int], np.ndarray],
     count: int,
     resolved: float = np.inf,
 ) -> LeadingSearch:
-    """How the leading modes of a state are searched for.
+    """Search for the leading modes of a state, with its limit point or frequency band.
 
     Stiffness damping orders modes by frequency until they reach the limit point -1/beta: leading modes are those of
     largest growth rate, right of it. Without it growth rates of high modes do not fall, so that "leading" has a meaning
@@ -116,9 +116,9 @@ def select_search(
     Parameters
     ----------
     options : SearchOptions
-        What was asked for.
-    conditions : Conditions
-        Of which only the stiffness damping and the factor on the loss factors matter.
+        Search options as asked for.
+    mu : Mu
+        Only the stiffness damping and the factor on the loss factors matter.
     structural_frequencies : callable
         From a number to that many lowest frequencies of the undamped structure in vacuo at the state, Hz, ascending;
         fewer where there are no more; not called where a band was asked for. `eigen.lowest_frequencies` computes them.
@@ -133,23 +133,23 @@ def select_search(
 
     Examples
     --------
-    >>> found = select_search(SearchOptions(), Conditions(10.0, 0.0, 0.0), lambda n: np.array([14.0, 20.0]), 2)
+    >>> found = select_search(SearchOptions(), Mu(density=10.0), lambda n: np.array([14.0, 20.0]), 2)
     >>> round(found.band, 6), found.origin.value
     (21.0, 'structure')
-    >>> select_search(SearchOptions(), Conditions(10.0, 0.0, 0.003), lambda n: np.zeros(0), 2).options.limit_point
+    >>> select_search(SearchOptions(), Mu(density=10.0, beta=0.003), lambda n: np.zeros(0), 2).options.limit_point
     -333.3333333333333
     """
-    found = _select(options, conditions, structural_frequencies, count)
+    found = _select(options, mu, structural_frequencies, count)
     if found.band > resolved:
         found = replace(found, options=replace(found.options, max_frequency=resolved), origin=BandOrigin.LINE)
     return replace(found, claimed=min(found.claimed, found.band, resolved))
 
 
-def _select(options: SearchOptions, conditions: Conditions, structural_frequencies, count: int) -> LeadingSearch:
+def _select(options: SearchOptions, mu: Mu, structural_frequencies, count: int) -> LeadingSearch:
     """As `select_search`, whatever is resolved."""
     asked = BandOrigin.NONE if options.max_frequency is None else BandOrigin.ASKED
-    creeps = conditions.loss_factor > 0
-    limit = None if creeps else limit_point(conditions.beta)
+    creeps = mu.loss_factor > 0
+    limit = None if creeps else limit_point(mu.beta)
     if asked is BandOrigin.ASKED:
         options = options if limit is None else replace(options, limit_point=limit)
         return LeadingSearch(options, asked, creeps=creeps)

@@ -1,4 +1,4 @@
-"""How far the lips stand open at their middle."""
+"""Opening of the lips at their middle."""
 
 from __future__ import annotations
 

@@ -37,9 +37,7 @@ class LoadStepOptions:
 
 @dataclass(frozen=True)
 class Way:
-    """How a pressure was reached: Newton iterations over all load steps, load steps, and the last equilibrium
-    iteration.
-    """
+    """Path to a pressure: Newton iterations over all load steps, number of load steps, last equilibrium iteration."""
 
     iterations: int
     steps: int

@@ -51,5 +51,5 @@ class Loading:
         return self.model.residual(q, self.whole, 1.0) - self.model.residual(q, self.whole, 0.0)
 
     def force_scale(self, q: np.ndarray, share: float) -> float:
-        """What residuals are measured against, N: the whole load."""
+        """Force to which residuals are relative, N: that of the whole load."""
         return self.model.force_scale(q, self.whole)

@@ -41,7 +41,7 @@ class MaterialStability:
 
     @property
     def holds(self) -> bool:
-        """Whether every point is stable."""
+        """True where the material is stable at every point."""
         return self.margin > 0.0
 
     @property

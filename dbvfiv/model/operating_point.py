@@ -1,4 +1,4 @@
-"""Where the valve's own curve of flow over pressure meets that of a pump."""
+"""Operating point: intersection of the valve's flow curve over pressure with the pump curve."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def operating_pressure(model: ValveModel, observer: Observer | None = None) -> f
     known: dict[float, float] = {}
 
     def beyond(pressure: float) -> float:
-        """By how much a pressure exceeds that of the pump at the flow it makes, Pa."""
+        """Excess of a pressure, Pa, over that of the pump at the flow that it drives."""
         if pressure not in known:
             observer.progress(f"looking for the operating point at {pressure:.6g} Pa")
             known[pressure] = path.go_to(pressure).volume_flow

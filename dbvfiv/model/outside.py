@@ -97,7 +97,7 @@ class AddedMass:
 
 
 class OutsideFluid:
-    """What the fluid outside a valve does.
+    """Added mass of the fluid outside a valve.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class OutsideFluid:
         return self._flows[symmetry]
 
     def _check_clearance(self, points: np.ndarray) -> str:
-        """What is wrong with the pipe around the valve, in a sentence; empty where it clears the outer face."""
+        """Sentence for a pipe around the valve that does not clear its outer face; empty where it does."""
         widest = float(np.hypot(points[:, 0], points[:, 1]).max())
         if self.radius is None or widest < self.radius:
             return ""
@@ -246,14 +246,14 @@ def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Works
 
 
 def surroundings(grid: np.ndarray, radius: float | None) -> Surroundings:
-    """What stays at rest around a valve.
+    """Boundaries at rest around a valve: extension of its flange, and the pipe around it.
 
     Parameters
     ----------
     grid : (l, k, 3) array, m
         Outer face at rest from the lip's row to the flange's, columns from x = 0 to y = 0.
     radius : float, optional
-        Of the pipe around it, m; without one the fluid is unbounded.
+        Radius of the pipe around it, m; without one the fluid is unbounded.
     """
     contour, top = grid[-1][:, :2], float(grid[-1][:, 2].mean())
     bore, step = float(contour[0, 1]), float(grid[-1][:, 2].mean() - grid[-2][:, 2].mean())

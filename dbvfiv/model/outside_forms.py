@@ -1,13 +1,13 @@
-"""How the fluid outside resists motions of second and third order: derivatives of its added mass by the shape.
+"""Forms of second and third order of the fluid outside: derivatives of its added mass by the shape.
 
 Its kinetic energy is rho v' M_a(q) v / 2, so by Lagrange's equations it resists with
 
     rho [ M_a(q) a + D M_a[v] v - grad (v' M_a v) / 2 ]
 
 (Lamb 1932, Hydrodynamics, art. 136). The shape's influence on the potential flow is taken by central differences with
-panels whose quadratures are frozen. It is known on the slowest motions x_i that are kept of the added mass, with X' K_s
-X = 1: displacements q count by X' K_s q, and forces f on them act as K_s X f. A motion outside of their span carries
-little fluid, see `dbvfiv.model.outside`.
+panels whose quadratures are frozen. It is projected on the slowest motions x_i, the kept ones of the added mass, with
+X' K_s X = 1: displacements q have the coordinates X' K_s q, and forces f on these act as K_s X f. A motion outside of
+their span carries little fluid, see `dbvfiv.model.outside`.
 
 Equation (T.21) of docs/theory.md.
 """

@@ -1,4 +1,4 @@
-"""How a wall relaxes: groups of layers, each with a series of its own, over common relaxation times."""
+"""Viscoelasticity of the wall: groups of layers, each with its own Prony series, over common relaxation times."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Branches:
 
 @dataclass(frozen=True)
 class WallRelaxation:
-    """What relaxes of a wall.
+    """Viscoelastic groups of layers of the wall.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class WallRelaxation:
 
     @classmethod
     def of(cls, section: Section) -> WallRelaxation:
-        """That of the layers of a section."""
+        """Groups of the layers of a section."""
         return cls(section.relaxing)
 
     def branches(self, loss_factor: float) -> Branches:
@@ -74,6 +74,9 @@ class WallRelaxation:
         return Branches(tuple(group.name for group in self.groups), strengths, times)
 
     def stiffness(self, loss_factor: float, matrices: Callable[[], Sequence]) -> Relaxation | None:
-        """What relaxes of a stiffness, None where nothing does; `matrices` gives K_g of each group when it is asked."""
+        """Viscoelastic part of a stiffness, None for an elastic wall.
+
+        `matrices` gives the stiffness K_g of each group and is called only where it is needed.
+        """
         branches = self.branches(loss_factor) if loss_factor else None
         return Relaxation(matrices(), branches.strengths, branches.times) if branches else None

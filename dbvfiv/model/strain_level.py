@@ -294,7 +294,7 @@ def _secant(before: tuple[float, float] | None, pair: tuple[float, float]) -> fl
 
 
 def _most_strained(states: Iterable[list[LayerLevel]]) -> Iterator[LayerLevel]:
-    """Of each layer the one that strains most among several states."""
+    """Most strained of several states, layer by layer."""
     for layers in zip(*states):
         yield max(layers, key=lambda layer: layer.peak)
 

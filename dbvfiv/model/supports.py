@@ -1,4 +1,4 @@
-"""Where the valve is held: clamped flange, symmetry planes and one-sided lip stops."""
+"""Supports of the valve: clamped flange, symmetry planes and one-sided lip stops."""
 
 from __future__ import annotations
 

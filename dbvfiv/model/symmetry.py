@@ -44,7 +44,7 @@ class Symmetry:
 
     @property
     def of_equilibria(self) -> bool:
-        """Whether it is the class in which equilibria lie."""
+        """True for the symmetry class in which equilibria lie."""
         return self.signs == (1, 1)
 
     @property
@@ -54,7 +54,7 @@ class Symmetry:
 
     @property
     def moves_lips_apart(self) -> bool:
-        """Whether the two lips move against each other in y, so that what stands between them acts."""
+        """True where the two lips move against each other in y, so that stops or contact between them act."""
         return self.signs[1] > 0
 
     def parity(self, mirrors: np.ndarray) -> np.ndarray:
@@ -111,7 +111,7 @@ def symmetry_named(name: str) -> Symmetry:
 
 
 def asks_for_equilibria(name: str) -> bool:
-    """Whether a name of the case file stands for the class of the equilibria alone."""
+    """True where a name of the case file stands for the symmetry class of the equilibria alone."""
     return name != ALL and symmetry_named(name).of_equilibria
 
 
@@ -144,7 +144,7 @@ class ClassDofs(DofMap):
         return super().expand(q)
 
     def at(self, base: np.ndarray) -> ClassDofs:
-        """The same unknowns counted from another state; numbering and sparsity are shared."""
+        """Copy of the unknowns that counts from another state; numbering and sparsity are shared."""
         for name in ("index", "element_index", "pattern", "slots"):
             getattr(self, name)  # found once, so that the copy has them
         other = object.__new__(ClassDofs)

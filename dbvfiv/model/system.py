@@ -23,14 +23,11 @@ from continuation import OutOfDomain, Spectrum, SystemBase
 from eigen import CoupledPencil, SearchOptions, SingularShiftError, Workspace, leading_modes
 from eigen.pencil import real_apply
 
+from ..case.parameters import SYSTEM_NAMES
 from ..errors import SolveError
 from ..flow import FlowMotion
 from .analytic import DAMPING, AnalyticResidual
 from .valve import ValveModel
-
-#: Names that no design parameter has, whether the flow law depends on them or not.
-CONDITIONS = ("inlet", "density", "storage", "pipe_length", "tail_length", "wave_speed", *DAMPING, "loss_factor")
-
 
 _MEMORY = (
     "A wall that relaxes remembers, and a state of displacements, velocities and flow does not hold its memory, so "
@@ -103,7 +100,7 @@ class ValveSystem(SystemBase):
         return self._models_get(self._design(mu))
 
     def _design(self, mu) -> tuple:
-        known = {*self.parameters, *CONDITIONS}
+        known = {*self.parameters, *SYSTEM_NAMES}
         return tuple(sorted((key, float(value)) for key, value in mu.items() if key not in known))
 
     def _models_get(self, key: tuple) -> ValveModel:

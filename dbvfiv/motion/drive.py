@@ -32,7 +32,7 @@ class Drive:
         return float(np.interp(time, self.times, self.pressures))
 
     def constant_after(self, time: float) -> bool:
-        """Whether the pressure does not change any more from a time on."""
+        """True where the pressure is constant from a time, s, on."""
         return (
             all(p == self.pressures[-1] for t, p in zip(self.times, self.pressures) if t > time)
             and self(time) == self.pressures[-1]

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..case.parameters import Mu
 from ..flow.gas_stepping import GasState
 from ..flow.line_stepping import LineFluid, LineInstant, LineState, LineStep, LineWaves
 from ..model import ValveModel
-from ..model.dynamics import Conditions
 from ..model.linear import CoupledFactor
 from ..shell import Memory, StepWall, WallMemory
 from .contact import FaceStep, MassSolver
@@ -32,7 +32,7 @@ class ValveMotion:
     Parameters
     ----------
     model : ValveModel
-    conditions : Conditions, optional
+    mu : Mu, optional
         Density and damping; those of the model's case by default.
 
     Attributes
@@ -47,13 +47,13 @@ class ValveMotion:
         Of the inner faces; None where the valve has stops.
     """
 
-    def __init__(self, model: ValveModel, conditions: Conditions | None = None):
+    def __init__(self, model: ValveModel, mu: Mu | None = None):
         self.model, self.contact = model, model.contact
-        self.conditions = Conditions.of(model.case) if conditions is None else conditions
-        branches = model.relaxation.branches(self.conditions.loss_factor)
+        self.mu = Mu.of(model.case) if mu is None else mu
+        branches = model.relaxation.branches(self.mu.loss_factor)
         self.wall = WallMemory(model.shell, branches.strengths, branches.times) if branches else None
         self.moving_fluid = model.flow.unsteady
-        self.fluid = model.flow.stepping(self.conditions.density) if self.moving_fluid else None
+        self.fluid = model.flow.stepping(self.mu.density) if self.moving_fluid else None
         self.waves = self._waves()
         self.size = model.size
         self.resolution = float(np.finfo(float).eps * np.abs(model.shell.mesh.nodes).max())
@@ -68,7 +68,7 @@ class ValveMotion:
         self._scale = scale[free]
         self.outside: MovingOutside | None = None
         if model.outside is not None:
-            density = model.case.outside.density(self.conditions.density)
+            density = model.case.outside.density(self.mu.density)
             self.outside = MovingOutside(model, density, self.length)
         self._rotations = np.flatnonzero(np.broadcast_to(np.arange(free.shape[1]) >= 3, free.shape)[free])
 
@@ -133,7 +133,7 @@ class ValveMotion:
             moved = area_new, flow.speed, flow.psi, psi_rate, inlet, mid_speed
             return Load(model.pressure_force(nodal, p), outlet, p, *moved, line, slope)
         p = model.flow.steady_pressure(area, inlet)
-        speed = model.flow.inlet_velocity(area_new, inlet, self.conditions.density) if inlet > model.flow.back else 0.0
+        speed = model.flow.inlet_velocity(area_new, inlet, self.mu.density) if inlet > model.flow.back else 0.0
         zero = np.zeros(self.stations)
         return Load(
             model.pressure_force(nodal, p),
@@ -249,7 +249,7 @@ class ValveMotion:
 
     @property
     def eliminated(self) -> bool:
-        """Whether pressures follow from the wall's motion alone, so that a step has no unknown of the fluid."""
+        """True where pressures follow from the wall's motion alone, so that a step has no unknown of the fluid."""
         return not self.moving_fluid
 
     def _pressure_slope(self, area: np.ndarray, load: Load, weights: Weights) -> np.ndarray:
@@ -294,7 +294,7 @@ class ValveMotion:
 
     @property
     def factored(self) -> bool:
-        """Whether there are factors to solve with."""
+        """True where a factorisation to solve with exists."""
         return self._factor is not None and self._factor.factorisations > 0
 
     def _solver(self, inner: int) -> CoupledFactor:
@@ -321,7 +321,7 @@ class ValveMotion:
 
         The equations are linear in the accelerations and the rate of the inlet velocity: one solve.
         """
-        model, alpha, beta = self.model, self.conditions.alpha, self.conditions.beta
+        model, alpha, beta = self.model, self.mu.alpha, self.mu.beta
         nodal = model.nodal(q)
         wall = None if memory is None else self.wall.held(memory)
         if self.outside is not None:
@@ -342,7 +342,7 @@ class ValveMotion:
         known = by_area @ rate + by_rate @ bend
         line = self.line_at(speed, inlet) if line is None else line
         load = self.load(q, v, q, v, self._instant(speed, known, inlet, self._line_moving(line, inlet, 0.0)), speed)
-        density = self.conditions.density
+        density = self.mu.density
         if line is not None:
             by_speed = by_speed + self.waves.inertance
         self._refactor_moving(

@@ -25,11 +25,12 @@ class GasMotion(ValveMotion):
 
     @property
     def quiet_inward(self) -> bool:
-        """Whether steps that draw the fluid in need no numerical damping: a gas is soft, the hammer of a liquid kicks
-        stiff walls as an incompressible fluid does.
+        """True where steps with inward flow need no numerical damping.
+
+        A gas is soft. The water hammer of a liquid hits stiff walls as an incompressible fluid does.
         """
         law = self.model.flow
-        return self.conditions.density * law.sound_speed**2 / law.ratio < GAS
+        return self.mu.density * law.sound_speed**2 / law.ratio < GAS
 
     def fluid_step(self, old: GasState, h: float, rate: float, inlet: float) -> GasStep:
         """The fluid in a step of length h, s; see `GasStep`."""
@@ -61,7 +62,7 @@ class GasMotion(ValveMotion):
         return by_area + weights.velocity * by_rate
 
     def _first_instant(self, q, v, speed, inlet, gas):
-        """That of a given state of the fluid, or of a steady flow, at rest where there is no speed."""
+        """First instant of the fluid: a given state, or steady flow, which is at rest where there is no speed."""
         gas = self._gas(q, v, self._steady(q, speed, inlet), inlet) if gas is None else gas
         return self._of_gas(gas, np.zeros(self.stations), inlet)
 

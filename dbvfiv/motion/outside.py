@@ -92,7 +92,7 @@ class MovingOutside:
         self._known = [*self._known[1 - REMEMBERED :], (self._place, self._mass)]
 
     def correction(self, solve: Callable, weight: float) -> OutsideCorrection:
-        """What turns solves with a matrix into those with weight M_a added to it; see `OutsideCorrection`."""
+        """Correction that turns solves with a matrix into solves with weight M_a added; see `OutsideCorrection`."""
         return OutsideCorrection(solve, self._mass.columns, weight * self.density)
 
 

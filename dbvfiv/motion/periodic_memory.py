@@ -1,4 +1,4 @@
-"""What relaxing layers hold in a periodic motion: their slow resultants through the filters of their branches."""
+"""Branch resultants of viscoelastic layers in a periodic motion: slow resultants through the branches' filters."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class PeriodicMemory:
         return self.filtered(np.stack([self.wall.resultants(x)[1] for x in q]), rates)
 
     def filtered(self, slow: np.ndarray, rates: Rates) -> np.ndarray:
-        """What the branches make (N, ne, 4, 8) of slow resultants (N, ne, 4, g, 8)."""
+        """Branch resultants (N, ne, 4, 8) from slow resultants (N, ne, 4, g, 8)."""
         return sum(rates.apply(phi, slow[:, :, :, g]) for g, phi in enumerate(self.filters))
 
     def slopes(self, q: np.ndarray, way: np.ndarray) -> np.ndarray:

@@ -151,7 +151,7 @@ class WallSlopes:
         return SparseBlocks(values, indices, indptr, (self._size, self._size), share, spread)
 
     def _norm(self, model: ValveModel, values: np.ndarray) -> float:
-        """Of a matrix on the structure's pattern, its unknowns in their sizes."""
+        """Frobenius norm of a matrix on the structure's pattern, with its unknowns scaled by their sizes."""
         indptr, indices = model.shell.dofs.pattern
         if self._sizes is None:
             self._sizes = np.repeat(self._scales, np.diff(indptr)) * self._scales[indices]

@@ -19,8 +19,8 @@ class StaggeredMotion(ValveMotion):
     moves, but are not changed by it.
     """
 
-    def __init__(self, model, conditions=None):
-        super().__init__(model, conditions)
+    def __init__(self, model, mu=None):
+        super().__init__(model, mu)
         self.coupled_fluid, self.moving_fluid = self.moving_fluid, False
         self._frozen: Load | None = None
 

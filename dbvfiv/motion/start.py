@@ -9,9 +9,10 @@ import numpy as np
 from eigen import CoupledPencil, SearchOptions, SingularShiftError, Spectrum, leading_modes, lowest_frequencies
 
 from ..case.model import Case
+from ..case.parameters import Mu
 from ..errors import SolveError
 from ..model import ValveModel
-from ..model.dynamics import Conditions, linearise
+from ..model.dynamics import linearise
 from ..model.equilibria import LoadPath, SteadyOptions
 from ..model.leading import select_search
 from ..model.newton import NewtonOptions
@@ -54,7 +55,7 @@ def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observe
     observer.progress(f"steady state at {inlet:.6g} Pa")
     q = steady_positions(model, inlet, SteadyOptions.of(case))
     areas = model.rows.areas(model.nodal(q))
-    speed = model.flow.inlet_velocity(areas, inlet, motion.conditions.density) if inlet > model.flow.back else 0.0
+    speed = model.flow.inlet_velocity(areas, inlet, motion.mu.density) if inlet > model.flow.back else 0.0
     if transient.start == "steady":
         return consistent_state(motion, 0.0, q, np.zeros(model.size), speed, inlet), None
     observer.progress("mode to follow")
@@ -123,10 +124,10 @@ def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, push:
         If there is no such mode, or it does not move the lip.
     """
     model = motion.model
-    pencil = linearise(model, q, inlet).pencil(motion.conditions)
+    pencil = linearise(model, q, inlet).pencil(motion.mu)
     try:
-        resolved = model.flow.resolved(motion.conditions.of_line)
-        found, index = _find_mode(pencil, motion.conditions, push, resolved)
+        resolved = model.flow.resolved(motion.mu.pipes)
+        found, index = _find_mode(pencil, motion.mu, push, resolved)
     except (SingularShiftError, np.linalg.LinAlgError) as error:
         said = str(error).rstrip(".")
         raise SolveError(f"The mode to push along at {inlet:.6g} Pa was not found: {said}.") from error
@@ -173,13 +174,11 @@ def on_mode(
     return consistent_state(motion, 0.0, moved, v, speed + flow[0], inlet, memory, line, gas)
 
 
-def _find_mode(
-    pencil: CoupledPencil, conditions: Conditions, push: Push, resolved: float = np.inf
-) -> tuple[Spectrum, int]:
+def _find_mode(pencil: CoupledPencil, mu: Mu, push: Push, resolved: float = np.inf) -> tuple[Spectrum, int]:
     """Leading modes, by the rule of all studies, and the place of the one to push along among them."""
     count = max(push.count, push.mode)
     while True:
-        search = select_search(push.search, conditions, lambda n: lowest_frequencies(pencil, n), count, resolved)
+        search = select_search(push.search, mu, lambda n: lowest_frequencies(pencil, n), count, resolved)
         found = leading_modes(pencil, count, search.options)
         oscillating = [i for i in range(len(found)) if found.eigenvalues[i].imag > 1e-6 * abs(found.eigenvalues[i])]
         if len(oscillating) >= push.mode:

@@ -173,17 +173,18 @@ class Stepper:
 
     @staticmethod
     def _smooth(state: MotionState, momenta: np.ndarray, h: float) -> bool:
-        """Whether the fluid flowed outwards before the last step, and the momentum of its sections changed little in
-        that.
+        """True where the fluid flowed outwards before the last step, and its momentum changed little in that step.
 
-        Sections, as what one loses another may gain; before too, as flow that has just turned round rings.
+        Sections are compared one by one, since one section may gain what another loses. The time before counts too,
+        since flow that has just turned round rings.
         """
         change = -h * np.diff(state.psi_rate)
         return bool(np.abs(change).sum() <= 0.34 * np.abs(momenta).sum()) and _outward(momenta - change)
 
     def _kept_momentum(self, trial: Trial, old: np.ndarray) -> bool:
-        """Whether the fluid's sections kept most of their momentum in a step and none turned round; if not, its
-        equations are better met at the end.
+        """True where the fluid's sections kept most of their momentum in a step and none turned round.
+
+        Otherwise the fluid's equations are better met at the end of the step.
         """
         new = self.motion.momenta(trial.load.psi, trial.load.speed)
         return bool(np.clip(old - new, 0.0, old).sum() <= 0.5 * old.sum()) and _outward(trial.load.speed)
@@ -191,7 +192,7 @@ class Stepper:
     def _works(self, trial: Trial) -> tuple[float, float]:
         """Work of the pressure and dissipation of a step, by the scheme's own weights."""
         way = trial.q - trial.old.q
-        alpha = self.motion.conditions.alpha
+        alpha = self.motion.mu.alpha
         lost = trial.damping @ way
         if alpha:
             lost += alpha * (self.motion.momentum(trial.q_mid, trial.v_mid) @ way)
@@ -308,5 +309,5 @@ class Stepper:
 
 
 def _outward(speed: np.ndarray) -> bool:
-    """Whether no speed (m,), or momentum of a section, points inwards."""
+    """True where no speed (m,), or momentum of a section, points inwards."""
     return not np.any(speed < -INWARD * np.abs(speed).max(initial=0.0))

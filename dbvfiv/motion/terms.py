@@ -1,4 +1,4 @@
-"""What the equations of a step are made of: weights of its parts, where its fluid starts from, what the fluid does."""
+"""Parts of the equations of a time step: weights, start of the fluid, and load by the fluid."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ..flow.line_stepping import LineInstant, LineState, LineStep
 
 @dataclass(frozen=True)
 class Weights:
-    """How the parts of the equations depend on what is new in a step.
+    """Weights of the parts of a step's equations: their dependence on the new unknowns.
 
     Attributes
     ----------
     theta : float
-        Where in the step the fluid's equations are met: the share of the new state there.
+        Point in the step at which the fluid's equations are met: the share of the new state there.
     load : float
         Factor of G p there.
     inertia : float
@@ -43,7 +43,7 @@ class Weights:
 
 @dataclass(frozen=True)
 class Step:
-    """What the fluid of a step starts from.
+    """Start of the fluid in a step.
 
     Attributes
     ----------
@@ -57,9 +57,9 @@ class Step:
     inlet : float
         Inlet pressure where the equations are met, Pa.
     line : LineStep or LineInstant, optional
-        The waves in an elastic line, at whose far end `inlet` is then.
+        Waves in an elastic upstream pipe; `inlet` is then the pressure at its far end.
     gas : GasStep or GasInstant, optional
-        A fluid that is compressed.
+        State of a compressible fluid.
     """
 
     theta: float

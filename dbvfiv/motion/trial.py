@@ -36,8 +36,8 @@ class Trial:
         self.weights = Weights(
             theta=theta,
             load=now if theta == 1.0 else 1.0,
-            inertia=(1.0 - s.alpha_m) / (s.beta * h * h) + motion.conditions.alpha * now * s.gamma / (s.beta * h),
-            force=now + motion.conditions.beta * s.rate / h,
+            inertia=(1.0 - s.alpha_m) / (s.beta * h * h) + motion.mu.alpha * now * s.gamma / (s.beta * h),
+            force=now + motion.mu.beta * s.rate / h,
             velocity=s.gamma / (s.beta * h),
             psi=rate / h,
             outside=(1.0 - s.alpha_m) / (s.beta * h * h),
@@ -56,7 +56,7 @@ class Trial:
         )
 
         # stiffness damping is by the slow law, and its force is known apart only where there is some
-        rayleigh = self.wall is not None and motion.conditions.beta
+        rayleigh = self.wall is not None and motion.mu.beta
         self._slow = motion.internal_force(old.q) if rayleigh else None
 
     def _slow_rate(self) -> np.ndarray:
@@ -86,7 +86,7 @@ class Trial:
         self.a_mid = old.a + (1.0 - s.alpha_m) * (self.a - old.a)
         self.at_load = (self.q, self.v) if self.fluid.theta == 1.0 else (self.q_mid, self.v_mid)
         self.load = motion.load(*self.at_load, self.q, self.v, self.fluid)
-        alpha, beta = motion.conditions.alpha, motion.conditions.beta
+        alpha, beta = motion.mu.alpha, motion.mu.beta
         self.damping = beta * (old.force_rate + s.rate * (self.force_rate - old.force_rate))
         elastic = old.force + now * (self.force - old.force)
         inertia = motion.inertia(self.q_mid, self.v_mid, self.a_mid + alpha * self.v_mid if alpha else self.a_mid)

@@ -84,7 +84,7 @@ def _refuse_empty(path: Path) -> None:
 
 
 def kind_of(path: str | Path) -> str:
-    """Which study a result file is of: "steady", "map", "transient" and so on.
+    """Kind of study that a result file is of: "steady", "map", "transient" and so on.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def _opened(path: Path) -> h5py.File:
 
 
 def _marked_as_open(path: Path) -> bool:
-    """Whether the file's superblock (version 3) says that a writer has not closed it."""
+    """True where the file's superblock (version 3) says that a writer has not closed it."""
     with open(path, "rb") as file:
         head = file.read(12)
     return len(head) == 12 and head[8] == 3 and bool(head[11] & 0b101)

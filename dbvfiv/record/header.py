@@ -1,4 +1,4 @@
-"""What every result file begins with: kind, case, versions and whether the run went to its end."""
+"""Header of every result file: kind, case, versions and completeness of the run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PACKAGES = ("numpy", "scipy", "jax", "jaxlib", "numba", "h5py")
 
 @dataclass(frozen=True)
 class Header:
-    """Where a result comes from.
+    """Provenance of a result.
 
     Attributes
     ----------
@@ -34,9 +34,9 @@ class Header:
     case : Case
         Complete, its defaults included.
     name : str
-        Of the case file, without folder and ending.
+        Name of the case file, without folder and ending.
     program : str
-        Name and version of what wrote it.
+        Name and version of the program that wrote the file.
     created : str
         ISO 8601, UTC.
     command : str
@@ -45,7 +45,7 @@ class Header:
     attachments : tuple of Attachment
         Files that the case names.
     complete : bool
-        Whether the run went to its end.
+        True where the run went to its end.
     layout : int
     """
 

@@ -1,4 +1,4 @@
-"""How quantities stand in result files: columns with units and descriptions, and how they are printed."""
+"""Layout of quantities in result files: columns with units and descriptions, and their printed form."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TEXT = "text"
 
 @dataclass(frozen=True)
 class Shown:
-    """How a quantity stands in a printed table.
+    """Format of a quantity in a printed table.
 
     Attributes
     ----------

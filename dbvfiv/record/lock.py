@@ -125,7 +125,7 @@ def _unwritable(path: Path, error: OSError) -> CaseError:
 
 
 def is_being_written(path: Path) -> bool:
-    """Whether a process holds the right to write a file."""
+    """True where a process holds the right to write a file."""
     try:
         descriptor = os.open(path, os.O_RDONLY)
     except OSError:

@@ -142,7 +142,7 @@ class MeshData:
         return self.rows[:, self.part.centre(self.rows.shape[1])]
 
     def extent(self, row: int, axis: int) -> float:
-        """Of the whole valve's mid-surface at rest, m, along x (0) or y (1), at a row."""
+        """Extent of the whole valve's mid-surface at rest, m, along x (0) or y (1), at a row."""
         places = self.nodes[self.rows[row], axis]
         return float(np.ptp([signs[axis] * places for signs in self.part.images]))
 

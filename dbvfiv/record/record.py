@@ -1,4 +1,7 @@
-"""What a run has found, tables of rows and notes: the same while it goes on, when it has ended, and from a file."""
+"""Record of a run: tables of rows, and notes.
+
+It reads the same while the run goes on, when it has ended, and from a file.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,7 @@ class Record(ABC):
 
     @abstractmethod
     def rows(self, table: str) -> int:
-        """How many rows a table has."""
+        """Number of rows of a table."""
 
     @abstractmethod
     def column(self, table: str, name: str) -> np.ndarray:
@@ -65,7 +68,7 @@ class Record(ABC):
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """What was not reached, in sentences."""
+        """Sentences on states that were not reached."""
         return self._said("failure")
 
     @property
@@ -81,7 +84,7 @@ class Record(ABC):
 
     @property
     def complete(self) -> bool:
-        """Whether the run went to its end."""
+        """True where the run went to its end."""
         marks = [note for note in self.log if note["what"] in ("begin", "end")]
         return bool(marks) and marks[-1]["what"] == "end" and bool(marks[-1]["complete"])
 
@@ -216,7 +219,7 @@ class GrowingRecord(Record, Observer):
         self.close()
 
     def __getstate__(self) -> dict[str, Any]:
-        """What it holds, without the file and whoever watches: a copy of it writes nothing."""
+        """State without the file and the observer: a copy of the record writes nothing."""
         return vars(self) | {"_journal": None, "watcher": Observer()}
 
     # -- as an observer ----
@@ -277,7 +280,7 @@ class StoredRecord(Record):
             self.header = replace(read_header(file, case_model), complete=self.complete)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All of it, read from the file: a copy can be asked where there is no such file."""
+        """State with all columns read from the file: a copy can be asked where there is no such file."""
         for name, table in self.tables.items():
             for column in table.columns:
                 self.column(name, column.name)

@@ -1,4 +1,4 @@
-"""What must not be cut in two: a signal that arrives meanwhile is heard when it is done."""
+"""Deferral of SIGINT and SIGTERM until the enclosed write is complete."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _HELD = (signal.SIGINT, signal.SIGTERM)
 
 
 class Shield:
-    """A context in which Ctrl-C and SIGTERM wait until it is left; not to be used twice at a time.
+    """Context that defers Ctrl-C (SIGINT) and SIGTERM until it is left; not to be nested or shared.
 
-    Python hears signals in its main thread alone, so elsewhere it does nothing; and nothing for signals that this
-    process ignores, or that end it without Python's help.
+    Python handles signals in its main thread alone, so in other threads the context does nothing. Nor does it for
+    signals that this process ignores or that end it without a Python handler.
     """
 
     def __init__(self):

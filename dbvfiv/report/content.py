@@ -1,4 +1,4 @@
-"""What a report is made of: parts with sentences, tables and pictures."""
+"""Content of a report: parts with sentences, tables and pictures."""
 
 from __future__ import annotations
 

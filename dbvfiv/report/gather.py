@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..case.parameters import PARAMETERS
+from ..case.parameters import PARAMETERS, Mu
 from ..errors import CaseError, SolveError
 from ..observer import Observer
 from ..studies.case import Case
@@ -18,7 +18,6 @@ from ..studies.map.result import MapResult
 from ..studies.modes.result import ModesResult
 from ..studies.onset.result import OnsetResult
 from ..studies.session import Session
-from ..studies.stability.place import Place
 from ..studies.steady.result import SteadyResult
 
 #: What runs for a report, in this order, and of which study it is.
@@ -35,7 +34,7 @@ RUNS = {
 
 @dataclass(frozen=True)
 class Runs:
-    """How much is computed for a report.
+    """Amount of computation for a report.
 
     Attributes
     ----------
@@ -46,7 +45,7 @@ class Runs:
     workers : int
         Processes that share the columns of the map.
     leave_out : tuple of str
-        Of `RUNS` those that are not wanted.
+        Names among `RUNS` that are not wanted.
     """
 
     cells: int = 20
@@ -191,7 +190,7 @@ def way_to_the_cycle(found: Gathered) -> dict[str, Any] | None:
     if found.modes is None or found.modes.stable is not False or found.onset is None:
         return None
     parameter = found.onset.parameter
-    here = Place.of(found.case).value(parameter)
+    here = Mu.of(found.case)[parameter]
     beside = [p for p in found.onset.points if p["edge"] and (p["value"] < here) == p["gains"] and p["frequency"] > 0]
     if not beside:
         return None

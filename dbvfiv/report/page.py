@@ -95,7 +95,7 @@ def answers(found: Gathered) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def setting(found: Gathered) -> str:
-    """What the answers are for, in a line."""
+    """Conditions that the report's answers hold for, in a line."""
     case, mesh = found.case, found.case.mesh
     words = [
         describe_fixed(case),

@@ -77,7 +77,7 @@ def rest_products(x: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class AssumedStrains:
-    """What an element assumes, as constant arrays.
+    """Assumed strain fields of the elements, as constant arrays.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class AssumedStrains:
 
 
 def assumed_strains(mesh, geometry: ReferenceGeometry, section, element: str) -> AssumedStrains:
-    """What the element of a name assumes on a mesh.
+    """Assumed strain fields on a mesh for an element by its name (one of `ELEMENTS`).
 
     Raises
     ------

@@ -56,7 +56,7 @@ class OuterFace:
 
     @cached_property
     def _pattern(self):
-        """Which entries are taken, in the order of rows and columns, their columns and the row pointers."""
+        """Sparsity pattern of `fluxes`: flat indices of the entries in CSR order, their columns, the row pointers."""
         index = self.shell.dofs.element_index
         order = np.argsort(index, axis=1, kind="stable")
         taken = (order + index.shape[1] * np.arange(len(index))[:, None])[np.take_along_axis(index, order, 1) >= 0]

@@ -53,7 +53,10 @@ def first_invariant(e):
 
 @numba.njit(fastmath=FAST, inline="always")
 def has_more(constants):
-    """Whether a rubber has more terms than those of Mooney and Rivlin, which are left out where they are zero."""
+    """True where a rubber has terms beyond Mooney and Rivlin's.
+
+    Loops leave these terms out where their constants are zero.
+    """
     return constants[3] != 0.0 or constants[4] != 0.0 or constants[5] != 0.0
 
 

@@ -1,4 +1,4 @@
-"""What a wall remembers of how it was strained: Maxwell branches at every Gauss point, advanced exactly over a step.
+"""Internal variables of a viscoelastic wall: Maxwell branches at every Gauss point, advanced exactly over a step.
 
 Each group of layers with one series has, beside its slow resultants S(E), branches h_j with
 
@@ -29,7 +29,7 @@ from .shell import Shell, StepWall
 
 @dataclass(frozen=True)
 class Memory:
-    """What a wall holds at one state.
+    """Internal variables (Maxwell branches) of the wall at one state, and their energy.
 
     Attributes
     ----------
@@ -38,13 +38,14 @@ class Memory:
     stretch : (ne, 4, j, 8) array
         Section strains that the springs of branches of each relaxation time hold.
     work, loss : (g,) arrays
-        Work done against the branches of each group since the start, and what of it they have dissipated, J.
+        Work done against the branches of each group since the start, and the dissipated part of it, J.
     stored : (g,) array
-        Energy that they hold, J.
+        Energy stored in the branches, J.
     strain, slow : (ne, 4, 8), (ne, 4, g, 8) arrays
         Section strains and slow resultants of each group at the state; they follow from its positions.
     ahead : tuple of float and array, optional
-        What a step of some length, s, needs of it (ne, 4, 8), where that is known.
+        Length of a step, s, and the resultants (ne, 4, 8) of the branches that such a step starts with, where they are
+        known.
     """
 
     branches: np.ndarray
@@ -100,7 +101,7 @@ class WallMemory:
         self._factors: dict[float, tuple] = {}
 
     def _wall_of(self, section, member: np.ndarray) -> tuple:
-        """What the loops take of the groups of a section."""
+        """Arguments of the compiled loops for the groups of a section."""
         stiffness = [section.wall((self._owner == g).astype(float))[0] for g in range(self.groups)]
         return np.array(stiffness), *section.rubber_points, member
 
@@ -187,7 +188,7 @@ class WallMemory:
         )
 
     def _over(self, h: float) -> tuple:
-        """What branches keep and gain over a step, what groups gain, and the wall stiffened by that."""
+        """Decay and gain factors of the branches over a step h, s, gains of the groups, and the stiffened wall."""
         if h not in self._factors:
             if len(self._factors) > 16:
                 self._factors.clear()

@@ -146,21 +146,24 @@ def thickness_over_radius(geometry: ReferenceGeometry) -> np.ndarray:
 
 
 def shifted_layers(geometry: ReferenceGeometry, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What strains of the mid-surface become at layers of their own length.
+    """Maps from strains of the mid-surface to strains of layers at a distance from it.
+
+    A layer of a curved wall is longer or shorter than the mid-surface.
 
     Parameters
     ----------
-    points : (np, 2) or, of zones, (ne, np, 2) array
+    geometry : ReferenceGeometry
+    points : (np, 2) or, for zones, (ne, np, 2) array
         Normalised coordinate and weight of every layer point.
 
     Returns
     -------
     plane : (ne, 4, np, 3, 3) array
-        Of in-plane strains [11, 22, 2*12]: S^-1/2 E S^-1/2 in local axes.
+        Map of in-plane strains [11, 22, 2*12]: S^-1/2 E S^-1/2 in local axes.
     across : (ne, 4, np, 2, 2) array
-        Of transverse shears: S^-1/2.
+        Map of transverse shears: S^-1/2.
     area : (ne, 4, np) array
-        det S over the mid-surface's area.
+        det S: area of the layer over that of the mid-surface.
     """
     inverse = np.linalg.inv(geometry.p)
     local = np.swapaxes(inverse, -1, -2) @ geometry.curvature @ np.swapaxes(geometry.p, -1, -2)

@@ -43,8 +43,9 @@ def relaxed_force_form(energies: EnergyFunctions, unknowns, directions, factors)
 
 
 def _along_sets(function, count):
-    """Of a function the derivatives along all sets of `count` directions, from those of its argument; both are tuples
-    numbered as `factors` of `relaxed_force_form` are.
+    """Derivatives of a function along all sets of `count` directions, from those of its argument.
+
+    Both are tuples numbered as `factors` of `relaxed_force_form` are.
     """
     if count == 0:
         return lambda parts: (function(parts[0]),)

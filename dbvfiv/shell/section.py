@@ -151,12 +151,12 @@ class Section:
         )
 
     def wall(self, factors: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """What the compiled loops take of a wall: stiffness of its linear layers and points of its rubbers.
+        """Arguments of the compiled loops: stiffness of the linear layers and points of the rubber layers.
 
         Parameters
         ----------
         factors : (nl,) array, optional
-            On the stress of each layer; points of rubber without stress are left out. One by default.
+            Factors on the stress of each layer; one by default. Points of rubber with a factor of zero are left out.
 
         Returns
         -------
@@ -185,7 +185,7 @@ class Section:
         return self._linear_stiffness(np.ones(len(self.kinds)))
 
     def _linear_stiffness(self, factor: np.ndarray) -> np.ndarray:
-        """That of the linear layers with a factor (np,) on the stress at each layer point."""
+        """Stiffness (8, 8) of the linear layers, with a factor (np,) on the stress at each layer point."""
         total = np.zeros((8, 8))
         for (zeta, weight), kind, par, (c, s), shear in zip(
             self.points * np.stack([np.ones_like(factor), factor], axis=1),

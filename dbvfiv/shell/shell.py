@@ -101,11 +101,11 @@ class Shell:
         self._frames = np.ascontiguousarray(mesh.frames)
 
     def with_free(self, free=None) -> Shell:
-        """The same shell with other free unknowns (nn, 5); all by default."""
+        """Copy of the shell with other free unknowns (nn, 5); all free by default."""
         return Shell(self.mesh, self.section, free, self.metric, self.element, self.zones, self.mass_kind)
 
     def wall_of(self, factors: np.ndarray | None = None) -> tuple:
-        """What the compiled loops take of the wall, zone by zone; `factors` (nl,) on the stress of each layer."""
+        """Arguments of the compiled loops, zone by zone; `factors` (nl,) multiply the stress of each layer."""
         sections = (self.section,) if self.zones is None else self.at_rest.sections
         return tuple(section.wall(factors) for section in sections)
 

@@ -1,4 +1,4 @@
-"""Which of the nodal unknowns are free, and the sparsity that follows from it."""
+"""Free nodal unknowns, their numbering, and the sparsity that follows from them."""
 
 from __future__ import annotations
 

@@ -12,12 +12,12 @@ from .section import Section
 
 @dataclass(frozen=True)
 class Zones:
-    """Which layers are where.
+    """Zones of the wall: elements that have the same layers.
 
     Attributes
     ----------
     presence : (nz, nl) bool array
-        Which layers each zone has.
+        True where a zone has a layer.
     of_element : (ne,) int array
         Zone of each element.
     """
@@ -48,7 +48,7 @@ class WallParts:
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
-        """That of each zone."""
+        """Section (layers through the thickness) of each zone."""
         return tuple(replace(self.section, present=tuple(map(bool, row))) for row in self.zones.presence)
 
     @cached_property

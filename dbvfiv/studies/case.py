@@ -29,7 +29,7 @@ def _section(kind: str) -> tuple[type[Section], Any]:
 
 
 class _CaseOfStudies(PhysicsCase):
-    """What is asked of the whole case, and needs keys of studies."""
+    """Queries on the whole case that need keys of studies."""
 
     def steady_pressures(self) -> tuple[float, ...]:
         """Pressures, Pa, of `steady` where none are asked for: drive.pressure if that was given, or changed later, and
@@ -83,7 +83,7 @@ class _CaseOfStudies(PhysicsCase):
         return self
 
     def meets_pump(self, kind: str) -> bool:
-        """Whether a study asks for the operating point of valve and pump."""
+        """True where a study has to find the operating point of valve and pump."""
         listed = kind == "steady" and "pressures" in self.steady.model_fields_set
         return self.seeks_operating_point and kind != "closure" and not listed
 

@@ -1,4 +1,4 @@
-"""What tells several runs apart, and one figure of all of them."""
+"""Differences between several runs, and one figure of all of them."""
 
 from __future__ import annotations
 

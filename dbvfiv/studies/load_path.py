@@ -1,4 +1,4 @@
-"""Where a walk of load steps over steady states goes on from, as the rows of its states keep it."""
+"""Restart data of a load path over steady states, kept in the rows of its states."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def way_on_shapes(mesh: MeshData) -> dict[str, tuple[int, ...]]:
 
 
 def way_on(path: LoadSteps) -> dict[str, Any]:
-    """Those columns of the state that a walk has just reached."""
+    """Restart columns of the state that a load path has just reached."""
     slope = np.full(path.model.size, np.nan) if path.slope is None else path.slope
     return {"path/slope": slope, "path/step": path.step}
 

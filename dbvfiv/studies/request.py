@@ -1,4 +1,4 @@
-"""What a command line asks of a study."""
+"""Request of a command line to a study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What results of all studies have in common: built from a record, whether of a run or of a file."""
+"""Base class of the results of all studies, built from the record of a run or of a file."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class StudyResult:
 
     @property
     def header(self) -> Header:
-        """Where it comes from."""
+        """Provenance of the result: header of its record."""
         return self.record.header
 
     @property
@@ -87,17 +87,17 @@ class StudyResult:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """What was not reached, in sentences."""
+        """Sentences on states that were not reached."""
         return self.record.failures
 
     @property
     def complete(self) -> bool:
-        """Whether the run went to its end."""
+        """True where the run went to its end."""
         return self.record.complete
 
     @property
     def interrupted(self) -> bool:
-        """Whether the run was ended from outside."""
+        """True where the run was ended from outside."""
         return not self.complete
 
     # -- numbers ----
@@ -111,7 +111,10 @@ class StudyResult:
         raise NotImplementedError
 
     def remarks(self) -> list[str]:
-        """What is left to say when the table has been printed row by row; everything if there is no such table."""
+        """Lines to print after the table.
+
+        The table itself was printed row by row; without such a table these are all lines.
+        """
         return self.lines()
 
     def shortfall(self) -> str | None:
@@ -152,7 +155,7 @@ class StudyResult:
 
     @property
     def drawable(self) -> bool:
-        """Whether there is anything to draw."""
+        """True where there is anything to draw."""
         return bool(self._drawers({}))
 
     def _drawers(self, choices: dict[str, Any]) -> dict[str, Callable[[], Any]]:

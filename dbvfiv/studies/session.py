@@ -62,7 +62,7 @@ _MODELS = ("described", "model", "mesh")
 
 
 class Session:
-    """What studies ask about a valve.
+    """Valve of a case, with its model, mesh and equilibria, as studies need them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What an eigenvalue search refuses, as a sentence that names the state."""
+"""Context that turns refusals of an eigenvalue search into a sentence that names the state."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a study is: how it is called, what its file holds, how it runs, what comes of it."""
+"""Declaration of a study: name, tables of its file, run and result."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Study:
 
 
 def nothing_to_resume(kind: str, path: str | Path | None) -> CaseError:
-    """What is said where a complete run is to go on."""
+    """Error for a complete run that is asked to resume."""
     return CaseError(f"The {kind} run in {str(path)!r} is complete; there is nothing to resume.")
 
 

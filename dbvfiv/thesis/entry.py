@@ -51,12 +51,12 @@ class Number:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What an entry found.
+    """Findings of an entry.
 
     Attributes
     ----------
     sentences : tuple of str
-        What agrees, what does not, and why as far as it is known.
+        Agreements, disagreements, and their reasons as far as these are known.
     numbers : tuple of Number
     pictures : tuple of Picture
     """
@@ -91,7 +91,7 @@ class Entry:
 
     @property
     def label(self) -> str:
-        """As the thesis calls it."""
+        """Name of the figure or table in the thesis."""
         return f"Table {self.name[1:]}" if self.name.startswith("T") else f"Fig. {self.name}"
 
     def part(self, outcome: Outcome) -> Part:

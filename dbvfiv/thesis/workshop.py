@@ -21,12 +21,12 @@ FULL, QUICK = (28, 48), (8, 14)
 
 
 class Workshop:
-    """Where entries get their runs from.
+    """Source of the runs that entries need: read from a folder, or computed.
 
     Parameters
     ----------
     folder : path
-        Of the result files.
+        Folder of the result files.
     quick : bool
         Coarse mesh, short histories: for a look, not for the numbers.
     observer : Observer, optional
@@ -50,7 +50,7 @@ class Workshop:
         return self._run("closure", changes)
 
     def duration(self, full: float, quick: float) -> float:
-        """Of a history, s."""
+        """Duration of a history, s: the full or the quick one."""
         return quick if self.quick else full
 
     def _run(self, kind: str, changes: Mapping[str, Any], name: str | None = None) -> Any:

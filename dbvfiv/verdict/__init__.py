@@ -1,5 +1,6 @@
-"""What a time series does in the end: steady, decaying, limit cycle, growing, closed or irregular. Knows nothing of
-valves.
+"""Verdict on a time series: steady, decaying, limit cycle, growing, closed or irregular.
+
+The package is independent of valves.
 """
 
 from .judge import judge

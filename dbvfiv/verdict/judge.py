@@ -1,5 +1,6 @@
-"""What a time series does in the end, judged so that sampling at the period, beats, slow growth and noise do not
-mislead.
+"""Verdict on the final behaviour of a time series.
+
+Sampling at the period, beats, slow growth and noise do not mislead it.
 """
 
 from __future__ import annotations
@@ -259,8 +260,9 @@ def _direction(cycles: Cycles, options: JudgeOptions) -> str:
 
 
 def _slackens(spread: np.ndarray) -> bool:
-    """Whether amplitudes change less and less, in proportion: as they do on the way to a cycle, and not in exponential
-    growth or decay.
+    """True where amplitudes change less and less, in proportion.
+
+    They do so on the way to a limit cycle, but not in exponential growth or decay.
     """
     half = len(spread) // 2
     first, last = trend_of(spread[: half + 1]), trend_of(spread[-half - 1 :])
@@ -268,7 +270,7 @@ def _slackens(spread: np.ndarray) -> bool:
 
 
 def _noise_on_cycle(cycles: Cycles, options: JudgeOptions) -> bool:
-    """Whether cycles differ by something without memory, within a cycle and from one to the next."""
+    """True where cycles differ by white noise, uncorrelated within a cycle and from one to the next."""
     kept = cycles.last(4 * options.cycles)
     left = kept.shape - kept.shape.mean(axis=0)
     left = left - left.mean()

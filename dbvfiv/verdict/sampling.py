@@ -1,4 +1,4 @@
-"""How a record was sampled: gaps in it, uneven steps."""
+"""Sampling of a record: gaps in it, uneven steps."""
 
 from __future__ import annotations
 

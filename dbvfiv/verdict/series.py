@@ -132,6 +132,6 @@ def undersampled(series: Series) -> float:
 
 
 def swings(series: Series) -> int:
-    """How often the signal passed its mean upwards."""
+    """Number of upward crossings of the signal's mean."""
     above = series.values > series.values.mean()
     return int(np.count_nonzero(above[1:] & ~above[:-1]))

@@ -188,7 +188,7 @@ def _number(cell: str, decimal: str) -> float | None:
 
 
 def _is_data(row: list[float | None]) -> bool:
-    """Whether a row holds numbers and nothing else but missing values."""
+    """True where a row holds numbers and nothing else but missing values."""
     return all(value is not None for value in row) and any(np.isfinite(value) for value in row)
 
 
@@ -242,7 +242,7 @@ def _header(head: list[list[str]], width: int) -> tuple[tuple[str, ...], tuple[s
 
 
 def _are_units(cells: list[str]) -> bool:
-    """Whether a row reads as units: all in brackets, or short with a unit of time among them."""
+    """True where a row reads as units: all in brackets, or short with a unit of time among them."""
     written = [cell.strip() for cell in cells if cell.strip()]
     if not written:
         return False

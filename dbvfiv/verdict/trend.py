@@ -1,4 +1,4 @@
-"""Whether a sequence of amplitudes grows, shrinks, settles, or comes and goes."""
+"""Trend of a sequence of amplitudes: growth, decay, convergence, or beats."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def settled(values: np.ndarray, band: float) -> int:
 
 
 def comes_and_goes(values: np.ndarray, band: float) -> bool:
-    """Whether the sequence turned back more than once by more than a relative band: beats rather than an approach."""
+    """True where the sequence turned back more than once by more than a relative band: beats, no approach."""
     level = values.max()
     turns, direction, reference = 0, 0, values[0]
     for value in values[1:]:

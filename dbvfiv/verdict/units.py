@@ -68,5 +68,5 @@ def unit_in_name(name: str) -> str:
 
 
 def is_unit_of_time(text: str) -> bool:
-    """Whether a text, with or without brackets, is a unit of time."""
+    """True where a text, with or without brackets, is a unit of time."""
     return text.strip().strip("[](){}<>").strip().lower() in _SECONDS

@@ -12,14 +12,14 @@ NAMES = ("steady", "decaying", "limit cycle", "growing", "closed", "irregular", 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a series does in the end.
+    """Final behaviour of a time series.
 
     Attributes
     ----------
     name : str
         One of `NAMES`.
     decided : bool
-        Whether more of the same would not change it.
+        True where a longer series would not change the verdict.
     reason : str
         One sentence.
     mean : float
@@ -45,8 +45,8 @@ class Verdict:
     smallest, largest : float
         Extremes of the whole series.
     noise : float
-        Root mean square of noise without memory about a constant level, where the end of the series is that; not a
-        number otherwise.
+        Root mean square of white noise about a constant level, where the end of the series is such noise; not a number
+        otherwise.
     judged : tuple of float, s
         Beginning and end of the part that the verdict is about: the whole series, or its longest part between gaps.
     notes : tuple of str

@@ -1,17 +1,15 @@
 """The table of parameters: every reader agrees with it."""
 
-import inspect
+import pickle
 
 import pytest
 
 from dbvfiv.case import CaseError
 from dbvfiv.case.describe import allowed_words, walk
-from dbvfiv.case.parameters import CONDITIONS, DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, SYSTEM_NAMES, listed
+from dbvfiv.case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, SYSTEM_NAMES, Mu, listed
 from dbvfiv.case.stability_axis import parse_stability_axis
-from dbvfiv.model.dynamics import Conditions
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.session import KEYWORDS
-from dbvfiv.studies.stability.place import Place
 
 
 @pytest.mark.parametrize("row", PARAMETERS.values(), ids=PARAMETERS)
@@ -56,13 +54,12 @@ def test_groups():
     assert DESIGN == ("thickness", "angle", "strain")
     assert SWEPT == ("pressure", "density", "alpha", "beta", "loss_factor", *lines)
     assert SYSTEM_NAMES == ("inlet", *SURROUNDINGS)
-    assert set(inspect.signature(Conditions).parameters) < set(SURROUNDINGS)
 
 
-def test_a_place_knows_every_parameter():
-    place = Place.of(thesis_case())
-    assert [place.value(name) for name in CONDITIONS] == [18e3, 1000.0, 5.0, 0.003, 0.0, 0.0, 0.0, 0.0, 0.0]
-    assert set(place.at(angle=30).mu()) == {*SYSTEM_NAMES, "angle"}
+def test_a_case_has_every_parameter_of_load_and_surroundings():
+    mu = Mu.of(thesis_case())
+    assert mu == Mu(pressure=18e3, density=1000.0, storage=0.0, alpha=5.0, beta=0.003, loss_factor=0.0)
+    assert set(mu.at(angle=30).for_system()) == {*SYSTEM_NAMES, "angle"}
 
 
 def test_words():
@@ -83,3 +80,19 @@ def test_help_lists_the_table(command_line, command):
 
 def test_arguments_of_the_python_interface():
     assert {name: KEYWORDS[name] for name in SWEPT} == {name: PARAMETERS[name].key for name in SWEPT}
+
+
+def test_a_parameter_point_holds_what_the_valve_has():
+    mu = Mu.of(Case().replace({"upstream.length": "20 m", "upstream.diameter": "0.3 m", "outside.fluid": "same"}))
+    assert mu["pipe_length"] == mu.pipe_length == 20.0 and mu.pipes == {"pipe_length": 20.0}
+    assert "tail_length" not in mu and mu.tail_length == 0.0 and mu.design == {}
+    moved = mu.at(density=1.2, thickness=0.9)
+    assert (moved.density, moved.design, mu.density) == (1.2, {"thickness": 0.9}, 1000.0)
+    assert moved.at(density=1000.0).only(*mu) == mu and hash(moved.at(density=1000.0).only(*mu)) == hash(mu)
+    assert pickle.loads(pickle.dumps(mu)) == mu
+    system = moved.for_system()
+    assert (system["inlet"], system["wave_speed"], system["thickness"]) == (mu.pressure, 0.0, 0.9)
+    with pytest.raises(ValueError, match="'desity' is no parameter"):
+        mu.at(desity=1.0)
+    with pytest.raises(AttributeError):
+        mu.density = 2.0

@@ -163,6 +163,7 @@ def test_two_files_are_all_it_takes(tmp_path):
     keys.write_text(with_key(keys.read_text()))
     code = (
         "import dbvfiv\n"
+        "from dbvfiv.studies.case import thesis_case\n"
         "for loss in (0.0, 0.5):\n"
         "    case = {'mesh.around': 6, 'mesh.along': 8, 'fluid.lip_loss': loss}\n"
         "    state = dbvfiv.load(thesis_case(), case).steady(pressure=6e3)\n"

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError
 from dbvfiv.flow import Channel, FlowMotion
 from dbvfiv.flow.terms.gap_friction import MEETING, GapFriction
-from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import LoadPath, find_equilibria
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.stability.place import Place, is_surrounding
+from dbvfiv.studies.stability.place import is_surrounding
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import leading_modes
 from tests.flow.test_channel import FLOOR, difference, passage
@@ -155,14 +156,14 @@ def test_cells_of_a_column_are_those_of_the_full_pencil(law):
     """Columns know fluids of unit density only. The density moves the steady state, so no study keeps it for others."""
     case = thesis_case(COARSE | {"fluid.viscosity": "water", "fluid.continuity": law, "drive.pressure": 600.0})
     assert not is_surrounding(case, "density") and is_surrounding(thesis_case(), "density")
-    walk, place = StabilityWalk(case), Place.of(case).at(density=900.0)
+    walk, place = StabilityWalk(case), Mu.of(case).at(density=900.0)
     betas = (1e-3, 2e-3, 3e-3, 5e-3)
     column = walk.column([place.at(beta=beta) for beta in betas])
     assert not column.how.any()
     model = ValveModel(case.replace({"fluid.density": 900.0}))
     linear = linearise(model, LoadPath(model).go_to(600.0).q, 600.0)
     for i, beta in enumerate(betas):
-        found = leading_modes(linear.pencil(Conditions(900.0, place.alpha, beta)), 2).eigenvalues[0]
+        found = leading_modes(linear.pencil(Mu(density=900.0, alpha=place.alpha, beta=beta)), 2).eigenvalues[0]
         assert column.growth_rate[i] == pytest.approx(found.real, rel=1e-6)
         assert 2 * np.pi * column.frequency[i] == pytest.approx(abs(found.imag), rel=1e-6, abs=1e-6)
 

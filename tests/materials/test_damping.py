@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbvfiv.case import CaseError
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.relaxing import SHIPPED_LOSSES
 from dbvfiv.materials import MaterialError, damping_of, relaxation_from_case, shipped_loss, shipped_loss_names
 from dbvfiv.materials.damping_report import describe_damping, outside_band, read_frequencies
 from dbvfiv.materials.rayleigh import rayleigh_constants, rayleigh_ratio
 from dbvfiv.model.build import build_section
-from dbvfiv.model.dynamics import Conditions
 from dbvfiv.studies.case import Case, thesis_case
 
 LOSS = {"damping.model": "loss factor"}
@@ -66,10 +66,10 @@ def test_every_layer_relaxes_with_the_same_times_and_none_does_under_rayleigh_da
 
 
 def test_laws_and_conditions_of_rayleigh_cases_are_what_they_were():
-    assert Conditions.of(thesis_case()) == Conditions(1000.0, 5.0, 0.003, 0.0)
-    assert Conditions.of(thesis_case(LOSS)) == Conditions(1000.0, 0.0, 0.0, 1.0)
-    assert Conditions.of(thesis_case(LOSS | {"damping.loss_factor": 0.5, "damping.alpha": 2})) == Conditions(
-        1000.0, 2.0, 0.0, 0.5
+    assert Mu.of(thesis_case()) == Mu(density=1000.0, alpha=5.0, beta=0.003, loss_factor=0.0)
+    assert Mu.of(thesis_case(LOSS)) == Mu(density=1000.0, alpha=0.0, beta=0.0, loss_factor=1.0)
+    assert Mu.of(thesis_case(LOSS | {"damping.loss_factor": 0.5, "damping.alpha": 2})) == Mu(
+        density=1000.0, alpha=2.0, beta=0.0, loss_factor=0.5
     )
     slow, relaxing = build_section(thesis_case()), build_section(thesis_case(LOSS))
     assert [layer.law for layer in slow.layers] == [layer.law for layer in relaxing.layers]

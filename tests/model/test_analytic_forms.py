@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from dbvfiv.model import Conditions, ValveModel, dynamic_residual
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import ValveModel, dynamic_residual
 from dbvfiv.model.analytic import AnalyticResidual
 from dbvfiv.studies.case import thesis_case
 from tests.small_valves import EVEN
@@ -44,7 +45,7 @@ def test_value_is_the_residual_in_motion(residual, about, parameters, changed):
     random, given = np.random.default_rng(7), parameters | {"storage": own.model.flow.storage}
     _, v, a, inner, rate = about
     motion = about[0], v + random.normal(size=len(v)), a + 1e6 * random.normal(size=len(a)), inner, rate
-    conditions = Conditions(given["density"], given["alpha"], given["beta"])
+    conditions = Mu(density=given["density"], alpha=given["alpha"], beta=given["beta"])
     force, rest = dynamic_residual(own.model, conditions, given["inlet"], *motion)
     found = own.value(motion, given)
     assert found[: len(force)] == pytest.approx(force, abs=1e-9 * np.abs(force).max())

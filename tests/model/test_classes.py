@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from dbvfiv.model import Conditions
+from dbvfiv.case.parameters import Mu
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.motion.start import steady_positions
@@ -101,9 +101,9 @@ def test_fluid_outside_slows_every_class(name):
         for linear, more in ((dry, 0.0), (wet, 1000.0 * wet.added.columns @ wet.added.columns.T))
     ]
     assert np.all(squares[1] < 0.8 * squares[0])
-    pencil = wet.pencil(Conditions(500.0, 0.0, 0.003), fluid=False)
+    pencil = wet.pencil(Mu(density=500.0, alpha=0.0, beta=0.003), fluid=False)
     x, s = np.ones(pencil.n), 2.0 + 30.0j
-    without = dry.pencil(Conditions(500.0, 0.0, 0.003), fluid=False)
+    without = dry.pencil(Mu(density=500.0, alpha=0.0, beta=0.003), fluid=False)
     terms, bare = (sum(p.terms(s, x, np.zeros(p.b))[0]) for p in (pencil, without))
     added = s**2 * 1000.0 * wet.added.columns @ (wet.added.columns.T @ x)
     assert terms == pytest.approx(bare + added, rel=1e-9, abs=1e-9 * np.abs(bare).max())

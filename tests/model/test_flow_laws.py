@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from continuation import System
+from dbvfiv.case.parameters import Mu
 from dbvfiv.flow import Channel
-from dbvfiv.model import Conditions, dynamic_residual, linearise
+from dbvfiv.model import dynamic_residual, linearise
 from dbvfiv.model.analytic import AnalyticResidual
 from dbvfiv.model.contract import EquilibriumModel, MotionForms
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions
@@ -130,7 +131,7 @@ def test_third_derivatives_with_three_unknowns(make_model):
 def test_modes_satisfy_the_equations_of_motion(settled):
     """The time-dependent residual along Re(shape exp(lambda t)) vanishes to first order in the amplitude."""
     model, q = settled
-    conditions = Conditions(MU["density"], MU["alpha"], MU["beta"])
+    conditions = Mu(density=MU["density"], alpha=MU["alpha"], beta=MU["beta"])
     pencil = linearise(model, q, PRESSURE).pencil(conditions)
     assert pencil.b == model.flow.inner
     found = leading_modes(pencil, 2)
@@ -160,7 +161,7 @@ def test_a_small_push_along_a_mode_follows_it_in_time(make_model, name):
     model = with_law(make_model, name)
     path = LoadPath(model, SteadyOptions(NewtonOptions(1e-13)))
     path.go_to(PRESSURE)
-    q, conditions = path.q, Conditions(20.0, 0.0, 0.0003)
+    q, conditions = path.q, Mu(density=20.0, alpha=0.0, beta=0.0003)
     found = leading_modes(linearise(model, q, PRESSURE).pencil(conditions), 4)
     mode = found.mode(int(np.flatnonzero(found.eigenvalues.imag > 1.0)[0]))
     value, scale = mode.eigenvalue, 1e-6 / np.abs(mode.q).max()

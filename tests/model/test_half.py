@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.part import HALF, QUARTER
 from dbvfiv.exchange.bodies import shape_of
 from dbvfiv.exchange.faces import WallFaces
 from dbvfiv.exchange.stl import triangulated
-from dbvfiv.model import Conditions
 from dbvfiv.model.analytic import AnalyticResidual
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.symmetry import HALF_SYMMETRIES, SYMMETRIES
@@ -113,7 +113,7 @@ def test_the_spectrum_is_the_union_of_two_classes_of_the_quarter(quarter, half, 
     """With the fluid; sideways in x a half has no plug that sways, so that class of the quarter is taken without."""
     q, h = find_open_state(), None
     h = half.shell.dofs.restrict(lifted(quarter, half, quarter.nodal(q)))
-    conditions = Conditions(10.0, 0.0, 0.003)
+    conditions = Mu(density=10.0, alpha=0.0, beta=0.003)
     union = np.concatenate(
         [
             leading_modes(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.model import BandOrigin, Conditions, growth_floor, limit_point, select_search
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import BandOrigin, growth_floor, limit_point, select_search
 from eigen import SearchOptions
 
 FREQUENCIES = np.array([14.0, 20.0, 28.0, 41.0])
@@ -20,7 +21,7 @@ def never(_count):
 
 
 def test_stiffness_damping_orders_the_modes():
-    found = select_search(SearchOptions(tolerance=1e-9), Conditions(10.0, 0.0, 0.004), lowest, 3)
+    found = select_search(SearchOptions(tolerance=1e-9), Mu(density=10.0, alpha=0.0, beta=0.004), lowest, 3)
     assert found.options == SearchOptions(tolerance=1e-9, limit_point=-250.0)
     assert found.origin is BandOrigin.NONE and np.isinf(found.band) and found.note is None and found.notes == ()
     assert found.floor == growth_floor(0.004) == pytest.approx(-200.0)
@@ -30,7 +31,7 @@ def test_stiffness_damping_orders_the_modes():
 @pytest.mark.parametrize("alpha", [0.0, 7.0])
 def test_without_it_a_band_holds_as_many_structural_frequencies_as_modes(alpha):
     """Mass damping shifts all growth rates alike and orders nothing."""
-    found = select_search(SearchOptions(), Conditions(10.0, alpha, 0.0), lowest, 3)
+    found = select_search(SearchOptions(), Mu(density=10.0, alpha=alpha, beta=0.0), lowest, 3)
     assert found.origin is BandOrigin.STRUCTURE and found.frequencies == 3
     assert found.band == found.options.max_frequency == pytest.approx(1.05 * 28.0)
     assert "29.4 Hz" in found.note and "modes.max_frequency" in found.note
@@ -39,7 +40,7 @@ def test_without_it_a_band_holds_as_many_structural_frequencies_as_modes(alpha):
 
 def test_the_band_follows_the_size_of_the_valve():
     """A valve half as large rings twice as high, and its band reaches twice as far: no fixed number of Hz."""
-    conditions = Conditions(10.0, 0.0, 0.0)
+    conditions = Mu(density=10.0, alpha=0.0, beta=0.0)
     full = select_search(SearchOptions(), conditions, lowest, 4).band
     half = select_search(SearchOptions(), conditions, lambda n: 2 * lowest(n), 4).band
     assert half == pytest.approx(2 * full)
@@ -47,17 +48,17 @@ def test_the_band_follows_the_size_of_the_valve():
 
 @pytest.mark.parametrize("beta", [0.0, 0.003])
 def test_a_band_that_was_asked_for_is_respected(beta):
-    found = select_search(SearchOptions(max_frequency=60.0), Conditions(10.0, 0.0, beta), never, 3)
+    found = select_search(SearchOptions(max_frequency=60.0), Mu(density=10.0, alpha=0.0, beta=beta), never, 3)
     assert found.band == 60.0 and found.origin is BandOrigin.ASKED and found.note is None
 
 
 def test_fewer_structural_frequencies_than_modes_are_said():
-    found = select_search(SearchOptions(), Conditions(10.0, 0.0, 0.0), lowest, 9)
+    found = select_search(SearchOptions(), Mu(density=10.0, alpha=0.0, beta=0.0), lowest, 9)
     assert found.frequencies == 4 and found.band == pytest.approx(1.05 * 41.0) and "holds 4 structural" in found.note
 
 
 def test_a_structure_that_does_not_oscillate_has_no_band():
-    found = select_search(SearchOptions(), Conditions(10.0, 0.0, 0.0), lambda n: np.zeros(n), 3)
+    found = select_search(SearchOptions(), Mu(density=10.0, alpha=0.0, beta=0.0), lambda n: np.zeros(n), 3)
     assert found.origin is BandOrigin.NONE and found.options == SearchOptions()
 
 
@@ -69,9 +70,11 @@ def test_limits():
 @pytest.mark.parametrize("beta", [0.0, 0.004])
 def test_loss_factors_do_not_order_the_modes(beta):
     """A band is needed whatever else damps, and creep is said."""
-    found = select_search(SearchOptions(), Conditions(10.0, 0.0, beta, 1.0), lowest, 3)
+    found = select_search(SearchOptions(), Mu(density=10.0, alpha=0.0, beta=beta, loss_factor=1.0), lowest, 3)
     assert found.origin is BandOrigin.STRUCTURE and found.band == pytest.approx(1.05 * 28.0)
     assert found.options.limit_point is None and np.isinf(found.floor)
     assert "Loss factors" in found.note and len(found.notes) == 2 and "creep" in found.notes[1]
-    asked = select_search(SearchOptions(max_frequency=60.0), Conditions(10.0, 0.0, beta, 1.0), never, 3)
+    asked = select_search(
+        SearchOptions(max_frequency=60.0), Mu(density=10.0, alpha=0.0, beta=beta, loss_factor=1.0), never, 3
+    )
     assert asked.band == 60.0 and asked.note is None and "creep" in asked.notes[0]

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import SolveError
-from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.model.outside import leading_added_mass
 from dbvfiv.studies.case import thesis_case
@@ -69,7 +70,7 @@ def test_frequencies_see_hardly_anything_of_what_is_left_out():
 def test_the_pencil_has_the_added_mass():
     model, q = valve()
     state, fluxes, impedance = parts()
-    conditions = Conditions(1000.0, 0.0, 0.001)
+    conditions = Mu(density=1000.0, alpha=0.0, beta=0.001)
     with_it = state.pencil(conditions)
     without = replace(state, added=None, _damped={}).pencil(conditions)
     added = 1000.0 * state.added.columns @ state.added.columns.T
@@ -85,7 +86,7 @@ def test_a_fixed_density_outside_does_not_follow_the_one_inside():
     _, q = valve()
     for fluid, factor in (("same", 10.0), (800.0, 800.0)):
         state = linearise(valve(fluid)[0], q, 10e3)
-        inertia = np.diag(state.pencil(Conditions(10.0, 0.0, 0.001)).A2)
+        inertia = np.diag(state.pencil(Mu(density=10.0, alpha=0.0, beta=0.001)).A2)
         np.testing.assert_allclose(inertia[-state.added.rank :], -factor)
 
 

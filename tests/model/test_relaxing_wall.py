@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import SolveError
 from dbvfiv.materials.prony import Prony
-from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.build import build_section
 from dbvfiv.model.system import ValveSystem, pencil_at
 from dbvfiv.shell import Section
@@ -53,14 +54,14 @@ def test_a_factor_scales_the_loss_factors(valve):
 
 
 def test_pencils_carry_what_relaxes(state):
-    wet = state.pencil(Conditions(10.0, 5.0, 0.0, 1.0))
-    dry = state.pencil(Conditions(10.0, 5.0, 0.0, 1.0), fluid=False)
+    wet = state.pencil(Mu(density=10.0, alpha=5.0, beta=0.0, loss_factor=1.0))
+    dry = state.pencil(Mu(density=10.0, alpha=5.0, beta=0.0, loss_factor=1.0), fluid=False)
     assert wet.branches == dry.branches == 3
     for pencil in (wet, dry):
         for found, expected in zip(pencil.relaxing, state.relaxing):
             assert abs(found - expected).max() == 0.0
     assert state.relaxing is state.relaxing
-    assert state.pencil(Conditions(10.0, 5.0, 0.0)).relaxation is None
+    assert state.pencil(Mu(density=10.0, alpha=5.0, beta=0.0)).relaxation is None
 
 
 def test_the_material_part_is_less_than_the_tangent_of_a_stressed_wall(state):
@@ -71,7 +72,10 @@ def test_the_material_part_is_less_than_the_tangent_of_a_stressed_wall(state):
 def test_a_system_has_the_same_pencil(valve, state):
     mu = {"inlet": 6e3, "density": 10.0, "storage": 0.0, "alpha": 5.0, "beta": 0.0, "loss_factor": 1.0}
     speed = valve.flow.steady_inner(valve.rows.areas(valve.nodal(state.q)), mu)
-    found, expected = pencil_at(valve, state.q, speed, mu), state.pencil(Conditions(10.0, 5.0, 0.0, 1.0))
+    found, expected = (
+        pencil_at(valve, state.q, speed, mu),
+        state.pencil(Mu(density=10.0, alpha=5.0, beta=0.0, loss_factor=1.0)),
+    )
     assert np.array_equal(found.relaxation.strengths, expected.relaxation.strengths)
     assert all(abs(a - b).max() == 0.0 for a, b in zip(found.relaxing, expected.relaxing))
     assert abs(found.K - expected.K).max() < 1e-12 * abs(expected.K).max()

@@ -30,12 +30,9 @@ def test_consistent_accelerations_meet_the_model(valve, open_state, law):
     if (
         motion.moving_fluid
     ):  # psi = U times an integral, at the areas' rates; only the outlet's equation fixes the rate of U
-        rates = [
-            dynamic_residual(model, motion.conditions, 9e3, open_state, v, state.a, state.speed, r)[1]
-            for r in (0.0, 1.0)
-        ]
+        rates = [dynamic_residual(model, motion.mu, 9e3, open_state, v, state.a, state.speed, r)[1] for r in (0.0, 1.0)]
         rate = -rates[0] / (rates[1] - rates[0])
-    force, outlet = dynamic_residual(model, motion.conditions, 9e3, open_state, v, state.a, state.speed, rate)
+    force, outlet = dynamic_residual(model, motion.mu, 9e3, open_state, v, state.a, state.speed, rate)
     scale = np.abs(state.force).max()
     assert np.abs(force).max() < 1e-9 * scale
     if motion.moving_fluid:

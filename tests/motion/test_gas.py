@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.case.parameters import Mu
 from dbvfiv.flow.gas_books import BOOKS
-from dbvfiv.model.dynamics import Conditions, linearise
+from dbvfiv.model.dynamics import linearise
 from dbvfiv.motion.choice import motion_of
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.gas import GasMotion
@@ -27,7 +28,7 @@ SOUND = {"fluid.sound_speed": 343.0}
 
 def leading(model, inlet):
     q = steady_positions(model, inlet)
-    pencil = linearise(model, q, inlet).pencil(Conditions.of(model.case))
+    pencil = linearise(model, q, inlet).pencil(Mu.of(model.case))
     return q, leading_modes(pencil, 4, SearchOptions(limit_point=-2500.0)).eigenvalues[0]
 
 

@@ -8,8 +8,9 @@ import pytest
 from continuation import blocks
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import SolveError
-from dbvfiv.model.dynamics import Conditions, dynamic_residual
+from dbvfiv.model.dynamics import dynamic_residual
 from dbvfiv.motion.periodic import PeriodicValve
 from dbvfiv.motion.start import steady_positions
 from tests.small_valves import find_open_state, make_valve
@@ -108,7 +109,7 @@ def test_residual_is_that_of_the_equations_of_motion(name):
     n = model.size
     rates = fine.rates
     q, v, a = (rates.apply(k, fine.samples) for k in range(3))
-    conditions = Conditions(mu["density"], mu["alpha"], mu["beta"])
+    conditions = Mu(density=mu["density"], alpha=mu["alpha"], beta=mu["beta"])
     for i in (0, 13, 29):
         state = (q[i, :n], v[i, :n], a[i, :n], q[i, n:], v[i, n:])
         force, rest = dynamic_residual(model, conditions, mu["inlet"], *state)

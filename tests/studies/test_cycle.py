@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
-from dbvfiv.model.dynamics import Conditions
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
@@ -42,7 +42,7 @@ def found(file):
 def lip_after(point, steps: int) -> float:
     """Displacement of the lip after one period in time, from the cycle."""
     orbit, model = point.orbit, point.orbit.model
-    motion, n = ValveMotion(model, Conditions(orbit.mu["density"], 0.0, 3e-3)), model.size
+    motion, n = ValveMotion(model, Mu(density=orbit.mu["density"], alpha=0.0, beta=3e-3)), model.size
     x, v = orbit.motion.at([0.0])[0], orbit.motion.rate([0.0])[0]
     state = consistent_state(motion, 0.0, x[:n], v[:n], x[n], orbit.mu["inlet"])
     stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: orbit.mu["inlet"])

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import CaseError, SolveError
-from dbvfiv.model import Conditions, ValveModel, linearise, select_search
+from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions, TransferBasis, certified_spectrum
 from tests.small_valves import FORMER
@@ -137,8 +137,8 @@ def count_of_random(rng, conditions_each: int) -> list[str]:
     basis = None
     for _ in range(conditions_each):
         beta = 0.0 if rng.random() < 0.1 else float(10 ** rng.uniform(-5, -2))
-        conditions = Conditions(float(10 ** rng.uniform(-1, 3.3)), float(rng.choice([0.0, 5.0])), beta)
-        pencil = linear.pencil(conditions, storage=float(rng.choice([0.0, 1.0])))
+        conditions = Mu(density=float(10 ** rng.uniform(-1, 3.3)), alpha=float(rng.choice([0.0, 5.0])), beta=beta)
+        pencil = linear.pencil(conditions.at(storage=float(rng.choice([0.0, 1.0]))))
         basis = TransferBasis(pencil) if basis is None else basis
         lowest = basis.structural_frequencies
         search = select_search(SearchOptions(), conditions, lambda n, known=lowest: known[:n], 6)
@@ -168,7 +168,7 @@ def test_three_hundred_random_discharges():
 
 def test_walks_reach_states_against_a_pressure():
     case = load(LIGHT, {"downstream.pressure": "4 kPa"}).case
-    walk, place = StabilityWalk(case), Place.of(case)
+    walk, place = StabilityWalk(case), Mu.of(case)
     for pressure in (6e3, 9e3, 5e3):
         state = load(LIGHT).steady(pressure=pressure - 4e3)
         assert walk.equilibrium(place.at(pressure=pressure)) == pytest.approx(state.q, rel=1e-6, abs=1e-9)

@@ -10,6 +10,7 @@ import pytest
 import dbvfiv
 from continuation.normal_form import Motion
 from dbvfiv.case import CaseError
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
 from dbvfiv.model.analytic import AnalyticResidual
@@ -18,7 +19,7 @@ from dbvfiv.model.equilibria import find_equilibrium, rest_state
 from dbvfiv.model.memory_forms import ValveMemoryForms
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.case import THESIS, thesis_case
-from dbvfiv.studies.stability.place import Place, is_surrounding
+from dbvfiv.studies.stability.place import is_surrounding
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import EVEN, make_valve
 from tests.verification.test_transient_modes import check_three_routes, three_routes
@@ -145,7 +146,7 @@ def test_studies_over_the_density_follow_the_steady_state():
     assert not is_surrounding(case, "density") and is_surrounding(load().case, "density")
     with pytest.raises(CaseError, match=r"sweep\.over.*density.*weight of the fluid"):
         load(keys).sweep("density=10:1000:4:log")
-    walk, place = StabilityWalk(case), Place.of(case)
+    walk, place = StabilityWalk(case), Mu.of(case)
     for density in (10.0, 400.0):
         valve = load(keys, {"fluid.density": density})
         there = place.at(density=density)

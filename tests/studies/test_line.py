@@ -7,9 +7,10 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case import CaseError
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.studies.case import THESIS, thesis_case
-from dbvfiv.studies.stability.place import Place, is_surrounding
+from dbvfiv.studies.stability.place import is_surrounding
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import FORMER
 
@@ -90,7 +91,7 @@ def test_friction_moves_the_steady_state_with_the_length():
         load(LIGHT, FRICTION).sweep("pipe_length=1:50:5:log")
     case = load(LIGHT, FRICTION).case
     assert not is_surrounding(case, "pipe_length") and is_surrounding(load(LIGHT, LINE).case, "pipe_length")
-    walk, place = StabilityWalk(case), Place.of(case)
+    walk, place = StabilityWalk(case), Mu.of(case)
     for length in (2.0, 80.0):
         valve = load(LIGHT, FRICTION, {"upstream.length": length})
         there = place.at(pipe_length=length)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
-from dbvfiv.model.dynamics import Conditions, dynamic_residual, linearise
+from dbvfiv.model.dynamics import dynamic_residual, linearise
 from dbvfiv.model.equilibria import LoadPath, rest_state
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
@@ -18,8 +19,8 @@ from dbvfiv.studies.modes.run import ModesOptions, run_modes
 from eigen import SearchOptions
 from eigen.residual import acceptable
 
-LIGHT = Conditions(10.0, 0.0, 0.003)
-WATER = Conditions(1000.0, 5.0, 0.003)
+LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
+WATER = Mu(density=1000.0, alpha=5.0, beta=0.003)
 
 
 @pytest.fixture(scope="module")
@@ -138,13 +139,13 @@ def test_in_vacuo_at_rest(model):
     there.
     """
     rest = rest_state(model)
-    free = run_modes(model, rest, Conditions(1000.0, 0.0, 0.0), ModesOptions(6, in_vacuo=True))
+    free = run_modes(model, rest, Mu(density=1000.0, alpha=0.0, beta=0.0), ModesOptions(6, in_vacuo=True))
     omega = free.eigenvalues.imag
     assert (np.diff(omega) > 0).all() and np.abs(free.eigenvalues.real).max() < 1e-6 * omega[0]
     assert 10 < omega[0] / (2 * np.pi) < 18 and free.stable is True
     assert any("stiffness damping" in note for note in free.notes)
     beta = 1e-4
-    damped = run_modes(model, rest, Conditions(1000.0, 0.0, beta), ModesOptions(3, in_vacuo=True))
+    damped = run_modes(model, rest, Mu(density=1000.0, alpha=0.0, beta=beta), ModesOptions(3, in_vacuo=True))
     expected = -beta * omega[:3] ** 2 / 2 + 1j * omega[:3] * np.sqrt(1 - (beta * omega[:3] / 2) ** 2)
     assert np.allclose(damped.eigenvalues, expected, rtol=1e-6)
 
@@ -165,13 +166,13 @@ def test_the_verdict_is_withheld_where_the_counts_disagree(model, state):
 
 def test_an_unstable_pair_is_proof(model, state):
     """Without stiffness damping the band holds some of the unstable modes: unstable, though the counts differ."""
-    found = run_modes(model, state, Conditions(10.0, 5.0, 0.0), ModesOptions(3))
+    found = run_modes(model, state, Mu(density=10.0, alpha=5.0, beta=0.0), ModesOptions(3))
     assert found.certified.unstable_count > 0 and found.stable is False
 
 
 @pytest.mark.parametrize("density", [1e-3, 2e4])
 def test_extreme_densities(model, state, density):
-    found = run_modes(model, state, replace(LIGHT, density=density))
+    found = run_modes(model, state, LIGHT.at(density=density))
     spectrum = found.spectrum
     assert found.certified.agrees and acceptable(spectrum.residual, spectrum.backward_error, 1e-8).all()
     assert all(note.endswith(".") for note in found.notes)

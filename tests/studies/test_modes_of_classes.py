@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.case.parameters import Mu
 from dbvfiv.drawing.faces import ValveSkin
 from dbvfiv.errors import CaseError
 from dbvfiv.model.classes import linearise_class
-from dbvfiv.model.dynamics import Conditions
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.record.whole_valve import WholeValve
 from dbvfiv.studies.modes.shapes import ModeSurface
@@ -130,8 +130,8 @@ def test_matrices_follow_the_conditions(name):
     """Damping, loss factors and density enter the pencil of a class as they do that of the symmetric one."""
     model = make_valve()
     linear = linearise_class(model, find_open_state(), 12e3, SYMMETRIES[name])
-    pencil = linear.pencil(Conditions(1000.0, 5.0, 0.003))
+    pencil = linear.pencil(Mu(density=1000.0, alpha=5.0, beta=0.003))
     assert np.allclose((pencil.C - 5.0 * linear.mass - 0.003 * linear.structure).data, 0.0, atol=1e-9)
     assert pencil.m == (0 if name == "AA" else model.stations)
-    light = linear.pencil(Conditions(10.0, 5.0, 0.003))
+    light = linear.pencil(Mu(density=10.0, alpha=5.0, beta=0.003))
     assert np.allclose(light.A0, pencil.A0, rtol=1e-10) and np.allclose(100 * light.A2, pencil.A2, rtol=1e-10)

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from dbvfiv.case.axis import parse_axis
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.stability_axis import parse_stability_axis
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
-from dbvfiv.model.dynamics import Conditions
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.modes.run import ModesOptions, run_modes
 from dbvfiv.studies.sweep.run import SweepOptions, run_sweep
 
-LIGHT = Conditions(10.0, 0.0, 0.003)
+LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
 OPTIONS = SweepOptions(count=4)
 DENSITY = parse_axis("density=1:1000:13:log")
 
@@ -60,7 +60,7 @@ def test_every_value_agrees_with_a_full_solve(model, state, over_density):
     checked = [check.value for check in over_density.checks]
     unchecked = [i for i, v in enumerate(over_density.values) if not np.isclose(v, checked, rtol=1e-9).any()]
     for column in (unchecked[1], unchecked[-2]):
-        full = run_modes(model, state, replace(LIGHT, density=over_density.values[column]), ModesOptions(3))
+        full = run_modes(model, state, LIGHT.at(density=over_density.values[column]), ModesOptions(3))
         assert max(nearest(over_density.branches, column, value) for value in full.eigenvalues) < 1e-5
 
 
@@ -182,10 +182,10 @@ def test_a_wall_that_relaxes_agrees_with_full_solves(over):
     changes |= {"damping.model": "loss factor", "materials.constants": "stable"}
     model = ValveModel(thesis_case(changes))
     state, axis = LoadPath(model).go_to(6e3), parse_stability_axis(over)
-    conditions = Conditions(10.0, 0.0, 0.0, 1.0)
+    conditions = Mu(density=10.0, alpha=0.0, beta=0.0, loss_factor=1.0)
     found = run_sweep(model, axis, conditions, SweepOptions(count=3, checks=2), state=state)
     assert found.certified
     for column in (1, 2):
-        here = replace(conditions, **{axis.parameter: found.values[column]})
+        here = conditions.at(**{axis.parameter: found.values[column]})
         full = run_modes(model, state, here, ModesOptions(3))
         assert max(nearest(found.branches, column, value) for value in full.eigenvalues) < 1e-5

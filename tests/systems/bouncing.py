@@ -102,7 +102,7 @@ class BouncingMotion(Motion):
         return self._factor.solve(force), 0.0
 
     def accelerations(self, q, v, speed, inlet, memory=None):
-        force = self.push - self.stiffness @ (q + self.conditions.beta * v)
+        force = self.push - self.stiffness @ (q + self.mu.beta * v)
         if self.contact is not None:
             force = force - self.contact.force(q)
         return self._mass_factor.solve(force), self.load(q, v, q, v, type("Still", (), {"inlet": 0.0}))

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, NotValidError, SolveError
 from dbvfiv.model.equilibria import SteadyOptions
 from dbvfiv.model.state import SteadyState
@@ -21,7 +22,6 @@ from dbvfiv.studies.modes.run import ModesOptions, run_modes
 from dbvfiv.studies.onset.run import run_onset
 from dbvfiv.studies.onset.search import OnsetOptions
 from dbvfiv.studies.session import Session
-from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.verdict import UNDECIDED, Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk
 from dbvfiv.studies.sweep.run import SweepOptions, run_sweep
@@ -137,7 +137,7 @@ def ask_all(cases) -> Iterator[Asked]:
 
 def verdicts_of(session: Session, state: SteadyState) -> Iterator[tuple[str, Verdict]]:
     """Verdicts on one state by every study."""
-    case, model, here = session.case, session.model, Place.of(session.case)
+    case, model, here = session.case, session.model, Mu.of(session.case)
     try:
         yield "modes", run_modes(model, state, options=ModesOptions.of(case)).verdict
     except NotValidError as error:
@@ -156,7 +156,7 @@ def verdicts_of(session: Session, state: SteadyState) -> Iterator[tuple[str, Ver
     yield "sweep", sweep.verdicts[0]
 
 
-def _walk(case: Case, model, here: Place, state: SteadyState) -> StabilityWalk:
+def _walk(case: Case, model, here: Mu, state: SteadyState) -> StabilityWalk:
     walk = StabilityWalk(case, model=model)
     walk.give(here, state.q)
     return walk

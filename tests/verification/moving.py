@@ -27,7 +27,7 @@ class Motion:
     resolution = 0.0
 
     def __init__(self, size: int, alpha: float = 0.0, beta: float = 0.0):
-        self.size, self.conditions = size, SimpleNamespace(alpha=alpha, beta=beta, density=0.0)
+        self.size, self.mu = size, SimpleNamespace(alpha=alpha, beta=beta, density=0.0)
 
     def begin_step(self, state, h, inlet):
         pass
@@ -87,7 +87,7 @@ class PointMotion(Motion):
 
     def accelerations(self, q, v, speed, inlet, memory=None):
         load = self.load(q, v, q, v, SimpleNamespace(inlet=inlet))
-        return -self._force(q) - self.conditions.beta * self._stiffness(q) * v - self._damping(q) * v, load
+        return -self._force(q) - self.mu.beta * self._stiffness(q) * v - self._damping(q) * v, load
 
 
 class ShellMotion(Motion):

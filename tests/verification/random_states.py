@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.materials import Prony, fit_constant
-from dbvfiv.model import Conditions, LinearisedState, ValveModel, linearise
+from dbvfiv.model import LinearisedState, ValveModel, linearise
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.model.relaxing import WallRelaxation
 from dbvfiv.studies.case import thesis_case
@@ -29,7 +30,7 @@ class RandomState:
     number : int
         Place in the sample.
     linear : LinearisedState
-    conditions : Conditions
+    mu : Mu
     storage : float
         Blend of the continuity laws, 0 quasi-steady to 1 storage.
     relaxation : Relaxation or None
@@ -38,18 +39,18 @@ class RandomState:
 
     number: int
     linear: LinearisedState
-    conditions: Conditions
+    mu: Mu
     storage: float
     relaxation: Relaxation | None = None
 
     @property
     def pencil(self) -> CoupledPencil:
-        elastic = replace(self.conditions, loss_factor=0.0)
-        pencil = self.linear.pencil(elastic, storage=self.storage)
+        elastic = self.mu.at(loss_factor=0.0)
+        pencil = self.linear.pencil(elastic.at(storage=self.storage))
         return pencil if self.relaxation is None else pencil.replace(relaxation=self.relaxation)
 
     def __str__(self) -> str:
-        c, branches = self.conditions, 0 if self.relaxation is None else self.relaxation.branches
+        c, branches = self.mu, 0 if self.relaxation is None else self.relaxation.branches
         return (
             f"state {self.number}: {self.linear.inlet:.5g} Pa, {c.density:.4g} kg/m3, alpha {c.alpha:.4g} 1/s, "
             f"beta {c.beta:.4g} s, storage {self.storage:.3g}, loss factor {c.loss_factor:.3g} with {branches} times"
@@ -81,13 +82,13 @@ def random_states(states: list[LinearisedState], number: int, seed: int) -> Iter
         place, density, alpha, beta = rng.random(4)
         kind = rng.random(3)
         blend = rng.random()
-        conditions = Conditions(
+        mu = Mu(
             density=float(10.0 ** (-3 + density * np.log10(2e7))),
             alpha=0.0 if kind[0] < 0.3 else float(100.0 * alpha**2),
             beta=0.0 if kind[1] < 0.12 else float(10.0 ** (-6 + 4 * beta)),
         )
         storage = 0.0 if kind[2] < 0.3 else 1.0 if kind[2] < 0.65 else float(blend)
-        yield RandomState(i, states[int(place * len(states))], conditions, storage)
+        yield RandomState(i, states[int(place * len(states))], mu, storage)
 
 
 def relaxing_states(states: list[LinearisedState], number: int, seed: int) -> Iterator[RandomState]:
@@ -109,8 +110,8 @@ def relaxing_states(states: list[LinearisedState], number: int, seed: int) -> It
         highest = max(group.series.loss_factor(at).max() for group in groups)
         factor = min(wanted, LARGEST_LOSS / highest) if highest > 0 else wanted
         relaxation = WallRelaxation(groups).stiffness(factor, lambda: state.linear.relaxing)
-        conditions = replace(state.conditions, beta=0.0, loss_factor=factor)
-        yield replace(state, conditions=conditions, relaxation=relaxation)
+        mu = state.mu.at(beta=0.0, loss_factor=factor)
+        yield replace(state, mu=mu, relaxation=relaxation)
 
 
 def _random_series(rng, band: tuple[float, float], branches: int) -> Prony:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from continuation import ContinuationOptions, NewtonOptions, continue_branch
+from dbvfiv.case.parameters import Mu
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.onset.normal_form import system_of
-from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk
 
 HIGHEST = 60e3
@@ -21,7 +21,7 @@ def walk():
 
 @pytest.fixture(scope="module")
 def branch(walk):
-    place = Place.of(walk.case)
+    place = Mu.of(walk.case)
     system = system_of(walk.case, walk, place)
     options = ContinuationOptions(
         step=0.02,
@@ -34,7 +34,9 @@ def branch(walk):
         newton=NewtonOptions(tolerance=1e-4, max_iterations=12),
         branch_points=False,
     )
-    return continue_branch(system, system.state(walk.equilibrium(place), place.mu()), place.mu(), "inlet", options)
+    return continue_branch(
+        system, system.state(walk.equilibrium(place), place.for_system()), place.for_system(), "inlet", options
+    )
 
 
 def test_the_branch_reaches_its_end_without_folds(branch):
@@ -54,5 +56,5 @@ def test_the_opening_is_softest_near_six_kilopascal(branch):
 
 def test_load_steps_find_the_same_state(branch, walk):
     last = branch.points[-1]
-    q = walk.equilibrium(Place.of(walk.case).at(pressure=float(last.z[-1])))
+    q = walk.equilibrium(Mu.of(walk.case).at(pressure=float(last.z[-1])))
     assert last.z[: q.size] == pytest.approx(q, abs=1e-6 * np.abs(q).max())

@@ -10,7 +10,7 @@ import os
 import numpy as np
 import pytest
 
-from dbvfiv.model.dynamics import Conditions
+from dbvfiv.case.parameters import Mu
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
@@ -39,7 +39,7 @@ def branch():
 def run(point, steps: int, size: float = 1.0, periods: int = PERIODS) -> np.ndarray:
     """Displacements of the lip at each step of a run that begins on the cycle, its oscillation times `size`."""
     orbit, model = point.orbit, point.orbit.model
-    motion, n = ValveMotion(model, Conditions(orbit.mu["density"], 0.0, 3e-3)), model.size
+    motion, n = ValveMotion(model, Mu(density=orbit.mu["density"], alpha=0.0, beta=3e-3)), model.size
     mean = orbit.motion.coefficients[0]
     x, v = mean + size * (orbit.motion.at([0.0])[0] - mean), size * orbit.motion.rate([0.0])[0]
     state = consistent_state(motion, 0.0, x[:n], v[:n], x[n], orbit.mu["inlet"])

@@ -11,7 +11,8 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
-from dbvfiv.model import Conditions, ValveModel, linearise, select_search
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.stepper import StepOptions
@@ -78,9 +79,9 @@ def test_balances_of_line_and_valve(law, speed):
     assert max(off) < 1e-6
 
 
-def certified(model: ValveModel, conditions: Conditions, pencil, basis: TransferBasis):
+def certified(model: ValveModel, conditions: Mu, pencil, basis: TransferBasis):
     """Spectrum and count in the band that waves in the line are resolved in."""
-    resolved = model.flow.resolved(conditions.of_line)
+    resolved = model.flow.resolved(conditions.pipes)
     search = select_search(SearchOptions(), conditions, lambda n: basis.structural_frequencies[:n], 6, resolved)
     return certified_spectrum(pencil, 6, search.options, basis=basis)
 
@@ -90,8 +91,8 @@ def test_a_line_of_more_waves_than_a_count_follows_is_counted_in_its_band():
     keys = {"mesh.around": 8, "mesh.along": 14, "fluid.density": 360.0, "damping.alpha": 0.0, "damping.beta": 4e-3}
     line = {"upstream.length": 110.0, "upstream.diameter": "504 mm", "upstream.wave_speed": 693.0, "drive.at": "line"}
     model = ValveModel(thesis_case(keys | line | {"drive.pressure": 463.0}))
-    linear, conditions = linearise(model, LoadPath(model).go_to(463.0).q, 463.0), Conditions.of(model.case)
-    pencil = linear.pencil(conditions, storage=1.0)
+    linear, conditions = linearise(model, LoadPath(model).go_to(463.0).q, 463.0), Mu.of(model.case)
+    pencil = linear.pencil(conditions.at(storage=1.0))
     found = certified(model, conditions, pencil, TransferBasis(pencil))
     print(f"\n{found.statement} {found.count.evaluations} points")
     assert found.agrees and found.stable and np.isfinite(found.count.band)
@@ -121,13 +122,13 @@ def installations(number: int, seed: int, states: int = 3) -> list[str]:
             model = ValveModel(case.replace({"upstream.pump": rows}))
         linear, basis = linearise(model, q, pressure), None
         for _ in range(states):
-            own = Conditions.of(model.case)
+            own = Mu.of(model.case)
             if case.damping.relaxes:
                 conditions = replace(own, loss_factor=float(rng.uniform(0.3, 1.5)))
             else:
                 beta = 0.0 if rng.random() < 0.1 else float(10 ** rng.uniform(-5, -2))
                 conditions = replace(own, alpha=float(rng.choice([0.0, 5.0])), beta=beta)
-            pencil = linear.pencil(conditions, storage=float(rng.choice([0.0, 1.0, rng.random()])))
+            pencil = linear.pencil(conditions.at(storage=float(rng.choice([0.0, 1.0, rng.random()]))))
             basis = TransferBasis(pencil) if basis is None or case.damping.relaxes else basis
             found = certified(model, conditions, pencil, basis)
             unstable += bool(found.unstable_count)

@@ -7,6 +7,8 @@ mesh), look at the differences and write the file anew:
     python tests/verification/test_fiv_onset.py
 
 Graded rows and columns and the enhanced element moved the onset at 6 kPa from 89.3 to 64.0 kg/m3 (quasi-steady) and
+from dbvfiv.case.parameters import Mu
+from dbvfiv.case.parameters import Mu
 from 11.0 to 5.9 (storage), and the leading growth rate at 10 kg/m3 from 47.6 to 27.9 1/s: the limits of fine meshes are
 53.5 kg/m3 and 25.7 1/s, so most of what this mesh of 10 x 20 was wrong by is gone (see test_valve_meshes).
 """
@@ -27,13 +29,13 @@ def measured() -> dict:
     """Onset densities at 2 and 6 kPa, onset pressures at 10 kg/m3, and leading eigenvalues at 6 kPa, for both
     continuity laws.
     """
+    from dbvfiv.case.parameters import Mu
     from dbvfiv.studies.case import thesis_case
     from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
-    from dbvfiv.studies.stability.place import Place
     from dbvfiv.studies.stability.walk import StabilityWalk
 
     case = thesis_case(MESH)
-    walk, base = StabilityWalk(case), Place.of(case)
+    walk, base = StabilityWalk(case), Mu.of(case)
 
     def onsets(parameter, values, **fixed):
         options = OnsetOptions(parameter, tuple(values), True, normal_form=False, coarse_mesh=0)

@@ -12,8 +12,9 @@ from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
 import dbvfiv
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.part import QUARTER
-from dbvfiv.model import Conditions, ValveModel, linearise, select_search
+from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.stepper import StepOptions
@@ -32,7 +33,7 @@ def by_hand(bare, conditions, storage: float, length: float, velocity: float):
     """The pencil without a line, with - rho L added to the coefficient of lambda U in every pressure, and - rho U_in to
     that of U for the velocity head out of a reservoir.
     """
-    pencil = bare.pencil(conditions, storage=storage)
+    pencil = bare.pencil(conditions.at(storage=storage))
     b0, b1 = pencil.B0.copy(), pencil.B1.copy()
     b1[1:] -= conditions.density * length
     b0[1:] -= conditions.density * velocity
@@ -43,7 +44,7 @@ def by_hand(bare, conditions, storage: float, length: float, velocity: float):
 @pytest.mark.parametrize("storage", [0.0, 1.0])
 @pytest.mark.parametrize("at", ["line", "reservoir"])
 def test_modes_for_pipes_of_four_lengths(at, storage):
-    conditions = Conditions(1000.0, 0.0, 4e-4)
+    conditions = Mu(density=1000.0, alpha=0.0, beta=4e-4)
     piped = thesis_case(SMALL | WATER | {"upstream.length": 1.0, "drive.at": at})
     bare, model = ValveModel(thesis_case(SMALL | WATER)), ValveModel(piped)
     path = LoadPath(model)
@@ -53,19 +54,19 @@ def test_modes_for_pipes_of_four_lengths(at, storage):
     ours, theirs = linearise(model, path.q, 500.0), linearise(bare, path.q, state.flange_pressure)
     velocity = 0.0 if at == "line" else state.station_velocity[-1]
     for length in LENGTHS:
-        pencil = ours.pencil(replace(conditions, pipe_length=length), storage=storage)
+        pencil = ours.pencil(conditions.at(pipe_length=length).at(storage=storage))
         found = leading_modes(pencil, 6).eigenvalues
         expected = leading_modes(by_hand(theirs, conditions, storage, length, velocity), 6).eigenvalues
         assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()
 
 
 def test_a_model_of_a_length_is_the_model_at_that_length():
-    conditions = Conditions(1000.0, 0.0, 4e-4)
+    conditions = Mu(density=1000.0, alpha=0.0, beta=4e-4)
     for friction in (0.0, 0.02):
         keys = SMALL | WATER | {"upstream.friction": friction, "upstream.diameter": "250 mm"}
         short, long = (ValveModel(thesis_case(keys | {"upstream.length": x})) for x in (3.0, 12.0))
         q = LoadPath(long).go_to(500.0).q
-        one = linearise(short, q, 500.0).pencil(replace(conditions, pipe_length=12.0))
+        one = linearise(short, q, 500.0).pencil(conditions.at(pipe_length=12.0))
         other = linearise(long, q, 500.0).pencil(conditions)
         for name in ("B0", "B1", "S0", "S1", "A0"):
             assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-12)
@@ -83,7 +84,9 @@ def test_water_flutters_behind_a_long_pipe_under_the_quasi_steady_law():
         model = ValveModel(thesis_case(WATER | {"upstream.length": 1.0, "drive.at": at} | dict(mesh)))
         linear = linearise(model, LoadPath(model).go_to(500.0).q, 500.0)
         for length, (growth, frequency) in (probes if mesh else better).items():
-            found = leading_modes(linear.pencil(Conditions(1000.0, 0.0, 4e-4, 0.0, length)), 4).eigenvalues
+            found = leading_modes(
+                linear.pencil(Mu(density=1000.0, alpha=0.0, beta=4e-4, loss_factor=0.0, pipe_length=length)), 4
+            ).eigenvalues
             mode = next(x for x in found if x.imag > 0)
             print(f"{at} {length:g} m: {mode.real:+.3f} 1/s at {mode.imag / 2 / np.pi:.3f} Hz")
             assert mode.real == pytest.approx(growth, rel=0.1)
@@ -172,8 +175,8 @@ def test_a_hundred_random_installations():
         linear, basis = linearise(model, LoadPath(model).go_to(pressure).q, pressure), None
         for _ in range(5):
             beta = 0.0 if rng.random() < 0.1 else float(10 ** rng.uniform(-5, -2))
-            conditions = Conditions(float(10 ** rng.uniform(-1, 3.3)), float(rng.choice([0.0, 5.0])), beta)
-            pencil = linear.pencil(conditions, storage=float(rng.choice([0.0, 1.0, rng.random()])))
+            conditions = Mu(density=float(10 ** rng.uniform(-1, 3.3)), alpha=float(rng.choice([0.0, 5.0])), beta=beta)
+            pencil = linear.pencil(conditions.at(storage=float(rng.choice([0.0, 1.0, rng.random()]))))
             basis = TransferBasis(pencil) if basis is None else basis
             lowest = basis.structural_frequencies
             search = select_search(SearchOptions(), conditions, lambda n, known=lowest: known[:n], 6)

@@ -18,8 +18,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.materials.damping import damping_of
-from dbvfiv.model import Conditions, LinearisedState, ValveModel, linearise
+from dbvfiv.model import LinearisedState, ValveModel, linearise
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes, lowest_frequencies
 
@@ -42,7 +43,7 @@ def at_rest(loss_factor: float, branches: int = 4, modulus: float = MODULUS) -> 
 
 def resonances(state: LinearisedState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Angular frequencies (k,) and shapes (n, k) of the elastic valve, the shapes by inverse iteration."""
-    elastic = state.pencil(Conditions(0.0, 0.0, 0.0), fluid=False)
+    elastic = state.pencil(Mu(density=0.0, alpha=0.0, beta=0.0), fluid=False)
     band = 1.02 * lowest_frequencies(elastic, MODES)[-1]
     modes = leading_modes(elastic, MODES, SearchOptions(max_frequency=float(band)))
     order = np.argsort(modes.frequency)
@@ -73,7 +74,7 @@ def test_the_first_eight_modes(eta, branches, tolerance, stiffer):
     state = at_rest(eta, branches)
     fit = damping_of(state.model.case, "one")
     series = fit.prony
-    pencil = state.pencil(Conditions(0.0, 0.0, 0.0, 1.0), fluid=False)
+    pencil = state.pencil(Mu(density=0.0, alpha=0.0, beta=0.0, loss_factor=1.0), fluid=False)
     omega, shapes = resonances(state)
 
     # the share that relaxes, by a material twice as stiff: stops and stresses would stay as they are

@@ -7,9 +7,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
-from dbvfiv.model import Conditions, ValveModel, linearise, select_search
+from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, TransferBasis, certified_spectrum
@@ -87,13 +88,15 @@ def look_at(number: int, seed: int, conditions_each: int = 3) -> tuple[list[str]
             continue
         basis = None
         for _ in range(conditions_each):
-            own = Conditions.of(case)
+            own = Mu.of(case)
             relaxes = bool(model.relaxation.groups)
             beta = 0.0 if relaxes or rng.random() < 0.1 else float(10 ** rng.uniform(-5, -2))
             factor = float(rng.uniform(0.3, 2.0)) if relaxes else 0.0
-            line = own.of_line
-            conditions = Conditions(own.density, float(rng.choice([0.0, 5.0])), beta, factor, **line)
-            pencil = linear.pencil(conditions, storage=float(rng.choice([0.0, 1.0])))
+            line = own.pipes
+            conditions = Mu(
+                density=own.density, alpha=float(rng.choice([0.0, 5.0])), beta=beta, loss_factor=factor, **line
+            )
+            pencil = linear.pencil(conditions.at(storage=float(rng.choice([0.0, 1.0]))))
             basis = TransferBasis(pencil) if basis is None or relaxes else basis
             lowest = basis.structural_frequencies
             resolved = model.flow.resolved(line)
@@ -130,8 +133,8 @@ def test_waves_resolved_far_above_the_modes():
     case = thesis_case(MESH | keys)
     model = ValveModel(case)
     linear = linearise(model, LoadPath(model).go_to(case.drive.pressure).q, case.drive.pressure)
-    own = Conditions.of(case)
-    pencil = linear.pencil(Conditions(own.density, 5.0, 1.838e-5, 0.0, **own.of_line), storage=1.0)
+    own = Mu.of(case)
+    pencil = linear.pencil(Mu(density=own.density, alpha=5.0, beta=1.838e-5, loss_factor=0.0, **own.pipes, storage=1.0))
     found = certified_spectrum(pencil, 6, SearchOptions(max_frequency=2800.0), whole=False)
     assert found.agrees and found.unstable_count == 8, found.statement
     every = all_eigenvalues(pencil)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.model import Conditions, ValveModel, linearise, select_search
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, certified_spectrum, lowest_frequencies
@@ -36,8 +37,14 @@ def look_at(number: int, seed: int) -> list[str]:
         storage, beta = float(rng.choice([0.0, 1.0])), float(10.0 ** rng.uniform(-4, -2.3))
         model = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 14} | keys))
         loss = 1.0 if model.relaxation.groups else 0.0
-        conditions = Conditions(density, 0.0, 0.0 if loss else beta, loss, keys.get("upstream.length"))
-        pencil = linearise(model, LoadPath(model).go_to(pressure).q, pressure).pencil(conditions, storage=storage)
+        conditions = Mu(
+            density=density,
+            alpha=0.0,
+            beta=0.0 if loss else beta,
+            loss_factor=loss,
+            pipe_length=keys.get("upstream.length"),
+        )
+        pencil = linearise(model, LoadPath(model).go_to(pressure).q, pressure).pencil(conditions.at(storage=storage))
         search = select_search(SearchOptions(), conditions, lambda n: lowest_frequencies(pencil, n), 6)
         found = certified_spectrum(pencil, 6, search.options)
         if not found.agrees:

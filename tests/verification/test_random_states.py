@@ -43,7 +43,7 @@ def examined(around: int, along: int, number: int, seed: int, pressures: int) ->
             bases[state.linear.inlet] = TransferBasis(pencil)
         basis = bases[state.linear.inlet]
         lowest = basis.structural_frequencies
-        search = select_search(SearchOptions(), state.conditions, lambda n, known=lowest: known[:n], COUNT)
+        search = select_search(SearchOptions(), state.mu, lambda n, known=lowest: known[:n], COUNT)
         out.append(Examined(state, certified_spectrum(pencil, COUNT, search.options, basis=basis)))
     return out
 
@@ -57,7 +57,7 @@ def examined_relaxing(around: int, along: int, number: int, seed: int, pressures
         pencil = state.pencil
         basis = TransferBasis(pencil)
         lowest = basis.structural_frequencies
-        search = select_search(SearchOptions(), state.conditions, lambda n, known=lowest: known[:n], COUNT)
+        search = select_search(SearchOptions(), state.mu, lambda n, known=lowest: known[:n], COUNT)
         out.append(Examined(state, certified_spectrum(pencil, COUNT, search.options, basis=basis)))
     return out
 

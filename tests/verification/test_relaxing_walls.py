@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.materials import IsotropicElastic
 from dbvfiv.materials.prony import Prony
-from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.build import build_section
 from dbvfiv.model.relaxing import WallRelaxation
 from dbvfiv.motion.start import steady_positions
@@ -165,7 +166,7 @@ def test_a_branch_that_relaxes_at_once_is_a_dashpot(pressed, fluid):
     """g tau = beta as tau tends to zero: C = beta K, of the material part alone in both."""
     beta, tau, search = 1e-3, 1e-10, SearchOptions(max_frequency=60.0)
     (material,) = pressed.relaxing
-    plain = pressed.pencil(Conditions(10.0, 0.0, 0.0), fluid)
+    plain = pressed.pencil(Mu(density=10.0, alpha=0.0, beta=0.0), fluid)
     dashpot = plain.replace(C=beta * material)
     branch = plain.replace(relaxation=Relaxation([material], [[beta / tau]], [tau]))
     whole = plain.replace(C=beta * pressed.structure)

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.model import Conditions, linearise
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import linearise
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
@@ -66,7 +67,7 @@ def three_routes(
     )  # judged at the ends and fed in the middle: the state itself is none of the checks
     resolved = model.flow.resolved({})
     found = sweep(
-        lambda d: state.pencil(Conditions(float(d), 0.0, BETA)),
+        lambda d: state.pencil(Mu(density=float(d), alpha=0.0, beta=BETA)),
         densities,
         4,
         SearchOptions(resolved if np.isfinite(resolved) else None, limit_point=-1 / BETA),

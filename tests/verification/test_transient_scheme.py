@@ -44,7 +44,7 @@ def test_order_of_the_coupled_scheme(law, nd):
     model = dbvfiv.load(thesis_case(), COARSE | {"fluid.continuity": law, "damping.alpha": 0.0}).model
     motion = ValveMotion(model)
     q = steady_positions(model, 12e3)
-    density = motion.conditions.density
+    density = motion.mu.density
     speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(q)), 12e3, density)
     start = consistent_state(motion, 0.0, q, 0 * q, speed, 12e3)
 

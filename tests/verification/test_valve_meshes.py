@@ -12,7 +12,8 @@ import pytest
 from scipy.optimize import brentq
 from scipy.sparse.linalg import eigsh
 
-from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes
@@ -37,7 +38,9 @@ def measured(around: int, along: int, keys=USUAL, pressures=FLOWS) -> tuple[floa
     options = SearchOptions(limit_point=-1 / 0.003)
 
     def growth(density):
-        return float(leading_modes(small.pencil(Conditions(density, 0.0, 0.003)), 1, options).eigenvalues[0].real)
+        return float(
+            leading_modes(small.pencil(Mu(density=density, alpha=0.0, beta=0.003)), 1, options).eigenvalues[0].real
+        )
 
     onset = brentq(growth, 45.0, 75.0, xtol=1e-3)
     return onset, growth(45.0), np.array([state.mass_flow for state in states])

@@ -5,7 +5,8 @@ mesh.
 import numpy as np
 import pytest
 
-from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, Workspace, leading_modes
@@ -13,7 +14,7 @@ from eigen.certificate import certified_spectrum
 from eigen.transfer import TransferBasis
 
 pytestmark = pytest.mark.slow
-LIGHT = Conditions(10.0, 0.0, 0.003)
+LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
 
 
 def model_of(around, along, **changes):
@@ -63,7 +64,7 @@ def test_water_is_damped_from_2_to_50_kpa():
     print()
     for lin in linearised(model_of(28, 48), [2e3, 6e3, 12e3, 18e3, 29e3, 36e3, 50e3]):
         for storage in (0.0, 1.0):
-            found = leading_modes(lin.pencil(Conditions(1000.0, 5.0, 0.003), storage=storage), 4, options())
+            found = leading_modes(lin.pencil(Mu(density=1000.0, alpha=5.0, beta=0.003, storage=storage)), 4, options())
             print(
                 f"{lin.inlet / 1e3:5.0f} kPa, {'storage' if storage else 'quasi-steady':12s}: leading "
                 f"{found.eigenvalues[0]:.3f} 1/s"
@@ -84,12 +85,18 @@ def test_two_counts_agree_at_200_random_states():
         workspace = Workspace()
         basis = TransferBasis(lin.pencil(LIGHT))
         for _ in range(10):
-            conditions = Conditions(
-                10 ** rng.uniform(-0.5, 3.2), rng.choice([0.0, rng.uniform(0, 10)]), 10 ** rng.uniform(-4, -2)
+            conditions = Mu(
+                density=10 ** rng.uniform(-0.5, 3.2),
+                alpha=rng.choice([0.0, rng.uniform(0, 10)]),
+                beta=10 ** rng.uniform(-4, -2),
             )
             storage = float(rng.integers(2))
             both = certified_spectrum(
-                lin.pencil(conditions, storage=storage), 6, options(conditions.beta), workspace=workspace, basis=basis
+                lin.pencil(conditions.at(storage=storage)),
+                6,
+                options(conditions.beta),
+                workspace=workspace,
+                basis=basis,
             )
             unstable += both.unstable_count > 0
             if not both.agrees:

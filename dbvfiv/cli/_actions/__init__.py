@@ -1,1 +1,1 @@
-"""What the commands do, once they are asked to: here all imports stand at the top, however heavy."""
+"""Actions behind the commands. All imports stand at the top here, however heavy."""

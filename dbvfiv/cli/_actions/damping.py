@@ -1,4 +1,4 @@
-"""What a case says of damping, in print and as a figure."""
+"""Print and plot the damping of a case."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What this machine offers and what is missing, in print."""
+"""Print the machine's solvers and packages, and those that are missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a result file holds."""
+"""Print the contents of a result file."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def _say(written: Sequence[Path], as_json: bool) -> None:
 
 
 def _film(result, file: Path, folder: Path, number: int) -> Callable[[], Path]:
-    """What writes the film that ``--animate`` asks of a result."""
+    """Function that writes the animation that ``--animate`` asks of a result."""
     if result.kind == "modes":
         result.mode(number)
         return lambda: result.animate(folder / f"mode-{number}.gif", number)

@@ -1,4 +1,4 @@
-"""What ``dbvfiv verdict`` reads, judges and shows: signals of a text file or of a transient run."""
+"""Read, judge and show time series for ``dbvfiv verdict``: signals of a text file or of a transient run."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from .._output import print_json
 
 @dataclass(frozen=True)
 class Reading:
-    """How a file is read.
+    """Options for reading the signals of a file.
 
     Attributes
     ----------
     columns : sequence of str
-        By name or number from 1; all without it.
+        Columns by name or number from 1; all where empty.
     time : str
         Column of the times, by name or number.
     rate : float, optional, Hz
@@ -34,9 +34,9 @@ class Reading:
     unit : str, optional
         Unit of the times; else as the header says.
     skip_bad : bool
-        Whether rows that hold no number are left out.
+        Leave out rows that hold no number.
     since : float, optional, s
-        What comes before is left out.
+        Time before which samples are left out.
     """
 
     columns: Sequence[str] = ()

@@ -97,7 +97,7 @@ class Impedance(LinearOperator):
     _transpose = _adjoint
 
     def matrix(self) -> np.ndarray:
-        """All of it (wet, wet)."""
+        """Dense matrix (wet, wet), 1/m, of the impedance."""
         (potential, _), *others = self._terms
         for other, carried in others:
             potential = potential - other @ carried
@@ -186,7 +186,10 @@ class PotentialFlow:
         return own, across, smooth_influence(fixed, moving, signs, frozen=(fixed, held)), self._alone
 
     def _symmetric(self, moving: Panels, held: Panels):
-        """The same for symmetric images, on which the whole flux rests."""
+        """Influence blocks as `_blocks`, for images that are symmetric about both planes.
+
+        The condition on the flux through the whole surface rests on these.
+        """
         signs = image_signs("SS")
         blocks = self._blocks(moving, held, signs)
         if self._fixed is None:
@@ -194,7 +197,10 @@ class PotentialFlow:
         return (*blocks[:3], smooth_influence(self._fixed, self._fixed, signs, True))
 
     def _own(self, moving: Panels, blocks) -> tuple[np.ndarray, np.ndarray | None]:
-        """What panels' own velocities lack for the whole flux of each to be right, for moving and other panels."""
+        """Corrections of the self-induced velocities that make the total flux of each panel right.
+
+        For moving panels, and for those of the surroundings or None without any.
+        """
         (_, velocity), across, back, alone = blocks
         flux = moving.areas @ velocity
         if self._fixed is None:

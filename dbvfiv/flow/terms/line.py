@@ -116,7 +116,7 @@ class PiecedLine(FlowTerm):
 
     @property
     def reservoir(self) -> bool:
-        """Whether the pressure that drives the flow is that of a reservoir; else it is static, in the first pipe."""
+        """True where the driving pressure is that of a reservoir, False where it is static in the first pipe."""
         return self.parts[0].reservoir
 
     def section(self, inlet):

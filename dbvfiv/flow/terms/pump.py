@@ -72,7 +72,7 @@ class Pump(FlowTerm):
         return ((a * x + b) * x + c) * x + d, (3 * a * x + 2 * b) * x + c
 
     def holds(self, flow: float) -> bool:
-        """Whether a flow, m3/s, is within the table."""
+        """True where a flow rate, m3/s, is within the pump's table."""
         return bool(self.flow[0] <= flow <= self.flow[-1])
 
     def gain(self, velocity, inlet_area, parameters):

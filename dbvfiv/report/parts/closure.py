@@ -1,4 +1,4 @@
-"""Whether, where and how firmly the valve shuts."""
+"""Part of the report on closure: back pressure at which the valve shuts, and its margins."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def part(found: Gathered) -> Part:
 
 
 def shutting(found: Gathered) -> tuple[str, ...]:
-    """Whether it shuts, in a sentence."""
+    """Sentence on closure: whether the valve shuts under the largest back pressure computed."""
     result = found.closure
     if result is None or not result.states:
         return ()

@@ -1,9 +1,8 @@
-"""What the vibration grows into."""
+"""Part of the report on the limit cycle that the vibration grows into."""
 
 from __future__ import annotations
 
-from ...case.parameters import PARAMETERS
-from ...studies.stability.place import Place
+from ...case.parameters import PARAMETERS, Mu
 from ..content import Part, Table, pictures_of
 from ..gather import Gathered
 from .missing import said_by
@@ -49,7 +48,7 @@ def cycles(found: Gathered) -> tuple[str, ...]:
     result = found.cycle
     if result is None or not result.points:
         return ()
-    row, here = PARAMETERS[result.parameter], Place.of(found.case).value(result.parameter)
+    row, here = PARAMETERS[result.parameter], Mu.of(found.case)[result.parameter]
     point = result.nearest(here)
     if abs(point.value - here) > 1e-6 * abs(here):
         return (

@@ -1,4 +1,4 @@
-"""How much the wall damps."""
+"""Part of the report on the damping of the wall."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..gather import Gathered
 
 
 def part(found: Gathered) -> Part | None:
-    """What the case says of damping, on which every verdict on vibration rests."""
+    """Part on the damping of the case, on which every verdict on vibration rests."""
     try:
         report = describe_damping(found.case)
     except CaseError as error:

@@ -1,4 +1,4 @@
-"""How far the valve opens, what flows, what it costs."""
+"""Part of the report on hydraulics: opening, flow and head loss."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def part(found: Gathered) -> Part:
 
 
 def opening(found: Gathered) -> tuple[str, ...]:
-    """What flows at the driving pressure, in a sentence."""
+    """Sentence on the flow and the opening at the driving pressure."""
     result = found.steady
     if result is None or not result.states:
         return ()

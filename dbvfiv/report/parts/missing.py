@@ -1,4 +1,4 @@
-"""What stands in the place of a study that gave no result."""
+"""Replacement for the part of a study that gave no result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether, where and how the valve vibrates."""
+"""Part of the report on vibration: stability, onset and unstable regions of the valve."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def modes(found: Gathered) -> Part:
 
 
 def classes(found: Gathered) -> Part:
-    """The same in motions that are not symmetric about both planes."""
+    """Part on modes of all symmetry classes, including those not symmetric about both planes."""
     result, title = found.classes, "Motions of all classes"
     if result is not None and not result.verdict.holds:
         return Part("classes", title, (result.sentence,), (), (), said_by(result))
@@ -67,7 +67,7 @@ def stability(found: Gathered) -> tuple[str, ...]:
 
 
 def onset(found: Gathered) -> Part:
-    """Where stability is lost along the parameter of the case."""
+    """Part on the loss of stability along the parameter of the case."""
     result, title = found.onset, "Where it begins"
     if result is None:
         return not_there(found, "onset", title)

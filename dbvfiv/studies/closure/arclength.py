@@ -93,7 +93,7 @@ class LimitPoint:
 
 @dataclass(frozen=True)
 class ArclengthPath:
-    """What was found beyond a limit point.
+    """Equilibrium path beyond a limit point, followed by arc length.
 
     Attributes
     ----------

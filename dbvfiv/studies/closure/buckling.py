@@ -94,10 +94,10 @@ class BucklingWatch:
         return stiffness_spectrum(self.pressed, q, pressure, self.eigenvalues)
 
     def _locate(self, stable: _Known, unstable: _Known) -> Buckling:
-        """Where the lowest eigenvalue vanishes between two states, by the secant rule kept within its bracket.
+        """State between two equilibria where the lowest eigenvalue vanishes, by a bracketed secant rule.
 
         States between them are corrected from a straight line through both. Where paths cross, the tangent is singular
-        and Newton's method may end on the other path; such a state is not used, and when none nearer is found the zero
+        and Newton's method may end on the other path; such a state is not used. When no nearer state is found, the zero
         is that of the line through the eigenvalues on both sides, with the state of the nearer one.
         """
         low, high, refused = stable, unstable, 0

@@ -14,7 +14,7 @@ LOWEST, BUCKLED_CLASS = "class stiffness", "class buckling"
 
 @dataclass(frozen=True)
 class ClassBuckling:
-    """What is known of one class.
+    """Buckling of the wall in one symmetry class.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class ClassBuckling:
 
     @property
     def sentence(self) -> str:
-        """The same for people."""
+        """Sentence on buckling in the class, or on its least stiffness."""
         motion = f"class {self.symmetry} ({symmetry_named(self.symmetry).words})"
         if self.buckling:
             return f"Buckling in {motion} at {self.critical_pressure / 1e3:.6g} kPa."

@@ -44,7 +44,7 @@ class ClassStiffness:
 
     @classmethod
     def of(cls, model: ClosureModel, symmetry: Symmetry) -> ClassStiffness:
-        """Of a valve with contact."""
+        """Stiffness of a valve with contact in a symmetry class."""
         return cls(model.pressed, symmetry.free_unknowns(model.mesh), symmetry.moves_lips_apart)
 
     def shell(self, q: np.ndarray) -> Shell:
@@ -88,7 +88,7 @@ class ClassWatch:
 
     @classmethod
     def of(cls, model: ClosureModel, steps: LoadStepOptions, eigenvalues: int, wanted: bool) -> ClassWatch:
-        """Of a model with contact; of no class unless it is wanted."""
+        """Buckling watches of a model with contact, one for each class besides that of the path; none unless wanted."""
         watches = {}
         for name, symmetry in symmetries_of(model.mesh.part).items() if wanted and model.supports == CONTACT else ():
             if not symmetry.of_equilibria:

@@ -215,7 +215,7 @@ def _set_out(model: ContactValve, motion: ClosingMotion, turn: Turn) -> tuple[Fi
     transient = model.case.transient
     q = steady_positions(model, turn.pressure)
     area = model.rows.areas(model.nodal(q))
-    speed = model.flow.inlet_velocity(area, turn.pressure, motion.conditions.density)
+    speed = model.flow.inlet_velocity(area, turn.pressure, motion.mu.density)
     state = consistent_state(motion, 0.0, q, np.zeros(model.size), speed, turn.pressure)
     rule = scheme("generalised-alpha", max(DAMPING, transient.numerical_damping))
     control = FixedSteps(Stepper(motion, rule, turn, StepOptions(backward=True)), ControlOptions(transient.step))
@@ -236,7 +236,7 @@ def _sample(model: ContactValve, motion: ClosingMotion, state, load) -> ClosingS
         lip_opening=lip.opening(state.q),
         lip_displacement=lip.displacement(state.q),
         least_opening=float(part.copies * passage.area.min()),
-        mass_flow=float(part.copies * motion.conditions.density * load.speed[0] * open_area[0]),
+        mass_flow=float(part.copies * motion.mu.density * load.speed[0] * open_area[0]),
         lowest_pressure=float(load.pressure.min()),
         highest_pressure=float(load.pressure.max()),
         contact_force=float(part.walls * contact.total),

@@ -60,7 +60,7 @@ class Comparison:
 
     @property
     def remark(self) -> str:
-        """What stands in the way of comparing; nothing does."""
+        """Sentence on obstacles to a comparison; always empty, since closure runs can always be compared."""
         return ""
 
     def difference(self, name: str) -> np.ndarray:
@@ -122,7 +122,7 @@ def compare(results: Sequence[ClosureResult]) -> Comparison:
 
 
 def draw(results: Sequence[ClosureResult]) -> Figure:
-    """What is compared over the back pressure, one panel each, and measured sections with the computed ones."""
+    """Figure of the compared quantities over the back pressure, and of measured and computed sections."""
     names = comparing.labels(results, _QUIET)
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(results)))
     shapes = [result.measured.shapes for result in results]

@@ -101,7 +101,7 @@ class EnergyLedger:
 
     @property
     def error(self) -> float:
-        """What is missing in the balance over the work of the pressure, sizes added up over all stretches."""
+        """Defect of the energy balance, absolute values summed over all stretches, over the work of the pressure."""
         return self.defect / abs(self.work) if self.work else 0.0
 
     @property
@@ -115,7 +115,7 @@ class EnergyLedger:
         self.equilibria = int(values[5])
 
     def begin(self, q: np.ndarray, pressure: float, slope: np.ndarray | None = None) -> None:
-        """Where the path starts, with dq/dP if that is known."""
+        """Start the ledger at the first state of the path, with dq/dP if that is known."""
         self._last = (pressure, self.pressed.multiplier.copy(), q, slope)
 
     def add(self, q: np.ndarray, pressure: float, slope: np.ndarray | None = None, refine: bool = True) -> None:

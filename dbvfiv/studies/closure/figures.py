@@ -156,5 +156,5 @@ def buckling_shape(result: ClosureResult) -> Figure:
 
 
 def supports_of(result: ClosureResult) -> str:
-    """What holds the walls apart, as it stands in titles."""
+    """Name of the supports that hold the walls apart, for titles."""
     return "contact of the inner faces" if result.supports == "contact" else "supports of Th. 3.6"

@@ -23,7 +23,7 @@ KINDS = (AREA, SHAPE)
 
 @dataclass(frozen=True)
 class MeasuredClosure:
-    """What was measured under back pressure, each None where it was not.
+    """Measurements under back pressure; None for a quantity that was not measured.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class MeasuredClosure:
         return (part for part in (self.passage, self.shapes) if part is not None)
 
     def sentences(self) -> list[str]:
-        """For people, one of each."""
+        """Sentences that compare each measured quantity with the computed one."""
         return [part.sentence() for part in self]
 
     def summary(self) -> dict[str, Any]:
@@ -50,7 +50,7 @@ class MeasuredClosure:
 
 
 def measured_closure(result: ClosureResult) -> MeasuredClosure:
-    """What a result holds of measured data, against its states and the path between them."""
+    """Measured data of a result, against its states and the path between them."""
     tables = kept_tables(result.record)
     areas = joined(tables, AREA, "pressure", "area")
     points = joined(tables, SHAPE, "pressure", "z", "face", "x", "y")

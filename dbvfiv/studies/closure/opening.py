@@ -1,4 +1,4 @@
-"""What stays open between the inner faces, row by row, and over which length the valve is shut."""
+"""Open passage between the inner faces, row by row, and the length over which the valve is shut."""
 
 from __future__ import annotations
 

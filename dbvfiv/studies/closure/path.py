@@ -121,11 +121,11 @@ class ClosurePath:
 
     @property
     def buckling(self) -> list[Buckling]:
-        """Where the tangent stiffness became singular, in the order met."""
+        """States at which the tangent stiffness became singular, in the order met."""
         return self.watch.found
 
     def restart(self, eigenvalue: float) -> PathRestart:
-        """Where the walk stands; `eigenvalue` is the lowest stiffness eigenvalue of the state just reached."""
+        """Restart data of the path; `eigenvalue` is the lowest stiffness eigenvalue, 1/s2, of the last state."""
         steps = self.steps
         return PathRestart(
             steps.pressure,

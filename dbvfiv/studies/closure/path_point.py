@@ -1,4 +1,4 @@
-"""What a walk along back pressures leaves behind, and what it needs to go on."""
+"""Points of a path along back pressures, and its restart data."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class PathPoint:
 
 @dataclass(frozen=True)
 class PathRestart:
-    """What a walk needs to go on from a state that it reached, as if it had never stopped.
+    """Restart data of a path: continues from a reached state as if it had never stopped.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What is said below the table of back-pressure states."""
+"""Sentences below the table of back-pressure states."""
 
 from __future__ import annotations
 

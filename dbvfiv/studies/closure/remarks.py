@@ -16,7 +16,7 @@ CROSSED = 10.0
 
 @dataclass(frozen=True)
 class FoundPlace:
-    """What warnings look at of a state that was found."""
+    """Pressure, Pa, overlap, m, and unknowns of a state that warnings look at."""
 
     pressure: float
     overlap: float
@@ -24,7 +24,7 @@ class FoundPlace:
 
 
 def start_warnings(model: ClosureModel) -> Iterator[str]:
-    """Where the inner face starts beyond the closing plane."""
+    """Warnings where the inner face starts beyond the closing plane."""
     mesh, near, beyond = model.mesh, model.folded_start, model.nodes_beyond
     if len(beyond):
         z = mesh.nodes[near, 2]
@@ -49,7 +49,7 @@ def start_warnings(model: ClosureModel) -> Iterator[str]:
 
 
 def overlap_warnings(model: ClosureModel, states: Iterable[FoundPlace]) -> Iterator[str]:
-    """Where the inner faces have crossed."""
+    """Warning where the inner faces overlap."""
     deep = [state for state in states if state.overlap > CROSSED * model.case.closure.penetration]
     if deep:
         worst = max(deep, key=lambda state: state.overlap)

@@ -196,7 +196,7 @@ class ClosureResult(StudyResult):
 
     @cached_property
     def safety(self) -> SafetyFactor | None:
-        """How far the valve is from its first limit; None if no equilibrium was found."""
+        """Margin of the valve to its first limit; None if no equilibrium was found."""
         return find_safety(self)
 
     def summary(self) -> dict[str, Any]:

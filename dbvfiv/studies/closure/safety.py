@@ -1,4 +1,4 @@
-"""How far a valve under back pressure is from its first limit."""
+"""Safety factor of a valve under back pressure: margin to its first limit."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class SafetyFactor:
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """Sentence on the factor of safety and the limit that it refers to."""
         rated = f"over the rated {self.rated_pressure / 1e3:.6g} kPa"
         if self.at_least:
             seal = "its seal is an assumption of the supports," if self.seal_assumed else "does not lose its seal,"
@@ -108,7 +108,7 @@ def _rising(result: ClosureResult) -> list[Any]:
 
 
 def _lost_seal(rising: list[Any]) -> np.ndarray:
-    """Where no section is shut although one was before; everywhere if none ever was."""
+    """Mask of points where no section is shut although one was before; True everywhere if none ever was."""
     shut = np.array([point.sealed_length > 0 for point in rising])
     return ~shut & np.maximum.accumulate(shut) if shut.any() else np.ones(len(shut), bool)
 

@@ -195,8 +195,9 @@ def face_overlap(model: ClosureModel, nodal: np.ndarray) -> float:
 
 
 def contact_front(passage: Opening, model: ClosureModel) -> float:
-    """How far from the lip, m, the walls have met along the centre line, to within the initial gap; linear between
-    rows.
+    """Distance from the lip, m, up to which the walls have met along the centre line, to within the initial gap.
+
+    It is linear between rows.
     """
     # just less than the gap that lifted rows have at rest
     gap = (

@@ -1,4 +1,4 @@
-"""How the valve is followed under back pressure, and kept: states, then the turn of the drive in time."""
+"""Run of the closure study: states under back pressure, then the time history of the drive's reversal."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def run(session: Session, record: GrowingRecord, in_time: bool = False, compare:
 
 
 def other_supports(case: Case) -> str:
-    """Those to compare with."""
+    """Kind of supports to compare with."""
     return HELD_LIPS if case.closure.supports == CONTACT else CONTACT
 
 

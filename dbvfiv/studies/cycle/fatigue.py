@@ -1,4 +1,4 @@
-"""What fatigue asks of a cycle: ranges of strain and stress in each layer over a period."""
+"""Ranges of strain and stress in each layer over a period, for fatigue."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class LayerRanges:
     place: np.ndarray
 
     def largest(self) -> list[dict[str, Any]]:
-        """Of each layer the largest range of a strain and of a stress, with where they are."""
+        """Largest ranges of strain and of stress of each layer, and their positions."""
         found = []
         for number, name in enumerate(self.names):
             strain, stress = self.strain[:, number], self.stress[:, number]

@@ -1,4 +1,4 @@
-"""Where a branch of cycles starts: a motion that a result file holds."""
+"""Start of a branch of cycles from a motion in a result file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
 
-from ...case.parameters import PARAMETERS
+from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ...motion.equations import ValveMotion
@@ -18,7 +18,6 @@ from ...motion.state import consistent_state
 from ...motion.stepper import StepFailure, Stepper
 from ..case import Case
 from ..session import load_result
-from ..stability.place import Place
 from ..stability.walk import StabilityWalk
 
 #: Steps of the period that is run from the last state of a run in time.
@@ -35,13 +34,13 @@ class Given:
     ----------
     value : float
         Of the parameter.
-    place : Place
+    place : Mu
     motion : PeriodicMotion
         Near a cycle.
     """
 
     value: float
-    place: Place
+    place: Mu
     motion: PeriodicMotion
 
 
@@ -65,14 +64,14 @@ def given_motion(case: Case, walk: StabilityWalk) -> Given:
             "time.",
             key="cycle.start_file",
         )
-    model = walk.built(Place.of(case)).model
+    model = walk.built(Mu.of(case)).model
     if result.mesh.nodes.shape != model.mesh.nodes.shape:
         raise CaseError(
             f"The motion of {str(path)!r} belongs to a mesh of {len(result.mesh.nodes)} nodes and this case's has "
             f"{len(model.mesh.nodes)}.",
             key="cycle.start_file",
         )
-    value = Place.of(result.case).value(axis.parameter)
+    value = Mu.of(result.case)[axis.parameter]
     point = _cycle_of(case, result) if result.kind == "cycle" else None
     if point is not None and result.parameter == axis.parameter:
         value = float(point.value)
@@ -84,7 +83,7 @@ def given_motion(case: Case, walk: StabilityWalk) -> Given:
             f"{row.text(high)}.",
             key="cycle.start_file",
         )
-    place = Place.of(case).at(**{axis.parameter: value})
+    place = Mu.of(case).at(**{axis.parameter: value})
     if point is not None:
         return Given(value, place, point.orbit.motion)
     return Given(value, place, _last_period(walk.built(place).model, case, place, result))
@@ -94,7 +93,7 @@ def _cycle_of(case: Case, result):
     """Cycle `cycle.start_cycle` of a result, counted in the order of its table."""
     number, points = case.cycle.start_cycle, sorted(result.points, key=lambda point: point.number)
     if number is None and result.parameter != case.cycle.axis.parameter and points:
-        return result.nearest(Place.of(case).value(result.parameter))
+        return result.nearest(Mu.of(case)[result.parameter])
     number = -1 if number is None else number
     if not -len(points) <= number < len(points):
         raise CaseError(
@@ -104,7 +103,7 @@ def _cycle_of(case: Case, result):
     return points[number]
 
 
-def _last_period(model: ValveModel, case: Case, place: Place, result) -> PeriodicMotion:
+def _last_period(model: ValveModel, case: Case, place: Mu, result) -> PeriodicMotion:
     """One period, in steps, from the last state of a run."""
     verdict = result.verdict
     if verdict["verdict"] != "limit cycle" or not verdict["frequency"]:
@@ -120,7 +119,7 @@ def _last_period(model: ValveModel, case: Case, place: Place, result) -> Periodi
             key="cycle.start_file",
         )
     state, inlet, period = result.states[-1], place.pressure, 1.0 / verdict["frequency"]
-    motion = ValveMotion(model, place.conditions)
+    motion = ValveMotion(model, place)
     dofs = model.shell.dofs
     speed = float(state.station_velocity[-1])
     now = consistent_state(motion, 0.0, dofs.restrict(state.nodal), dofs.restrict(state.nodal_rate), speed, inlet)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...case.parameters import PARAMETERS
+from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError
 from ...model.system import ValveSystem
 from ...record.fields import motion
@@ -18,7 +18,7 @@ from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve
 from ..orbits.orbit import Orbit
 from ..result import StudyResult
-from ..stability.place import Place, describe_fixed, fixed_conditions, rebuilder
+from ..stability.place import describe_fixed, fixed_conditions, rebuilder
 from ..stability.verdict import Verdict
 from . import figures
 from .fatigue import LayerRanges, layer_ranges
@@ -47,7 +47,7 @@ class Point:
 
     @property
     def stable(self) -> bool | None:
-        """Whether all perturbations of the model's symmetry decay; None where that was not asked for."""
+        """True where all perturbations of the model's symmetry decay; None where stability was not asked for."""
         return None if self.unstable < 0 else bool(self.unstable == 0)
 
     @property
@@ -60,7 +60,7 @@ class Point:
     def orbit(self) -> Orbit:
         """The motion, over one period."""
         name = PARAMETERS[self.result.parameter].system_name or self.result.parameter
-        mu = Place.of(self.result.case).mu() | {name: float(self.value)}
+        mu = Mu.of(self.result.case).for_system() | {name: float(self.value)}
         return Orbit(self.result.system.model(mu), mu, read_motion(self.result.record, self.number))
 
     @cached_property

@@ -1,4 +1,4 @@
-"""How cycles are kept in a record, and read again to go on."""
+"""Storage of cycles in a record, and their restart."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def series_rows(number: int, motion: PeriodicMotion, size: int) -> dict[str, np.
 
 
 def special_note(special: SpecialCycle, parameter: str, orbit: Orbit) -> dict[str, Any]:
-    """What a record keeps of a special point."""
+    """Note that a record keeps of a bifurcation of the branch of cycles."""
     low, high = orbit.lip_extremes
     return {
         "kind": special.kind,

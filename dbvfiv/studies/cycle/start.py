@@ -1,4 +1,4 @@
-"""Where a branch of cycles starts: the onset of a scan."""
+"""Start of a branch of cycles from an onset (Hopf bifurcation) of a scan."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...case.parameters import PARAMETERS
+from ...case.parameters import PARAMETERS, Mu
 from ...errors import SolveError
 from ...observer import Observer
 from ..case import Case
 from ..orbits.onset import Onset, onset_at
 from ..stability.correction import OnsetCorrection
 from ..stability.crossings import Crossing, Scan, locate
-from ..stability.place import Place, is_surrounding
+from ..stability.place import condition_of, is_surrounding
 from ..stability.walk import StabilityWalk
 
 #: Values of the range that are asked whether the steady state is stable.
@@ -30,10 +30,10 @@ def find_onset(case: Case, walk: StabilityWalk, observer: Observer) -> Onset:
     SolveError
         If the range holds none with an oscillation.
     """
-    axis, base = case.cycle.axis, Place.of(case)
+    axis, base = case.cycle.axis, Mu.of(case)
     values = [axis.values[i] for i in np.unique(np.linspace(0, len(axis.values) - 1, SCANNED).astype(int))]
 
-    def place(value: float) -> Place:
+    def place(value: float) -> Mu:
         return base.at(**{axis.parameter: value})
 
     def spectrum(value: float) -> np.ndarray:
@@ -53,7 +53,7 @@ def find_onset(case: Case, walk: StabilityWalk, observer: Observer) -> Onset:
     raise SolveError(_without(case, scan))
 
 
-def _column(case: Case, walk: StabilityWalk, places: list[Place]):
+def _column(case: Case, walk: StabilityWalk, places: list[Mu]):
     """Cells at places with a small model of theirs; None where the steady state does not stay the same."""
     if not is_surrounding(case, case.cycle.axis.parameter):
         return None
@@ -61,13 +61,13 @@ def _column(case: Case, walk: StabilityWalk, places: list[Place]):
     return None if column.cell is None or column.eigenvalues is None else column
 
 
-def _scan_of(column, axis, place: Callable[[float], Place]) -> Scan:
+def _scan_of(column, axis, place: Callable[[float], Mu]) -> Scan:
     """Cells of a column, and inside a bracket what its small model says."""
 
     def leading(value: float) -> np.ndarray:
-        return np.asarray(column.cell(place(value).condition).leading[0])
+        return np.asarray(column.cell(condition_of(place(value))).leading[0])
 
-    return Scan(leading, axis.log, inside=lambda value: np.asarray(column.eigenvalues(place(value).condition)))
+    return Scan(leading, axis.log, inside=lambda value: np.asarray(column.eigenvalues(condition_of(place(value)))))
 
 
 def _located(scan: Scan, crossing: Crossing) -> tuple[float, complex]:
@@ -78,7 +78,7 @@ def _located(scan: Scan, crossing: Crossing) -> tuple[float, complex]:
 
 def _corrected(column, place, spectrum, crossing: Crossing, value: float, expected: complex) -> tuple[float, complex]:
     """An onset of a small model where the full matrices have it; searched for by these where corrections fail."""
-    correct = OnsetCorrection(column, lambda other: place(other).condition, spectrum)
+    correct = OnsetCorrection(column, lambda other: condition_of(place(other)), spectrum)
     found, frequency, left = correct(value, abs(expected.imag) / (2 * np.pi))
     if np.isfinite(left):
         return found, 2j * np.pi * frequency

@@ -1,4 +1,4 @@
-"""How a branch of cycles is followed and kept."""
+"""Run of the cycle study: follows a branch of cycles and keeps it in a record."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import CyclePoint, SpecialCycle
 
+from ...case.parameters import Mu
 from ...errors import CaseError, SolveError
 from ...motion.periodic import check_periodic
 from ...record.record import GrowingRecord
@@ -18,7 +19,7 @@ from ..case import Case
 from ..orbits.follower import Follower
 from ..orbits.onset import MODES
 from ..session import Session
-from ..stability.place import Place, check_scan
+from ..stability.place import check_scan
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..study import Study
@@ -68,7 +69,7 @@ def run(session: Session, record: GrowingRecord) -> None:
         _from_onset(case, walk, record)
     record.progress("verdict on the steady state")
     try:
-        verdict = walk.verdict(Place.of(case))
+        verdict = walk.verdict(Mu.of(case))
     except SolveError as error:
         verdict = Verdict.undecided(str(error))
     record.note(VERDICT, **verdict.summary())
@@ -81,7 +82,7 @@ def _from_onset(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
         record.note("onset", value=onset.value, frequency=onset.eigenvalue.imag / (2 * np.pi))
     follower = Follower(case, walk, onset.place, axis.parameter, onset.spectrum)
     keeper = _Keeper(record, follower)
-    known = read_points(record, onset.place.mu(), follower.name)
+    known = read_points(record, onset.place.for_system(), follower.name)
     if len(known) < 2:
         record.progress(f"first cycles, beside {axis.parameter} = {onset.value:.6g}")
         keeper.known = len(known)
@@ -106,7 +107,7 @@ def _from_file(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
         if leg in ended or given.value == end:
             continue
         keeper = _Keeper(record, follower, leg)
-        known = read_points(record, given.place.mu(), follower.name, leg)
+        known = read_points(record, given.place.for_system(), follower.name, leg)
         if not known:
             cycle = follower.near(given.motion, given.value)
             tracer = follower.tracer(axis.values, cycle.motion)

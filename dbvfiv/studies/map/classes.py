@@ -34,7 +34,7 @@ def look_at_classes(case: Case, record: GrowingRecord, walk: StabilityWalk) -> N
 
 
 def note_of_class(found: FoundMap, name: str) -> dict[str, Any]:
-    """What a record keeps of a class: tables (y, x)."""
+    """Note that a record keeps of a symmetry class: its grids as tables (y, x)."""
     grids = {grid: found.grid(grid)[0].tolist() for grid in _GRIDS}
     return {"symmetry": name, "motion": symmetry_named(name).words} | grids
 

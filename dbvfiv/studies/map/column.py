@@ -14,11 +14,12 @@ from eigen import Column
 from eigen.column import MISSING
 
 from ...case.axis import Axis
+from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
 from ..case import Case
 from ..stability.correction import OnsetCorrection
 from ..stability.crossings import Sample, Scan, locate
-from ..stability.place import Place, is_surrounding
+from ..stability.place import condition_of, is_surrounding, point_under
 from ..stability.verdict import NOT_VALID, OUTCOMES, UNDECIDED, Verdict, describe_counts
 from ..stability.walk import StabilityWalk
 
@@ -50,13 +51,13 @@ class ColumnTask(NamedTuple):
 
     @property
     def key(self) -> tuple[float, int]:
-        """What tells it from other columns."""
+        """Key that identifies the column among the others."""
         return self.value, self.level
 
 
 @dataclass(frozen=True)
 class MapPlan:
-    """Which cells a map has, and in which order they are found.
+    """Plan of a map: its cells, and the order in which they are computed.
 
     Attributes
     ----------
@@ -65,7 +66,7 @@ class MapPlan:
     laws : tuple of float
         Blends of the continuity laws, one picture each.
     refine : int
-        How often columns are halved where the number of onsets changes.
+        Number of times that columns are halved where the number of onsets changes.
     """
 
     case: Case
@@ -78,13 +79,13 @@ class MapPlan:
     def of(cls, case: Case) -> MapPlan:
         """The map of a case file."""
         x, y = case.map.axes
-        storage = Place.of(case).storage
+        storage = Mu.of(case).storage
         both = case.map.continuity == "both" and "storage" not in (x.parameter, y.parameter)
         return cls(case, x, y, (0.0, 1.0) if both else (storage,), case.map.refine)
 
     @property
     def transposed(self) -> bool:
-        """Whether columns run along x: where only y changes the steady state."""
+        """True where columns run along x, since y alone changes the steady state."""
         return is_surrounding(self.case, self.x.parameter) and not is_surrounding(self.case, self.y.parameter)
 
     @property
@@ -98,10 +99,10 @@ class MapPlan:
         return self.x if self.transposed else self.y
 
     @cached_property
-    def base(self) -> Place:
-        return Place.of(self.case)
+    def base(self) -> Mu:
+        return Mu.of(self.case)
 
-    def place(self, across: float, along: float, law: float) -> Place:
+    def place(self, across: float, along: float, law: float) -> Mu:
         """Parameters of a cell."""
         named = {self.across.parameter: across, self.along.parameter: along}
         return self.base.at(**({"storage": law} | named))
@@ -174,7 +175,7 @@ class MapColumn:
         return cls(task.value, task.level, cells, np.zeros((0, 5)), np.nan, sentence, seconds)
 
     def has(self, law: int) -> bool:
-        """Whether it was solved under a continuity law."""
+        """True where the column was solved under a continuity law, given by its number."""
         how = self.cells.get("how")
         return not self.failure and (how is None or bool((how[law] != MISSING).any()))
 
@@ -251,12 +252,12 @@ def _law(
         return _state_by_state(plan, walk.apart(), places)
     column = walk.column(places, edges=edges)
     verdicts = walk.verdicts(places, column)
-    sample = column.eigenvalues or (lambda condition: walk.column([places[0].under(condition)]).leading[0])
-    cell = column.cell or (lambda condition: walk.column([places[0].under(condition)]))
+    sample = column.eigenvalues or (lambda condition: walk.column([point_under(places[0], condition)]).leading[0])
+    cell = column.cell or (lambda condition: walk.column([point_under(places[0], condition)]))
     scan = Scan(
-        lambda other: sample(plan.place(value, other, law).condition),
+        lambda other: sample(condition_of(plan.place(value, other, law))),
         along.log,
-        lambda other: bool(cell(plan.place(value, other, law).condition).certified[0]),
+        lambda other: bool(cell(condition_of(plan.place(value, other, law))).certified[0]),
     )
     # what the cells know need not be found again
     _enter_known(scan, along, column)
@@ -266,7 +267,7 @@ def _law(
 
     correct = OnsetCorrection(
         column,
-        lambda other: plan.place(value, other, law).condition,
+        lambda other: condition_of(plan.place(value, other, law)),
         lambda other: walk.spectrum(plan.place(value, other, law)).eigenvalues,
     )
     onsets = []
@@ -276,8 +277,8 @@ def _law(
     return column, verdicts, onsets
 
 
-def shared_place(plan: MapPlan, value: float) -> Place | None:
-    """Where the steady state of a column lies; None if its cells have states of their own."""
+def shared_place(plan: MapPlan, value: float) -> Mu | None:
+    """Parameter point whose steady state all cells of a column share; None if cells have states of their own."""
     if not is_surrounding(plan.case, plan.along.parameter):
         return None
     return plan.place(value, plan.along.values[0], plan.laws[0])
@@ -294,7 +295,7 @@ def _enter_known(scan: Scan, along: Axis, column: Column) -> None:
             scan.samples[value] = Sample(value, row, bool(certified) if counted >= 0 else None)
 
 
-def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):
+def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Mu]):
     """Both axes change the steady state: every cell has its own, solved directly, whatever columns came before."""
     parts = [_cell_or_blank(walk, place) for place in places]
     column = Column.joined(parts)
@@ -309,7 +310,7 @@ def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Place]):
     return column, verdicts, _onsets(scan, plan.along, LOCATED)
 
 
-def _cell_or_blank(walk: StabilityWalk, place: Place) -> Column:
+def _cell_or_blank(walk: StabilityWalk, place: Mu) -> Column:
     """Column of one place; blank where the constants of the rubber do not hold."""
     try:
         return walk.column([place])

@@ -104,7 +104,7 @@ def cycles_along(case: Case, plan: MapPlan, column: MapColumn, law: int, walk: S
 
 
 def _is_covered(plan: MapPlan, found: CycleCells, along: float, direction: float) -> bool:
-    """Whether a branch has been through the cell next to an onset, on its unstable side."""
+    """True where a branch of cycles has passed the cell next to an onset, on its unstable side."""
     values = np.asarray(plan.along.values)
     beyond = np.flatnonzero(values > along) if direction > 0 else np.flatnonzero(values < along)[::-1]
     return bool(len(beyond)) and not np.isnan(found.amplitude[beyond[0]])
@@ -173,7 +173,7 @@ def summary_of(record: Record, plan: MapPlan, law: int) -> dict[str, Any]:
 
 
 def sentences(record: Record, plan: MapPlan, law: int) -> list[str]:
-    """Which cells have a cycle, and why unstable ones have none."""
+    """Sentences on the cells with a limit cycle, and on the reasons why unstable cells have none."""
     amplitude, growing = (cycle_grid(record, plan, name)[law] for name in ("amplitude", "growing"))
     there = ~np.isnan(amplitude)
     said = [f"  limit cycles in {int(there.sum())} cells, {int((there & (growing > 0)).sum())} of them unstable"]

@@ -72,7 +72,7 @@ class ColumnPool:
 
     @property
     def is_here(self) -> bool:
-        """Whether this process does all the work itself."""
+        """True where this process does all the work itself."""
         return self.workers <= 1 and mpi_size() == 1
 
     def columns(self, wanted: Iterable[ColumnTask]) -> Iterator[MapColumn]:

@@ -1,4 +1,4 @@
-"""How columns, curves and checks of a map are kept in a record, and read again."""
+"""Storage of a map's columns, curves and checks in a record, and their restart."""
 
 from __future__ import annotations
 

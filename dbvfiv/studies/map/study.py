@@ -1,4 +1,4 @@
-"""How a stability map is found and kept."""
+"""Run of the map study: finds a stability map and keeps it in a record."""
 
 from __future__ import annotations
 

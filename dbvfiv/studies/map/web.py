@@ -92,7 +92,7 @@ class Web:
 
     @classmethod
     def of(cls, plan: MapPlan, columns, law: int) -> Web:
-        """Of all columns of a map under a law."""
+        """Web of neutral curves through all columns of a map under a continuity law."""
         ordered = sorted(columns, key=lambda column: column.value)
         usable = [column for column in ordered if column.has(law)]
         web = cls(
@@ -161,7 +161,10 @@ class Web:
     # ----
 
     def is_known(self, i: int, k: int, side: int) -> bool:
-        """Whether the curve beside an onset is: linked to one nearby, at an edge, in a tip, at a side of the map."""
+        """True where the neutral curve beside an onset is known.
+
+        It is linked to an onset nearby, ends at an edge or in a fold (tip), or meets a side of the map.
+        """
         if not 0 <= i + side < len(self.columns):
             return True
         other = self.links(side)[i].get(k)
@@ -215,7 +218,7 @@ class Web:
         return self.place[i] + side * width * (max(share, 0.04) if share < 0.97 else 0.5)
 
     def _towards_tip(self, tip: Tip) -> float | None:
-        """How far to go until the branches are close, by the square of their distance."""
+        """Distance to the fold where two branches are close, extrapolated from the square of their distance."""
         back = self.links(-tip.side)[tip.column]
         if tip.first not in back or tip.second not in back:
             return None
@@ -227,7 +230,7 @@ class Web:
         return ahead * (1.0 - (0.4 * TIP) ** 2 / now)
 
     def _towards_edge(self, i: int, side: int, k: int) -> float | None:
-        """How far to go until a straight curve is close to the edge."""
+        """Distance at which a straight curve is close to the edge."""
         back = self.links(-side)[i].get(k)
         if back is None:
             return None
@@ -238,8 +241,9 @@ class Web:
         return abs(self.place[i] - self.place[i - side]) * (left - 0.4 * EDGE) / abs(run)
 
     def _is_hidden(self, i: int) -> bool:
-        """Whether the modes at the lower edge change between two columns otherwise than the ends of curves there
-        say.
+        """True where curves between two columns must have been missed.
+
+        The number of unstable modes at the lower edge then changes otherwise than the ends of curves there explain.
         """
         cells = [self.columns[j].cells for j in (i, i + 1)]
         if any(not table or table["unstable"][self.law, 0] < 0 for table in cells):

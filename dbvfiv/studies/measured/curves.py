@@ -49,7 +49,7 @@ class MeasuredCurve:
 
     @property
     def off(self) -> tuple[str, dict[str, float]]:
-        """What a table of several runs says: its title, and a number for each point."""
+        """Deviations for a table of several runs: its title, and the deviation, %, at each measured point."""
         unit, factor = self.unit
         points = enumerate(zip(self.pressure, factor * self.measured), 1)
         names = [f"{number}: {p / 1e3:.6g} kPa, {value:.5g} {unit}" for number, (p, value) in points]
@@ -62,7 +62,7 @@ class MeasuredCurve:
         return plain_rows(names, rows)
 
     def sentence(self) -> str:
-        """For people."""
+        """Sentence on the deviation of the computed from the measured points."""
         known = self.difference[np.isfinite(self.difference)]
         begin = f"Measured: {len(self.pressure)} point{'s' * (len(self.pressure) > 1)} of {self.what}"
         if not len(known):
@@ -102,12 +102,12 @@ class MeasuredTaps:
 
     @property
     def share(self) -> np.ndarray:
-        """The same over the pressure that drives the flow."""
+        """Computed less measured pressure over the pressure that drives the flow; NaN where that is not positive."""
         return self.excess / np.where(self.pressure > 0, self.pressure, np.nan)
 
     @property
     def off(self) -> tuple[str, dict[str, float]]:
-        """What a table of several runs says: its title, and a number for each point."""
+        """Deviations for a table of several runs: its title, and the deviation, kPa, at each measured point."""
         places = enumerate(zip(self.pressure / 1e3, 1e3 * self.z, self.measured / 1e3), 1)
         names = [f"{number}: {p:.6g} kPa, z = {z:.4g} mm, {tap:.5g} kPa" for number, (p, z, tap) in places]
         return "Pressure along the axis, computed less measured, kPa", dict(zip(names, self.excess / 1e3))
@@ -118,7 +118,7 @@ class MeasuredTaps:
         return plain_rows(("pressure", "z", "tap", "computed_tap", "difference"), rows)
 
     def sentence(self) -> str:
-        """For people."""
+        """Sentence on the deviation of the computed from the measured pressures along the axis."""
         known = np.isfinite(self.share)
         begin = f"Measured: {len(self.z)} pressure{'s' * (len(self.z) > 1)} along the axis"
         if not known.any():

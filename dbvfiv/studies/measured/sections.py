@@ -98,7 +98,7 @@ def distances(points: np.ndarray, curve: np.ndarray, part: Part = QUARTER) -> np
 
 
 def _inside(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
-    """Whether points (k, 2) lie in a polygon (c, 2): its edges cross a ray from there an odd number of times."""
+    """Mask of points (k, 2) inside a polygon (c, 2): its edges cross a ray from there an odd number of times."""
     (x, y), a, b = points.T[:, :, None], polygon, np.roll(polygon, -1, axis=0)
     crosses = (a[:, 1] > y) != (b[:, 1] > y)
     rise = np.where(b[:, 1] != a[:, 1], b[:, 1] - a[:, 1], 1.0)
@@ -138,7 +138,7 @@ class MeasuredSection:
 
     @property
     def title(self) -> str:
-        """Which it is, for people."""
+        """Title of the section: pressure, axial position and face."""
         place = "lip" if self.z is None else f"z = {1e3 * self.z:.4g} mm"
         return f"{kilopascals(self.pressure)}, {place}, {self.face}"
 
@@ -183,7 +183,7 @@ class MeasuredShapes:
 
     @property
     def off(self) -> tuple[str, dict[str, float]]:
-        """What a table of several runs says: its title, and a number for each section."""
+        """Deviations for a table of several runs: its title, and the root mean square, mm, of each section."""
         square = [float(np.sqrt(np.mean(section.distance**2))) for section in self.sections]
         names = [
             f"{number}: {section.title}, {len(section.points)} point{'s' * (len(section.points) > 1)}"
@@ -196,7 +196,7 @@ class MeasuredShapes:
         return [section.summary() for section in self.sections]
 
     def sentence(self) -> str:
-        """For people."""
+        """Sentence on the deviation of the computed from the measured sections."""
         known = 1e3 * self.distance[np.isfinite(self.distance)]
         count, sections = len(self.distance), len(self.sections)
         begin = f"Measured: {count} point{'s' * (count > 1)} of the wall in {sections} section{'s' * (sections > 1)}"

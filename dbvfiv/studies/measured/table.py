@@ -1,4 +1,4 @@
-"""What several runs are off by from the same measured data, beside each other."""
+"""Table of the deviations of several runs from the same measured data."""
 
 from __future__ import annotations
 

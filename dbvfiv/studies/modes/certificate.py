@@ -36,7 +36,7 @@ CURVE = (
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """What two routes say about the number of unstable eigenvalues.
+    """Eigenvalue count by two routes: the list of modes, and the argument principle.
 
     Attributes
     ----------
@@ -46,15 +46,15 @@ class Certificate:
     unstable_count, unstable_count_independent : int
         From the list of modes, and from the winding of the determinant; both eigenvalues of a conjugate pair count.
     statement : str
-        The same in a sentence.
+        The count and its certainty in a sentence.
     certain : bool
-        Whether the phase of the determinant could be followed everywhere.
+        True where the phase of the determinant could be followed everywhere.
     line : float, 1/s
-        Growth rate above which is counted: 0 but for undamped structures.
+        Growth rate above which eigenvalues are counted: 0 but for undamped structures.
     counted_up_to : float, Hz
         Frequency at which the independent count ends; infinite but for searches in a band.
     distance : float
-        Of the winding from a whole number.
+        Distance of the winding from a whole number.
     response_error : float
         Error of log det made by the reduced basis behind the count; NaN if no basis was used.
     status : str
@@ -66,7 +66,7 @@ class Certificate:
     rejected : int
         Pairs thrown away because of their residual.
     frequency, phase : (k,) Hz, rad
-        The phase of the determinant on the line.
+        Phase of the determinant on the line.
     """
 
     stable: bool | None
@@ -124,8 +124,9 @@ class Certificate:
 
     @classmethod
     def joined(cls, parts: Mapping[str, Certificate]) -> Certificate:
-        """Of several classes of motion by their names: counts add up, and what holds for all of them holds. The
-        curve is that of the first.
+        """Join the certificates of several symmetry classes, given by their names.
+
+        Counts add up, and what holds for all of them holds. The curve is that of the first.
         """
         each = list(parts.values())
         if len(each) == 1:

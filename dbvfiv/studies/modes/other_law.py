@@ -20,7 +20,7 @@ _NUMBERS = ("growth_rate", "angular_frequency", "residual")
 
 @dataclass(frozen=True, eq=False)
 class OtherLaw:
-    """What the other continuity law says.
+    """Modes and verdict under the other continuity law.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class OtherLaw:
         Without its curve.
     verdict : Verdict
     outside : str
-        What is outside the wall, in words.
+        Fluid outside the wall, in words.
     """
 
     continuity: str
@@ -63,7 +63,7 @@ class OtherLaw:
 
 
 def note_of(found: FoundModes, continuity: str) -> dict[str, Any]:
-    """What a record keeps of modes under the other law."""
+    """Note that a record keeps of the modes under the other continuity law."""
     modes = [{name: row[name] for name in _NUMBERS} for row in rows_of(found)]
     certificate = Certificate.of(found).note()
     return {"continuity": continuity, "modes": modes, "certificate": certificate, "verdict": found.verdict.summary()}

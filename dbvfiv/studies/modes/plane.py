@@ -88,7 +88,7 @@ def conditions(result: ModesResult) -> str:
 
 
 def in_vacuo(result: ModesResult) -> bool:
-    """Whether the fluid was left out of the modes."""
+    """True where the modes are those in vacuo, without the fluid."""
     return result.case.modes.in_vacuo or result.case.drive.kind != "flow"
 
 

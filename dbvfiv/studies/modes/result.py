@@ -96,7 +96,7 @@ class ModesResult(StudyResult):
 
     @cached_property
     def certificate(self) -> Certificate | None:
-        """Of all classes searched; None if the run ended before it had one."""
+        """Certificate of all classes searched; None if the run ended before it had one."""
         return Certificate.joined(self.certificates) if self.certificates else None
 
     @property
@@ -115,7 +115,7 @@ class ModesResult(StudyResult):
         return Verdict.joined({name: self._verdict(note) for name, note in notes.items()})
 
     def _verdict(self, note: dict[str, Any]) -> Verdict:
-        """That of one class; of files of earlier versions from what they hold."""
+        """Verdict on one class; for files of earlier versions from the data that they hold."""
         if "verdict" in note:
             return Verdict.read(note["verdict"])
         values = [complex(m.growth_rate, m.angular_frequency) for m in self.modes]
@@ -133,13 +133,13 @@ class ModesResult(StudyResult):
 
     @property
     def law(self) -> str:
-        """What a verdict stands under: the continuity law, and what is outside; in vacuo the latter alone."""
+        """Conditions of a verdict, in words: continuity law and fluid outside; in vacuo the latter alone."""
         case = self.case
         return case.outside.words if case.modes.in_vacuo or not case.continuity else f"under {case.continuity}"
 
     @cached_property
     def other_law(self) -> other_law.OtherLaw | None:
-        """The same state under the other continuity law, where that was asked for."""
+        """Modes of the same state under the other continuity law; None where that was not asked for."""
         notes = self.record.notes(other_law.NOTE)
         return other_law.read(notes[-1], self.case.outside.words) if notes else None
 

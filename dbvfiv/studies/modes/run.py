@@ -17,10 +17,10 @@ from eigen import (
     certified_spectrum,
 )
 
+from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError
 from ...model import ValveModel
 from ...model.classes import linearise_class
-from ...model.dynamics import Conditions
 from ...model.equilibria import require_equilibrium
 from ...model.material_stability import material_stability
 from ...model.state import SteadyState
@@ -74,7 +74,7 @@ class FoundModes:
     ----------
     model : ValveModel
     state : SteadyState
-    conditions : Conditions
+    mu : Mu
     in_vacuo : bool
     certified : CertifiedSpectrum
         Eigenvalues, vectors, residuals and both counts of the unstable ones.
@@ -96,7 +96,7 @@ class FoundModes:
 
     model: ValveModel
     state: SteadyState
-    conditions: Conditions
+    mu: Mu
     in_vacuo: bool
     certified: CertifiedSpectrum
     claimed: float
@@ -137,17 +137,16 @@ class FoundModes:
 
     @property
     def stable(self) -> bool | None:
-        """Whether all modes decay; None where that is not known."""
+        """True where all modes decay; None where that is not known."""
         return self.verdict.stable
 
 
 def run_modes(
     model: ValveModel,
     state: SteadyState,
-    conditions: Conditions | None = None,
+    mu: Mu | None = None,
     options: ModesOptions | None = None,
     observer: Observer | None = None,
-    storage: float | None = None,
     symmetry: Symmetry = SYMMETRIES[EQUILIBRIA],
 ) -> FoundModes:
     """Leading modes of a steady state in one class of motion.
@@ -157,12 +156,10 @@ def run_modes(
     model : ValveModel
     state : SteadyState
         An equilibrium of the model.
-    conditions : Conditions, optional
-        Fluid density and Rayleigh damping; those of the case otherwise.
+    mu : Mu, optional
+        Parameter point; that of the case by default.
     options : ModesOptions, optional
     observer : Observer, optional
-    storage : float, optional
-        Blend of the continuity laws in place of the model's own.
     symmetry : Symmetry, optional
         The class; that of the equilibria by default.
 
@@ -175,7 +172,7 @@ def run_modes(
     SolveError
         If the state is no equilibrium, or no shift was found at which the pencil can be factored.
     """
-    conditions = Conditions.of(model.case) if conditions is None else conditions
+    mu = Mu.of(model.case) if mu is None else mu
     options = ModesOptions.of(model.case) if options is None else options
     observer = Observer() if observer is None else observer
     require_equilibrium(model, state)
@@ -186,18 +183,18 @@ def run_modes(
             "of an ideal fluid is undetermined; "
             "modes.in_vacuo gives those of the structure at rest."
         )
-    if conditions.loss_factor:
-        rubber = material_stability(model, state.q, state.pressure, conditions.loss_factor)
+    if mu.loss_factor:
+        rubber = material_stability(model, state.q, state.pressure, mu.loss_factor)
         if not rubber.holds:
             raise NotValidError(rubber.sentence)
     observer.begin("modes", 1)
     observer.progress("linearising")
     linear = linearise_class(model, state.q, state.pressure, symmetry)
-    pencil = linear.pencil(conditions, not without_fluid, storage)
+    pencil = linear.pencil(mu, not without_fluid)
     observer.progress("searching")
     with solving(state.pressure):
         family = ValveFamily(linear, options.search.max_frequency, options.count)
-        search = family.leading_under(conditions, without_fluid)
+        search = family.leading_under(mu, without_fluid)
         asked = replace(search.options, shifts=options.search.shifts, tolerance=options.search.tolerance)
         basis = TransferBasis(pencil, modes=max(_BASIS, options.count))
         certified = certified_spectrum(pencil, options.count, asked, basis=basis)
@@ -206,8 +203,8 @@ def run_modes(
     notes = (*notes, *certified.spectrum.notes)
     if symmetry.of_equilibria and not (model.mesh.part.is_quarter or without_fluid):
         notes = (*notes, _NO_PLUG)
-    reach = search.claimed, family.is_searched(certified.spectrum.eigenvalues, conditions, search.band)
-    result = _described(model, state, conditions, without_fluid, certified, reach, pencil, linear, notes, symmetry)
+    reach = search.claimed, family.is_searched(certified.spectrum.eigenvalues, mu, search.band)
+    result = _described(model, state, mu, without_fluid, certified, reach, pencil, linear, notes, symmetry)
     observer.item(result)
     if result.stable is None:
         observer.warn(result.verdict.reason)
@@ -216,7 +213,7 @@ def run_modes(
 
 
 def _described(
-    model, state, conditions, in_vacuo, certified: CertifiedSpectrum, reach, pencil, linear, notes, symmetry
+    model, state, mu, in_vacuo, certified: CertifiedSpectrum, reach, pencil, linear, notes, symmetry
 ) -> FoundModes:
     """Shapes, areas and pressures of the eigenvectors, scaled to a largest displacement of 1."""
     spectrum = certified.spectrum
@@ -231,7 +228,7 @@ def _described(
     return FoundModes(
         model,
         state,
-        conditions,
+        mu,
         in_vacuo,
         certified,
         *reach,

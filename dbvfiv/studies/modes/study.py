@@ -1,4 +1,4 @@
-"""How leading modes of a steady state are found and kept."""
+"""Run of the modes study: finds leading modes of a steady state and keeps them in a record."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, Symmetry, asks_for_equilibria, chosen_symmetries
@@ -15,7 +16,6 @@ from ..case import Case
 from ..session import Session
 from ..stability.laws import STORAGE, other_law, require_two_laws
 from ..stability.margin import critical_damping_factor
-from ..stability.place import Place
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..study import Study
@@ -52,9 +52,8 @@ def run(session: Session, record: GrowingRecord) -> None:
         return
     if further:
         law = other_law(case)
-        found = run_modes(
-            session.model, state, options=ModesOptions.of(case), observer=record, storage=float(law == STORAGE)
-        )
+        mu = Mu.of(session.model.case).at(storage=float(law == STORAGE))
+        found = run_modes(session.model, state, mu, options=ModesOptions.of(case), observer=record)
         record.note(NOTE, **note_of(found, law))
 
 
@@ -108,7 +107,7 @@ def _keep(session: Session, record: GrowingRecord, state: SteadyState, symmetry:
 
 def _critical_factor(session: Session, state: SteadyState, verdict: Verdict) -> float:
     """Factor on the damping of the wall at which flutter begins; NaN where the search for it fails."""
-    place = Place.of(session.case)
+    place = Mu.of(session.case)
     walk = StabilityWalk(session.case, model=session.model)
     walk.give(place, state.q)
     try:

@@ -1,1 +1,1 @@
-"""Where a valve loses or regains stability along one parameter."""
+"""Onset study: loss and regain of stability along one parameter."""

@@ -14,7 +14,7 @@ from .run import FoundOnsets
 
 
 def note_of_class(found: FoundOnsets) -> dict[str, Any]:
-    """What a record keeps of the onsets of a class."""
+    """Note that a record keeps of the onsets of a symmetry class."""
     said = note_of(found)
     del said["continuity"]
     name = found.options.symmetry

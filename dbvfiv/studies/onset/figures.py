@@ -118,7 +118,7 @@ def _floor(growth: np.ndarray) -> float:
 
 
 def _jumps(frequency: np.ndarray) -> np.ndarray:
-    """Where another mode has taken the lead."""
+    """Mask of values where another mode has become the leading one."""
     step = np.abs(np.diff(frequency, prepend=frequency[:1]))
     return step > 0.25 * np.maximum(frequency, 1.0)
 

@@ -15,12 +15,12 @@ BESIDE = 1e-7
 def known_intervals(
     values: np.ndarray, growth: np.ndarray, certified: np.ndarray, edges: Iterable[float], unstable: bool
 ) -> list[Interval]:
-    """Where a state is known to be unstable, or stable.
+    """Intervals in which a state is known to be unstable, or stable.
 
     Parameters
     ----------
     values : (s,) array
-        Of the scan, ascending.
+        Values of the scan, ascending.
     growth : (s,) array, 1/s
         Growth rate of the leading mode there.
     certified : (s,) bool array
@@ -28,7 +28,7 @@ def known_intervals(
     edges : iterable of float
         Onsets at which the state changes between stable and unstable.
     unstable : bool
-        Which of the two is asked for.
+        True for the unstable intervals, False for the stable ones.
     """
     edges, found = sorted(edges), []
     # right at an onset the sign of the growth rate is that of rounding
@@ -47,7 +47,7 @@ def known_intervals(
 
 
 def uncertain_intervals(values: np.ndarray, certified: np.ndarray) -> list[Interval]:
-    """Where nothing is claimed, because a neighbour lacks a certificate."""
+    """Intervals in which nothing is claimed, because a neighbour in the scan lacks a certificate."""
     found: list[Interval] = []
     for i in range(len(values) - 1):
         if not (certified[i] and certified[i + 1]):

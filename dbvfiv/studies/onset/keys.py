@@ -14,7 +14,7 @@ from ...case.stability_axis import StabilityRange, parse_stability_axis
 
 
 class Keys(Section):
-    """Where a state loses stability."""
+    """Onset of instability along one parameter."""
 
     over: StabilityRange = key(
         "density",

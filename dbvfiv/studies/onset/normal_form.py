@@ -9,12 +9,12 @@ import numpy as np
 from continuation import ContinuationError
 from continuation.normal_form import hopf_normal_form, hopf_normal_form_of
 
-from ...case.parameters import PARAMETERS
+from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...errors import SolveError
 from ...model.memory_forms import ValveMemoryForms
 from ...model.system import ValveSystem
 from ..case import Case
-from ..stability.place import Place, rebuilder
+from ..stability.place import rebuilder
 from ..stability.walk import StabilityWalk
 from .point import OnsetPoint
 
@@ -34,13 +34,13 @@ def described(point: OnsetPoint, case: Case, walk: StabilityWalk, mode) -> Onset
     return replace(point, criticality=form.criticality, first_lyapunov_coefficient=form.l1, crossing_speed=speed)
 
 
-def system_of(case: Case, walk: StabilityWalk, place: Place) -> ValveSystem:
+def system_of(case: Case, walk: StabilityWalk, place: Mu) -> ValveSystem:
     """The valve as a System of `continuation` at a place."""
-    model = walk.built(replace(place, design={})).model
+    model = walk.built(place.only(*(name for name in place if name not in DESIGN))).model
     return ValveSystem(model, rebuilder(case), walk.search(place).options)
 
 
-def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: str | None = None):
+def normal_form(case: Case, walk: StabilityWalk, place: Mu, mode, parameter: str | None = None):
     """Hopf normal form at a located onset, a `continuation.HopfNormalForm`.
 
     Raises
@@ -48,7 +48,7 @@ def normal_form(case: Case, walk: StabilityWalk, place: Place, mode, parameter: 
     ContinuationError
         If the eigenvalue is not simple.
     """
-    mu = place.mu()
+    mu = place.for_system()
     omega = abs(complex(mode.eigenvalue).imag)
     follows = parameter and not (parameter == "density" and case.gravity.is_there)  # whose levels it would leave out
     name = PARAMETERS[parameter].system_name or None if follows else None

@@ -15,7 +15,7 @@ _SLIVER = 1e-6
 
 
 def note_of(found: FoundOnsets) -> dict[str, Any]:
-    """What a record keeps of onsets under the other law."""
+    """Note that a record keeps of the onsets under the other continuity law."""
     return {
         "continuity": found.case.fluid.continuity,
         "points": [point.summary() for point in found.points],

@@ -1,4 +1,4 @@
-"""What a run over one parameter finds: samples of its scan, and crossings of the imaginary axis."""
+"""Samples of a scan over one parameter, and its crossings of the imaginary axis."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ...case.parameters import Mu
 from ..case import Case
-from ..stability.place import Place
 from ..stability.verdict import Verdict
 
 #: Meshes of a run: that of the case, and the coarser one for the uncertainty.
@@ -45,13 +45,13 @@ class OnsetSample:
 
 @dataclass(frozen=True)
 class Side:
-    """What the full pencil says a little beside an onset.
+    """Stability at a parameter value a little beside an onset, by the full model.
 
     Attributes
     ----------
     value : float
     growth_rate, frequency : float, 1/s, Hz
-        Of the crossing mode.
+        Growth rate and frequency of the crossing mode.
     leading : float, 1/s
         Growth rate of the leading mode.
     unstable, counted : int
@@ -67,7 +67,7 @@ class Side:
 
     @property
     def eigenvalue(self) -> complex:
-        """Of the crossing mode, 1/s."""
+        """Eigenvalue of the crossing mode, 1/s."""
         return complex(self.growth_rate, 2 * np.pi * self.frequency)
 
     def summary(self) -> dict:
@@ -109,7 +109,7 @@ class OnsetPoint:
         Direct eigenvalues on both sides.
     confirmed : bool
         Both sides agree with the crossing, and both counts agree on each side.
-    place : Place
+    place : Mu
     bracket : (2,) tuple of float
         Neighbouring values of the scan that it lies between.
     ahead : int
@@ -136,7 +136,7 @@ class OnsetPoint:
     below: Side
     above: Side
     confirmed: bool
-    place: Place
+    place: Mu
     bracket: tuple[float, float]
     ahead: int = 0
     criticality: str | None = None
@@ -153,7 +153,7 @@ class OnsetPoint:
 
     @property
     def key(self) -> tuple[float, float, int]:
-        """What tells it from other crossings of the same scan."""
+        """Key that identifies the crossing among those of the same scan."""
         return (*self.bracket, self.ahead)
 
     def summary(self) -> dict:
@@ -190,6 +190,6 @@ class OnsetPoint:
                 "above": Side.of(summary["above"]),
                 "bracket": tuple(summary["bracket"]),
                 "note": summary["note"] or "",
-                "place": Place.of(case).at(**{summary["parameter"]: summary["value"]}),
+                "place": Mu.of(case).at(**{summary["parameter"]: summary["value"]}),
             }
         )

@@ -57,7 +57,7 @@ class OnsetResult(StudyResult):
 
     @cached_property
     def _own_points(self) -> list[dict[str, Any]]:
-        """Those within the symmetry of the model."""
+        """Onsets within the symmetry of the model."""
         return read_points(self.record)
 
     @cached_property
@@ -109,19 +109,22 @@ class OnsetResult(StudyResult):
 
     @property
     def unstable_intervals(self) -> list[Interval]:
-        """Where the state is known to be unstable within the range scanned."""
+        """Intervals of the scanned range in which the state is known to be unstable."""
         parts = [self._own_intervals(True), *(part["unstable"] for part in self.classes)]
         return joined_stretches(parts) if self.classes else parts[0]
 
     @property
     def stable_intervals(self) -> list[Interval]:
-        """Where it is known to be stable, in all classes that were asked for."""
+        """Intervals of the scanned range in which the state is known to be stable.
+
+        It is stable there in all symmetry classes that were asked for.
+        """
         parts = [self._own_intervals(False), *(part["stable"] for part in self.classes)]
         return common_stretches(parts) if self.classes else parts[0]
 
     @property
     def uncertain_intervals(self) -> list[Interval]:
-        """Where neither is claimed."""
+        """Intervals of the scanned range in which neither stability nor instability is claimed."""
         own = uncertain_intervals(self.values, self.certified)
         parts = [own, *(part["uncertain"] for part in self.classes)]
         return joined_stretches(parts) if self.classes else own

@@ -1,4 +1,4 @@
-"""How samples and points of an onset run are kept in a record, and read again to go on."""
+"""Storage of an onset run's samples and points in a record, and their restart."""
 
 from __future__ import annotations
 
@@ -78,14 +78,14 @@ def _earlier(eigenvalues: np.ndarray, certified: bool) -> Verdict:
 
 
 def read_points(record: Record) -> list[dict[str, Any]]:
-    """What is known last about each point, in ascending order of the parameter."""
+    """Latest note on each onset point, in ascending order of the parameter."""
     latest = {(*note["bracket"], note["ahead"]): note for note in record.notes(_POINT)}
     points = [{name: value for name, value in note.items() if name != "what"} for note in latest.values()]
     return sorted(points, key=lambda point: point["value"])
 
 
 def known_items(record: Record, case: Case) -> list[OnsetSample | OnsetPoint]:
-    """What an interrupted run had found, for `run_onset`."""
+    """Samples and points that an interrupted run had found, for `run_onset`."""
     return [*read_samples(record), *(OnsetPoint.of(point, case) for point in read_points(record))]
 
 

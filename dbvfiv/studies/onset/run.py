@@ -1,4 +1,4 @@
-"""Where a valve loses or regains stability along one parameter."""
+"""Search for the onsets at which a valve loses or regains stability along one parameter."""
 
 from __future__ import annotations
 
@@ -57,12 +57,15 @@ class FoundOnsets:
 
     @cached_property
     def unstable_intervals(self) -> list[Interval]:
-        """Where the state is known to be unstable within the range scanned."""
+        """Intervals of the scanned range in which the state is known to be unstable."""
         return self._intervals(True)
 
     @cached_property
     def stable_intervals(self) -> list[Interval]:
-        """Where it is known to be stable; what neither list holds is uncertain."""
+        """Intervals of the scanned range in which the state is known to be stable.
+
+        Values in neither list of intervals are uncertain.
+        """
         return self._intervals(False)
 
     def _intervals(self, unstable: bool) -> list[Interval]:

@@ -9,12 +9,13 @@ import numpy as np
 
 from eigen import Certificate
 
+from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
 from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...observer import Observer
 from ..case import Case
 from ..stability.crossings import WATCHED, Crossing, Sample, Scan, locate
-from ..stability.place import Place, is_surrounding
+from ..stability.place import condition_of, is_surrounding
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from .normal_form import MISSING, described
@@ -78,7 +79,7 @@ class OnsetSearch:
     observer : Observer, optional
         `item` is told of every `OnsetSample` and `OnsetPoint`; of a point again when more is known about it.
     walk : StabilityWalk, optional
-    place : Place, optional
+    place : Mu, optional
         The other parameters; those of the case by default.
     known : iterable of OnsetSample and OnsetPoint
         What is not to be solved again; a later point takes the place of an earlier one. Samples of other meshes are
@@ -93,14 +94,14 @@ class OnsetSearch:
         options: OnsetOptions,
         observer: Observer | None = None,
         walk: StabilityWalk | None = None,
-        place: Place | None = None,
+        place: Mu | None = None,
         known: Iterable[OnsetSample | OnsetPoint] = (),
         mesh: int = FINE,
     ):
         self.case, self.options, self.mesh = case, options, mesh
         self.observer = observer or Observer()
         self.walk = walk or StabilityWalk(case, self.observer, symmetry=symmetry_named(options.symmetry))
-        self.base = place or Place.of(case)
+        self.base = place or Mu.of(case)
         known = list(known)
         self._samples = {item.value: item for item in known if isinstance(item, OnsetSample) and item.mesh == mesh}
         self._known = {item.key: item for item in known if isinstance(item, OnsetPoint)}
@@ -108,7 +109,7 @@ class OnsetSearch:
         self.scan = Scan(self._scanned, options.log, inside=self._inside)
         self._column = None
 
-    def place(self, value: float) -> Place:
+    def place(self, value: float) -> Mu:
         return self.base.at(**{self.options.parameter: value})
 
     # -- samples
@@ -133,9 +134,9 @@ class OnsetSearch:
         mode it is of no use, so it is left out there and the sample is not kept.
         """
         eigenvalues = None if self._column is None else self._column.eigenvalues
-        if eigenvalues is None or value in self._samples or not self.place(value).condition.loss:
+        if eigenvalues is None or value in self._samples or not condition_of(self.place(value)).loss:
             return self._scanned(value)
-        return Sample(value, eigenvalues(self.place(value).condition)[:WATCHED])
+        return Sample(value, eigenvalues(condition_of(self.place(value)))[:WATCHED])
 
     def _solved(self, value: float) -> OnsetSample:
         place = self.place(value)
@@ -155,7 +156,7 @@ class OnsetSearch:
         certified = cell.certificate(0).agrees
         return OnsetSample(value, np.asarray(found)[:WATCHED], self.mesh, certified=certified, verdict=verdict)
 
-    def _cell(self, place: Place):
+    def _cell(self, place: Mu):
         """Leading eigenvalues and their certificate: on a small model where the steady state stays the same, with the
         full pencil elsewhere.
         """
@@ -168,7 +169,7 @@ class OnsetSearch:
             self._column = self.walk.column([self.place(v) for v in taken], len(taken))
         if self._column.cell is None:
             return self.walk.column([place])
-        return self._column.cell(place.condition)
+        return self._column.cell(condition_of(place))
 
     def uncertainties(self) -> list[str]:
         """Sentences about what is not known: stretches of the scan without a certificate, and a band that was searched
@@ -282,7 +283,7 @@ class OnsetSearch:
                 break
         return float(b if crossing.low.value <= b <= crossing.high.value else value)
 
-    def critical(self, place: Place, eigenvalue: complex):
+    def critical(self, place: Mu, eigenvalue: complex):
         """The mode of the full pencil at a place that an eigenvalue found otherwise belongs to.
 
         Raises
@@ -294,13 +295,13 @@ class OnsetSearch:
         apart = np.abs(spectrum.eigenvalues - eigenvalue)
         if not len(spectrum) or apart.min() > SAME * abs(eigenvalue):
             raise SolveError(
-                f"At {self.options.parameter} = {place.value(self.options.parameter):.6g} the full pencil has no mode "
+                f"At {self.options.parameter} = {place[self.options.parameter]:.6g} the full pencil has no mode "
                 f"near {abs(eigenvalue.imag) / (2 * np.pi):.4g} Hz that is neutral, so no onset is claimed there."
             )
         return spectrum.mode(int(np.argmin(apart)))
 
     def _side(self, value: float, eigenvalue: complex) -> tuple[Side, Certificate]:
-        """What the full pencil says at a value, and what vouches for it."""
+        """Stability at a value by the full model, and the certificate of its eigenvalue count."""
         cell = self.walk.column([self.place(value)])
         values, certificate = cell.leading[0], cell.certificate(0)
         crossing = complex(values[int(np.argmin(np.abs(values - eigenvalue)))])

@@ -1,4 +1,4 @@
-"""How onsets along one parameter are found and kept."""
+"""Run of the onset study: finds onsets along one parameter and keeps them in a record."""
 
 from __future__ import annotations
 

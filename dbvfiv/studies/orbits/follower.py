@@ -13,12 +13,12 @@ from continuation.cycles import Cycle, CycleOptions, CycleSolver, cycles_beside_
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
 
-from ...case.parameters import PARAMETERS
+from ...case.parameters import PARAMETERS, Mu
 from ...errors import SolveError
 from ...model.system import ValveSystem
 from ...motion.periodic import PeriodicValve
 from ..case import Case
-from ..stability.place import Place, rebuilder
+from ..stability.place import rebuilder
 from ..stability.walk import StabilityWalk
 from .onset import Onset
 from .orbit import Orbit
@@ -43,7 +43,7 @@ class Follower:
     case : Case
         Its section `cycle` says how.
     walk : StabilityWalk
-    place : Place
+    place : Mu
         Parameters at the start.
     parameter : str
         The one to move.
@@ -56,13 +56,13 @@ class Follower:
         If the equations of periodic motions do not cover the case.
     """
 
-    def __init__(self, case: Case, walk: StabilityWalk, place: Place, parameter: str, spectrum):
+    def __init__(self, case: Case, walk: StabilityWalk, place: Mu, parameter: str, spectrum):
         self.case, self.walk, self.place, self.parameter = case, walk, place, parameter
-        system = ValveSystem(walk.built(Place.of(case)).model, rebuilder(case))
-        self.system = PeriodicValve(system.model, place.mu())
+        system = ValveSystem(walk.built(Mu.of(case)).model, rebuilder(case))
+        self.system = PeriodicValve(system.model, place.for_system())
         self.solver = CycleSolver(self.system, _basis(self.system, spectrum), CycleOptions())
         self.name = PARAMETERS[parameter].system_name or parameter
-        model = self.system.model(place.mu())
+        model = self.system.model(place.for_system())
         #: Number of the displacement in y of the lip at x = z = 0 among the unknowns.
         self.lip = int(model.shell.dofs.index[model.mesh.centre_line[0], 1])
 
@@ -74,7 +74,7 @@ class Follower:
         ------
         SolveError
         """
-        mu, h, mode = onset.place.mu(), Harmonics(HARMONICS), onset.mode
+        mu, h, mode = onset.place.for_system(), Harmonics(HARMONICS), onset.mode
         model = self.system.model(mu)
         q, amplitude = self.walk.equilibrium(onset.place), self.case.cycle.amplitude
         inner = model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)
@@ -117,7 +117,7 @@ class Follower:
         SolveError
         """
         try:
-            found = self.solver.solve(guess, self.place.mu() | {self.name: value})
+            found = self.solver.solve(guess, self.place.for_system() | {self.name: value})
         except ContinuationError as error:
             raise SolveError(f"No cycle was found at {self.parameter} = {value:.6g}: {error}") from error
         if np.linalg.norm(found.motion.coefficients[1:]) < 0.2 * np.linalg.norm(guess.coefficients[1:]):
@@ -127,12 +127,10 @@ class Follower:
     def begin(
         self, onset: Onset, values: Sequence[float], tell: Callable[[CyclePoint], None]
     ) -> tuple[CycleTracer, list[str]]:
-        """What follows the branch of an onset through ascending values, its first cycles found and told of: two small
-        ones, and those at the values nearer to the onset; and why some of the latter were not found.
+        """Tracer of the branch of an onset through ascending values, with its first cycles found and reported.
 
-        Raises
-        ------
-        SolveError
+        The first cycles are two small ones, and those at the values nearer to the onset. The second value returned is
+        why some of the latter were not found.
         """
         rest, first, second = self.from_onset(onset)
         ends, cycles, missed = sorted((onset.value, second.mu[self.name])), [first, second], []
@@ -150,7 +148,7 @@ class Follower:
         return tracer, missed
 
     def tracer(self, values: Sequence[float], first: PeriodicMotion) -> CycleTracer:
-        """What follows a branch that has a motion `first` on it through ascending values of the parameter."""
+        """Tracer of a branch through ascending values of the parameter; `first` is a motion on the branch."""
         asked = self.case.cycle
         swing = np.sqrt(2.0) * np.linalg.norm(first.coefficients[1:3, self.lip])
         whole = np.linalg.norm(first.coefficients[1:] / self.system.scales)
@@ -171,7 +169,7 @@ class Follower:
         return CycleTracer(self.solver, self.name, options, events)
 
     def orbit(self, cycle: Cycle) -> Orbit:
-        """What is looked at of a cycle."""
+        """Orbit of a cycle, from which its results are taken."""
         return Orbit(self.system.model(cycle.mu), cycle.mu, cycle.motion)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..stability.place import Place
+from ...case.parameters import Mu
 from ..stability.walk import StabilityWalk
 
 #: Leading modes of which the basis of the corrections is made at the start.
@@ -21,7 +21,7 @@ class Onset:
     ----------
     value : float
         Of the parameter.
-    place : Place
+    place : Mu
     spectrum : eigen.Spectrum
         Leading modes there.
     index : int
@@ -29,7 +29,7 @@ class Onset:
     """
 
     value: float
-    place: Place
+    place: Mu
     spectrum: object
     index: int
 
@@ -42,7 +42,7 @@ class Onset:
         return self.spectrum.mode(self.index)
 
 
-def onset_at(walk: StabilityWalk, place: Place, value: float, expected: complex) -> Onset | None:
+def onset_at(walk: StabilityWalk, place: Mu, value: float, expected: complex) -> Onset | None:
     """The onset at a place where an eigenvalue is known to be neutral; None if that does not oscillate.
 
     Raises

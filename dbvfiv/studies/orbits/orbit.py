@@ -1,4 +1,4 @@
-"""What is read off a cycle of the valve."""
+"""Results of a limit cycle of the valve."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""How the leading mode answers to every parameter of a valve."""
+"""Sensitivity of the leading mode to every parameter of a valve."""

@@ -1,4 +1,4 @@
-"""How an eigenvalue answers to a parameter: of the load, of the surroundings, of the wall.
+"""Derivatives of an eigenvalue with respect to parameters of the load, the surroundings and the wall.
 
 d lambda = - w^H dT x / (w^H T' x) with left and right vectors of the coupled pencil (`eigen.eigenvalue_derivative`).
 The change of the pencil is taken through the equilibrium: parameters that move it are stepped by a small amount to
@@ -16,14 +16,14 @@ import numpy as np
 from eigen import CoupledPencil, Mode, Relaxation
 from eigen.derivative import difference, eigenvalue_derivative
 
-from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS
+from ...case.parameters import DESIGN, PARAMETERS, PIPES, SURROUNDINGS, Mu
 from ...errors import CaseError, SolveError
-from ...model import Conditions, ValveModel, linearise
+from ...model import ValveModel, linearise
 from ...model.newton import EquilibriumSolver, NewtonOptions
 from ..stability.place import is_surrounding, redesigned, require_parameter
 
 #: Parameters of the surroundings that a pencil takes.
-_OF_PENCIL = tuple(name for name in SURROUNDINGS if name in {field.name for field in fields(Conditions)})
+_OF_PENCIL = tuple(name for name in SURROUNDINGS if name in {"density", "alpha", "beta", "loss_factor", *PIPES})
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def parameters_of(model: ValveModel) -> tuple[str, ...]:
 
 
 def _has(model: ValveModel, name: str) -> bool:
-    """Whether anything in a valve depends on a parameter of the table in one way."""
+    """True where a parameter of the table acts on the valve and has one value there."""
     if name in ("density", "storage"):
         return model.flow.has_fluid and model.flow.unsteady
     if name == "angle":  # of all plies at once
@@ -111,7 +111,7 @@ def eigenvalue_sensitivities(
     model: ValveModel,
     q: np.ndarray,
     pressure: float,
-    conditions: Conditions,
+    mu: Mu,
     mode: Mode,
     parameters: Iterable[str],
     step: float = 1e-4,
@@ -136,11 +136,11 @@ def eigenvalue_sensitivities(
     SolveError
         If the steady state is lost beside its place.
     """
-    return [differentiate(model, q, pressure, conditions, mode, name, step) for name in parameters]
+    return [differentiate(model, q, pressure, mu, mode, name, step) for name in parameters]
 
 
 def differentiate(
-    model: ValveModel, q: np.ndarray, pressure: float, conditions: Conditions, mode: Mode, name: str, step: float = 1e-4
+    model: ValveModel, q: np.ndarray, pressure: float, mu: Mu, mode: Mode, name: str, step: float = 1e-4
 ) -> Sensitivity:
     """Derivative of one eigenvalue by one parameter; see `eigenvalue_sensitivities`.
 
@@ -151,12 +151,12 @@ def differentiate(
     known = parameters_of(model)
     if name not in known:
         raise ValueError(f"An eigenvalue cannot be differentiated by '{name}'; it can by {', '.join(known)}.")
-    value = _value(model, pressure, conditions, name)
+    value = _value(model, pressure, mu, name)
     h = step * (abs(value) or 1.0)
-    pencil = linearise(model, q, pressure).pencil(conditions)
+    pencil = linearise(model, q, pressure).pencil(mu)
 
     def slope(low: float, high: float) -> complex:
-        ends = (_pencil(model, q, pressure, conditions, name, v) for v in (low, high))
+        ends = (_pencil(model, q, pressure, mu, name, v) for v in (low, high))
         here, *ends = _with_common_times(pencil, *ends)
         return eigenvalue_derivative(here, mode, difference(*ends, high - low))
 
@@ -204,17 +204,16 @@ def _layer(name: str) -> tuple[int, str]:
     return int(number) - 1, quantity
 
 
-def _value(model, pressure, conditions, name) -> float:
+def _value(model, pressure, mu, name) -> float:
     if name == "pressure":
         return pressure
     if name in _OF_PENCIL:
-        value = getattr(conditions, name)
         own = {
             "pipe_length": model.case.upstream.whole_length,
             "tail_length": model.case.downstream.length,
             "wave_speed": model.case.upstream.first_wave_speed,
         }
-        return own[name] if value is None else value
+        return mu[name] if name in mu else own[name]
     if name == "storage":
         return 1.0 if model.case.fluid.continuity == "storage" else 0.0
     if name == "thickness":
@@ -228,24 +227,24 @@ def _value(model, pressure, conditions, name) -> float:
     return float(getattr(layer if quantity in ("thickness", "angle") else layer.law, quantity))
 
 
-def _pencil(model, q, pressure, conditions, name, value):
+def _pencil(model, q, pressure, mu, name, value):
     """Pencil at the steady state with one parameter changed."""
     if name in _OF_PENCIL and is_surrounding(model.case, name):
-        return linearise(model, q, pressure).pencil(replace(conditions, **{name: value}))
+        return linearise(model, q, pressure).pencil(mu.at(**{name: value}))
     if name == "storage":
-        return linearise(model, q, pressure).pencil(conditions, storage=value)
+        return linearise(model, q, pressure).pencil(mu.at(storage=value))
     changed = model
     if name == "pressure":
         pressure = value
     elif name in DESIGN or name in _OF_PENCIL:
-        conditions = replace(conditions, **({} if name in DESIGN else {name: value}))
+        mu = mu.at(**({} if name in DESIGN else {name: value}))
         changed = ValveModel(redesigned(model.case, {name: value}))
     else:
         changed = ValveModel(model.case, _section(model.shell.section, name, value))
     result = EquilibriumSolver(changed, NewtonOptions(tolerance=1e-11)).solve(q, pressure)
     if not result.converged:
         raise SolveError(f"The steady state was lost with {name} at {value:.6g}: {result.reason}.")
-    return linearise(changed, result.q, pressure).pencil(conditions)
+    return linearise(changed, result.q, pressure).pencil(mu)
 
 
 def _section(section, name, value):

@@ -1,4 +1,4 @@
-"""Which parameters move a mode, and which way: bars of relative derivatives."""
+"""Bars of the relative derivatives of a mode: parameters that move it, and their direction."""
 
 from __future__ import annotations
 

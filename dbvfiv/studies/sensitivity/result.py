@@ -85,12 +85,12 @@ class SensitivityResult(StudyResult):
 
     @property
     def growth_rate(self) -> float:
-        """Of the mode, 1/s."""
+        """Growth rate of the mode, 1/s."""
         return self.eigenvalue.real
 
     @property
     def frequency(self) -> float:
-        """Of the mode, Hz."""
+        """Frequency of the mode, Hz."""
         return abs(self.eigenvalue.imag) / (2 * np.pi)
 
     @cached_property

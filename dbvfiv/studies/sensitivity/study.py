@@ -1,4 +1,4 @@
-"""How derivatives of an eigenvalue are found and kept."""
+"""Run of the sensitivity study: finds derivatives of an eigenvalue and keeps them in a record."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from eigen import Mode, leading_modes
 
+from ...case.parameters import Mu
 from ...errors import CaseError, SolveError
-from ...model.dynamics import Conditions, linearise
+from ...model.dynamics import linearise
 from ...model.equilibria import require_equilibrium
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
@@ -15,7 +16,7 @@ from ...record.states import read_states, state_row
 from ..session import Session
 from ..solving import solving
 from ..stability.family import ValveFamily
-from ..stability.place import Place
+from ..stability.place import condition_of
 from ..study import Study
 from .derivatives import differentiate, parameters_of
 from .result import MODE, STATE, VALUES, SensitivityResult, row_of, tables_of
@@ -41,8 +42,8 @@ def run(session: Session, record: GrowingRecord) -> None:
     if not record.rows(STATE):
         record.append(STATE, state_row(model, session.equilibrium(record)))
     (state,) = read_states(record, STATE)
-    conditions = Conditions.of(session.case)
-    mode = _find_mode(session, state, conditions)
+    mu = Mu.of(session.case)
+    mode = _find_mode(session, state, mu)
     record.note(MODE, number=asked.mode, eigenvalue=complex(mode.eigenvalue))
     record.begin("sensitivity", len(names))
     done = set(record.column(VALUES, "parameter"))
@@ -51,7 +52,7 @@ def run(session: Session, record: GrowingRecord) -> None:
             continue
         record.progress(name)
         try:
-            found = differentiate(model, state.q, state.pressure, conditions, mode, name, asked.step)
+            found = differentiate(model, state.q, state.pressure, mu, mode, name, asked.step)
         except SolveError as error:
             record.fail(str(error))
             continue
@@ -59,7 +60,7 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.item(found)
 
 
-def _find_mode(session: Session, state: SteadyState, conditions: Conditions) -> Mode:
+def _find_mode(session: Session, state: SteadyState, mu: Mu) -> Mode:
     """The mode asked for, with its left vector."""
     model, number = session.model, session.case.sensitivity.mode
     require_equilibrium(model, state)
@@ -68,8 +69,8 @@ def _find_mode(session: Session, state: SteadyState, conditions: Conditions) -> 
     linear = linearise(model, state.q, state.pressure)
     family = ValveFamily(linear, session.case.modes.max_frequency, session.case.modes.count)
     with solving(state.pressure):
-        options = replace(family.search(Place.of(session.case).condition), left=True)
-        found = leading_modes(linear.pencil(conditions), number + _MARGIN, options)
+        options = replace(family.search(condition_of(Mu.of(session.case))), left=True)
+        found = leading_modes(linear.pencil(mu), number + _MARGIN, options)
     if len(found) < number:
         raise SolveError(f"The state at {state.pressure:.6g} Pa has {len(found)} leading modes, and no mode {number}.")
     return found.mode(number - 1)

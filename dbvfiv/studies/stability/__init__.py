@@ -1,1 +1,1 @@
-"""What studies of stability share: places of the parameter space, their steady states and spectra, crossings."""
+"""Shared parts of stability studies: parameter points, their steady states and spectra, crossings."""

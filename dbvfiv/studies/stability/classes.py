@@ -13,8 +13,9 @@ NOTE = "class"
 
 
 def classes_to_look_at(record: GrowingRecord, chosen: str, part: Part) -> Iterator[Symmetry]:
-    """Those of a choice, "all" or one, on a part of the valve, that are neither that of the equilibria nor in the
-    record yet.
+    """Symmetry classes still to be computed for a choice, "all" or one, on a part of the valve.
+
+    The class of the equilibria and classes that the record holds already are left out.
     """
     done = {note["symmetry"] for note in record.notes(NOTE)}
     for symmetry in chosen_symmetries(chosen, part):

@@ -98,7 +98,7 @@ class Scan:
         return self._asked(float(value), self._sample)
 
     def within(self, value: float) -> Sample | None:
-        """The same inside a bracket: a sample that nothing has to vouch for."""
+        """Sample at a value inside a bracket, which needs no certificate; None where there is no equilibrium."""
         return self._asked(float(value), self._inside)
 
     def _asked(self, value: float, sample) -> Sample | None:
@@ -160,7 +160,7 @@ class Scan:
         return list(wanted)
 
     def certified(self, value: float) -> bool:
-        """Whether the sample at a value of the scan may be claimed."""
+        """True where the eigenvalue count of the sample at a value of the scan is certified."""
         sample = self.samples[value]
         if sample.certified is None:
             vouched = True if self._certify is None else bool(self._certify(value))
@@ -189,8 +189,9 @@ class Scan:
 
 
 def _exchanged(low: Sample, high: Sample) -> bool:
-    """Whether one mode ceases to be unstable between two samples and another becomes so: each is where the other sample
-    has its nearest, all of them together.
+    """True where one mode ceases to be unstable between two samples and another becomes so.
+
+    Modes of the samples are paired by the least sum of their distances.
     """
     if not (low.unstable and high.unstable):
         return False

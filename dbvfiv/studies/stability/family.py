@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, Workspace, lowest_frequencies
 from eigen.creep import edge_of
 from eigen.family import Reach
 
-from ...model.dynamics import Conditions, LinearisedState
+from ...case.parameters import OUTSIDE, PIPES, Mu
+from ...model.dynamics import LinearisedState
 from ...model.leading import LeadingSearch, select_search
 
 #: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
@@ -20,7 +19,7 @@ LEAST_MODES = 10
 
 
 class ValveFamily(PencilFamily):
-    """Conditions are (density, alpha, beta, law, loss factor); the law as `law_of` makes it.
+    """Conditions are (density, alpha, beta, law, loss factor); the law as `flow_law` makes it.
 
     At unit density the fluid's unknown is the inlet velocity, at others that times the root of the density.
 
@@ -64,36 +63,32 @@ class ValveFamily(PencilFamily):
         return self._frequencies[:count]
 
     def search(self, condition: Condition) -> SearchOptions:
-        """What is searched in the spectrum: the rule that every study follows."""
+        """Search options for the spectrum, by the rule that every study follows."""
         return self.leading(condition).options
 
     def leading(self, condition: Condition) -> LeadingSearch:
-        """The same, with the frequency up to which the search speaks for the state."""
-        line = law_parts(condition.law)[1]
-        return self.leading_under(
-            Conditions(condition.inertia, condition.alpha, condition.beta, condition.loss, **line)
-        )
+        """Search for the leading modes, with the frequency up to which it is a verdict on the state."""
+        return self.leading_under(condition_point(condition))
 
-    def leading_under(self, conditions: Conditions, in_vacuo: bool = False) -> LeadingSearch:
-        """The same under conditions by their names, with the fluid or in vacuo."""
-        line = conditions.of_line
-        key = conditions.beta, conditions.loss_factor, in_vacuo, *line.values()  # nothing else decides
+    def leading_under(self, mu: Mu, in_vacuo: bool = False) -> LeadingSearch:
+        """Search for the leading modes under conditions given by their names, with the fluid or in vacuo."""
+        key = mu.beta, mu.loss_factor, in_vacuo, *mu.pipes.values()  # nothing else decides
         if key not in self._searches:
             asked = SearchOptions(max_frequency=self.max_frequency)
-            resolved = np.inf if in_vacuo else self.linear.model.flow.resolved(line)
-            self._searches[key] = select_search(asked, conditions, self._lowest, self.modes, resolved)
+            resolved = np.inf if in_vacuo else self.linear.model.flow.resolved(mu.pipes)
+            self._searches[key] = select_search(asked, mu, self._lowest, self.modes, resolved)
         return self._searches[key]
 
-    def is_searched(self, values: np.ndarray, conditions: Conditions, band: float) -> np.ndarray:
+    def is_searched(self, values: np.ndarray, mu: Mu, band: float) -> np.ndarray:
         """Eigenvalues in the region that every study searches, (k,) bool: beside it lie relaxations of the wall, and
         modes of it that are slow and strongly damped; `band` is in Hz.
         """
-        if not conditions.loss_factor:
+        if not mu.loss_factor:
             return np.ones(len(values), bool)
-        return Reach(-np.inf, 2 * np.pi * band, edge_of(self.relaxation(conditions.loss_factor))).is_mode(values)
+        return Reach(-np.inf, 2 * np.pi * band, edge_of(self.relaxation(mu.loss_factor))).is_mode(values)
 
     def relaxation(self, loss: float) -> Relaxation | None:
-        """What relaxes with a factor on the loss factors of all materials."""
+        """Viscoelastic part of the stiffness, with a factor on all loss factors; None for an elastic wall."""
         loss = float(loss)
         if loss not in self._relaxations:
             if len(self._relaxations) > _KEPT:
@@ -101,7 +96,7 @@ class ValveFamily(PencilFamily):
             self._relaxations[loss] = self.linear.relaxation(loss)
         return self._relaxations[loss]
 
-    def parts(self, law: Law) -> dict[str, np.ndarray]:
+    def parts(self, law: Mu) -> dict[str, np.ndarray]:
         """A0 to S1 at density 1."""
         if law not in self._parts:
             if len(self._parts) > _KEPT:
@@ -109,69 +104,33 @@ class ValveFamily(PencilFamily):
             self._parts[law] = self._computed(law)
         return self._parts[law]
 
-    def _computed(self, law: Law) -> dict[str, np.ndarray]:
+    def _computed(self, law: Mu) -> dict[str, np.ndarray]:
         linear, flow = self.linear, self.linear.model.flow
-        storage, line = law_parts(law)
+        line = law.pipes
         if "wave_speed" in line:  # so that the compressibility is that of the fluid
             line["wave_speed"] *= np.sqrt(law.density)
         line |= flow.at_unit_density()
-        parts = linear.flow_parts(1.0, storage, line) if flow.has_fluid else linear.no_flow()
+        parts = linear.flow_parts(1.0, law.storage, line) if flow.has_fluid else linear.no_flow()
         if linear.added is None:
             return parts
-        return linear.added.parts(parts, outside_of(law) or 1.0)
+        return linear.added.parts(parts, law.outside / law.density if law.outside else 1.0)
 
     def pencil(self, condition: Condition) -> CoupledPencil:
         """The full pencil, with the inlet velocity itself as unknown."""
-        density, alpha, beta, law, loss_factor = condition
-        storage, line = law_parts(law)
-        return self.linear.pencil(Conditions(density, alpha, beta, loss_factor, **line), storage=storage)
+        return self.linear.pencil(condition_point(condition))
 
 
-class FluidLaw(NamedTuple):
-    """The law of a condition where more than the blend of the continuity laws decides; 0 for what there is not.
+def flow_law(mu: Mu) -> Mu:
+    """Part of a parameter point that the flow's matrices at unit density depend on.
 
-    Attributes
-    ----------
-    storage : float
-        Blend of the continuity laws.
-    pipe_length, tail_length : float, m
-        Of the lines in front and behind.
-    wave_speed, density : float, m/s, kg/m3
-        Of an elastic line in front. Waves tell fluids of different densities apart by more than their inertia, so the
-        density is a part of the law with them.
-    outside : float
-        Density outside over that inside where it does not follow it.
+    The flow model and the pipes; the density where waves or a fixed fluid outside tell fluids apart by more than their
+    inertia.
     """
-
-    storage: float
-    pipe_length: float = 0.0
-    tail_length: float = 0.0
-    wave_speed: float = 0.0
-    density: float = 0.0
-    outside: float = 0.0
+    outside = (OUTSIDE,) if mu.outside else ()
+    return mu.only("storage", *PIPES, *(("density",) if mu.wave_speed or outside else ()), *outside)
 
 
-#: Blend of the continuity laws alone, or with what else decides.
-Law = float | FluidLaw
-
-#: What of it belongs to the lines.
-OF_LINE = ("pipe_length", "tail_length", "wave_speed")
-
-
-def law_of(storage: float, density: float, **others: float) -> Law:
-    """The law of a condition; what else decides by the names of `FluidLaw`, 0 for what there is not."""
-    if others.get("wave_speed"):
-        others["density"] = density
-    return FluidLaw(storage, **others) if any(others.values()) else storage
-
-
-def law_parts(law: Law) -> tuple[float, dict[str, float]]:
-    """Blend of the continuity laws, and parameters of the line as `Conditions.of_line` has them, of a law."""
-    if not isinstance(law, FluidLaw):
-        return float(law), {}
-    return law.storage, {name: getattr(law, name) for name in OF_LINE if getattr(law, name)}
-
-
-def outside_of(law: Law) -> float:
-    """Density outside over that inside of a law; 0 where it follows it."""
-    return law.outside if isinstance(law, FluidLaw) else 0.0
+def condition_point(condition: Condition) -> Mu:
+    """Parameter point of a condition."""
+    density, alpha, beta, law, loss_factor = condition
+    return Mu(law, density=density, alpha=alpha, beta=beta, loss_factor=loss_factor)

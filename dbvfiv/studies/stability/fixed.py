@@ -1,4 +1,4 @@
-"""What stays fixed while stability is asked over other parameters: options of the commands that name it."""
+"""Check that a command's options do not fix a parameter that a range of the case varies."""
 
 from __future__ import annotations
 

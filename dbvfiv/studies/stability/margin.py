@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
-from ...case.parameters import PARAMETERS
-from .place import Place
+from ...case.parameters import PARAMETERS, Mu
+from .place import condition_of
 from .verdict import FLUTTERS, STABLE, Verdict
 from .walk import StabilityWalk
 
@@ -16,7 +16,7 @@ LOWER, HIGHER = np.geomspace(1.0, 0.05, 9), np.geomspace(1.0, 10.0, 7)
 ACCURACY = 1e-4
 
 
-def critical_damping_factor(walk: StabilityWalk, place: Place, verdict: Verdict) -> float:
+def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) -> float:
     """Factor on the loss factors, or on beta, at which flutter begins, next to 1.
 
     It lies below 1 where the state is stable and above where it flutters.
@@ -24,7 +24,7 @@ def critical_damping_factor(walk: StabilityWalk, place: Place, verdict: Verdict)
     Parameters
     ----------
     walk : StabilityWalk
-    place : Place
+    place : Mu
     verdict : Verdict
         On the place.
 
@@ -39,7 +39,7 @@ def critical_damping_factor(walk: StabilityWalk, place: Place, verdict: Verdict)
         If there is no steady state.
     """
     name = "loss_factor" if place.loss_factor > 0 else "beta"
-    own = place.value(name)
+    own = place[name]
     if own <= 0 or verdict.outcome not in (STABLE, FLUTTERS):
         return np.nan
     factors = LOWER if verdict.outcome == STABLE else HIGHER
@@ -52,7 +52,7 @@ def critical_damping_factor(walk: StabilityWalk, place: Place, verdict: Verdict)
         return float(swings.real.max()) if swings.size else np.nan
 
     def at(factor: float) -> float:
-        return growth(column.eigenvalues(place.at(**{name: own * factor}).condition))
+        return growth(column.eigenvalues(condition_of(place.at(**{name: own * factor}))))
 
     rates = [growth(row) for row in column.leading]
     for a, b, low, high in zip(factors[:-1], factors[1:], rates[:-1], rates[1:]):

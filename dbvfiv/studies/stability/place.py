@@ -3,111 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
 
 from eigen import Condition
 
 from ...case.materials import RUBBERS
-from ...case.parameters import CONDITIONS, DESIGN, PARAMETERS
+from ...case.parameters import PARAMETERS, PIPES, Mu
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
-from ...model.dynamics import Conditions
 from ..case import Case
-from .family import OF_LINE, law_of, law_parts
+from .family import condition_point, flow_law
 
 
-@dataclass(frozen=True)
-class Place:
-    """One set of parameters.
+def condition_of(mu: Mu) -> Condition:
+    """(density, alpha, beta, law, loss factor) of a parameter point, the law as `ValveFamily` has it."""
+    return Condition(mu.density, mu.alpha, mu.beta, flow_law(mu), mu.loss_factor)
 
-    Attributes
-    ----------
-    pressure : float, Pa
-    density, alpha, beta : float
-        kg/m3, 1/s, s.
-    loss_factor : float
-        Factor on the loss factors of all materials.
-    storage : float
-        Blend of the continuity laws, 0 quasi-steady, 1 storage.
-    pipe_length : float, m
-        Of the line in front; 0 without one.
-    tail_length : float, m
-        Of the pipe behind; 0 without one.
-    wave_speed : float, m/s
-        In an elastic line; 0 without one.
-    outside : float, kg/m3
-        Density of the fluid outside where it is fixed; 0 where there is none or it follows `density`.
-    design : dict
-        Values of those parameters of the design (`dbvfiv.case.parameters.DESIGN`) that are not the case's own.
-    """
 
-    pressure: float
-    density: float
-    alpha: float
-    beta: float
-    storage: float
-    loss_factor: float = 0.0
-    pipe_length: float = 0.0
-    tail_length: float = 0.0
-    wave_speed: float = 0.0
-    outside: float = 0.0
-    design: Mapping[str, float] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, case: Case) -> Place:
-        """The parameters of a case."""
-        storage = 1.0 if case.fluid.continuity == "storage" else 0.0
-        damping = case.damping
-        return cls(
-            case.drive.pressure,
-            case.fluid.density,
-            damping.alpha,
-            damping.beta,
-            storage,
-            damping.loss_factor,
-            case.upstream.whole_length if case.has_line else 0.0,
-            case.downstream.length if case.has_tail else 0.0,
-            case.upstream.first_wave_speed if case.has_waves else 0.0,
-            case.outside.fixed_density,
-        )
-
-    def at(self, **values: float) -> Place:
-        """With some parameters changed."""
-        own = {name: float(value) for name, value in values.items() if name not in DESIGN}
-        design = {name: float(value) for name, value in values.items() if name in DESIGN}
-        return replace(self, **own, design={**self.design, **design})
-
-    @property
-    def line(self) -> dict[str, float]:
-        """Parameters of the lines that there are, by their names."""
-        return {name: getattr(self, name) for name in OF_LINE if getattr(self, name)}
-
-    @property
-    def condition(self) -> Condition:
-        """(density, alpha, beta, law, loss factor), the law as `dbvfiv.studies.stability.family.ValveFamily` has it."""
-        ratio = self.outside / self.density if self.outside else 0.0
-        law = law_of(self.storage, self.density, **self.line, outside=ratio)
-        return Condition(self.density, self.alpha, self.beta, law, self.loss_factor)
-
-    def under(self, condition: Condition) -> Place:
-        """The same steady state under another condition."""
-        density, alpha, beta, law, loss_factor = condition
-        storage, line = law_parts(law)
-        line = dict.fromkeys(OF_LINE, 0.0) | line
-        return self.at(density=density, alpha=alpha, beta=beta, storage=storage, loss_factor=loss_factor, **line)
-
-    @property
-    def conditions(self) -> Conditions:
-        """What surrounds the structure there."""
-        return Conditions(self.density, self.alpha, self.beta, self.loss_factor, **self.line)
-
-    def value(self, name: str) -> float:
-        return float(self.design[name] if name in DESIGN else getattr(self, name))
-
-    def mu(self) -> dict[str, float]:
-        """Parameters of a `ValveSystem`."""
-        own = {PARAMETERS[name].system_name: getattr(self, name) for name in CONDITIONS}
-        return {**own, **self.design}
+def point_under(mu: Mu, condition: Condition) -> Mu:
+    """Parameter point of the same steady state under another condition."""
+    return Mu({name: value for name, value in mu.items() if name not in PIPES}, **condition_point(condition))
 
 
 def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
@@ -133,7 +47,7 @@ def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
 
 
 def describe_fixed(case: Case, *moved: str) -> str:
-    """The same in words, "6 kPa static, 10 kg/m³, quasi-steady, α = 0 1/s, β = 0.003 s"."""
+    """Fixed conditions of a case in words, "6 kPa static, 10 kg/m³, quasi-steady, α = 0 1/s, β = 0.003 s"."""
     words = []
     for name, value in fixed_conditions(case, *moved).items():
         text = value if isinstance(value, str) else PARAMETERS[name].text(value)
@@ -142,7 +56,7 @@ def describe_fixed(case: Case, *moved: str) -> str:
 
 
 def is_surrounding(case: Case, name: str) -> bool:
-    """Whether a parameter leaves the steady state and the linearised structure of a case as they are."""
+    """True where a parameter leaves the steady state and the linearised structure of a case as they are."""
     return PARAMETERS[name].surrounding and not why_it_moves(case, name)
 
 

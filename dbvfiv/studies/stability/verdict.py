@@ -147,7 +147,7 @@ class Verdict:
 
     @property
     def holds(self) -> bool:
-        """Whether growth rates mean anything: the rubber's constants are stable here."""
+        """True where growth rates are valid, since the rubber's constants are stable at the state."""
         return self.outcome != NOT_VALID
 
     def sentence(self, conditions: str = "") -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from eigen import Column, ColumnSolver, Workspace
 from eigen.column import DIRECT
 
+from ...case.parameters import Mu
 from ...errors import NotValidError, SolveError
 from ...model import ValveModel
 from ...model.classes import linearise_class
@@ -22,7 +23,7 @@ from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...observer import Observer
 from ..case import Case
 from .family import ValveFamily
-from .place import Place, moving_surroundings, rebuilder
+from .place import condition_of, moving_surroundings, rebuilder
 from .verdict import Verdict
 
 #: Steps over the last one up to which a cubic is trusted ahead of it.
@@ -82,13 +83,13 @@ class StabilityWalk:
         symmetry: Symmetry = SYMMETRIES[EQUILIBRIA],
     ):
         self.case, self.symmetry = case, symmetry
-        self._recalled: list[Place] = []
+        self._recalled: list[Mu] = []
         self._validity: dict[tuple, str] = {}
         self._workspace = Workspace()  # for structural frequencies
         self.observer = observer or Observer()
         self._rebuild = rebuilder(case)
-        own = Place.of(case)
-        self._moving = {name: own.value(name) for name in moving_surroundings(case)}
+        own = Mu.of(case)
+        self._moving = {name: own[name] for name in moving_surroundings(case)}
         self._built: dict[tuple, _Built] = {}
         self._last: tuple[tuple, ValveFamily] | None = None
         if model is not None:
@@ -98,13 +99,13 @@ class StabilityWalk:
         path = LoadPath(model, SteadyOptions.of(self.case))
         return _Built(model, path, ColumnSolver(), {})
 
-    def _key(self, place: Place) -> tuple:
-        """What a model has to be built anew for: the design, and what of the surroundings moves the steady state."""
+    def _key(self, place: Mu) -> tuple:
+        """Key of the model of a parameter point: the design, and those conditions that move the steady state."""
         design = dict(place.design)
-        design |= {name: place.value(name) for name, own in self._moving.items() if place.value(name) != own}
+        design |= {name: place[name] for name, own in self._moving.items() if place[name] != own}
         return tuple(sorted(design.items()))
 
-    def built(self, place: Place) -> _Built:
+    def built(self, place: Mu) -> _Built:
         """Model and path of the design of a place."""
         key = self._key(place)
         if key not in self._built:
@@ -113,7 +114,7 @@ class StabilityWalk:
             self._built[key] = self._new(self._rebuild(dict(key)))
         return self._built[key]
 
-    def equilibrium(self, place: Place) -> np.ndarray:
+    def equilibrium(self, place: Mu) -> np.ndarray:
         """Displacements q (n,) of the steady state.
 
         Raises
@@ -126,7 +127,7 @@ class StabilityWalk:
             del self._recalled[0]
         return self._reach(place)
 
-    def recall(self, place: Place) -> None:
+    def recall(self, place: Mu) -> None:
         """Say that a state was found at a place by an earlier run.
 
         The next new state is reached from where that run stood, with the same digits: states that were recalled are
@@ -135,7 +136,7 @@ class StabilityWalk:
         if not self._key(place):  # states of other designs are found from rest each
             self._recalled.append(place)
 
-    def give(self, place: Place, q: np.ndarray) -> None:
+    def give(self, place: Mu, q: np.ndarray) -> None:
         """Hand over the steady state of a place that was found elsewhere."""
         self.built(place).known[place.pressure] = q
 
@@ -150,7 +151,7 @@ class StabilityWalk:
         other._built = {key: replace(built, solver=ColumnSolver()) for key, built in self._built.items()}
         return other
 
-    def _reach(self, place: Place) -> np.ndarray:
+    def _reach(self, place: Mu) -> np.ndarray:
         built = self.built(place)
         if place.pressure in built.known:
             return built.known[place.pressure]
@@ -172,7 +173,7 @@ class StabilityWalk:
         built.known[place.pressure] = path.q
         return path.q
 
-    def family(self, place: Place) -> ValveFamily:
+    def family(self, place: Mu) -> ValveFamily:
         """The linearised state for any density, damping and continuity law; the last one is kept.
 
         Raises
@@ -187,16 +188,16 @@ class StabilityWalk:
             self._last = (key, ValveFamily(linear, modes.max_frequency, modes.count, self._workspace))
         return self._last[1]
 
-    def search(self, place: Place) -> LeadingSearch:
-        """What is searched in the spectrum of a place, and up to which frequency the search speaks for it.
+    def search(self, place: Mu) -> LeadingSearch:
+        """Search for the leading modes at a parameter point, with the frequency up to which it is a verdict.
 
         Raises
         ------
         SolveError
         """
-        return self.family(place).leading(place.condition)
+        return self.family(place).leading(condition_of(place))
 
-    def require_valid(self, place: Place) -> None:
+    def require_valid(self, place: Mu) -> None:
         """Refuse a place at which the constants of a rubber with loss factors are unstable.
 
         Raises
@@ -206,7 +207,7 @@ class StabilityWalk:
         SolveError
             If there is no steady state.
         """
-        loss = place.condition.loss
+        loss = condition_of(place).loss
         if not loss:
             return
         key = place.pressure, self._key(place), loss
@@ -218,7 +219,7 @@ class StabilityWalk:
         if self._validity[key]:
             raise NotValidError(self._validity[key])
 
-    def spectrum(self, place: Place, count: int = 6):
+    def spectrum(self, place: Mu, count: int = 6):
         """Leading modes of the full pencil, an `eigen.Spectrum`.
 
         Raises
@@ -229,14 +230,14 @@ class StabilityWalk:
         self.require_valid(place)
         family = self.family(place)
         with _explained(place):
-            return self.built(place).solver.direct(family, place.condition, count)
+            return self.built(place).solver.direct(family, condition_of(place), count)
 
-    def column(self, places: list[Place], snapshots: int = 3, edges: bool = False, spectra=None) -> Column:
+    def column(self, places: list[Mu], snapshots: int = 3, edges: bool = False, spectra=None) -> Column:
         """Cells that share a steady state; those whose rubber has lost stability are left blank.
 
         Parameters
         ----------
-        places : list of Place
+        places : list of Mu
         snapshots : int
             Of them, at which the vectors of the small model are made.
         edges : bool
@@ -261,15 +262,15 @@ class StabilityWalk:
             raise refusal
         family = self.family(places[0])
         with _explained(places[0]):
-            conditions = [places[i].condition for i in sound]
+            conditions = [condition_of(places[i]) for i in sound]
             column = self.built(places[0]).solver.solve(family, conditions, snapshots, edges, spectra)
         return column if refusal is None else column.spread(sound, len(places))
 
-    def verdicts(self, places: list[Place], column: Column) -> list[Verdict]:
+    def verdicts(self, places: list[Mu], column: Column) -> list[Verdict]:
         """Verdicts on places from the cells that `column` gave of them."""
         return [self._verdict(place, column, i) for i, place in enumerate(places)]
 
-    def verdict(self, place: Place, spectrum=None) -> Verdict:
+    def verdict(self, place: Mu, spectrum=None) -> Verdict:
         """Verdict on one place; its leading modes with the full pencil may be known.
 
         Raises
@@ -282,7 +283,7 @@ class StabilityWalk:
         except NotValidError as error:
             return Verdict.not_valid(str(error))
 
-    def _verdict(self, place: Place, column: Column, cell: int) -> Verdict:
+    def _verdict(self, place: Mu, column: Column, cell: int) -> Verdict:
         try:
             self.require_valid(place)
         except NotValidError as error:
@@ -300,7 +301,7 @@ class StabilityWalk:
 
 
 @contextmanager
-def _explained(place: Place):
+def _explained(place: Mu):
     """Turns what numerics refuse into a sentence with the pressure."""
     try:
         yield

@@ -158,7 +158,7 @@ def _areas(axes: Axes, result: SteadyResult, label: str, colour: Any) -> None:
 
 
 def _taps(axes: Axes, result: SteadyResult, label: str, colour: Any) -> None:
-    """What was computed less what was measured, over the place."""
+    """Plot the computed less the measured tap pressure, kPa, over the distance from the lip."""
     taps = result.measured.taps
     if taps is not None:
         axes.plot(1e3 * taps.z, taps.excess / 1e3, color=colour, **MEASURED)

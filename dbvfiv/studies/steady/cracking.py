@@ -26,14 +26,14 @@ _ACCURACY = 1e-5
 
 @dataclass(frozen=True)
 class Cracking:
-    """Where the passage has grown to a multiple of that at rest.
+    """Cracking pressure: that at which the passage has grown to a multiple of its area at rest.
 
     Attributes
     ----------
     area_ratio : float
         The multiple.
     pressure : float or None, Pa
-        What drives the flow there over the pressure downstream; None where no state is open so far.
+        Driving pressure there, over the pressure downstream; None where no state is open so far.
     head : float or None, m
         The same as a head of the fluid.
     """
@@ -47,7 +47,7 @@ class Cracking:
         return asdict(self)
 
     def sentence(self, highest: float) -> str:
-        """For people; `highest` is the highest pressure among the states, Pa."""
+        """Sentence on the cracking pressure; `highest` is the highest pressure among the states, Pa."""
         grown = f"{self.area_ratio:g} times the passage at rest"
         if self.pressure is None:
             return f"Cracking: not up to {highest / 1e3:.4g} kPa, where the lips leave less than {grown}."

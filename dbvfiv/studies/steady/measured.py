@@ -26,7 +26,7 @@ KINDS = (DISCHARGE, AREA, SHAPE, TAPS)
 
 @dataclass(frozen=True)
 class MeasuredStates:
-    """What was measured, each None where it was not.
+    """Measurements of steady states; None for a quantity that was not measured.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class MeasuredStates:
         return (part for part in (self.discharge, self.area, self.shapes, self.taps) if part is not None)
 
     def sentences(self) -> list[str]:
-        """For people, one of each."""
+        """Sentences that compare each measured quantity with the computed one."""
         return [part.sentence() for part in self]
 
     def summary(self) -> dict[str, Any]:
@@ -63,7 +63,7 @@ class MeasuredStates:
 
 
 def measured_states(result: SteadyResult) -> MeasuredStates:
-    """What a result holds of measured data, against its states."""
+    """Measured data of a result, against its states."""
     tables, states, rest = kept_tables(result.record), result.states, result.case.rest_pressure
     flows, areas = joined(tables, DISCHARGE, "pressure", "mass_flow"), joined(tables, AREA, "pressure", "area")
     points, taps = (

@@ -36,8 +36,9 @@ HEAD_DISCHARGE = Published(
 
 
 def applies(case: Case) -> bool:
-    """Whether a case is the 12-inch valve with water flowing through it: layers and materials may differ, shape and
-    wall may not.
+    """True for the 12-inch valve with water flowing through it.
+
+    Layers and materials may differ, shape and wall may not.
     """
     same_shape = case.valve.model_copy(update={"saddle": "ruled"}) == Valve()
     bare = not (case.has_line or case.has_tail or case.rest_pressure)

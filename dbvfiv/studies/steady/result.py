@@ -47,7 +47,7 @@ class SteadyResult(StudyResult):
 
     @property
     def cracking(self) -> cracking.Cracking | None:
-        """Where the valve begins to open; None without a flow."""
+        """Cracking pressure at which the valve begins to open; None without a flow."""
         notes = self.record.notes(cracking.NOTE)
         names = cracking.Cracking.__dataclass_fields__
         return cracking.Cracking(**{name: notes[-1][name] for name in names}) if notes else None

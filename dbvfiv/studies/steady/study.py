@@ -1,4 +1,4 @@
-"""How equilibria over a list of pressures are found: each from the one before."""
+"""Run of the steady study: equilibria over a list of pressures, each from the one before."""
 
 from __future__ import annotations
 

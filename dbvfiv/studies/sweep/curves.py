@@ -94,7 +94,7 @@ def _mark_crossing(axes, crossing: Crossing, result: SweepResult, x: np.ndarray)
 
 
 def surroundings_of(result: SweepResult) -> str:
-    """What is not swept, as it stands in titles."""
+    """Fixed parameters of a sweep, for titles."""
     case = result.case
     parts = []
     if result.parameter != "pressure":

@@ -23,16 +23,16 @@ from eigen.dense import all_eigenvalues
 from eigen.left import biorthogonalise, left_by_inverse_iteration
 
 from ...case.axis import Axis
+from ...case.parameters import Mu
 from ...errors import NotValidError
 from ...model import ValveModel
 from ...model.classes import linearise_class
-from ...model.dynamics import Conditions
 from ...model.equilibria import LoadPath, SteadyOptions
 from ...model.leading import LeadingSearch
 from ...model.state import SteadyState
 from ...model.symmetry import symmetry_named
 from ...observer import Observer
-from ..stability.place import Place
+from ..case import Case
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 
@@ -49,14 +49,14 @@ COUNTED = 0.999
 
 @dataclass(frozen=True)
 class Check:
-    """What was verified at one value.
+    """Verification of eigenvalues and their count at one value of the parameter.
 
     Attributes
     ----------
     value : float
     error : float
-        Largest relative difference of the leading eigenvalues between basis and full pencil; largest residual where
-        every value is solved in full.
+        Largest relative difference of the leading eigenvalues between reduced-order and full model; largest residual
+        where every value is solved in full.
     unstable_count, unstable_count_independent : int
         Both eigenvalues of a pair count.
     agrees : bool
@@ -85,7 +85,7 @@ class Family(Protocol):
 
     def prepare(self, axis: Axis) -> None: ...
 
-    def conditions_at(self, value: float) -> Conditions: ...
+    def mu_at(self, value: float) -> Mu: ...
 
     def pencil(self, value: float) -> CoupledPencil: ...
 
@@ -100,21 +100,18 @@ class Family(Protocol):
     def verdicts(self, values: np.ndarray, spectra: list[Spectrum]) -> dict[float, Verdict]: ...
 
 
-def _place_of(model: ValveModel, pressure: float, conditions: Conditions) -> Place:
-    """The place of a steady state under conditions."""
-    own = {name: getattr(conditions, name) for name in ("density", "alpha", "beta", "loss_factor")}
-    return Place.of(model.case).at(pressure=pressure, **own, **conditions.of_line)
+def _complete(case: Case, mu: Mu, pressure: float) -> Mu:
+    """Parameter point of a case at a pressure, Pa, with the values of another one."""
+    return Mu.of(case).at(**{**mu, "pressure": pressure})
 
 
 class FluidFamily:
     """One state; density, alpha, beta or the factor on the loss factors moves."""
 
-    def __init__(
-        self, model: ValveModel, state: SteadyState, axis: Axis, conditions: Conditions, options, observer: Observer
-    ):
-        self.state, self.axis, self.conditions, self.options, self.observer = state, axis, conditions, options, observer
+    def __init__(self, model: ValveModel, state: SteadyState, axis: Axis, mu: Mu, options, observer: Observer):
+        self.state, self.axis, self.mu, self.options, self.observer = state, axis, mu, options, observer
         self.walk = StabilityWalk(model.case, observer, model, symmetry_named(options.symmetry))
-        self.walk.give(_place_of(model, state.pressure, conditions), state.q)
+        self.walk.give(_complete(model.case, mu, state.pressure), state.q)
         self.linear = linearise_class(model, state.q, state.pressure, symmetry_named(options.symmetry))
         self.pressure = state.pressure
         self.done: tuple[Check, ...] = ()
@@ -124,8 +121,8 @@ class FluidFamily:
         self.errors: dict[float, float] = {}
         self.workspace = Workspace()
 
-    def conditions_at(self, value: float) -> Conditions:
-        return replace(self.conditions, **{self.axis.parameter: float(value)})
+    def mu_at(self, value: float) -> Mu:
+        return self.mu.at(**{self.axis.parameter: float(value)})
 
     def prepare(self, axis: Axis) -> None:
         """Make the basis and enlarge it until full solves at some of the values confirm it."""
@@ -160,15 +157,13 @@ class FluidFamily:
         """Compare with a full solve, and enlarge the basis where it misses the tolerance; whether it was good enough
         before.
         """
-        conditions, count = self.conditions_at(value), self.options.count
+        mu, count = self.mu_at(value), self.options.count
         search = self._selected(value)
         self.notes = self.notes or search.notes
         pencil = self._full(value)
 
         def error(full: Spectrum) -> float:
-            damping = conditions.alpha * basis.project(pencil.M) + conditions.beta * basis.project(
-                self.linear.structure
-            )
+            damping = mu.alpha * basis.project(pencil.M) + mu.beta * basis.project(self.linear.structure)
             reduced = basis.reduced(pencil, damping=damping)
             found = self._reduced(reduced, search, count + 4, left=False).eigenvalues
             worst = _largest_gap(full.eigenvalues, found)
@@ -203,8 +198,8 @@ class FluidFamily:
         found = self.walk.search(self._place(value))
         return replace(found, options=replace(found.options, tolerance=self.options.search.tolerance))
 
-    def _place(self, value: float) -> Place:
-        return _place_of(self.linear.model, self.pressure, self.conditions_at(value))
+    def _place(self, value: float) -> Mu:
+        return _complete(self.linear.model.case, self.mu_at(value), self.pressure)
 
     def refusal(self, value: float) -> str:
         """Why the constants of the rubber do not hold at a value; empty where they do."""
@@ -220,11 +215,11 @@ class FluidFamily:
         return dict(zip(map(float, values), found))
 
     def _full(self, value: float) -> CoupledPencil:
-        return self.linear.pencil(self.conditions_at(value))
+        return self.linear.pencil(self.mu_at(value))
 
     def pencil(self, value: float) -> CoupledPencil:
         """On the basis."""
-        pencil = self.small.pencil(self.conditions_at(value))
+        pencil = self.small.pencil(self.mu_at(value))
         self._searches[pencil] = self._selected(value)
         return pencil
 
@@ -261,8 +256,8 @@ class FluidFamily:
 class PressureFamily:
     """A state for every pressure, found from the nearest one known."""
 
-    def __init__(self, model: ValveModel, conditions: Conditions, options, observer: Observer):
-        self.model, self.conditions, self.options, self.observer = model, conditions, options, observer
+    def __init__(self, model: ValveModel, mu: Mu, options, observer: Observer):
+        self.model, self.mu, self.options, self.observer = model, mu, options, observer
         self.path = LoadPath(model, SteadyOptions.of(model.case), observer=observer)
         self.known: dict[float, SteadyState] = {}
         self.workspace = Workspace()
@@ -273,13 +268,13 @@ class PressureFamily:
         self._searches: WeakKeyDictionary[CoupledPencil, LeadingSearch] = WeakKeyDictionary()
         self._bands: dict[float, LeadingSearch] = {}
 
-    def conditions_at(self, value: float) -> Conditions:
-        return self.conditions
+    def mu_at(self, value: float) -> Mu:
+        return self.mu
 
     def prepare(self, axis: Axis) -> None:
         self.pressure = axis.values[0]
 
-    def _place(self, value: float) -> Place:
+    def _place(self, value: float) -> Mu:
         """The place of a pressure, its state known to the walk."""
         self.pressure = value
         if value not in self.known:
@@ -288,13 +283,13 @@ class PressureFamily:
                 if near.pressure != self.path.pressure:
                     self.path.q, self.path.pressure, self.path.slope = near.q, near.pressure, None
             self.known[value] = self.path.go_to(value)
-        place = _place_of(self.model, value, self.conditions)
+        place = _complete(self.model.case, self.mu, value)
         self.walk.give(place, self.known[value].q)
         return place
 
     def refusal(self, value: float) -> str:
         """Why the constants of the rubber do not hold at a pressure; empty where they do."""
-        return _refusal(self.walk, self._place(value)) if self.conditions.loss_factor else ""
+        return _refusal(self.walk, self._place(value)) if self.mu.loss_factor else ""
 
     def verdicts(self, values: np.ndarray, spectra: list[Spectrum]) -> dict[float, Verdict]:
         """Verdict on each pressure, from its leading modes and a count."""
@@ -307,7 +302,7 @@ class PressureFamily:
     def pencil(self, value: float) -> CoupledPencil:
         place = self._place(value)
         symmetry = symmetry_named(self.options.symmetry)
-        pencil = linearise_class(self.model, self.known[value].q, value, symmetry).pencil(self.conditions)
+        pencil = linearise_class(self.model, self.known[value].q, value, symmetry).pencil(self.mu)
         if value not in self._bands:
             found = self.walk.search(place)
             asked = replace(found.options, tolerance=self.options.search.tolerance)
@@ -340,7 +335,7 @@ class PressureFamily:
         return tuple(self.known[float(value)] for value in values)
 
 
-def _refusal(walk: StabilityWalk, place: Place) -> str:
+def _refusal(walk: StabilityWalk, place: Mu) -> str:
     try:
         walk.require_valid(place)
     except NotValidError as error:

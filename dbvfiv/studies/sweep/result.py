@@ -92,7 +92,7 @@ class Branch:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where a branch crosses zero growth, by interpolation between two values.
+    """Crossing of zero growth by a branch, interpolated between two values of the parameter.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class Crossing:
     value : float
     frequency : float, Hz
     to_unstable : bool
-        Whether the branch becomes unstable as the parameter grows.
+        True where the branch becomes unstable as the parameter grows.
     """
 
     branch: int
@@ -182,7 +182,7 @@ class SweepResult(StudyResult):
 
     @property
     def certified(self) -> bool:
-        """Whether all checks held."""
+        """True where all checks held."""
         over = self.record.notes("over")
         return bool(over) and over[-1]["certified"]
 
@@ -199,12 +199,13 @@ class SweepResult(StudyResult):
 
     @property
     def units(self) -> str:
-        """Of the parameter."""
+        """SI unit of the parameter."""
         return PARAMETERS[self.parameter].quantity.si
 
     def crossings(self) -> tuple[Crossing, ...]:
-        """Where branches cross zero growth, interpolated between neighbouring values; two real ones that have merged
-        count once.
+        """Crossings of zero growth by the branches, interpolated between neighbouring values.
+
+        Two real branches that have merged count once.
         """
         scale = np.log if self.axis.log else np.asarray
         place = scale(self.values)

@@ -11,10 +11,10 @@ import numpy as np
 from eigen import Branches, SearchOptions, Spectrum, TrackOptions, track
 
 from ...case.axis import Axis
+from ...case.parameters import Mu
 from ...errors import CaseError, SolveError
 from ...materials import outside_band
 from ...model import ValveModel
-from ...model.dynamics import Conditions
 from ...model.equilibria import require_equilibrium
 from ...model.leading import growth_floor
 from ...model.state import SteadyState
@@ -78,7 +78,7 @@ class SweepOptions:
 
 @dataclass(frozen=True)
 class SweepPoint:
-    """What is known at one value as soon as it is solved."""
+    """Eigenvalues, 1/s, and unstable count at one value, as soon as it is solved."""
 
     value: float
     eigenvalues: np.ndarray
@@ -127,7 +127,7 @@ class FoundBranches:
 def run_sweep(
     model: ValveModel,
     axis: Axis,
-    conditions: Conditions | None = None,
+    mu: Mu | None = None,
     options: SweepOptions | None = None,
     observer: Observer | None = None,
     state: SteadyState | None = None,
@@ -144,7 +144,7 @@ def run_sweep(
     model : ValveModel
     axis : Axis
         Parameter and values.
-    conditions : Conditions, optional
+    mu : Mu, optional
         Density and damping where they are not swept; those of the case otherwise.
     options : SweepOptions, optional
     observer : Observer, optional
@@ -161,7 +161,7 @@ def run_sweep(
     SolveError
         If not even the first value was solved.
     """
-    conditions = Conditions.of(model.case) if conditions is None else conditions
+    mu = Mu.of(model.case) if mu is None else mu
     options = SweepOptions.of(model.case) if options is None else options
     observer = Observer() if observer is None else observer
     if axis.parameter == "density" and not model.flow.has_fluid:
@@ -170,12 +170,12 @@ def run_sweep(
             "pressure, alpha or beta."
         )
     if axis.parameter == "pressure":
-        family: Family = PressureFamily(model, conditions, options, observer)
+        family: Family = PressureFamily(model, mu, options, observer)
     else:
         if state is None:
             raise ValueError("A sweep over density or damping needs the state at which it is made.")
         require_equilibrium(model, state)
-        family = FluidFamily(model, state, axis, conditions, options, observer)
+        family = FluidFamily(model, state, axis, mu, options, observer)
     observer.begin(f"sweep over {axis.parameter}", len(axis.values))
     run = _Run(model, family, axis, options, observer, keep)
     interrupted, failures = False, ()
@@ -302,7 +302,7 @@ class _Run:
 
 
 def _with_gaps(branches: Branches, sound: np.ndarray, values: np.ndarray) -> Branches:
-    """The same branches over more values, those left out not being there."""
+    """Branches over more values, with NaN at values that were left out."""
     eigenvalues = np.full((len(branches.ids), len(values)), complex(np.nan, np.nan))
     confidence = np.full(eigenvalues.shape, np.nan)
     at = np.flatnonzero(np.isin(values, sound))
@@ -314,7 +314,7 @@ def _shown(branches: Branches, family: Family, values: np.ndarray) -> Branches:
     """Branches clearly right of the limit point -1/beta, numbered from 1 by their largest growth rate."""
     eigenvalues, confidence = branches.eigenvalues.copy(), branches.confidence.copy()
     for column, value in enumerate(values):
-        beyond = eigenvalues[:, column].real <= growth_floor(family.conditions_at(value).beta)
+        beyond = eigenvalues[:, column].real <= growth_floor(family.mu_at(value).beta)
         eigenvalues[beyond, column] = np.nan
         confidence[beyond, column] = np.nan
     there = np.isfinite(eigenvalues.real)

@@ -1,4 +1,4 @@
-"""How modes along a parameter are followed and kept."""
+"""Run of the sweep study: follows modes along a parameter and keeps them in a record."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class RunVerdict:
 
     @property
     def decided(self) -> bool:
-        """Whether both agree and more of the same would not change them."""
+        """True where the verdicts on mass flow and lip displacement agree and a longer run would not change them."""
         lip = self.lip_displacement
         return self.mass_flow.decided and lip.decided and self.mass_flow.name == lip.name
 

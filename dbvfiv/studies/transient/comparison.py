@@ -73,7 +73,7 @@ def compare(results: Sequence[TransientResult], names: Sequence[str] | None = No
 
 
 def _swings(result: TransientResult) -> bool:
-    """Whether a run ends in cycles, at least three, and not on its way to somewhere."""
+    """True where a run ends in at least three cycles, and not in a transition."""
     return bool(result.cycle) and result.verdict["lip_displacement"]["cycles_observed"] >= 3
 
 

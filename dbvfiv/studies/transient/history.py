@@ -1,4 +1,4 @@
-"""What is read off every step: rows of `dbvfiv.studies.transient.tables.HISTORY`."""
+"""Quantities computed at every step: rows of `dbvfiv.studies.transient.tables.HISTORY`."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Reader:
     def _row(self, state, load, h: float, evaluations: int) -> dict[str, Any]:
         motion, model = self.motion, self.motion.model
         kinetic, strain, stop = motion.energies(state.q, state.v)
-        density = motion.conditions.density
+        density = motion.mu.density
         area = load.area
         throat = int(np.argmin(area))
         out = density * load.speed[0] * float(self.motion.model.flow.open_area(area[0]))

@@ -1,4 +1,4 @@
-"""How a run is kept in its record: the history in batches, full states, and points to go on from."""
+"""Storage of a run in its record: the history in batches, full states, and restart points."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Keeper:
         return self._kept[HISTORY] + len(self._pending["time"])
 
     def __contains__(self, name: str) -> bool:
-        """Whether there is such a column of the history."""
+        """True where the history has a column of that name."""
         return name in self._pending
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -140,5 +140,5 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
 
 
 def _goes_on(time: float, before: Case, now: Case) -> bool:
-    """Whether the end of a run that is over was moved to a later time."""
+    """True where the end of a finished run was moved to a later time."""
     return time < RunOptions.of(now).end and now.transient.duration > before.transient.duration

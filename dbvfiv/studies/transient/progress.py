@@ -1,4 +1,4 @@
-"""Where a run stands: all that is needed to go on with the same numbers."""
+"""Restart point of a run: all that is needed to continue with the same numbers."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _LATER = ("contact_loss", "numerical_loss")
 
 
 def memory_row(memory: Memory) -> dict[str, Any]:
-    """What of a memory does not follow from positions."""
+    """Row of the internal variables of the wall that do not follow from its positions."""
     values = (memory.branches, memory.stretch, memory.work, memory.loss, memory.stored)
     return {column.name: value for column, value in zip(MEMORY_COLUMNS, values, strict=True)}
 
 
 @dataclass
 class Progress:
-    """Where a run stands.
+    """Restart point of a run.
 
     Attributes
     ----------
@@ -35,11 +35,11 @@ class Progress:
     saved : int
         Full states kept so far.
     work, dissipation, energy, renewed, contact_loss, numerical_loss : float
-        The books of energy, J of the part.
+        Energy budget, J of the computed part.
     control : tuple of float
-        Of the step control.
+        State of the step control.
     eigenvalue : complex
-        Of the mode of a kick; not a number without.
+        Eigenvalue, 1/s, of the mode of a kick; not a number without one.
     """
 
     state: MotionState
@@ -96,5 +96,5 @@ class Progress:
 
 
 def _has(record: Record, name: str) -> bool:
-    """Whether restart points of a record have a column."""
+    """True where restart points of a record have a column."""
     return any(c.name == name for c in record.tables[RESTART].columns)

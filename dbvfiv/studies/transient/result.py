@@ -121,7 +121,7 @@ class TransientResult(StudyResult):
 
     @property
     def begun(self) -> bool:
-        """Whether there is anything: a state to start from and a step."""
+        """True where the run has a start and at least one step."""
         return self.record.rows(HISTORY) > 1
 
     @cached_property
@@ -146,7 +146,7 @@ class TransientResult(StudyResult):
 
     @property
     def complete(self) -> bool:
-        """Whether the run went to its end, or to where its verdict ended it."""
+        """True where the run went to its end, or to where its verdict ended it."""
         return super().complete and not self.failures
 
     @property
@@ -155,7 +155,7 @@ class TransientResult(StudyResult):
 
     @property
     def stopped(self) -> bool:
-        """Whether the verdict ended the run."""
+        """True where the verdict ended the run."""
         return self.complete and float(self.history["time"][-1]) < RunOptions.of(self.case).end
 
     def require_steps(self) -> None:

@@ -34,7 +34,7 @@ from .tables import tables_of
 
 @dataclass
 class TransientRun:
-    """What a run found, besides what its record keeps.
+    """Result of a run, besides its record.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class TransientRun:
     failures : list of str
     interrupted : bool
     stopped : bool
-        Whether the verdict ended it.
+        True where the verdict ended the run.
     residuals, solves, factorisations, halvings : int
         Work done, of this part of the run if it was resumed.
     """
@@ -140,7 +140,7 @@ class Runner:
 
     def _judge_rubber(self, state: MotionState, inlet: float) -> None:
         """Note where the constants of rubbers with loss factors do not hold at the state that is kicked."""
-        loss = self.motion.conditions.loss_factor
+        loss = self.motion.mu.loss_factor
         found = material_stability(self.model, state.q, inlet, loss) if loss else None
         if found is not None and not found.holds:
             self.record.note(REFUSAL, text=found.sentence)

@@ -1,4 +1,4 @@
-"""How a time history is run and kept."""
+"""Run of the transient study: computes a time history and keeps it in a record."""
 
 from __future__ import annotations
 

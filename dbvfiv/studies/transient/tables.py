@@ -1,4 +1,4 @@
-"""What the file of a transient run holds: a row for each step, full states, and points to go on from."""
+"""Tables in the file of a transient run: a row for each step, full states, and restart points."""
 
 from __future__ import annotations
 

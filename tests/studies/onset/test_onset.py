@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.onset.run import run_onset
 from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
-from dbvfiv.studies.stability.place import Place
+from dbvfiv.studies.stability.place import condition_of
 from tests.small_valves import FORMER
 
 
@@ -84,10 +85,10 @@ def test_criticality_and_uncertainty(coarse_case):
     assert point.uncertainty == pytest.approx(abs(point.value - point.coarse_value) / 3, rel=0.05)
 
 
-def test_a_place_changes_what_it_is_told(coarse_case):
-    place = Place.of(coarse_case).at(density=3.0, thickness=0.9)
-    assert place.condition == (3.0, 0.0, 0.003, 0.0, 0.0) and place.design == {"thickness": 0.9}
-    assert place.mu()["inlet"] == 6000.0 and place.mu()["thickness"] == 0.9
+def test_a_parameter_point_is_changed(coarse_case):
+    place = Mu.of(coarse_case).at(density=3.0, thickness=0.9)
+    assert condition_of(place) == (3.0, 0.0, 0.003, Mu(storage=0.0), 0.0) and place.design == {"thickness": 0.9}
+    assert place.for_system()["inlet"] == 6000.0 and place.for_system()["thickness"] == 0.9
 
 
 def _undamped(coarse_case, **more):

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.sensitivity import derivatives as sensitivity
 from eigen import SearchOptions, leading_modes
 
-CONDITIONS = Conditions(10.0, 1.0, 0.003)
+CONDITIONS = Mu(density=10.0, alpha=1.0, beta=0.003)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +54,7 @@ def test_derivative_is_that_of_the_eigenvalue(valve, name):
     )
 
 
-LOSSY = Conditions(10.0, 1.0, 0.0, 1.0)
+LOSSY = Mu(density=10.0, alpha=1.0, beta=0.0, loss_factor=1.0)
 
 
 @pytest.fixture(scope="module")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.model import Conditions, ValveModel, linearise
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.sensitivity.derivatives import eigenvalue_sensitivities
-from dbvfiv.studies.stability.place import Place
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions, leading_modes
 
@@ -28,7 +26,7 @@ def walk_of(**keys):
 @pytest.mark.parametrize("fluid", ["same", 1000.0])
 def test_columns_over_density_agree_with_full_spectra(law, fluid):
     case, walk = walk_of(**{"outside.fluid": fluid, "fluid.continuity": law})
-    base = Place.of(case).at(pressure=6e3)
+    base = Mu.of(case).at(pressure=6e3)
     places = [base.at(density=d) for d in np.geomspace(2.0, 1500.0, 12)]
     column = walk.column(places)
     assert column.certified.all() and column.error < 1e-6
@@ -47,18 +45,18 @@ def test_columns_over_density_agree_with_full_spectra(law, fluid):
 def test_most_cells_need_no_direct_solution():
     """Counts that jump over a mode of the laden structure would all be repaired directly, at many times the cost."""
     case, walk = walk_of(**{"outside.fluid": "same", "fluid.continuity": "storage"})
-    base = Place.of(case).at(pressure=6e3)
+    base = Mu.of(case).at(pressure=6e3)
     column = walk.column([base.at(density=d) for d in np.geomspace(2.0, 1500.0, 30)])
     assert np.count_nonzero(column.how) <= 2 and column.certified.all()
 
 
 def test_sensitivities_are_slopes_of_the_eigenvalue():
     case = thesis_case(MESH | {"outside.fluid": "same"})
-    model, pressure, conditions = ValveModel(case), 8e3, Conditions(200.0, 0.0, 0.002)
+    model, pressure, conditions = ValveModel(case), 8e3, Mu(density=200.0, alpha=0.0, beta=0.002)
 
     def leading(pressure, density, near=None):
         q = find_equilibria(model, [pressure]).states[0].q
-        pencil = linearise(model, q, pressure).pencil(replace(conditions, density=density))
+        pencil = linearise(model, q, pressure).pencil(conditions.at(density=density))
         found = leading_modes(pencil, 6, SearchOptions(limit_point=-500.0, left=near is None))
         i = (
             int(np.argmin(np.abs(found.eigenvalues - near)))

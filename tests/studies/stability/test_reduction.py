@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.studies.stability.family import ValveFamily
-from dbvfiv.studies.stability.place import Place
 from eigen import ColumnSolver, Condition, FamilyReduction
 from eigen.phase_count import phase_counts
 from eigen.reduced import POWERS
@@ -20,7 +20,7 @@ def storage(request):
 
 @pytest.fixture(scope="module")
 def family(walk, coarse_case) -> ValveFamily:
-    return walk.family(Place.of(coarse_case))
+    return walk.family(Mu.of(coarse_case))
 
 
 def test_fluid_parts_go_with_powers_of_the_root_of_density(family):

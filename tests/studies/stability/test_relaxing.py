@@ -5,12 +5,13 @@ import pytest
 
 from dbvfiv import resume
 from dbvfiv.api import Valve
+from dbvfiv.case.parameters import Mu
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.onset.run import run_onset
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.stability.place import Place
+from dbvfiv.studies.stability.place import condition_of
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import certified_spectrum
 from tests.small_valves import FORMER
@@ -46,7 +47,7 @@ def lossy_walk(lossy_case):
 @pytest.mark.parametrize("parameter, values", [("density", (1.0, 1000.0)), ("loss_factor", (0.25, 3.0))])
 @pytest.mark.parametrize("storage", [0.0, 1.0], ids=["quasi-steady", "storage"])
 def test_cells_agree_with_the_full_pencil(lossy_case, lossy_walk, parameter, values, storage):
-    base = Place.of(lossy_case).at(storage=storage)
+    base = Mu.of(lossy_case).at(storage=storage)
     places = [base.at(**{parameter: value}) for value in np.geomspace(*values, 9)]
     column = lossy_walk.column(places)
     assert column.certified.all() and (column.how == 0).sum() > 6
@@ -59,7 +60,7 @@ def test_cells_agree_with_the_full_pencil(lossy_case, lossy_walk, parameter, val
 
 def test_cells_of_dense_fluids_over_the_loss_factor_need_no_full_pencil(lossy_case, lossy_walk):
     """Vectors corrected once left 1e-5 of the leading eigenvalue there, and every cell to the full pencil."""
-    base = Place.of(lossy_case).at(storage=0.0, density=1000.0)
+    base = Mu.of(lossy_case).at(storage=0.0, density=1000.0)
     places = [base.at(loss_factor=value) for value in np.geomspace(0.25, 1.5, 12)]
     column = lossy_walk.column(places)
     assert column.certified.all() and (column.how == 0).all() and column.error < 1e-6
@@ -70,7 +71,7 @@ def test_cells_of_dense_fluids_over_the_loss_factor_need_no_full_pencil(lossy_ca
 
 def test_an_elastic_wall_is_one_without_loss_factors(lossy_case, lossy_walk):
     """At a factor of zero on them, beside cells that relax."""
-    base = Place.of(lossy_case)
+    base = Mu.of(lossy_case)
     elastic = lossy_walk.spectrum(base.at(loss_factor=0.0)).eigenvalues[0]
     barely = lossy_walk.spectrum(base.at(loss_factor=1e-4)).eigenvalues[0]
     assert barely == pytest.approx(elastic, rel=1e-3)
@@ -86,7 +87,7 @@ def test_maps_against_certified_spectra(lossy_case, lossy_walk, continuity, seco
     for i, j in ((0, 0), (1, 3)):
         place = result.plan.place(result.plan.x.values[i], result.plan.y.values[j], result.plan.laws[0])
         family = lossy_walk.family(place)
-        found = certified_spectrum(family.pencil(place.condition), 6, family.search(place.condition))
+        found = certified_spectrum(family.pencil(condition_of(place)), 6, family.search(condition_of(place)))
         assert found.unstable_count == found.unstable_count_independent == unstable[j, i]
         assert growth[j, i] == pytest.approx(
             found.spectrum.growth_rate[0], abs=1e-6 * abs(found.spectrum.eigenvalues[0])
@@ -134,7 +135,7 @@ def test_onset_over_the_loss_factor_is_where_bisection_finds_it(lossy_case, loss
     assert point.confirmed and not point.gains and abs(point.growth_rate) < 1e-6
 
     def growth(value):
-        return lossy_walk.spectrum(Place.of(case).at(loss_factor=value)).growth_rate[0]
+        return lossy_walk.spectrum(Mu.of(case).at(loss_factor=value)).growth_rate[0]
 
     low, high = 0.98 * point.value, 1.02 * point.value
     for _ in range(8):

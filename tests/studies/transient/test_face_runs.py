@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.model.dynamics import Conditions, linearise
+from dbvfiv.case.parameters import Mu
+from dbvfiv.model.dynamics import linearise
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.start import steady_positions
@@ -77,7 +78,7 @@ def test_a_small_motion_of_pressed_lips_follows_its_mode(valve):
     model = valve({"supports.contact": "faces", "damping.beta": 1e-4} | changes)
     q = steady_positions(model, 500.0)
     assert model.touching(q) > 3
-    pencil = linearise(model, q, 500.0).pencil(Conditions.of(model.case), fluid=False)
+    pencil = linearise(model, q, 500.0).pencil(Mu.of(model.case), fluid=False)
     mass, damping, stiffness = (np.asarray(part.todense()) for part in (pencil.M, pencil.C, pencil.K))
     n, zero = model.size, np.zeros((model.size, model.size))
     inverse = np.linalg.inv(mass)
