@@ -189,7 +189,7 @@ class SparseBlocks:
         Of the rows, as `scipy.sparse.csr_matrix` has them.
     shape : (int, int)
     share : float
-        What these matrices weigh beside others that they are added to: the smaller it is, the more of them is left out.
+        Weight of these matrices beside others that they are added to: the smaller it is, the more of them is left out.
     spread : (N, M) array, optional
         Weights of those in these.
 

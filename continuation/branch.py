@@ -124,7 +124,7 @@ class Branch:
     next_step : float
         Where the step control stood.
     restart : dict of str to ndarray
-        What a resumed run needs besides the points.
+        Borders and frame that a resumed run needs besides the points.
     """
 
     kind: str
@@ -167,7 +167,7 @@ class Branch:
         return {**self.fixed, **dict(zip(self.names, map(float, z[self.size :])))}
 
     def of_kind(self, kind: str, located: bool = True) -> list[SpecialPoint]:
-        """Special points of one kind, located ones only unless told otherwise."""
+        """Special points of one kind, located ones only by default."""
         return [s for s in self.special if s.kind == kind and (s.located or not located)]
 
     def reopen(self) -> Branch:

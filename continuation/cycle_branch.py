@@ -1,4 +1,9 @@
-"""Branches of periodic motions along one parameter: steps, folds, changes of stability, other events."""
+"""Branches of periodic motions along one parameter: steps, folds, changes of stability, other events.
+
+The next cycle is sought at a value of the parameter that was asked for, or in the hyperplane through a prediction
+normal to the way there (pseudo-arclength).  A fold is the extreme value of the parameter on a parabola through three
+cycles; a change of stability or an event is a zero of a test function, by false position along the branch.
+"""
 
 from __future__ import annotations
 
@@ -109,7 +114,7 @@ class CycleTracer:
         self, report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None, step: float | None = None
     ) -> str:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
-        is found; the reason of the end. `step` is the first step where it is not that of the options.
+        is found; the reason of the end. `step` is the first step, that of the options by default.
         """
         options = self.options
         step = options.step if step is None else step
@@ -152,19 +157,19 @@ class CycleTracer:
         return float(np.sign(self.points[-1].value - self.points[-2].value))
 
     def _advance(self, step: float) -> tuple[CyclePoint | None, float, str]:
-        options, said = self.options, ""
+        options, reason = self.options, ""
         while step >= options.min_step:
             target = self._target(step)
             try:
                 cycle = self._step(step, target)
                 point = self._accept(cycle, target in options.values)
             except ContinuationError as error:
-                said = str(error)
+                reason = str(error)
                 step *= 0.4
                 continue
             grown = 2.0 if cycle.iterations <= 6 else (0.7 if cycle.iterations >= 10 else 1.0)
             return point, min(max(step * grown, options.min_step), options.max_step), ""
-        return None, step, f"no further cycle was found: {said}"
+        return None, step, f"no further cycle was found: {reason}"
 
     def _target(self, step: float) -> float | None:
         """The next value that is asked for, or the limit, where it lies within the step."""

@@ -2,8 +2,8 @@
 
 The preconditioner has two levels. On a small basis, in which the equations are coupled strongly in time, the
 linearisation is projected and solved as a dense matrix, with whatever else is unknown and the conditions that go with
-it; in all other directions a smoother solves each harmonic by itself. What corrections need beyond the basis is added
-to it, so that neighbours on a branch need ever fewer iterations.
+it; in all other directions a smoother solves each harmonic by itself. Directions that corrections need beyond the
+basis are added to it, so that neighbours on a branch need ever fewer iterations.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ class CycleOptions:
     Attributes
     ----------
     tolerance : float
-        What the last correction leaves, over the size of the motion about its mean: the size of the next one, by the
-        contraction seen.
+        Error that the last correction leaves, over the size of the motion about its mean: the size of the next one, by
+        the contraction seen.
     max_iterations : int
         Corrections.
     linear : float
-        What a correction may leave of its linear equations.
+        Share of its linear equations that a correction may leave.
     krylov : int
         Most Krylov iterations for a correction.
     renew_at : float
@@ -164,7 +164,7 @@ class CycleSolver:
         raise NotConverged(f"No periodic motion was found near the guess: {sentence}", "iterations")
 
     def unknowns(self, free: Sequence[str]) -> tuple[str, ...]:
-        """All that is unknown beside the motion: the frequency first where time does not matter."""
+        """Free unknowns beside the motion: the frequency first for an autonomous system."""
         free = tuple(free)
         return (FREQUENCY, *free) if self.system.autonomous and FREQUENCY not in free else free
 

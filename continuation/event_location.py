@@ -199,7 +199,7 @@ class EventMonitor:
     def between(self, tracer, before, after, index, found):
         name = self.event.name
         f0, f1 = before.tests[name], after.tests[name]
-        # A value that is not finite is no crossing, and a zero was told when it was reached.
+        # A value that is not finite is no crossing, and a zero was reported when it was reached.
         if not (f0 * f1 < 0 or (f1 == 0 and f0 != 0)):
             return []
         values = {"stop": float(self.event.stop)} if self.event.stop else {}

@@ -49,7 +49,7 @@ class Exponents:
     vectors : list of (2 H + 1, n) complex arrays
         Coefficients of the perturbations.
     errors : (k,) array
-        What each perturbation misses in the full equations, as a share of itself.
+        Share of each perturbation that it misses in the full equations.
     trivial : float
         Size of the exponent of the shift in time, 1/s; zero for a forced system.
     omega : float

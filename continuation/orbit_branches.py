@@ -60,13 +60,15 @@ def continue_orbits(
     ------
     NotConverged
         No second orbit was found beside the first.
+    ValueError
+        The first orbit lies at the limit of the parameter.
     """
     follower = _Follower(system, parameter, options, discretisation, orbit.mu)
     first = Cycle(orbit.motion, dict(orbit.mu), 0.0, 0, 0)
 
     def steps():
         follower.tracer.begin(first, False, follower.take)
-        follower.tracer.extend(follower.beside(first), False, follower.take)
+        follower.tracer.extend(follower.second_orbit(first), False, follower.take)
         return follower.tracer.run(follower.take)
 
     return follower.run(steps, observers)
@@ -133,7 +135,10 @@ def resume_orbits(
     discretisation: OrbitOptions | None = None,
     observers=None,
 ) -> Branch:
-    """Go on from the last point of a branch of orbits, e.g. one loaded from a file."""
+    """Go on from the last point of a branch of orbits, e.g. one loaded from a file.
+
+    The branch handed over stays as it is; the one returned holds its points and the new ones.
+    """
     require(branch.kind == "orbits", f"This needs a branch of orbits, not {branch.kind}.")
     require(len(branch) > 1, "A branch of orbits goes on from two points at least.")
     follower = _Follower(system, branch.names[0], options, discretisation, branch.fixed)
@@ -193,12 +198,13 @@ class _Follower:
         self.observers: list = []
         self._met: list[str] = []
 
-    def beside(self, first: Cycle) -> Cycle:
+    def second_orbit(self, first: Cycle) -> Cycle:
         """Orbit a first step along the parameter away from the first one."""
         options, value = self.tracer.options, first.mu[self.parameter]
         step, reason = options.step * options.scale, ""
         while step >= options.min_step * options.scale:
             target = float(np.clip(value + self.options.direction * step, *options.limits))
+            require(target != value, f"The branch starts at its limit, {self.parameter} = {value:g}.")
             try:
                 return self.tracer.solver.solve(first.motion, first.mu | {self.parameter: target})
             except NotConverged as error:
@@ -229,7 +235,7 @@ class _Follower:
             return f"stopped at: {stop}"
 
     def take(self, item: CyclePoint | SpecialCycle) -> None:
-        """Record a point or a special point, and tell the observers."""
+        """Record a point or a special point, and notify the observers."""
         branch = self.branch
         branch.next_step = self.tracer.next_step
         if isinstance(item, CyclePoint):
@@ -300,4 +306,4 @@ def _padded(z: np.ndarray, size: int) -> np.ndarray:
 
 
 class _Stop(Exception):
-    """End of a branch at a special point that was asked for."""
+    """End of a branch at a special point of a kind in ``stop_at``."""

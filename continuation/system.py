@@ -21,7 +21,7 @@ Parameters = Mapping[str, float]
 
 @runtime_checkable
 class ShiftedSolver(Protocol):
-    """Solves with ``A - lambda B`` for one complex ``lambda``."""
+    """Products and solves with ``A - lambda B`` for one complex ``lambda``."""
 
     def matvec(self, x: np.ndarray) -> np.ndarray: ...
 
@@ -37,18 +37,10 @@ class ShiftedSolver(Protocol):
 
 
 @runtime_checkable
-class Linearisation(Protocol):
+class Linearisation(ShiftedSolver, Protocol):
     """``A = dF/du`` and ``B`` at one state; all vectors of shape (n,), real or complex."""
 
     size: int
-
-    def matvec(self, x: np.ndarray) -> np.ndarray: ...
-
-    def rmatvec(self, x: np.ndarray) -> np.ndarray: ...
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray: ...
-
-    def solve_transpose(self, rhs: np.ndarray) -> np.ndarray: ...
 
     def mass_matvec(self, x: np.ndarray) -> np.ndarray: ...
 

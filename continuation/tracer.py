@@ -36,16 +36,6 @@ class Observer:
         """After the last step, also when interrupted."""
 
 
-class Calling(Observer):
-    """Observer that calls a function with the branch after each point."""
-
-    def __init__(self, function: Callable):
-        self._function = function
-
-    def accepted(self, branch):
-        self._function(branch)
-
-
 class Checkpoint(Observer):
     """Save the branch every few points, so that a killed run can be resumed.
 
@@ -75,7 +65,13 @@ def as_observers(observers) -> list[Observer]:
         return []
     if isinstance(observers, Observer) or callable(observers):
         observers = [observers]
-    return [o if isinstance(o, Observer) else Calling(o) for o in observers]
+    return [o if isinstance(o, Observer) else _observer_of(o) for o in observers]
+
+
+def _observer_of(function: Callable) -> Observer:
+    observer = Observer()
+    observer.accepted = function
+    return observer
 
 
 def run_observed(branch, observers: list[Observer], steps: Callable[[], str]):

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 
 from continuation import (
     Branch,
+    Checkpoint,
     ContinuationOptions,
     JaxSystem,
     NotABifurcation,
@@ -153,6 +154,34 @@ def test_period_doubling_of_a_twisted_band():
     (point,) = branch.of_kind("period doubling")
     assert abs(point.mu["mu"] - a) < 1e-7
     assert branch.unstable[0] == 0 and branch.unstable[-1] == 1
+
+
+def test_a_branch_whose_series_grow(tmp_path):
+    """Van der Pol's oscillator from mu = 0.5 to 1, periods to the printed digits, checkpoints on the way."""
+    system = van_der_pol()
+    orbit = find_orbit(system, 2 * CIRCLE * [1, -1], 2 * np.pi, {"mu": 0.5})
+    seen = []
+    options = ContinuationOptions(limits={"mu": (0.1, 1.0)}, step=0.1, max_step=0.2)
+    path = tmp_path / "orbits.h5"
+    branch = continue_orbits(
+        system, orbit, "mu", options, observers=[lambda b: seen.append(len(b)), Checkpoint(path, 2)]
+    )
+    assert branch.reason == "limit of mu reached" and seen == list(range(1, len(branch) + 1))
+    assert abs(branch.values("period")[0] - 6.380676) < 5.1e-7 and abs(branch.values("period")[-1] - 6.663287) < 5.1e-7
+    assert np.all(np.diff(branch.values("harmonics")) >= 0) and np.ptp(branch.values("harmonics")) > 0
+    assert branch.states.shape == Branch.load(path).states.shape and set(branch.unstable) == {0}
+    assert np.isclose(orbit_at(system, branch, 0).period, orbit.period, rtol=1e-12)
+    with pytest.raises(ValueError, match="starts at its limit"):
+        continue_orbits(system, orbit_at(system, branch, -1), "mu", options)
+
+
+def test_a_branch_stops_where_it_is_asked_to():
+    system, mu = bautin(), {"mu": 0.4**4 - 0.4**2, "nu": 1.0}
+    orbit = find_orbit(system, 0.4 * CIRCLE, 2 * np.pi, mu)
+    assert not orbit.stable and np.allclose(orbit.exponents, 2 * 0.4**2 - 4 * 0.4**4, atol=1e-9)
+    options = ContinuationOptions(limits={"mu": (-1, 0.3)}, direction=-1, stop_at=frozenset({"fold of cycles"}))
+    branch = continue_orbits(system, orbit, "mu", options)
+    assert branch.reason == "stopped at: fold of cycles" and branch.special[-1].index >= len(branch) - 3
 
 
 def test_a_guess_that_is_no_orbit():
