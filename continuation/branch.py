@@ -1,4 +1,4 @@
-"""Branches and curves as results: points, special points, HDF5 files.
+"""Branches and curves as results: points, special points, figures, HDF5 files.
 
 One HDF5 file holds a branch: the attribute ``header`` (JSON) with names, parameters and the reason of the end; ``z``
 and ``tangent`` of shape (points, unknowns); one dataset per number; ragged eigenvalues padded with nan; one group per
@@ -15,8 +15,6 @@ from typing import Any
 
 import h5py
 import numpy as np
-
-from continuation.plots import plot_branch
 
 #: Version of the layout of files.
 FORMAT = 1
@@ -203,8 +201,64 @@ class Branch:
             return cls(**header, points=_read_points(file), special=special, restart=restart)
 
     def plot(self, observable=None, ax=None):
-        """Branch diagram; see `continuation.plots.plot_branch`."""
-        return plot_branch(self, observable, ax)
+        """Branch diagram, stable parts solid, unstable ones dashed; curves in their two parameters.
+
+        Parameters
+        ----------
+        observable : callable or int, optional
+            ``observable(u)``, or the index of an unknown; the largest absolute entry by default.
+            Curves in two parameters need none.
+        ax : matplotlib axes, optional
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        if ax is None:
+            import matplotlib.pyplot as plt
+
+            ax = plt.subplots()[1]
+        two = len(self.names) == 2
+        if observable is None:
+
+            def observable(u):
+                return np.abs(u).max()
+        elif isinstance(observable, (int, np.integer)):
+            index = int(observable)
+
+            def observable(u):
+                return u[index]
+
+        def height(u, mu):
+            return mu[self.names[1]] if two else observable(u)
+
+        x = self.values()
+        y = np.array([height(u, self.mu(i)) for i, u in enumerate(self.states)])
+        unstable = self.unstable
+        if np.all(unstable < 0):
+            ax.plot(x, y, "k-")
+        else:
+            ax.plot(x, y, "k:", linewidth=0.5)
+            for keep, style in ((unstable == 0, "k-"), (unstable > 0, "k--")):
+                # A segment belongs to a style when both of its ends do.
+                ax.plot(x, np.where(keep, y, np.nan), style)
+        for special in self.special:
+            if not np.isfinite(special.u).all():
+                continue
+            ax.plot(
+                special.mu[self.names[0]],
+                height(special.u, special.mu),
+                _MARKERS.get(special.kind, "x"),
+                label=special.kind,
+                fillstyle="full" if special.located else "none",
+            )
+        handles, labels = ax.get_legend_handles_labels()
+        unique = dict(zip(labels, handles))
+        if unique:
+            ax.legend(unique.values(), unique.keys())
+        ax.set_xlabel(self.names[0])
+        ax.set_ylabel(self.names[1] if two else "state")
+        return ax
 
 
 def _write(file, branch: Branch) -> None:
@@ -252,3 +306,15 @@ def _read_special(item) -> SpecialPoint:
 
 #: Arrays and numbers of a point that files hold, one dataset each.
 _NUMBERS = ("z", "tangent", "step", "iterations", "residual", "unstable")
+
+
+#: Markers of special points in figures.
+_MARKERS = {
+    "fold": "s",
+    "branch point": "D",
+    "hopf": "o",
+    "bogdanov-takens": "*",
+    "generalised hopf": "^",
+    "cusp": "v",
+    "zero-hopf": "P",
+}
