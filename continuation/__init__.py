@@ -2,8 +2,8 @@
 
 A model fulfils `System` (or is written once as a `JaxSystem`); `continue_branch` follows its
 equilibria, finds and locates folds, branch points and Hopf points; `switch_branch`,
-`continue_fold` and `continue_hopf` go on from those; `continuation.orbits` holds periodic
-orbits.
+`continue_fold`, `continue_hopf` and `orbits_from_hopf` go on from those; `find_orbit` and
+`continue_orbits` serve periodic orbits, by harmonic balance.
 
 Examples
 --------
@@ -27,21 +27,22 @@ from importlib import import_module
 from continuation.branch import Branch, CurvePoint, SpecialPoint
 from continuation.branches import continue_branch, resume, switch_branch
 from continuation.curves import continue_fold, continue_hopf, resume_curve
-from continuation.errors import (
+from continuation.event_location import Event
+from continuation.linear import MatrixLinearisation
+from continuation.newton import Deflation, NewtonResult, equilibrium
+from continuation.normal_form import HopfNormalForm, fold_coefficient, hopf_normal_form
+from continuation.options import (
     ContinuationError,
+    ContinuationOptions,
     DerivativeMissing,
+    NewtonOptions,
     NotABifurcation,
     NotConverged,
     OutOfDomain,
     SingularSystem,
 )
-from continuation.events import Event
-from continuation.linear import MatrixLinearisation
-from continuation.newton import Deflation, NewtonResult, equilibrium
-from continuation.normal_form import HopfNormalForm, fold_coefficient, hopf_normal_form
-from continuation.observers import Checkpoint, Observer
-from continuation.options import ContinuationOptions, NewtonOptions
 from continuation.system import Linearisation, Parameters, Spectrum, System, SystemBase
+from continuation.tracer import Checkpoint, Observer
 
 __all__ = [
     "Branch",
@@ -61,6 +62,8 @@ __all__ = [
     "NotABifurcation",
     "NotConverged",
     "Observer",
+    "Orbit",
+    "OrbitOptions",
     "OutOfDomain",
     "Parameters",
     "SingularSystem",
@@ -71,17 +74,35 @@ __all__ = [
     "continue_branch",
     "continue_fold",
     "continue_hopf",
+    "continue_orbits",
     "equilibrium",
+    "find_orbit",
     "fold_coefficient",
     "hopf_normal_form",
+    "orbit_at",
+    "orbits_from_hopf",
     "resume",
     "resume_curve",
+    "resume_orbits",
+    "special_orbit",
     "switch_branch",
 ]
 
+_LATE = {
+    "JaxSystem": "continuation.jax_system",
+    "Orbit": "continuation.orbits",
+    "OrbitOptions": "continuation.orbits",
+    "find_orbit": "continuation.orbits",
+    "continue_orbits": "continuation.orbit_branches",
+    "orbit_at": "continuation.orbit_branches",
+    "orbits_from_hopf": "continuation.orbit_branches",
+    "resume_orbits": "continuation.orbit_branches",
+    "special_orbit": "continuation.orbit_branches",
+}
+
 
 def __getattr__(name):
-    # JAX takes long to import and not every system is written in it.
-    if name == "JaxSystem":
-        return import_module("continuation.jax_system").JaxSystem
+    # JAX and compiled kernels take long to import, and not everyone needs them.
+    if name in _LATE:
+        return getattr(import_module(_LATE[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,15 +1,118 @@
-"""Sparse matrices of one pattern, one for each sample of a period, as linearisations about motions have them."""
+"""Matrices at the samples of a period, as sums of few: sparse ones of one pattern, and their dense projections.
+
+``A_i = sum_k w_ik A_k``: the matrices of a linearisation about a smooth motion are combinations of a few.  Reading few
+matrices once, in single precision, and summing entries where they are used takes half the time of reading one for each
+sample, which is bound by memory.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
+import numba
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
-from continuation.dense_blocks import DenseBlocks
 from continuation.harmonics import Harmonics
-from continuation.sparse_products import LANES, TOGETHER, add_products, add_products_of_one, padded
+
+#: Matrices that are summed at once: the number of them is filled up to a multiple of this with zeros.
+TOGETHER = 4
+#: Samples that are taken at once: likewise.
+LANES = 8
+#: Size over the largest of combinations of small dense matrices that are rounding.
+ROUNDING = 1e-15
+
+
+def pad_to_multiple(array: np.ndarray, axis: int, multiple: int) -> np.ndarray:
+    """Fill an array up with zeros, so that its length is a multiple of a number.
+
+    Examples
+    --------
+    >>> pad_to_multiple(np.ones((1, 3)), 1, 4).tolist()
+    [[1.0, 1.0, 1.0, 0.0]]
+    """
+    missing = -array.shape[axis] % multiple
+    return np.pad(array, [(0, missing if k == axis else 0) for k in range(array.ndim)])
+
+
+@numba.njit(cache=True, fastmath={"contract"}, error_model="numpy")
+def add_products(indptr, indices, values, weights, x, out):
+    """Add to out (n, v, N) the products of sum_k weights[k, t] B_k with x (m, v, N) at each sample t.
+
+    values (nnz, k) holds entries of the B_k, weights (k, N), of one type; k is a multiple of `TOGETHER`.
+    """
+    count, samples = weights.shape
+    entry = np.empty(samples, values.dtype)
+    for i in range(len(indptr) - 1):
+        for p in range(indptr[i], indptr[i + 1]):
+            j = indices[p]
+            a, b, c, d = values[p, 0], values[p, 1], values[p, 2], values[p, 3]
+            for t in range(samples):
+                entry[t] = a * weights[0, t] + b * weights[1, t] + c * weights[2, t] + d * weights[3, t]
+            for k in range(4, count, 4):
+                a, b, c, d = values[p, k], values[p, k + 1], values[p, k + 2], values[p, k + 3]
+                for t in range(samples):
+                    entry[t] += (
+                        a * weights[k, t] + b * weights[k + 1, t] + c * weights[k + 2, t] + d * weights[k + 3, t]
+                    )
+            for v in range(x.shape[1]):
+                for t in range(samples):
+                    out[i, v, t] += entry[t] * x[j, v, t]
+
+
+@numba.njit(cache=True, fastmath={"contract"}, error_model="numpy")
+def add_products_of_one(indptr, indices, values, weights, x, out):
+    """`add_products` with one matrix, k = 1."""
+    samples = weights.shape[1]
+    total = np.empty(samples)
+    for i in range(len(indptr) - 1):
+        for v in range(x.shape[1]):
+            total[:] = 0.0
+            for p in range(indptr[i], indptr[i + 1]):
+                a, j = values[p, 0], indices[p]
+                for t in range(samples):
+                    total[t] += a * x[j, v, t]
+            for t in range(samples):
+                out[i, v, t] += weights[0, t] * total[t]
+
+
+class DenseBlocks:
+    """N matrices that are sums of a few.
+
+    Parameters
+    ----------
+    weights : (N, k) array
+    parts : (k, r, r) array
+    rows : (k', r, n) array, optional
+        V^T A of the first of the full matrices that these are projections of, in single precision.
+    """
+
+    def __init__(self, weights: np.ndarray, parts: np.ndarray, rows: np.ndarray | None = None):
+        self.weights, self.parts, self.rows = weights, parts, rows
+
+    @classmethod
+    def of_stack(cls, stack: np.ndarray, rows: np.ndarray | None = None, tolerance: float = ROUNDING) -> DenseBlocks:
+        """Combinations of matrices (N, r, r) above a share of the largest; there are at most r^2."""
+        weights, sizes, parts = la.svd(stack.reshape(len(stack), -1), full_matrices=False)
+        kept = sizes >= tolerance * sizes[0]
+        parts, weights = (sizes[:, None] * parts)[kept].reshape(-1, *stack.shape[1:]), weights[:, kept]
+        rows = None if rows is None else np.tensordot(weights.T, rows, 1).astype(rows.dtype)
+        return cls(np.ascontiguousarray(weights), parts, rows)
+
+    @cached_property
+    def stack(self) -> np.ndarray:
+        """(N, r, r)."""
+        return np.tensordot(self.weights, self.parts, 1)
+
+    def __len__(self) -> int:
+        return len(self.weights)
+
+    def between_harmonics(self, h: Harmonics) -> np.ndarray:
+        """(k, 2 H + 1, 2 H + 1): what the weight of each part makes of coefficients."""
+        return np.matmul(h.basis.T, self.weights.T[:, :, None] * h.basis) / h.samples
+
 
 #: Size over the largest of those combinations of the matrices that are left out.
 LEFT_OUT = 1e-6
@@ -86,7 +189,7 @@ class SparseBlocks:
         Of the rows, as `scipy.sparse.csr_matrix` has them.
     shape : (int, int)
     share : float
-        What these matrices weigh beside others that they are added to: the smaller it is, the more of them is left out.
+        Weight of these matrices beside others that they are added to: the smaller it is, the more of them is left out.
     spread : (N, M) array, optional
         Weights of those in these.
 
@@ -132,7 +235,7 @@ class SparseBlocks:
         return len(self.weights)
 
     def _in_turn(self):
-        """The combinations; one matrix that changes, for it is dear to make."""
+        """Yield the combinations; one matrix whose data change, for it is dear to make."""
         matrix = sp.csr_matrix((self.values[0], *self._pattern), shape=self.shape, copy=False)
         for row in self.values:
             matrix.data = row
@@ -144,8 +247,10 @@ class SparseBlocks:
         """
         if self._entries is None:
             multiple = TOGETHER if len(self.values) > 1 else 1
-            self._entries = np.ascontiguousarray(padded(self.values, 0, multiple).T, SINGLE)
-            self._lanes = padded(padded(np.ascontiguousarray(self.weights.T, SINGLE), 0, multiple), 1, LANES)
+            self._entries = np.ascontiguousarray(pad_to_multiple(self.values, 0, multiple).T, SINGLE)
+            self._lanes = pad_to_multiple(
+                pad_to_multiple(np.ascontiguousarray(self.weights.T, SINGLE), 0, multiple), 1, LANES
+            )
         indices, indptr = self._pattern
         add = add_products if len(self._lanes) > 1 else add_products_of_one
         add(indptr, indices, self._entries, self._lanes, x, out)
@@ -155,7 +260,7 @@ class SparseBlocks:
         if np.iscomplexobj(samples):
             return self.times(samples.real) + 1j * self.times(samples.imag)
         x = np.moveaxis(samples.reshape(*samples.shape[:2], -1), 0, 2)
-        x = padded(np.ascontiguousarray(x), 2, LANES)
+        x = pad_to_multiple(np.ascontiguousarray(x), 2, LANES)
         out = np.zeros((self.shape[0], *x.shape[1:]))
         self.add_to(out, x)
         return np.moveaxis(out[..., : len(samples)], 2, 0).reshape(len(samples), -1, *samples.shape[2:])
@@ -184,7 +289,7 @@ class SparseBlocks:
 
 def sum_of_products(h: Harmonics, blocks: Sequence[SparseBlocks], motions: Sequence[np.ndarray]) -> np.ndarray:
     """Coefficients (v, 2 H + 1, n) of the sum of matrices times real motions (v, 2 H + 1, m), one set for each."""
-    lanes, count = padded(h.basis, 0, LANES), len(motions[0])
+    lanes, count = pad_to_multiple(h.basis, 0, LANES), len(motions[0])
     out = np.zeros((blocks[0].shape[0], count, len(lanes)))
     x = np.empty((blocks[0].shape[1], count, len(lanes)))
     last = None

@@ -1,20 +1,28 @@
-"""Branches and curves as result objects: points, special points, files, figures, JSON."""
+"""Branches and curves as results: points, special points, figures, HDF5 files.
+
+One HDF5 file holds a branch: the attribute ``header`` (JSON) with names, parameters and the reason of the end; ``z``
+and ``tangent`` of shape (points, unknowns); one dataset per number; ragged eigenvalues padded with nan; one group per
+special point.
+"""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+import os
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
 
-from continuation import storage
-from continuation.plots import plot_branch
+#: Version of the layout of files.
+FORMAT = 1
 
 
 @dataclass
 class SpecialPoint:
-    """A point where something happens on a branch.
+    """Special point of a branch: a bifurcation, or an event of the user's own.
 
     Attributes
     ----------
@@ -49,22 +57,10 @@ class SpecialPoint:
     values: dict = field(default_factory=dict)
     vectors: dict = field(default_factory=dict)
 
-    def to_dict(self) -> dict:
-        """Without the vectors."""
-        values = {k: v if isinstance(v, str) else float(v) for k, v in self.values.items()}
-        return {
-            "kind": self.kind,
-            "index": self.index,
-            "mu": self.mu,
-            "located": self.located,
-            "reason": self.reason,
-            **values,
-        }
-
 
 @dataclass
 class CurvePoint:
-    """One point of a curve.
+    """Point of a curve.
 
     Attributes
     ----------
@@ -73,6 +69,7 @@ class CurvePoint:
     step : float
         Arclength step that led here (0 at the start).
     iterations : int
+        Corrections spent on it.
     residual : float
     tests : dict of str to float
         Test functions.
@@ -80,21 +77,31 @@ class CurvePoint:
         Unstable eigenvalues among those asked for; -1 if not known.
     eigenvalues : ndarray, complex
         Converged eigenvalues with non-negative imaginary part.
+    local : continuation.problem.Local or None
+        Linearisation at the point while the run is on.
+    data : dict
+        Notes of the monitors while the run is on.
     """
 
     z: np.ndarray
     tangent: np.ndarray
-    step: float
-    iterations: int
-    residual: float
+    step: float = 0.0
+    iterations: int = 0
+    residual: float = np.nan
     tests: dict = field(default_factory=dict)
     unstable: int = -1
     eigenvalues: np.ndarray = field(default_factory=lambda: np.empty(0, complex))
+    local: Any = None
+    data: dict = field(default_factory=dict)
+
+    def record(self) -> CurvePoint:
+        """Copy for a result: without linearisation and notes."""
+        return replace(self, tests=dict(self.tests), local=None, data={})
 
 
 @dataclass
 class Branch:
-    """A computed curve; everything accepted is kept whatever ended the run.
+    """Computed branch or curve; everything accepted is kept whatever ended the run.
 
     Attributes
     ----------
@@ -115,7 +122,7 @@ class Branch:
     next_step : float
         Where the step control stood.
     restart : dict of str to ndarray
-        What a resumed run needs besides the points.
+        Borders and frame that a resumed run needs besides the points.
     """
 
     kind: str
@@ -158,59 +165,156 @@ class Branch:
         return {**self.fixed, **dict(zip(self.names, map(float, z[self.size :])))}
 
     def of_kind(self, kind: str, located: bool = True) -> list[SpecialPoint]:
-        """Special points of one kind, located ones only unless told otherwise."""
+        """Special points of one kind, located ones only by default."""
         return [s for s in self.special if s.kind == kind and (s.located or not located)]
 
-    def to_dict(self) -> dict:
-        """Everything but states and vectors, ready for ``json.dumps``."""
-        columns = (*self.names, *self.extra_names)
-        return {
-            "kind": self.kind,
-            "parameters": list(self.names),
-            "fixed": {k: v for k, v in self.fixed.items() if k not in self.names},
-            "reason": self.reason,
-            "points": [
-                {
-                    **dict(zip(columns, map(float, point.z[self.size :]))),
-                    "residual": float(point.residual),
-                    "iterations": int(point.iterations),
-                    "unstable_count": None if point.unstable < 0 else int(point.unstable),
-                    "eigenvalues": [[float(x.real), float(x.imag)] for x in point.eigenvalues],
-                }
-                for point in self.points
-            ],
-            "special": [special.to_dict() for special in self.special],
-        }
-
-    def to_json(self) -> str:
-        """One JSON document; numbers that are not finite become null."""
-        return json.dumps(_finite(self.to_dict()), allow_nan=False)
+    def reopen(self) -> Branch:
+        """Copy with lists of its own, for a run that goes on from the last point."""
+        return replace(
+            self, points=list(self.points), special=list(self.special), reason="running", restart=dict(self.restart)
+        )
 
     def save(self, path: str | Path) -> None:
         """Write HDF5; the file is replaced only when the new one is complete."""
-        storage.save(self, Path(path))
+        path = Path(path)
+        partial = path.with_name(path.name + ".partial")
+        with h5py.File(partial, "w") as file:
+            _write(file, self)
+        os.replace(partial, path)
 
     @classmethod
     def load(cls, path: str | Path) -> Branch:
-        """Read what `save` wrote."""
-        return storage.load(Path(path), cls, CurvePoint, SpecialPoint)
+        """Read a file that `save` wrote.
+
+        Raises
+        ------
+        ValueError
+            The file is not one of these, or of an unknown format.
+        """
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("format") != FORMAT:
+                raise ValueError(f"{path} is not a branch file of format {FORMAT}.")
+            header = json.loads(file.attrs["header"])
+            header["names"], header["extra_names"] = tuple(header["names"]), tuple(header["extra_names"])
+            restart = {name: item[()] for name, item in file.get("restart", {}).items()}
+            special = [_read_special(item) for item in file["special"].values()]
+            return cls(**header, points=_read_points(file), special=special, restart=restart)
 
     def plot(self, observable=None, ax=None):
-        """Branch diagram; see `continuation.plots.plot_branch`."""
-        return plot_branch(self, observable, ax)
+        """Branch diagram, stable parts solid, unstable ones dashed; curves in their two parameters.
+
+        Parameters
+        ----------
+        observable : callable or int, optional
+            ``observable(u)``, or the index of an unknown; the largest absolute entry by default.
+            Curves in two parameters need none.
+        ax : matplotlib axes, optional
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        if ax is None:
+            import matplotlib.pyplot as plt
+
+            ax = plt.subplots()[1]
+        two = len(self.names) == 2
+        if observable is None:
+
+            def observable(u):
+                return np.abs(u).max()
+        elif isinstance(observable, (int, np.integer)):
+            index = int(observable)
+
+            def observable(u):
+                return u[index]
+
+        def height(u, mu):
+            return mu[self.names[1]] if two else observable(u)
+
+        x = self.values()
+        y = np.array([height(u, self.mu(i)) for i, u in enumerate(self.states)])
+        unstable = self.unstable
+        if np.all(unstable < 0):
+            ax.plot(x, y, "k-")
+        else:
+            ax.plot(x, y, "k:", linewidth=0.5)
+            for keep, style in ((unstable == 0, "k-"), (unstable > 0, "k--")):
+                # A segment belongs to a style when both of its ends do.
+                ax.plot(x, np.where(keep, y, np.nan), style)
+        for special in self.special:
+            if not np.isfinite(special.u).all():
+                continue
+            ax.plot(
+                special.mu[self.names[0]],
+                height(special.u, special.mu),
+                _MARKERS.get(special.kind, "x"),
+                label=special.kind,
+                fillstyle="full" if special.located else "none",
+            )
+        handles, labels = ax.get_legend_handles_labels()
+        unique = dict(zip(labels, handles))
+        if unique:
+            ax.legend(unique.values(), unique.keys())
+        ax.set_xlabel(self.names[0])
+        ax.set_ylabel(self.names[1] if two else "state")
+        return ax
 
 
-def _finite(value):
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
-    if isinstance(value, (bool, str, int)) or value is None:
-        return value
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    if isinstance(value, np.integer):
-        return int(value)
-    if isinstance(value, (complex, np.complexfloating)):
-        return [_finite(value.real), _finite(value.imag)]
-    return value
+def _write(file, branch: Branch) -> None:
+    points, names = branch.points, ("kind", "size", "names", "extra_names", "fixed", "reason", "next_step")
+    file.attrs["format"] = FORMAT
+    file.attrs["header"] = json.dumps({name: getattr(branch, name) for name in names})
+    for name in _NUMBERS:
+        file[name] = np.array([getattr(p, name) for p in points])
+    padded = np.full((len(points), max((p.eigenvalues.size for p in points), default=0)), np.nan + 0j)
+    for row, point in zip(padded, points):
+        row[: point.eigenvalues.size] = point.eigenvalues
+    file["eigenvalues"] = padded
+    tests = file.create_group("tests")
+    for name in sorted({name for p in points for name in p.tests}):
+        tests[name] = np.array([p.tests.get(name, np.nan) for p in points])
+    for name, array in branch.restart.items():
+        file[f"restart/{name}"] = array
+    group = file.create_group("special")
+    for number, special in enumerate(branch.special):
+        item = group.create_group(f"{number:06d}")
+        values = {name: v if isinstance(v, str) else float(v) for name, v in special.values.items()}
+        header = {name: getattr(special, name) for name in ("kind", "index", "mu", "located", "reason")}
+        item.attrs["header"] = json.dumps(header | {"values": values})
+        item["u"], item["z"], item["tangent"] = special.u, special.z, special.tangent
+        for name, vector in special.vectors.items():
+            item[f"vectors/{name}"] = vector
+
+
+def _read_points(file) -> list[CurvePoint]:
+    columns = {name: file[name][()] for name in _NUMBERS}
+    tests = {name: item[()] for name, item in file["tests"].items()}
+    points = []
+    for i, values in enumerate(file["eigenvalues"][()]):
+        own = {name: column[i] if column.ndim > 1 else column[i].item() for name, column in columns.items()}
+        noted = {name: float(column[i]) for name, column in tests.items() if not np.isnan(column[i])}
+        points.append(CurvePoint(**own, tests=noted, eigenvalues=values[~np.isnan(values.real)]))
+    return points
+
+
+def _read_special(item) -> SpecialPoint:
+    arrays = {name: item[name][()] for name in ("u", "z", "tangent")}
+    vectors = {name: vector[()] for name, vector in item.get("vectors", {}).items()}
+    return SpecialPoint(**json.loads(item.attrs["header"]), **arrays, vectors=vectors)
+
+
+#: Arrays and numbers of a point that files hold, one dataset each.
+_NUMBERS = ("z", "tangent", "step", "iterations", "residual", "unstable")
+
+
+#: Markers of special points in figures.
+_MARKERS = {
+    "fold": "s",
+    "branch point": "D",
+    "hopf": "o",
+    "bogdanov-takens": "*",
+    "generalised hopf": "^",
+    "cusp": "v",
+    "zero-hopf": "P",
+}

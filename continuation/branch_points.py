@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from continuation.bordered import Bordered
+from continuation.branch import CurvePoint
 from continuation.conditions import BranchPointCondition, generic_borders, null_pair
-from continuation.errors import SingularSystem
-from continuation.here import Here
-from continuation.locate import companion, safeguarded, special_at
-from continuation.problem import correct
+from continuation.event_location import locate_zero, solve_augmented, special_at
+from continuation.linear import Bordered
+from continuation.options import SingularSystem
 from continuation.system import SystemBase
 
 
@@ -24,30 +23,30 @@ class BranchPointMonitor:
     def __init__(self):
         self._b = self._c = None
 
-    def measure(self, tracer, here):
+    def measure(self, tracer, point):
         if self._b is None:
             self._b, self._c = generic_borders(tracer.problem.n + 1)
-        here.data["borders"] = (self._b, self._c)
-        here.tests["branch point"] = self._test(tracer, here)
+        point.data["borders"] = (self._b, self._c)
+        point.tests["branch point"] = self._test(tracer, point)
 
-    def _test(self, tracer, here, borders=None):
-        g = self._scalar(tracer, here, borders)[0]
-        sign = self._sign(tracer, here)
+    def _test(self, tracer, point, borders=None):
+        g = self._scalar(tracer, point, borders)[0]
+        sign = self._sign(tracer, point)
         return g if sign is None else sign * abs(g)
 
-    def _extended(self, tracer, here):
-        row = tracer.problem.weights * here.tangent
-        return Bordered(here.local.linear, here.local.columns[0], row[:-1], row[-1])
+    def _extended(self, tracer, point):
+        row = tracer.problem.weights * point.tangent
+        return Bordered(point.local.linear, point.local.columns[0], row[:-1], row[-1])
 
-    def _sign(self, tracer, here):
-        own = getattr(here.local.linear, "determinant_sign", None)
-        return None if own is None else own() * self._extended(tracer, here).complement_sign
+    def _sign(self, tracer, point):
+        own = getattr(point.local.linear, "determinant_sign", None)
+        return None if own is None else own() * self._extended(tracer, point).complement_sign
 
-    def _scalar(self, tracer, here, borders=None):
+    def _scalar(self, tracer, point, borders=None):
         """``g`` and the null vectors with the borders given or in force."""
         b, c = borders or (self._b, self._c)
         try:
-            g, v, w, _ = null_pair(self._extended(tracer, here), b, c)
+            g, v, w, _ = null_pair(self._extended(tracer, point), b, c)
         except SingularSystem:
             return np.nan, None, None
         return float(g), v, w
@@ -61,19 +60,19 @@ class BranchPointMonitor:
         self._adapt(tracer, after)
         return special
 
-    def _adapt(self, tracer, here):
+    def _adapt(self, tracer, point):
         """Turn the borders towards the vectors just found, for a well-scaled test function.
 
         A generic part stays, so that no other vector ever is out of their sight.
         """
-        _, v, w = self._scalar(tracer, here)
+        _, v, w = self._scalar(tracer, point)
         if v is None:
             return
         b, c = generic_borders(v.size)
         self._b = w / np.linalg.norm(w) + 0.3 * b
         self._c = v / np.linalg.norm(v) + 0.3 * c
-        here.data["borders"] = (self._b, self._c)
-        here.tests["branch point"] = self._test(tracer, here)
+        point.data["borders"] = (self._b, self._c)
+        point.tests["branch point"] = self._test(tracer, point)
 
     def _examine(self, tracer, before, after, index, g0, g1, borders):
         if not np.isfinite(g0 * g1) or (g0 * g1 >= 0 and g1 != 0):
@@ -82,16 +81,16 @@ class BranchPointMonitor:
             return [special_at(tracer, "branch point", after, index, False, "location was not asked for")]
         sizes = []
 
-        def indicator(here):
-            g = self._test(tracer, here, borders)
+        def indicator(point):
+            g = self._test(tracer, point, borders)
             sizes.append(abs(g))
             return g
 
         def attempt(guess, *_):
-            point = self.solve(tracer, guess, borders)
-            return point if isinstance(point, str) else (point.z[:-1], point)
+            result = self.solve(tracer, guess, borders)
+            return result if isinstance(result, str) else (result.z[:-1], result)
 
-        result, guess, reason = safeguarded(tracer, before, after, indicator, attempt)
+        result, guess, reason = locate_zero(tracer, before, after, indicator, attempt)
         if result is None:
             if sizes[-1] > max(abs(g0), abs(g1)):
                 return []  # The test function went through infinity: no branch point.
@@ -110,15 +109,17 @@ class BranchPointMonitor:
         rows = problem.frame(np.stack([guess.tangent, v], axis=1))
         condition = BranchPointCondition(unfolded.direction, rows)
         name = problem.names[0]
-        augmented = companion(
-            tracer, condition, (name, unfolded.name), unfolded, {**problem.mu(guess.z), unfolded.name: 0.0}
+        result = solve_augmented(
+            tracer,
+            condition,
+            np.append(guess.z, 0.0),
+            np.hstack([rows, np.zeros((2, 1))]),
+            (name, unfolded.name),
+            unfolded,
+            {**problem.mu(guess.z), unfolded.name: 0.0},
         )
-        frame = np.hstack([rows, np.zeros((2, 1))])
-        result = correct(
-            augmented, np.append(guess.z, 0.0), frame, tracer.options.newton, None, tracer.options.location_tolerance
-        )
-        if not result.converged:
-            return f"Newton's method on the augmented system: {result.reason}"
+        if isinstance(result, str):
+            return result
         if abs(result.z[-1]) > 1e-6 * (1 + np.abs(result.z[:-1]).max()):
             return "The point is a branch point of an unfolded system only."
         return result
@@ -128,13 +129,13 @@ class BranchPointMonitor:
         value = result.local.condition
         kernel = np.stack(value.null, axis=1)
         directions = branch_directions(tracer.problem, value, guess.tangent)
-        here = Here(result.z[:-1], directions[0], result.local)
+        point = CurvePoint(result.z[:-1], directions[0])
         vectors = {"left": value.w, "kernel": kernel}
         if len(directions) == 2:
             vectors["direction"] = directions[1]
         values = {"iterations": result.iterations, "unfolding": float(result.z[-1])}
         reason = "" if len(directions) == 2 else "only one branch direction is real"
-        return special_at(tracer, "branch point", here, index, True, reason, values, vectors)
+        return special_at(tracer, "branch point", point, index, True, reason, values, vectors)
 
 
 def branch_directions(problem, value, tangent):

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from continuation.branch import Branch, SpecialPoint
 from continuation.branch_points import BranchPointMonitor
-from continuation.errors import NotABifurcation, NotConverged
-from continuation.events import EventMonitor
-from continuation.folds import FoldMonitor
-from continuation.options import ContinuationOptions
+from continuation.event_location import EventMonitor, FoldMonitor
+from continuation.options import ContinuationOptions, NotABifurcation, NotConverged
 from continuation.problem import Problem
 from continuation.stability import SpectrumMonitor
 from continuation.tracer import Tracer
@@ -84,9 +80,9 @@ def continue_branch(
         raise ValueError(f"The state has shape {u.shape}; the system needs ({system.size},).")
     direction = np.zeros(u.size + 1)
     direction[-1] = options.direction
-    here = tracer.start(tracer.problem.pack(u, mu), direction)
-    branch = Branch("equilibria", system.size, (parameter,), (), mu, [here.point()])
-    return tracer.run(branch, here, options.step)
+    point = tracer.start(tracer.problem.pack(u, mu), direction)
+    branch = Branch("equilibria", system.size, (parameter,), (), mu, [point.record()])
+    return tracer.run(branch, point, options.step)
 
 
 def resume(
@@ -105,13 +101,7 @@ def resume(
         raise ValueError(f"This resumes branches of equilibria, not a {branch.kind}.")
     options = options or ContinuationOptions()
     tracer = branch_tracer(system, branch.fixed, branch.names[0], options, events, spectrum, observers)
-    last = branch.points[-1]
-    here = tracer.start(last.z, last.tangent, branch.restart.get("frame"))
-    longer = replace(
-        branch, points=list(branch.points), special=list(branch.special), reason="running", restart=dict(branch.restart)
-    )
-    step = float(np.clip(branch.next_step or options.step, options.min_step, options.max_step))
-    return tracer.run(longer, here, step)
+    return tracer.resume(branch)
 
 
 def switch_branch(
@@ -156,16 +146,16 @@ def switch_branch(
     reason = ""
     while step >= options.min_step:
         try:
-            here = tracer.start(special.z + step * direction, direction, frame)
+            point = tracer.start(special.z + step * direction, direction, frame)
         except NotConverged as error:
             reason = error.reason
         else:
-            gap = here.z - special.z
+            gap = point.z - special.z
             gap = gap / problem.norm(gap)
             known = special.tangent / problem.norm(special.tangent)
             if abs(problem.dot(gap, direction)) > abs(problem.dot(gap, known)):
-                branch = Branch("equilibria", system.size, (parameter,), (), dict(special.mu), [here.point()])
-                return tracer.run(branch, here, step)
+                branch = Branch("equilibria", system.size, (parameter,), (), dict(special.mu), [point.record()])
+                return tracer.run(branch, point, step)
             reason = "the corrector fell back to the known branch"
         step *= options.shrink
     raise NotConverged(f"The other branch was not found: {reason}.", reason)

@@ -9,10 +9,12 @@ Numerical Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, ch. 4).  
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
-from continuation.bordered import Bordered, bordered
-from continuation.multilinear import Derivatives
+from continuation.linear import Bordered, bordered
+from continuation.system import Derivatives
 
 
 def unit_last(size, dtype=float):
@@ -39,6 +41,10 @@ def generic_borders(size):
 class FoldCondition:
     """``g = 0``: ``F_u`` is singular.
 
+    `evaluate` gives a copy at a point, with ``values`` of shape (count,), their derivatives ``d_extra`` by the extra
+    unknowns, of shape (count, extra), and ``along`` a change of state and parameters; ``v, w`` are the right and left
+    null vectors there.
+
     Parameters
     ----------
     p, q : ndarray, shape (n,)
@@ -47,35 +53,32 @@ class FoldCondition:
 
     extra, count = 0, 1
     extra_names: tuple[str, ...] = ()
+    d_extra = np.zeros((1, 0))
 
     def __init__(self, p, q):
         self.p, self.q = p / np.linalg.norm(p), q / np.linalg.norm(q)
 
     def evaluate(self, system, u, mu, names, linear, extra):
-        return FoldValue(self, Derivatives(system, u, mu), linear)
+        """Condition at a point; ``linear`` is the linearisation there."""
+        at = copy(self)
+        at.linear, at._derivatives = linear, Derivatives(system, u, mu)
+        at._measure(extra)
+        return at
 
-    def adapt(self, value):
-        """Turn the borders to the null vectors found, so that they stay near."""
-        self.__init__(value.w, value.v)
-
-
-class FoldValue:
-    """The fold condition at a point: ``values``, ``along``, and the null vectors ``v, w``."""
-
-    d_extra = np.zeros((1, 0))
-
-    def __init__(self, condition, derivatives, linear):
-        self._derivatives = derivatives
-        self.linear = linear
-        g, self.v, self.w, self._border = null_pair(linear, condition.p, condition.q)
+    def _measure(self, extra):
+        g, self.v, self.w, self._border = null_pair(self.linear, self.p, self.q)
         self.values = np.array([g])
 
     def along(self, du, dmu):
         return np.array([-self.w @ self._derivatives.jacobian_along(self.v, du, dmu)])
 
+    def adapt(self, at):
+        """Turn the borders to the null vectors at a point, so that they stay near."""
+        self.p, self.q = at.w / np.linalg.norm(at.w), at.v / np.linalg.norm(at.v)
 
-class HopfCondition:
-    """Real and imaginary part of ``g``: ``F_u - i omega B`` is singular.
+
+class HopfCondition(FoldCondition):
+    """Real and imaginary part of ``g``: ``F_u - i omega B`` is singular, with eigenvectors ``v, w``.
 
     Parameters
     ----------
@@ -86,26 +89,11 @@ class HopfCondition:
     extra, count = 1, 2
     extra_names = ("omega",)
 
-    def __init__(self, p, q):
-        self.p, self.q = p / np.linalg.norm(p), q / np.linalg.norm(q)
-
-    def evaluate(self, system, u, mu, names, linear, extra):
-        return HopfValue(self, Derivatives(system, u, mu), linear, float(extra[0]))
-
-    def adapt(self, value):
-        self.__init__(value.w, value.v)
-
-
-class HopfValue:
-    """The Hopf condition at a point; ``v, w`` are the right and left eigenvectors at ``g = 0``."""
-
-    def __init__(self, condition, derivatives, linear, omega):
-        self._derivatives, self.omega = derivatives, omega
-        self.linear = linear
-        shifted = linear.shifted(1j * omega)
-        g, self.v, self.w, _ = null_pair(shifted, condition.p, condition.q)
+    def _measure(self, extra):
+        self.omega = float(extra[0])
+        g, self.v, self.w, _ = null_pair(self.linear.shifted(1j * self.omega), self.p, self.q)
         self.values = np.array([g.real, g.imag])
-        slope = 1j * np.vdot(self.w, linear.mass_matvec(self.v))
+        slope = 1j * np.vdot(self.w, self.linear.mass_matvec(self.v))
         self.d_extra = np.array([[slope.real], [slope.imag]])
 
     def along(self, du, dmu):
@@ -119,19 +107,11 @@ class BogdanovTakensCondition(FoldCondition):
     """``F_u v = 0`` and ``w' B v = 0``: a double zero eigenvalue with one eigenvector."""
 
     count = 2
-
-    def evaluate(self, system, u, mu, names, linear, extra):
-        return BogdanovTakensValue(self, Derivatives(system, u, mu), linear)
-
-
-class BogdanovTakensValue(FoldValue):
-    """Condition of a double zero eigenvalue: a fold whose left and right null vectors are orthogonal."""
-
     d_extra = np.zeros((2, 0))
 
-    def __init__(self, condition, derivatives, linear):
-        super().__init__(condition, derivatives, linear)
-        self._bv, self._bw = linear.mass_matvec(self.v), linear.mass_rmatvec(self.w)
+    def _measure(self, extra):
+        super()._measure(extra)
+        self._bv, self._bw = self.linear.mass_matvec(self.v), self.linear.mass_rmatvec(self.w)
         self.values = np.array([self.values[0], self.w @ self._bv])
 
     def along(self, du, dmu):
@@ -163,25 +143,23 @@ class BranchPointCondition:
 
     extra, count = 0, 2
     extra_names: tuple[str, ...] = ()
+    d_extra = np.zeros((2, 0))
 
     def __init__(self, p, rows):
         self.p, self.rows = p / np.linalg.norm(p), rows
 
     def evaluate(self, system, u, mu, names, linear, extra):
-        return BranchPointValue(self, system, u, mu, names[0], linear)
+        """Condition at a point: ``null`` are two vectors of shape (n + 1,) that span the kernel at ``values = 0``."""
+        at = copy(self)
+        at._system, at._u, at._mu, at._name = system, u, mu, names[0]
+        at._derivatives = Derivatives(system, u, mu)
+        at._measure(linear)
+        return at
 
-
-class BranchPointValue:
-    """``null``: two vectors of shape (n + 1,) that span the kernel at ``values = 0``."""
-
-    d_extra = np.zeros((2, 0))
-
-    def __init__(self, condition, system, u, mu, name, linear):
-        self._system, self._u, self._mu, self._name = system, u, mu, name
-        self._derivatives = Derivatives(system, u, mu)
-        n = u.size
-        columns = [system.d_parameter(u, mu, name), condition.p]
-        rows = np.hstack([condition.rows, np.zeros((2, 1))])
+    def _measure(self, linear):
+        n = self._u.size
+        columns = [self._system.d_parameter(self._u, self._mu, self._name), self.p]
+        rows = np.hstack([self.rows, np.zeros((2, 1))])
         # The first border must not be singular with its row alone, so the rows are ordered
         # by the caller: the tangent of the branch first.
         solver = bordered(linear, columns, rows)

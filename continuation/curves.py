@@ -1,30 +1,182 @@
-"""Fold and Hopf curves in two parameters, and the points of codimension two on them."""
+"""Fold and Hopf curves in two parameters, and the points of codimension two on them.
+
+A fold curve is ``F = 0`` with a singular ``F_u``; cusps (quadratic coefficient zero) and Bogdanov-Takens points lie on
+it.  A Hopf curve is ``F = 0`` with a singular ``F_u - i omega B``; it ends at Bogdanov-Takens points, and generalised
+Hopf and zero-Hopf points lie on it (Kuznetsov, Elements of Applied Bifurcation Theory, ch. 8 and 10).
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from continuation.branch import Branch, SpecialPoint
-from continuation.conditions import FoldCondition, HopfCondition
-from continuation.curve_monitors import FoldCurveMonitor, HopfCurveMonitor
-from continuation.errors import NotABifurcation
-from continuation.options import ContinuationOptions
+from continuation.branch import Branch, CurvePoint, SpecialPoint
+from continuation.conditions import BogdanovTakensCondition, FoldCondition, HopfCondition, generic_borders, null_pair
+from continuation.event_location import solve_augmented, special_at
+from continuation.normal_form import fold_coefficient, hopf_normal_form
+from continuation.options import (
+    ContinuationError,
+    ContinuationOptions,
+    DerivativeMissing,
+    NotABifurcation,
+    SingularSystem,
+)
 from continuation.problem import Problem
 from continuation.stability import CountMonitor
 from continuation.tracer import Tracer
 
-_KINDS = {"fold curve": FoldCondition, "hopf curve": HopfCondition}
+
+def solve_bogdanov_takens(tracer, z, v, w):
+    """Newton on ``F = 0, g = 0, w' B v = 0`` in state and both parameters; see `solve_augmented`."""
+    return solve_augmented(tracer, BogdanovTakensCondition(w, v), z[: tracer.problem.n + 2], tracer.frame)
 
 
-def _tracer(kind, system, mu, parameters, condition, options, observers, lyapunov=True, spectrum=None):
-    if len(set(parameters)) != 2:
-        raise ValueError(f"A {kind} needs two different parameters, not {parameters}.")
-    problem = Problem(system, mu, parameters, condition, options.state_scale, options.parameter_scales)
-    monitor = FoldCurveMonitor() if kind == "fold curve" else HopfCurveMonitor(lyapunov)
-    monitors = [monitor, CountMonitor(spectrum)] if options.eigenvalues else [monitor]
-    return Tracer(problem, options, monitors, observers)
+def bogdanov_takens_special(tracer, result, tangent, index):
+    """Special point of a fold curve where the zero eigenvalue is double."""
+    value = result.local.condition
+    values = {"omega": 0.0, "iterations": result.iterations}
+    vectors = {"right": value.v / np.linalg.norm(value.v), "left": value.w}
+    return special_at(tracer, "bogdanov-takens", CurvePoint(result.z, tangent), index, True, "", values, vectors)
+
+
+class FoldCurveMonitor:
+    """Cusps (quadratic coefficient zero) and Bogdanov-Takens points (``w' B v`` zero)."""
+
+    def measure(self, tracer, point):
+        value = point.local.condition
+        system = tracer.problem.system
+        v = value.v / np.linalg.norm(value.v)
+        w = value.w / np.linalg.norm(value.w)
+        last = point.data.get("orientation")
+        if last is None:
+            last = getattr(self, "_last", (v, w))
+        # Null vectors have no sign of their own; keep that of the point before.
+        v = v if v @ last[0] >= 0 else -v
+        w = w if w @ last[1] >= 0 else -w
+        point.data["orientation"] = (v, w)
+        point.tests["bogdanov-takens"] = float(w @ point.local.linear.mass_matvec(v))
+        point.tests["cusp"] = float(0.5 * w @ system.d2(point.local.u, point.local.mu, v, v))
+
+    def between(self, tracer, before, after, index, found):
+        special = []
+        self._last = after.data["orientation"]
+        for kind in ("cusp", "bogdanov-takens"):
+            if before.tests[kind] * after.tests[kind] < 0:
+                special.append(self._locate(tracer, kind, before, after, index))
+        return special
+
+    def _locate(self, tracer, kind, before, after, index):
+        def test(point):
+            point.data["orientation"] = before.data["orientation"]
+            self.measure(tracer, point)
+            return point.tests[kind]
+
+        point = tracer.root(before, after, test, tolerance=1e-3 if kind != "cusp" else 1e-11)
+        if point is None:
+            return special_at(tracer, kind, after, index, False, "the curve was lost")
+        v, w = point.data["orientation"]
+        if kind == "bogdanov-takens":
+            result = solve_bogdanov_takens(tracer, point.z, v, w)
+            if isinstance(result, str):
+                return special_at(tracer, kind, point, index, False, result)
+            if tracer.fraction(before, after, result.z)[1] >= 1.0:
+                return special_at(tracer, kind, point, index, False, "Newton's method left the bracket")
+            return bogdanov_takens_special(tracer, result, point.tangent, index)
+        coefficient = fold_coefficient(tracer.problem.system, point.local.u, point.local.mu, v, w)
+        return special_at(
+            tracer, kind, point, index, True, "", {"quadratic_coefficient": coefficient}, {"right": v, "left": w}
+        )
+
+
+class HopfCurveMonitor:
+    """``l1`` and its zeros, zero-Hopf points, and the end of the curve at ``omega = 0``.
+
+    Parameters
+    ----------
+    lyapunov : bool
+        Compute ``l1``; without it generalised Hopf points are not seen.
+    """
+
+    def __init__(self, lyapunov=True):
+        self.lyapunov = lyapunov
+
+    def measure(self, tracer, point):
+        value, problem = point.local.condition, tracer.problem
+        omega = float(problem.extra(point.z)[0])
+        point.tests["omega"] = omega
+        point.tests["l1"] = np.nan
+        if self.lyapunov and omega > 0:
+            try:
+                point.tests["l1"] = hopf_normal_form(problem.system, point.local.u, point.local.mu, omega, value.v).l1
+            except (ContinuationError, DerivativeMissing):
+                pass
+        point.tests["zero-hopf"] = self._zero(point)
+
+    def _zero(self, point):
+        """Changes sign with a real eigenvalue at zero: by the determinant where there is one.
+
+        The bordered scalar in its point has poles as well, which can hide a zero.
+        """
+        linear = point.local.linear
+        try:
+            g = float(null_pair(linear, *generic_borders(linear.size))[0])
+        except SingularSystem:
+            return np.nan
+        sign = getattr(linear, "determinant_sign", None)
+        return g if sign is None else abs(g) * sign()
+
+    def between(self, tracer, before, after, index, found):
+        special = []
+        if after.tests["omega"] <= 0.0 < before.tests["omega"]:
+            return [self._end(tracer, before, after, index)]
+        if before.tests["l1"] * after.tests["l1"] < 0:
+            special += self._root(tracer, "generalised hopf", "l1", before, after, index)
+        if before.tests["zero-hopf"] * after.tests["zero-hopf"] < 0:
+            special += self._root(tracer, "zero-hopf", "zero-hopf", before, after, index)
+        return special
+
+    def _root(self, tracer, kind, name, before, after, index):
+        bound = 2 * max(abs(before.tests[name]), abs(after.tests[name]))
+
+        def test(point):
+            self.measure(tracer, point)
+            return point.tests[name]
+
+        point = tracer.root(before, after, test, tolerance=1e-11)
+        if point is None:
+            return [special_at(tracer, kind, after, index, False, "the curve was lost")]
+        if abs(point.tests[name]) > bound:
+            return []  # A pole of the test function, not a zero.
+        value = point.local.condition
+        v = value.v / np.linalg.norm(value.v)
+        values = {"omega": point.tests["omega"], "first_lyapunov_coefficient": point.tests["l1"]}
+        return [special_at(tracer, kind, point, index, True, "", values, {"right": v, "left": value.w})]
+
+    def _end(self, tracer, before, after, index):
+        """The Bogdanov-Takens point where the frequency reaches zero."""
+        n = tracer.problem.n
+        share = before.tests["omega"] ** 2 / (before.tests["omega"] ** 2 + after.tests["omega"] ** 2)
+        z = before.z + share * (after.z - before.z)
+        v = before.local.condition.v.real
+        w = before.local.condition.w.real
+        linear = before.local.linear
+        for _ in range(2):
+            _, v, w, _ = null_pair(linear, w / np.linalg.norm(w), v / np.linalg.norm(v))
+        result = solve_bogdanov_takens(tracer, z, v, w)
+        if isinstance(result, str):
+            point = special_at(tracer, "bogdanov-takens", before, index, False, result)
+        else:
+            point = bogdanov_takens_special(tracer, result, before.tangent[: n + 2], index)
+            point.z, point.tangent = np.append(point.z, 0.0), np.append(point.tangent, 0.0)
+        # Behind the point the equations only mirror omega; that part is not the curve's.
+        point.values["beyond"] = 1.0
+        return point
+
+
+#: Kinds of points that curves start from.
+_STARTS = {
+    "fold curve": ("fold", "bogdanov-takens", "cusp"),
+    "hopf curve": ("hopf", "generalised hopf", "zero-hopf"),
+}
 
 
 def continue_fold(
@@ -39,10 +191,13 @@ def continue_fold(
 
     Parameters
     ----------
+    system : System
     special : SpecialPoint
         A fold, or a Bogdanov-Takens point.
     parameters : (str, str)
         ``options.direction`` is the sign of the first step in the second one.
+    options : ContinuationOptions
+    observers : Observer, callable or sequence of them
     spectrum : callable, optional
         In place of the system's own.  With ``options.eigenvalues`` the count of unstable
         eigenvalues besides the critical one is recorded: 0 on the edge of stability.
@@ -51,17 +206,16 @@ def continue_fold(
     -------
     Branch
         Of kind ``"fold curve"``.
+
+    Raises
+    ------
+    NotABifurcation
+        The point is no located fold.
     """
-    return _continue(
-        "fold curve",
-        ("fold", "bogdanov-takens", "cusp"),
-        system,
-        special,
-        parameters,
-        options,
-        observers,
-        spectrum=spectrum,
-    )
+    borders = _borders("fold curve", special)
+    monitors = [FoldCurveMonitor(), CountMonitor(spectrum)]
+    tracer = _tracer(system, special.mu, parameters, FoldCondition(*borders), options, observers, monitors)
+    return _start("fold curve", tracer, special)
 
 
 def continue_hopf(
@@ -80,39 +234,66 @@ def continue_hopf(
 
     Parameters
     ----------
+    system, special, parameters, options, observers, spectrum
+        As in `continue_fold`; the point is a Hopf point.
     lyapunov : bool
         Compute the first Lyapunov coefficient at every point (third derivatives).
-    spectrum : callable, optional
-        As in `continue_fold`.
 
     Returns
     -------
     Branch
         Of kind ``"hopf curve"``; ``values("omega")`` is the angular frequency along it,
         ``values("l1")`` the first Lyapunov coefficient.
+
+    Raises
+    ------
+    NotABifurcation
+        The point is no located Hopf point.
     """
-    return _continue(
-        "hopf curve",
-        ("hopf", "generalised hopf", "zero-hopf"),
-        system,
-        special,
-        parameters,
-        options,
-        observers,
-        lyapunov,
-        spectrum,
-    )
+    borders = _borders("hopf curve", special)
+    monitors = [HopfCurveMonitor(lyapunov), CountMonitor(spectrum)]
+    tracer = _tracer(system, special.mu, parameters, HopfCondition(*borders), options, observers, monitors)
+    return _start("hopf curve", tracer, special)
 
 
-def _continue(kind, accepted, system, special, parameters, options, observers, lyapunov=True, spectrum=None):
-    options = options or ContinuationOptions()
-    if special.kind not in accepted or "right" not in special.vectors:
+def resume_curve(
+    system,
+    branch: Branch,
+    options: ContinuationOptions | None = None,
+    observers=None,
+    lyapunov: bool = True,
+    spectrum=None,
+) -> Branch:
+    """Go on from the last point of a fold or Hopf curve, e.g. one loaded from a file."""
+    if branch.kind not in _STARTS:
+        raise ValueError(f"This resumes fold and Hopf curves, not {branch.kind}.")
+    fold = branch.kind == "fold curve"
+    condition = (FoldCondition if fold else HopfCondition)(branch.restart["p"], branch.restart["q"])
+    monitors = [FoldCurveMonitor() if fold else HopfCurveMonitor(lyapunov), CountMonitor(spectrum)]
+    tracer = _tracer(system, branch.fixed, branch.names, condition, options, observers, monitors)
+    return tracer.resume(branch)
+
+
+def _borders(kind, special):
+    """Left and right vectors of a special point from which a curve of a kind can start."""
+    if special.kind not in _STARTS[kind] or "right" not in special.vectors:
         raise NotABifurcation(
-            f"A {kind} starts at a located point of kind {', '.join(accepted)}; this is a "
+            f"A {kind} starts at a located point of kind {', '.join(_STARTS[kind])}; this is a "
             f"{special.kind}{'' if special.located else ' that was only bracketed'}."
         )
-    condition = _KINDS[kind](special.vectors["left"], special.vectors["right"])
-    tracer = _tracer(kind, system, special.mu, parameters, condition, options, observers, lyapunov, spectrum)
+    return special.vectors["left"], special.vectors["right"]
+
+
+def _tracer(system, mu, parameters, condition, options, observers, monitors):
+    options = options or ContinuationOptions()
+    if len(set(parameters)) != 2:
+        raise ValueError(f"A curve needs two different parameters, not {parameters}.")
+    problem = Problem(system, mu, parameters, condition, options.state_scale, options.parameter_scales)
+    return Tracer(problem, options, monitors if options.eigenvalues else monitors[:1], observers)
+
+
+def _start(kind, tracer, special):
+    """Curve from a special point, in the direction the options ask for."""
     problem = tracer.problem
     extra = [special.values["omega"]] if problem.e else []
     n = problem.n
@@ -126,30 +307,7 @@ def _continue(kind, accepted, system, special, parameters, options, observers, l
     second[n + 1] = 1.0
     frame = problem.frame(np.stack([along, second], axis=1))
     direction = np.zeros(z.size)
-    direction[n + 1] = options.direction
-    here = tracer.start(z, direction, frame)
-    branch = Branch(kind, n, tuple(parameters), problem.condition.extra_names, dict(special.mu), [here.point()])
-    return tracer.run(branch, here, options.step)
-
-
-def resume_curve(
-    system,
-    branch: Branch,
-    options: ContinuationOptions | None = None,
-    observers=None,
-    lyapunov: bool = True,
-    spectrum=None,
-) -> Branch:
-    """Go on from the last point of a fold or Hopf curve, e.g. one loaded from a file."""
-    if branch.kind not in _KINDS:
-        raise ValueError(f"This resumes fold and Hopf curves, not {branch.kind}.")
-    options = options or ContinuationOptions()
-    condition = _KINDS[branch.kind](branch.restart["p"], branch.restart["q"])
-    tracer = _tracer(branch.kind, system, branch.fixed, branch.names, condition, options, observers, lyapunov, spectrum)
-    last = branch.points[-1]
-    here = tracer.start(last.z, last.tangent, branch.restart["frame"])
-    longer = replace(
-        branch, points=list(branch.points), special=list(branch.special), reason="running", restart=dict(branch.restart)
-    )
-    step = float(np.clip(branch.next_step or options.step, options.min_step, options.max_step))
-    return tracer.run(longer, here, step)
+    direction[n + 1] = tracer.options.direction
+    point = tracer.start(z, direction, frame)
+    branch = Branch(kind, n, problem.names, problem.condition.extra_names, dict(special.mu), [point.record()])
+    return tracer.run(branch, point, tracer.options.step)

@@ -1,4 +1,9 @@
-"""Branches of periodic motions along one parameter: steps, folds, changes of stability, other events."""
+"""Branches of periodic motions along one parameter: steps, folds, changes of stability, other events.
+
+The next cycle is sought at a value of the parameter that was asked for, or in the hyperplane through a prediction
+normal to the way there (pseudo-arclength).  A fold is the extreme value of the parameter on a parabola through three
+cycles; a change of stability or an event is a zero of a test function, by false position along the branch.
+"""
 
 from __future__ import annotations
 
@@ -7,27 +12,34 @@ from dataclasses import replace
 
 import numpy as np
 
-from continuation.bordered_cycle import Condition
-from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions, CyclePoint, SpecialCycle
-from continuation.cycle_prediction import POINTS, by_arclength, by_parameter, parameter_is_better
-from continuation.cycle_zeros import (
+from continuation.cycle_linearisation import Condition
+from continuation.cycle_points import (
+    DOUBLING,
+    FOLD,
+    POINTS,
+    TORUS,
+    CycleBranchOptions,
+    CyclePoint,
+    SpecialCycle,
     change_between,
     crossing_of,
     growth_of_crossing,
     lagrange,
+    parameter_predicts_better,
+    predict_by_arclength,
+    predict_by_parameter,
     value_at_zero,
     zero_ahead,
 )
 from continuation.cycles import Cycle, CycleSolver
-from continuation.errors import ContinuationError, NotConverged
 from continuation.harmonics import Harmonics
 from continuation.hill import floquet_exponents
-from continuation.options import require
+from continuation.options import ContinuationError, NotConverged, require
 from continuation.periodic import PeriodicMotion
 
 
 class CycleTracer:
-    """Follows a branch of cycles.
+    """Follow a branch of cycles.
 
     Parameters
     ----------
@@ -42,7 +54,9 @@ class CycleTracer:
     points : list of CyclePoint
     special : list of SpecialCycle
     reason : str
-        Why the branch ended.
+        Reason of the end.
+    next_step : float
+        Arclength step that the step control takes next.
     """
 
     def __init__(
@@ -55,23 +69,23 @@ class CycleTracer:
         self.solver, self.parameter, self.options, self.events = solver, parameter, options, dict(events)
         self.points: list[CyclePoint] = []
         self.special: list[SpecialCycle] = []
-        self.reason = "running"
+        self.reason, self.next_step = "running", options.step
         self._origin: list[CyclePoint] = []
         self._weight = 1.0 / (np.asarray(solver.system.scales) * options.motion_scale) ** 2
 
     # -- the branch
     # ----
 
-    def start(self, first: Cycle, second: Cycle, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
+    def start(self, first: Cycle, second: Cycle, report: Callable[[CyclePoint], None] = lambda item: None) -> None:
         """Begin with two cycles; the branch goes on from the second, away from the first."""
-        self.begin(first, False, tell)
-        self.extend(second, False, tell)
+        self.begin(first, False, report)
+        self.extend(second, False, report)
 
     def begin(
         self,
         first: Cycle,
         asked: bool,
-        tell: Callable[[CyclePoint], None] = lambda item: None,
+        report: Callable[[CyclePoint], None] = lambda item: None,
         origin: Cycle | None = None,
     ) -> None:
         """Begin with one cycle; `extend` gives the way to go.
@@ -83,11 +97,11 @@ class CycleTracer:
         if origin is not None:
             length = -self._distance(point, origin)
             self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
-        tell(point)
+        report(point)
 
-    def extend(self, cycle: Cycle, asked: bool, tell: Callable[[CyclePoint], None] = lambda item: None) -> None:
+    def extend(self, cycle: Cycle, asked: bool, report: Callable[[CyclePoint], None] = lambda item: None) -> None:
         """Take a cycle as the next point."""
-        tell(self._accept(cycle, asked))
+        report(self._accept(cycle, asked))
 
     def restore(self, points: Sequence[CyclePoint]) -> None:
         """Go on from points that are known; `extend` where there is but one."""
@@ -96,12 +110,14 @@ class CycleTracer:
             replace(p, tests={name: float(event(p.cycle)) for name, event in self.events.items()}) for p in points
         ]
 
-    def run(self, tell: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None) -> str:
+    def run(
+        self, report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None, step: float | None = None
+    ) -> str:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
-        is found; why it ended.
+        is found; the reason of the end. `step` is the first step, that of the options by default.
         """
         options = self.options
-        step = options.step
+        step = options.step if step is None else step
         while len(self.points) < options.max_points:
             if len(self.points) > 1 and self._is_over():
                 self.reason = f"limit of {self.parameter} reached"
@@ -110,27 +126,28 @@ class CycleTracer:
             if done is None:
                 for special in self._ahead():
                     self.special.append(special)
-                    tell(special)
+                    report(special)
                 self.reason = again
                 return self.reason
-            if self._turned():
+            self.next_step = step
+            if self._has_turned_back():
                 del self.points[-1]
                 self.reason = f"the cycles shrink to nothing beyond {self.parameter} = {self.points[-1].value:.6g}"
                 return self.reason
             for special in self._between(self.points[-2], self.points[-1]):
                 self.special.append(special)
-                tell(special)
-            tell(self.points[-1])
+                report(special)
+            report(self.points[-1])
         self.reason = f"limit of {self.parameter} reached" if self._is_over() else "points used up"
         return self.reason
 
     def _is_over(self) -> bool:
-        """Whether the branch has left the range, or reached its end."""
+        """True when the branch has left the range, or reached its end."""
         (low, high), ahead, value = self.options.limits, self._direction(), self.points[-1].value
         return bool((value <= low and ahead < 0) or (value >= high and ahead > 0))
 
-    def _turned(self) -> bool:
-        """Whether the last motion is opposite to the one before: between them the branch has met an onset, and goes
+    def _has_turned_back(self) -> bool:
+        """True when the last motion is opposite to the one before: between them the branch has met an onset, and goes
         back on itself with the phase turned by half a period.
         """
         a, b = (p.motion for p in self.points[-2:])
@@ -140,27 +157,27 @@ class CycleTracer:
         return float(np.sign(self.points[-1].value - self.points[-2].value))
 
     def _advance(self, step: float) -> tuple[CyclePoint | None, float, str]:
-        options, said = self.options, ""
+        options, reason = self.options, ""
         while step >= options.min_step:
             target = self._target(step)
             try:
                 cycle = self._step(step, target)
                 point = self._accept(cycle, target in options.values)
             except ContinuationError as error:
-                said = str(error)
+                reason = str(error)
                 step *= 0.4
                 continue
             grown = 2.0 if cycle.iterations <= 6 else (0.7 if cycle.iterations >= 10 else 1.0)
             return point, min(max(step * grown, options.min_step), options.max_step), ""
-        return None, step, f"no further cycle was found: {said}"
+        return None, step, f"no further cycle was found: {reason}"
 
     def _target(self, step: float) -> float | None:
         """The next value that is asked for, or the limit, where it lies within the step."""
-        here, ahead = self.points[-1].value, self._direction()
-        reach = (self._value_at(step) - here) * ahead
+        now, ahead = self.points[-1].value, self._direction()
+        reach = (self._value_at(step) - now) * ahead
         wanted = [v for v in (*self.options.values, *self.options.limits) if np.isfinite(v)]
-        wanted = [v for v in wanted if 1e-9 * self.options.scale < (v - here) * ahead <= 1.5 * reach]
-        return min(wanted, key=lambda v: abs(v - here)) if wanted else None
+        wanted = [v for v in wanted if 1e-9 * self.options.scale < (v - now) * ahead <= 1.5 * reach]
+        return min(wanted, key=lambda v: abs(v - now)) if wanted else None
 
     def _value_at(self, step: float) -> float:
         """The parameter a step ahead, by the polynomial through the last points."""
@@ -188,7 +205,7 @@ class CycleTracer:
         last = self.points[-1]
         if target is not None:
             return self._solved(self._expected(target, step), last.cycle.mu | {self.parameter: target}, (), ())
-        motion, value = by_arclength(self._last(), last.arclength + step, self._series()), self._value_at(step)
+        motion, value = predict_by_arclength(self._last(), last.arclength + step, self._series()), self._value_at(step)
         mu = last.cycle.mu | {self.parameter: value}
         return self._solved(motion, mu, (self.parameter,), (self._plane(motion, value),))
 
@@ -210,14 +227,16 @@ class CycleTracer:
 
     def _expected(self, target: float, step: float) -> PeriodicMotion:
         """The motion at a value about a step ahead."""
-        if parameter_is_better(self.points, self._weight):
-            motion = by_parameter(self.points, target, self._series(), self._weight)
+        if parameter_predicts_better(self.points, self._weight):
+            motion = predict_by_parameter(self.points, target, self._series(), self._weight)
             if motion is not None:
                 return motion
-        return by_arclength(self._last(), self.points[-1].arclength + self._way_to(target, step), self._series())
+        return predict_by_arclength(
+            self._last(), self.points[-1].arclength + self._way_to(target, step), self._series()
+        )
 
     def _series(self) -> Harmonics:
-        """Of the next motion: longer where the last one nearly needed it."""
+        """Series of the next motion: longer where the last one nearly needed it."""
         last, options = self.points[-1].motion, self.options
         if last.tail > 0.4 * options.tail and last.harmonics.count + 2 <= options.max_harmonics:
             return Harmonics(last.harmonics.count + 2)
@@ -238,11 +257,11 @@ class CycleTracer:
 
     def _accept(self, cycle: Cycle, asked: bool) -> CyclePoint:
         """Take a cycle as the next point, with the phase of the one before."""
-        point = self.described(cycle, asked)
+        point = self.describe(cycle, asked)
         self.points.append(point)
         return point
 
-    def described(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
+    def describe(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
         """A cycle with its exponents and what events make of it; `after` is the point it follows, the last without."""
         after = self.points[-1] if after is None and self.points else after
         exponents = None
@@ -281,12 +300,12 @@ class CycleTracer:
     def _fold(self, before: CyclePoint, a: CyclePoint, b: CyclePoint) -> SpecialCycle:
         """The extreme value of the parameter of a parabola through points, renewed until it stays."""
         near, value, located = [before, a, b], a.value, False
-        for _ in range(6):
+        for _ in range(12):
             s = np.array([p.arclength for p in near])
             fit = np.polyfit(s - s[1], [p.value for p in near], 2)
             at = -0.5 * fit[1] / fit[0]
             new = float(np.polyval(fit, at))
-            located = abs(new - value) <= 1e-6 * max(abs(value), self.options.scale)
+            located = abs(new - value) <= max(1e-4 * self.options.located, 1e-12) * max(abs(value), self.options.scale)
             value = new
             if located:
                 break
@@ -301,7 +320,7 @@ class CycleTracer:
     def _interpolated(self, near: Sequence[CyclePoint], arclength: float) -> CyclePoint | None:
         """A cycle between points, at an arclength; None where it is not found."""
         h = max((p.motion.harmonics for p in near), key=lambda h: h.count)
-        guess = by_arclength(near, arclength, h)
+        guess = predict_by_arclength(near, arclength, h)
         c, weights = guess.coefficients, lagrange([p.arclength for p in near], arclength)
         value = float(sum(w * p.value for w, p in zip(weights, near)))
         first, last = near[0], near[-1]
@@ -314,7 +333,7 @@ class CycleTracer:
             cycle = self._solved(guess, mu, (self.parameter,), (condition,))
         except ContinuationError:
             return None
-        point = self.described(cycle, after=first)
+        point = self.describe(cycle, after=first)
         return CyclePoint(cycle, point.value, arclength, point.exponents, False, point.tests)
 
     def _ahead(self) -> list[SpecialCycle]:
@@ -350,7 +369,7 @@ class CycleTracer:
         width, located = b.arclength - a.arclength, False
         low, high, flow, fhigh = a, b, fa, fb
         met = [(fa, a), (fb, b)]
-        for _ in range(8):
+        for _ in range(16):
             s = (low.arclength * fhigh - high.arclength * flow) / (fhigh - flow)
             point = self._interpolated([low, high], s)
             if point is None:
@@ -363,9 +382,9 @@ class CycleTracer:
                 flow, high, fhigh = 0.5 * flow, point, f
             if low.arclength > high.arclength:
                 low, high, flow, fhigh = high, low, fhigh, flow
-            if min(abs(f) for f, _ in met) <= 1e-3 * max(abs(fa), abs(fb)) or high.arclength - low.arclength <= (
-                self.options.located * width
-            ):
+            if min(abs(f) for f, _ in met) <= 0.1 * self.options.located * max(
+                abs(fa), abs(fb)
+            ) or high.arclength - low.arclength <= (self.options.located * width):
                 located = True
                 break
         met.sort(key=lambda one: abs(one[0]))

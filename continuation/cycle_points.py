@@ -1,14 +1,21 @@
-"""What a branch of periodic motions is made of: options, cycles, special points."""
+"""Points of a branch of periodic motions: options, special points, predictions, zeros of test functions.
+
+The next cycle lies on polynomials through the last ones, in the arclength or in the parameter; a special point lies at
+a zero of a test function between two of them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from continuation.cycles import Cycle
+from continuation.harmonics import Harmonics
 from continuation.hill import Exponents
 from continuation.options import require
+from continuation.periodic import PeriodicMotion
 
 #: Kinds of special points.
 FOLD, DOUBLING, TORUS = "fold", "period doubling", "torus"
@@ -72,7 +79,7 @@ class CyclePoint:
     arclength : float
     exponents : Exponents or None
     asked : bool
-        Whether it lies at a value that was asked for.
+        True at a value that was asked for.
     tests : dict
         Values of the events' functions.
     """
@@ -103,7 +110,7 @@ class SpecialCycle:
     frequency : float
         Of the perturbation that becomes neutral, Hz; zero for a fold.
     located : bool
-        Whether it was found as closely as asked for.
+        True when it was found as closely as asked for.
     """
 
     kind: str
@@ -111,3 +118,130 @@ class SpecialCycle:
     value: float
     frequency: float = 0.0
     located: bool = True
+
+
+def value_at_zero(met: Sequence[tuple[float, CyclePoint]], one: float, other: float) -> float:
+    """The parameter where a test vanishes, from tests and points by decreasing nearness: by the polynomial through all,
+    or through two where that leaves the bracket.
+    """
+    for some in (met, met[:2]):
+        tests = [f for f, _ in some]
+        if len(set(tests)) == len(tests):
+            value = float(sum(w * p.value for w, (_, p) in zip(lagrange(tests, 0.0), some)))
+            if min(one, other) <= value <= max(one, other):
+                return value
+    return float(met[0][1].value)
+
+
+def zero_ahead(points: Sequence[CyclePoint], name: str) -> float:
+    """Arclength from the last point to the zero of an event on the secant of the last two; infinite without."""
+    a, b = points[-2:]
+    slope = (b.tests[name] - a.tests[name]) / (b.arclength - a.arclength)
+    return -b.tests[name] / slope if slope else np.inf
+
+
+def lagrange(nodes: Sequence[float], x: float) -> np.ndarray:
+    """Weights at x of the polynomial through nodes."""
+    nodes = np.asarray(nodes, float)
+    out = np.ones(len(nodes))
+    for i, a in enumerate(nodes):
+        for j, b in enumerate(nodes):
+            if i != j:
+                out[i] *= (x - b) / (a - b)
+    return out
+
+
+def crossing_of(exponents: Exponents) -> complex:
+    """The exponent nearest to the imaginary axis."""
+    return complex(exponents.values[np.argmin(np.abs(exponents.values.real))])
+
+
+def change_between(a: Exponents, b: Exponents) -> str | None:
+    """Kind of the bifurcation between two cycles, None if there is none."""
+    if a.unstable == b.unstable:
+        return None
+    few, many = sorted((a, b), key=lambda e: e.unstable)
+    crossing = crossing_of(min((few, many), key=lambda e: abs(crossing_of(e).real)))
+    half = 0.5 * many.omega
+    if abs(many.unstable - few.unstable) % 2 == 0 and not many.is_real(crossing):
+        return TORUS
+    if abs(crossing.imag - half) < 0.05 * half:
+        return DOUBLING
+    return FOLD if crossing.imag < 0.05 * half else TORUS
+
+
+def growth_of_crossing(a: Exponents, b: Exponents) -> Callable[[CyclePoint], float]:
+    """Growth rate of the exponent that crosses, as a function of a point."""
+    few, many = (a, b) if a.unstable < b.unstable else (b, a)
+    rank = few.unstable if few.unstable < len(few.values) else 0
+    index = min(rank, len(many.values) - 1)
+
+    def test(point: CyclePoint) -> float:
+        values = point.exponents.values
+        return float(values.real[min(index, len(values) - 1)])
+
+    return test
+
+
+#: Points that predictions are made of.
+POINTS = 4
+#: Most by which errors of points may grow in a prediction by the parameter: older points that bring more are not used.
+GROWTH = 50.0
+
+
+def predict_by_arclength(points: Sequence[CyclePoint], arclength: float, h: Harmonics) -> PeriodicMotion:
+    """The motion at an arclength, by the polynomial through points."""
+    weights = lagrange([p.arclength for p in points], arclength)
+    coefficients = sum(w * h.resized(p.motion.coefficients) for w, p in zip(weights, points))
+    return PeriodicMotion(h, coefficients, float(sum(w * p.motion.omega for w, p in zip(weights, points))))
+
+
+def predict_by_parameter(
+    points: Sequence[CyclePoint], value: float, h: Harmonics, weight: np.ndarray
+) -> PeriodicMotion | None:
+    """The motion at a value of the parameter, by polynomials in it through the last points; None where these do not
+    lead one way to it.
+
+    Beside an onset the odd harmonics have a size with a root in it; its square, their shape, and all else are functions
+    of the parameter without a singularity (Hassard, Kazarinoff & Wan 1981, ch. 1), so that these are continued.
+
+    Parameters
+    ----------
+    points : sequence of CyclePoint
+    value : float
+    h : Harmonics
+        Of the prediction.
+    weight : (n,) array
+        Of squares of unknowns in sizes.
+    """
+    values = [p.value for p in points[-POINTS:]]
+    steps = np.diff([*values, value])
+    if len(values) < 2 or not (np.all(steps > 0) or np.all(steps < 0)):
+        return None
+    count = 2
+    for more in range(3, len(values) + 1):
+        if np.abs(lagrange(values[-more:], value)).sum() <= GROWTH:
+            count = more
+    odd = np.append(False, (np.arange(1, h.size) + 1) // 2 % 2 == 1)
+    weights = lagrange(values[-count:], value)
+    parts = [h.resized(p.motion.coefficients) for p in points[-count:]]
+    sizes = np.array([np.sqrt(np.sum(c[odd] ** 2 * weight)) for c in parts])
+    square = float(weights @ sizes**2)
+    if square <= 0 or not np.all(sizes > 0):
+        return None
+    coefficients = sum(
+        w * c * np.where(odd, np.sqrt(square) / size, 1.0)[:, None] for w, c, size in zip(weights, parts, sizes)
+    )
+    omegas = [p.motion.omega for p in points[-count:]]
+    return PeriodicMotion(h, coefficients, float(weights @ omegas))
+
+
+def parameter_predicts_better(points: Sequence[CyclePoint], weight: np.ndarray) -> bool:
+    """True when the last point would have been met closer by the parameter than by the arclength."""
+    last, before = points[-1], points[:-1]
+    h, c = last.motion.harmonics, last.motion.coefficients
+    one = predict_by_parameter(before, last.value, h, weight)
+    if one is None:
+        return len(before) < 2
+    other = predict_by_arclength(before[-POINTS:], last.arclength, h)
+    return bool(np.sum((one.coefficients - c) ** 2 * weight) <= np.sum((other.coefficients - c) ** 2 * weight))

@@ -2,8 +2,8 @@
 
 The preconditioner has two levels. On a small basis, in which the equations are coupled strongly in time, the
 linearisation is projected and solved as a dense matrix, with whatever else is unknown and the conditions that go with
-it; in all other directions a smoother solves each harmonic by itself. What corrections need beyond the basis is added
-to it, so that neighbours on a branch need ever fewer iterations.
+it; in all other directions a smoother solves each harmonic by itself. Directions that corrections need beyond the
+basis are added to it, so that neighbours on a branch need ever fewer iterations.
 """
 
 from __future__ import annotations
@@ -14,15 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from continuation.bordered_cycle import FREQUENCY, Condition, CycleLinearisation, moved, values_of
-from continuation.errors import NotConverged
-from continuation.options import require
+from continuation.cycle_linearisation import FREQUENCY, Condition, CycleLinearisation, apply_change, free_values
+from continuation.options import NotConverged, require
 from continuation.periodic import PeriodicMotion
 
 #: Directions of a motion itself that belong to the basis: those above this share of the largest.
 OWN = 1e-4
 #: Distance over the size of a motion within which the smoother of another one is used again.
 NEAR = 0.1
+#: Directions that are learnt at once: at most so many, those above this share of a correction.
+MOST_LEARNT, LEARNT = 6, 0.05
 #: Contraction that is counted on at most.
 LEAST_CONTRACTION = 0.15
 
@@ -34,12 +35,12 @@ class CycleOptions:
     Attributes
     ----------
     tolerance : float
-        What the last correction leaves, over the size of the motion about its mean: the size of the next one, by the
-        contraction seen.
+        Error that the last correction leaves, over the size of the motion about its mean: the size of the next one, by
+        the contraction seen.
     max_iterations : int
         Corrections.
     linear : float
-        What a correction may leave of its linear equations.
+        Share of its linear equations that a correction may leave.
     krylov : int
         Most Krylov iterations for a correction.
     renew_at : float
@@ -84,7 +85,7 @@ class Cycle:
 
 
 class CycleSolver:
-    """Finds periodic motions of a system one after another, each from a guess near it.
+    """Corrector of periodic motions of a system, one after another, each from a guess near it.
 
     Parameters
     ----------
@@ -140,32 +141,30 @@ class CycleSolver:
                 self._smoothed = motion, linear.smoother
                 linear.prepare(free, conditions, unbalance[: motion.coefficients.size].reshape(shape))
             change, used, missed = linear.solve(-unbalance, options.linear, options.krylov)
-            change = _updated(change, steps, linear.units)
+            change = _update_correction(change, steps, linear.units)
             spent += used
             sizes.append(self._size(change, motion))
-            if len(steps) > 1 and sizes[-1] > 2.0 * sizes[-2]:  # of a linearisation that is no good here
+            if len(steps) > 1 and sizes[-1] > 2.0 * sizes[-2]:  # a linearisation that does not serve
                 linear = None
                 continue
             if not sizes[-1] < 10.0 or (len(sizes) > 8 and sizes[-1] > max(0.5 * sizes[-4], 1e-3)):
                 break
-            motion, mu = moved(motion, mu, free, change)
+            motion, mu = apply_change(motion, mu, free, change)
             if motion.omega <= 0:
                 break
             learnt = self.learn(change[: motion.coefficients.size].reshape(shape))
-            if _left(sizes[-len(steps) :]) <= options.tolerance:
+            if _remaining_error(sizes[-len(steps) :]) <= options.tolerance:
                 return Cycle(motion, mu, sizes[-1], len(sizes), spent)
             if _is_slow(sizes[-len(steps) :], options.renew_at) or sizes[-1] > 0.5 or missed > 0.5:
                 linear = None
             elif sizes[-1] > 100 * options.tolerance and learnt.shape[1] and linear.extend(learnt):
                 linear.factor()
-        raise NotConverged(
-            f"No periodic motion was found near the guess: {len(sizes)} corrections, the last of "
-            f"{sizes[-1] if sizes else np.nan:.2g} of its size.",
-            "iterations",
-        )
+        last = sizes[-1] if sizes else np.nan
+        sentence = f"{len(sizes)} corrections, the last of {last:.2g} of its size."
+        raise NotConverged(f"No periodic motion was found near the guess: {sentence}", "iterations")
 
     def unknowns(self, free: Sequence[str]) -> tuple[str, ...]:
-        """All that is unknown beside the motion: the frequency first where time does not matter."""
+        """Free unknowns beside the motion: the frequency first for an autonomous system."""
         free = tuple(free)
         return (FREQUENCY, *free) if self.system.autonomous and FREQUENCY not in free else free
 
@@ -178,7 +177,7 @@ class CycleSolver:
 
     def _unbalance(self, motion, mu, free, conditions) -> np.ndarray:
         force = motion.harmonics.project(self.system.residual(motion, mu))
-        extra = values_of(motion, mu, free)
+        extra = free_values(motion, mu, free)
         return np.append(force.ravel(), [c.miss(motion.coefficients, extra) for c in conditions])
 
     def _size(self, change: np.ndarray, motion: PeriodicMotion) -> float:
@@ -210,21 +209,21 @@ class CycleSolver:
         size = np.abs(np.diag(r))
         return np.ascontiguousarray(q[:, : len(size)][:, size > 1e-8 * size[0]])
 
-    def learn(self, rows: np.ndarray, share: float = 0.05, most: int = 6) -> np.ndarray:
+    def learn(self, rows: np.ndarray) -> np.ndarray:
         """Add the leading directions (n, k) of corrections (k, n) beyond the basis to it, and return these; the oldest
         of those added before give way. They take effect with the next linearisation.
         """
-        added = self._beyond(rows, (self._given, self._learnt), share, most)
-        self._learnt = _newest(self._learnt, added, self.options.basis)
+        added = self._beyond(rows, (self._given, self._learnt))
+        self._learnt = _append_directions(self._learnt, added, self.options.basis)
         return added
 
-    def learn_perturbations(self, rows: np.ndarray, share: float = 0.05, most: int = 6) -> np.ndarray:
+    def learn_perturbations(self, rows: np.ndarray) -> np.ndarray:
         """Add leading directions (n, k) of what perturbations (k, n) lack to the basis for them, and return these."""
-        added = self._beyond(rows, (self._given, self._learnt, self._of_perturbations), share, most)
-        self._of_perturbations = _newest(self._of_perturbations, added, self.options.perturbations)
+        added = self._beyond(rows, (self._given, self._learnt, self._of_perturbations))
+        self._of_perturbations = _append_directions(self._of_perturbations, added, self.options.perturbations)
         return added
 
-    def _beyond(self, rows: np.ndarray, knowns: Sequence[np.ndarray], share: float, most: int) -> np.ndarray:
+    def _beyond(self, rows: np.ndarray, knowns: Sequence[np.ndarray]) -> np.ndarray:
         scaled = rows / self.system.scales
         whole = np.linalg.norm(scaled)
         if not whole > 0 or self._given.shape[1] == len(self._given):
@@ -232,10 +231,55 @@ class CycleSolver:
         for known in knowns:
             scaled = scaled - (scaled @ known) @ known.T
         _, sizes, found = la.svd(scaled, full_matrices=False)
-        return found[:most][sizes[:most] > share * whole].T
+        return found[:MOST_LEARNT][sizes[:MOST_LEARNT] > LEARNT * whole].T
 
 
-def _updated(change: np.ndarray, steps: list[np.ndarray], units: np.ndarray) -> np.ndarray:
+def cycles_beside_onset(
+    solver: CycleSolver, small: PeriodicMotion, mu: Mapping[str, float], parameter: str, row: np.ndarray, ratio: float
+) -> tuple[Cycle, Cycle, Cycle]:
+    """Equilibrium at a Hopf point as a cycle at rest, and two small cycles beside it.
+
+    To leading order parameter, frequency and mean change with the square of the amplitude, as the normal form has it,
+    and harmonic k with its power k: the guess of the second cycle follows from the first.
+
+    Parameters
+    ----------
+    small : PeriodicMotion
+        The equilibrium and the critical mode with the amplitude of the first cycle.
+    mu : mapping
+        Parameters at the Hopf point.
+    parameter : str
+        The one that is free while the amplitude is held.
+    row : (2 H + 1, n) array
+        Functional of coefficients that measures the amplitude; zero for the mean.
+    ratio : float
+        Amplitude of the second cycle over that of the first.
+
+    Raises
+    ------
+    NotConverged
+    """
+    h, amplitude = small.harmonics, float(np.vdot(row, small.coefficients))
+    free = np.zeros(len(solver.unknowns((parameter,))))
+
+    def of_amplitude(guess, mu, value):
+        return solver.solve(guess, mu, (parameter,), (Condition(row, free, value),))
+
+    first = of_amplitude(small, mu, amplitude)
+    change = first.motion.coefficients - small.coefficients
+    powers = np.append(2.0, np.repeat(np.arange(1.0, h.count + 1), 2))[:, None]
+    guess = PeriodicMotion(
+        h,
+        small.coefficients * np.append(1.0, np.full(h.size - 1, ratio))[:, None] + change * ratio**powers,
+        small.omega + (first.motion.omega - small.omega) * ratio**2,
+    )
+    value = mu[parameter] + (first.mu[parameter] - mu[parameter]) * ratio**2
+    still = small.coefficients * (np.arange(h.size) == 0)[:, None]
+    rest = Cycle(PeriodicMotion(h, still, small.omega), dict(mu), 0.0, 0, 0)
+    return rest, first, of_amplitude(guess, dict(mu) | {parameter: value}, ratio * amplitude)
+
+
+def _update_correction(change: np.ndarray, steps: list[np.ndarray], units: np.ndarray) -> np.ndarray:
     """A correction by a linearisation elsewhere, with what the corrections before it say of the difference: Broyden's
     method, by the steps alone (Kelley 1995, ch. 7). It matters where a perturbation is nearly neutral. Added to the
     steps.
@@ -250,19 +294,19 @@ def _updated(change: np.ndarray, steps: list[np.ndarray], units: np.ndarray) -> 
     return z * units
 
 
-def _left(sizes: Sequence[float]) -> float:
-    """What corrections of these sizes by one linearisation leave: the next one, by the contraction they show."""
+def _remaining_error(sizes: Sequence[float]) -> float:
+    """Error left by corrections of these sizes by one linearisation: the next one, by the contraction they show."""
     if len(sizes) < 2:
         return sizes[-1]
     return max(LEAST_CONTRACTION, *(b / a for a, b in zip(sizes[-3:], sizes[-2:]))) * sizes[-1]
 
 
 def _is_slow(sizes: Sequence[float], contraction: float) -> bool:
-    """Whether the last two corrections by one linearisation became no smaller than that."""
+    """True when the last two corrections by one linearisation shrank by less than a contraction."""
     return len(sizes) > 2 and sizes[-1] > contraction * sizes[-2] and sizes[-2] > contraction * sizes[-3]
 
 
-def _newest(known: np.ndarray, added: np.ndarray, most: int) -> np.ndarray:
+def _append_directions(known: np.ndarray, added: np.ndarray, most: int) -> np.ndarray:
     """Columns with more behind them, the first of which give way."""
     room = max(most - added.shape[1], 0)
     return np.hstack([known[:, max(known.shape[1] - room, 0) :], added])

@@ -90,14 +90,6 @@ class Harmonics:
         cosine, sine = coefficients[1::2] / np.sqrt(2), coefficients[2::2] / np.sqrt(2)
         return np.concatenate([(cosine + 1j * sine)[::-1], coefficients[:1], cosine - 1j * sine])
 
-    def one_sided(self, harmonics: np.ndarray) -> np.ndarray:
-        """Undo `two_sided`."""
-        minus, plus = harmonics[: self.count][::-1], harmonics[self.count + 1 :]
-        out = np.empty((self.size, *harmonics.shape[1:]), complex)
-        out[0] = harmonics[self.count]
-        out[1::2], out[2::2] = (plus + minus) / np.sqrt(2), 1j * (plus - minus) / np.sqrt(2)
-        return out
-
     def resized(self, coefficients: np.ndarray) -> np.ndarray:
         """Coefficients of another number of harmonics made to fit: cut off, or followed by zeros."""
         out = np.zeros((self.size, *coefficients.shape[1:]), coefficients.dtype)
@@ -112,7 +104,7 @@ class Harmonics:
 
 
 class Rates:
-    """What d/dt and its functions do to samples of motions ``exp(shift t)`` times a periodic function.
+    """Functions of d/dt applied to samples of motions ``exp(shift t)`` times a periodic function.
 
     Parameters
     ----------

@@ -26,11 +26,15 @@ _REACH = 0.75
 _RIM = 0.05
 #: Most corrections of an eigenpair whose projection is not exact.
 _REFINED = 10
-#: What the equations of a perturbation out of the band may have beyond the series.
+#: Largest share that either of the leading two perturbations may miss; four times as much for the others.
+_TOLERANCE = 1e-3
+#: Times that the basis is made larger for them.
+_ROUNDS = 3
+#: Largest share of the equations of a perturbation out of the band beyond the series.
 _CLOSED = 1e-4
 #: Distance over omega within which turned exponents with like perturbations are one.
 _ALIKE = 0.02
-#: How far past half the frequency the imaginary part of a real negative multiplier may come out, over omega.
+#: Distance past half the frequency that the imaginary part of a real negative multiplier may come out, over omega.
 _EDGE = 1e-4
 
 
@@ -45,7 +49,7 @@ class Exponents:
     vectors : list of (2 H + 1, n) complex arrays
         Coefficients of the perturbations.
     errors : (k,) array
-        What each perturbation misses in the full equations, as a share of itself.
+        Share of each perturbation that it misses in the full equations.
     trivial : float
         Size of the exponent of the shift in time, 1/s; zero for a forced system.
     omega : float
@@ -72,7 +76,7 @@ class Exponents:
         return int(sum(1 if self.is_real(value) else 2 for value in grows))
 
     def is_real(self, value: complex) -> bool:
-        """Whether the multiplier of an exponent is real."""
+        """True where the multiplier of an exponent is real."""
         near = 1e-3 * self.omega
         return abs(value.imag) < near or abs(value.imag - 0.5 * self.omega) < near
 
@@ -81,28 +85,24 @@ class Exponents:
         return self.unstable == 0
 
 
-def floquet_exponents(solver, linear, count: int = 4, tolerance: float = 1e-3, rounds: int = 3) -> Exponents:
+def floquet_exponents(solver, linear, count: int = 4) -> Exponents:
     """Leading exponents of the motion of a linearisation.
 
     Parameters
     ----------
     solver : continuation.cycles.CycleSolver
         Its basis grows by what perturbations miss.
-    linear : continuation.bordered_cycle.CycleLinearisation
+    linear : continuation.cycle_linearisation.CycleLinearisation
         At the motion itself.
     count : int
         Exponents wanted.
-    tolerance : float
-        Largest share that either of the leading two may miss; four times as much for the others.
-    rounds : int
-        Times that the basis is made larger.
     """
-    for left in range(rounds, -1, -1):
+    for left in range(_ROUNDS, -1, -1):
         found = _of_projection(linear, count, solver.system.autonomous)
         missed = _missed(linear, found.as_found, found.vectors)
         errors = np.array([share for share, _ in missed])
         found = replace(found, errors=errors)
-        limits = tolerance * np.where(np.arange(len(errors)) < 2, 1.0, 4.0)
+        limits = _TOLERANCE * np.where(np.arange(len(errors)) < 2, 1.0, 4.0)
         if not left or not np.any(errors > limits):
             return found
         rows = [p for (share, rest), most in zip(missed, limits) if share > most for p in (rest.real, rest.imag)]
@@ -169,9 +169,9 @@ def _refined(linear, sigma: complex, x: np.ndarray) -> tuple[complex, np.ndarray
     size = x.size
     for count in range(_REFINED):
         if count < 3:  # the quadratic about a shift is off where it relaxes; later matrices are not
-            here, ahead = reduced.matrix(complex(sigma)), reduced.matrix(complex(sigma + step))
+            middle, ahead = reduced.matrix(complex(sigma)), reduced.matrix(complex(sigma + step))
             matrix = np.zeros((size + 1, size + 1), complex)
-            matrix[:size, :size], matrix[:size, size] = here, (ahead - here) @ x.ravel() / step
+            matrix[:size, :size], matrix[:size, size] = middle, (ahead - middle) @ x.ravel() / step
             matrix[size, :size] = x.ravel().conj()
             balance = 1.0 / np.maximum(np.abs(matrix).max(axis=1), 1e-300)
             factor = la.lu_factor(matrix * balance[:, None], check_finite=False)
@@ -205,7 +205,7 @@ def _each_once(pairs, inside, omega: float) -> list[tuple[complex, np.ndarray]]:
 
 
 def _cut_off(reduced, sigma: complex, x: np.ndarray) -> float:
-    """What of a perturbation's equations lies beyond the series, over those within at the frequency of the motion."""
+    """Share of a perturbation's equations beyond the series, over those within at the frequency of the motion."""
     h, rates = reduced.motion.harmonics, reduced.rates(complex(sigma))
     samples = h.evaluate(x)
     rest = sum(term.apply(samples, rates) for term in reduced.terms)

@@ -1,4 +1,8 @@
-"""A system whose residual is written once in JAX; every derivative follows from it."""
+"""System whose residual is written once in JAX; every derivative follows from it.
+
+Sparse Jacobians are assembled from a few directional derivatives: columns that share no row have one colour and one
+direction (Curtis, Powell & Reid, J. Inst. Math. Appl. 13 (1974) 117).
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,6 @@ import jax.numpy as jnp  # noqa: E402
 import numpy as np  # noqa: E402
 import scipy.sparse as sp  # noqa: E402
 
-from continuation.colouring import ColouredJacobian  # noqa: E402
 from continuation.linear import MatrixLinearisation  # noqa: E402
 from continuation.system import SystemBase  # noqa: E402
 
@@ -30,10 +33,8 @@ class JaxSystem(SystemBase):
         None is the identity; a matrix is a constant ``B``; a callable ``mass(u, mu, v)``
         returns ``B(u, mu) v`` (linear in ``v``) and is differentiated too.
     sparsity : None or sparse matrix, shape (n, n)
-        Where ``dF/du`` may be non-zero; given, Jacobians are assembled sparse from a few
+        Pattern of ``dF/du``, and of a callable mass; given, Jacobians are assembled sparse from a few
         coloured directional derivatives.  None assembles them dense.
-    mass_sparsity : None or sparse matrix
-        The same for a callable mass; default ``sparsity``.
 
     Examples
     --------
@@ -49,17 +50,15 @@ class JaxSystem(SystemBase):
         size: int,
         mass=None,
         sparsity: sp.spmatrix | None = None,
-        mass_sparsity: sp.spmatrix | None = None,
     ):
         self.size = int(size)
         self._callable_mass = mass if callable(mass) else None
         self._constant_mass = None if callable(mass) else mass
         self.constant_mass, self.identity_mass = not callable(mass), mass is None
         self._colouring = None if sparsity is None else ColouredJacobian(sparsity)
-        pattern = sparsity if mass_sparsity is None else mass_sparsity
         self._mass_colouring = None
-        if self._callable_mass and pattern is not None:
-            self._mass_colouring = ColouredJacobian(pattern)
+        if self._callable_mass:
+            self._mass_colouring = self._colouring
 
         def f(u, mu):
             return jnp.asarray(residual(u, mu), dtype=jnp.float64)
@@ -173,3 +172,53 @@ def _directional_derivatives(f) -> dict[int, Callable]:
 
     jitted = jax.jit(derivative)
     return {1: jitted, 2: jitted, 3: jitted}
+
+
+def colour_columns(pattern: sp.spmatrix) -> np.ndarray:
+    """Greedy distance-2 colouring: columns of one colour share no row.
+
+    Parameters
+    ----------
+    pattern : sparse matrix, shape (m, n)
+        Where entries may be non-zero.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        Colours 0, 1, ...; see Curtis, Powell & Reid, J. Inst. Math. Appl. 13 (1974) 117.
+    """
+    by_row, by_column = sp.csr_matrix(pattern), sp.csc_matrix(pattern)
+    colours = np.full(pattern.shape[1], -1)
+    for j in range(pattern.shape[1]):
+        rows = by_column.indices[by_column.indptr[j] : by_column.indptr[j + 1]]
+        taken = {colours[k] for r in rows for k in by_row.indices[by_row.indptr[r] : by_row.indptr[r + 1]]}
+        colour = 0
+        while colour in taken:
+            colour += 1
+        colours[j] = colour
+    return colours
+
+
+class ColouredJacobian:
+    """Sparse matrix from products with the seeds of a colouring.
+
+    Attributes
+    ----------
+    seeds : ndarray, shape (colours, n)
+        Directions whose products with the Jacobian hold all its entries.
+    """
+
+    def __init__(self, pattern: sp.spmatrix):
+        coo = sp.coo_matrix(pattern)
+        coo.sum_duplicates()
+        self.shape = coo.shape
+        self._rows, self._columns = coo.row, coo.col
+        colours = colour_columns(coo)
+        self._colour_of_entry = colours[self._columns]
+        self.seeds = np.zeros((colours.max(initial=0) + 1, self.shape[1]))
+        self.seeds[colours, np.arange(self.shape[1])] = 1.0
+
+    def assemble(self, products: np.ndarray) -> sp.csc_matrix:
+        """Matrix whose products with the seeds are ``products``, shape (colours, m)."""
+        data = np.asarray(products)[self._colour_of_entry, self._rows]
+        return sp.csc_matrix((data, (self._rows, self._columns)), shape=self.shape)

@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from continuation.errors import NotConverged, OutOfDomain, SingularSystem
-from continuation.options import NewtonOptions, require
+from continuation.options import NewtonOptions, NotConverged, OutOfDomain, SingularSystem, require
 
 
 @dataclass(frozen=True)
 class Deflation:
-    """Pushes Newton away from equilibria that are known.
+    """Factor that pushes Newton's method away from equilibria that are known.
 
     The residual is multiplied by ``prod_i (|u - u_i|^-power + shift)``: Farrell, Birkisson &
     Funke, SIAM J. Sci. Comput. 37 (2015) A2026.
@@ -56,7 +55,7 @@ class Deflation:
 
 @dataclass(frozen=True)
 class NewtonResult:
-    """Where Newton's method ended and why.
+    """Outcome of Newton's method: the last state and the reason of the end.
 
     Attributes
     ----------
@@ -176,7 +175,6 @@ def equilibrium(
             return done("singular", iteration)
         if deflation is not None:
             step = step * deflation.step_factor(u, step)
-        damping = 1.0
         trial = evaluate(u + step)
         if options.line_search:
 
@@ -184,12 +182,19 @@ def equilibrium(
                 factor = 1.0 if deflation is None else deflation.magnitude(position)
                 return factor * residual_norm(system, value)
 
-            here = merit(u, residual)
-            while not merit(u + damping * step, trial) <= (1 - 1e-4 * damping) * here:
-                damping *= 0.5
-                if damping < options.min_damping:
-                    return done("line search stalled", iteration)
-                trial = evaluate(u + damping * step)
-        u = u + damping * step
-        residual = trial
+            step, trial = _shortened(evaluate, merit, u, residual, step, trial, options.min_damping)
+            if step is None:
+                return done("line search stalled", iteration)
+        u, residual = u + step, trial
     raise AssertionError("unreachable")
+
+
+def _shortened(evaluate, merit, u, residual, step, trial, least):
+    """Step halved until the merit falls (Armijo), and the residual behind it; None below the least fraction."""
+    start, damping = merit(u, residual), 1.0
+    while not merit(u + damping * step, trial) <= (1 - 1e-4 * damping) * start:
+        damping *= 0.5
+        if damping < least:
+            return None, trial
+        trial = evaluate(u + damping * step)
+    return damping * step, trial

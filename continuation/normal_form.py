@@ -1,23 +1,28 @@
-"""Normal forms at Hopf and fold points, with a mass matrix that may depend on the state.
+"""Normal forms at Hopf and fold points.
 
-Hopf: ``z' = i omega z + c1 z |z|^2`` on the centre manifold, by the homological equations
-(Kuznetsov, Elements of Applied Bifurcation Theory, ch. 5.4, 3.5), extended to
-``B(u) u' = F(u)``: a term ``exp(s t) a`` of the motion has the velocity ``s a``, so the
-nonlinearity ``F(u) - (B(u) - B(u0)) u'`` is multilinear in pairs ``(a, s a)``.
+Hopf: ``z' = i omega z + c1 z |z|^2`` on the centre manifold, by the homological equations (Kuznetsov, Elements of
+Applied Bifurcation Theory, ch. 5.4, 3.5).  They ask for the residual of motions ``sum a_i exp(s_i t)`` about the
+equilibrium alone,
 
-Normalisation: ``q* q = 1`` and ``p* B q = 1``; ``l1 = Re c1 / omega``.  ``l1`` scales with
-``|q|^2``; its sign, the amplitude of the motion and the orbit do not depend on it.
+    sum T(s_i) a_i exp(s_i t) + 1/2 sum d2[(s_i, a_i), (s_j, a_j)] exp((s_i + s_j) t) + ...,
+
+so that one derivation serves ``B(u) u' = F(u)``, with ``T(s) = A - s B``, and viscoelastic systems, whose internal
+variables are no part of the state: kernels that are sums of exponentials make that exact.
+
+Normalisation: ``q* q = 1`` and ``p* T' q = 1``, or ``p* B q = 1`` for ``B u' = F``; ``l1 = Re c1 / omega``.  It
+scales with ``|q|^2``; its sign, the amplitude of the motion and the orbit do not depend on it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from continuation.conditions import FoldCondition, HopfCondition
-from continuation.errors import NotABifurcation
-from continuation.multilinear import Derivatives
+from continuation.conditions import FoldCondition, null_pair
+from continuation.options import NotABifurcation, SingularSystem
+from continuation.system import Derivatives
 
 
 @dataclass(frozen=True)
@@ -29,7 +34,7 @@ class HopfNormalForm:
     omega : float
         Angular frequency.
     q, p : ndarray, complex, shape (n,)
-        Right and left eigenvectors, ``q* q = 1``, ``p* B q = 1``.
+        Right and left eigenvectors, ``q* q = 1``, ``p* B q = 1`` or ``p* T' q = 1``.
     c1 : complex
         Cubic coefficient.
     l1 : float
@@ -109,17 +114,101 @@ class HopfNormalForm:
         return self.u + motion
 
 
-def hopf_normal_form(system, u, mu, omega, q, p, parameter: str | None = None) -> HopfNormalForm:
+class Motion(NamedTuple):
+    """Motion ``vector * exp(rate * t)``, vector of shape (n,)."""
+
+    rate: complex
+    vector: np.ndarray
+
+
+class MotionForms(Protocol):
+    """Residual of a system about an equilibrium, for exponential motions.
+
+    Attributes
+    ----------
+    rest : ndarray, shape (k,)
+        The equilibrium, as `state` gives it.
+    """
+
+    rest: np.ndarray
+
+    def pencil(self, s: complex):
+        """``T(s)``, with ``matvec``, ``rmatvec``, ``solve`` and ``solve_transpose``."""
+
+    def slope(self, motion: Motion) -> np.ndarray:
+        """``T'(s) a``, shape (n,)."""
+
+    def second(self, a: Motion, b: Motion) -> np.ndarray:
+        """Second form, shape (n,), complex."""
+
+    def third(self, a: Motion, b: Motion, c: Motion) -> np.ndarray:
+        """Third form, shape (n,), complex."""
+
+    def state(self, motion: Motion) -> np.ndarray:
+        """State of a motion, shape (k,), linear in its vector: its norm is the unit of the amplitude."""
+
+    def parameter_slope(self, name: str) -> np.ndarray:
+        """Derivative of the residual at the equilibrium, shape (n,), by a parameter."""
+
+    def mixed(self, motion: Motion, name: str) -> np.ndarray:
+        """Derivative of ``T(s) a``, shape (n,), by a parameter at a fixed state."""
+
+
+class SystemForms:
+    """`MotionForms` of ``F(u, mu) - B(u, mu) u'``.
+
+    Parameters
+    ----------
+    system : System
+        With ``d2`` and ``d3``.
+    u : ndarray, shape (n,)
+        The equilibrium.
+    mu : mapping of str to float
+    """
+
+    def __init__(self, system, u, mu):
+        self.rest, self._mu, self._system = np.array(u), dict(mu), system
+        self._d, self._linear = Derivatives(system, u, self._mu), system.linear(u, self._mu)
+
+    def pencil(self, s):
+        return self._linear.shifted(s) if s else self._linear
+
+    def slope(self, motion):
+        return -self._linear.mass_matvec(motion.vector)
+
+    def second(self, a, b):
+        mass = self._d.mass_d(a.rate * a.vector, b.vector) + self._d.mass_d(b.rate * b.vector, a.vector)
+        return self._d.d2(a.vector, b.vector) - mass
+
+    def third(self, a, b, c):
+        d = self._d
+        mass = sum(d.mass_d2(x.rate * x.vector, y.vector, z.vector) for x, y, z in ((a, b, c), (b, a, c), (c, a, b)))
+        return d.d3(a.vector, b.vector, c.vector) - mass
+
+    def state(self, motion):
+        return motion.vector
+
+    def parameter_slope(self, name):
+        return self._system.d_parameter(self.rest, self._mu, name)
+
+    def mixed(self, motion, name):
+        d = self._d
+        return d.d2_parameter(name, motion.vector) - motion.rate * d.mass_parameter(name, motion.vector)
+
+
+def hopf_normal_form(system, u, mu, omega: float, q, parameter: str | None = None) -> HopfNormalForm:
     """First Lyapunov coefficient and the second-order motion at a located Hopf point.
 
     Parameters
     ----------
     system : System
         With ``d2`` and ``d3``.
-    u, mu, omega
-        The point.
-    q, p : ndarray, complex, shape (n,)
-        Right and left eigenvectors, of any size; polished here by one bordered solve.
+    u : ndarray, shape (n,)
+    mu : mapping of str to float
+    omega : float
+        Angular frequency, rad per unit of time.
+    q : ndarray, complex, shape (n,)
+        Right eigenvector, of any size; polished here by bordered solves.
     parameter : str, optional
         Also give the speed at which the eigenvalue crosses along this parameter.
 
@@ -128,48 +217,92 @@ def hopf_normal_form(system, u, mu, omega, q, p, parameter: str | None = None) -
     NotABifurcation
         ``i omega`` is not a simple eigenvalue, or the frequency is zero.
     """
-    mu = dict(mu)
-    if not omega > 0:
-        raise NotABifurcation(f"A Hopf point needs a positive frequency, not {omega}.")
-    linear = system.linear(u, mu)
-    value = HopfCondition(p, q).evaluate(system, u, mu, (), linear, [omega])
-    q = value.v / np.linalg.norm(value.v)
-    bq = linear.mass_matvec(q)
-    overlap = np.vdot(value.w, bq)
-    if abs(overlap) <= 1e-10 * np.linalg.norm(value.w) * max(np.linalg.norm(bq), 1e-300):
-        raise NotABifurcation("The critical eigenvalue is not simple: p* B q vanishes.")
-    p = value.w / np.conj(overlap)
-    d = Derivatives(system, u, mu)
+    _require_frequency(omega)
+    form = hopf_normal_form_of(SystemForms(system, u, mu), omega, q, parameter)
+    return replace(form, p=-form.p)  # T' = -B
+
+
+def hopf_normal_form_of(
+    forms: MotionForms, omega: float, q: np.ndarray, parameter: str | None = None
+) -> HopfNormalForm:
+    """First Lyapunov coefficient and the second-order motion from the residual of exponential motions.
+
+    Parameters
+    ----------
+    forms : MotionForms
+        Of a viscoelastic system, say.
+    omega, q, parameter
+        As in `hopf_normal_form`; ``T(i omega) q = 0`` nearly, q of shape (n,).
+
+    Returns
+    -------
+    HopfNormalForm
+        ``q``, ``h20`` and ``h11`` as `MotionForms.state` gives them, with ``|q| = 1``; ``p`` is the left vector of the
+        pencil, ``p* T'(i omega) q = 1``.
+
+    Raises
+    ------
+    NotABifurcation
+        ``i omega`` is not a simple eigenvalue, or the frequency is zero.
+    """
+    _require_frequency(omega)
     s = 1j * omega
+    q, p = _eigenvectors(forms, s, np.asarray(q, complex))
 
     def second(a, sa, b, sb):
-        return d.d2(a, b) - d.mass_d(sa * a, b) - d.mass_d(sb * b, a)
+        return -forms.second(Motion(sa, a), Motion(sb, b))
 
     def third(a, sa, b, sb, c, sc):
-        return d.d3(a, b, c) - d.mass_d2(sa * a, b, c) - d.mass_d2(sb * b, a, c) - d.mass_d2(sc * c, a, b)
+        return -forms.third(Motion(sa, a), Motion(sb, b), Motion(sc, c))
 
     def solve(shift, rhs):
-        return linear.shifted(shift).solve(rhs) if shift else linear.solve(rhs)
+        return -forms.pencil(shift).solve(rhs)
 
     c1, h20, h11, cancellation = cubic_coefficient(second, third, solve, q, p, s)
     crossing = None
     if parameter is not None:
-        du = -linear.solve(system.d_parameter(u, mu, parameter))
-        dmu = {parameter: 1.0}
-        change = d.jacobian_along(q, du, dmu) - s * d.mass_along(q, du, dmu)
-        crossing = complex(np.vdot(p, change))
+        du = -forms.pencil(0.0).solve(forms.parameter_slope(parameter))
+        change = forms.mixed(Motion(s, q), parameter)
+        if np.any(du):
+            change = change + forms.second(Motion(s, q), Motion(0.0, du))
+        crossing = -complex(np.vdot(p, change))
     return HopfNormalForm(
         float(omega),
-        q,
+        forms.state(Motion(s, q)),
         p,
         c1,
         c1.real / omega,
-        h20,
-        h11,
-        np.array(u),
+        forms.state(Motion(2 * s, h20)),
+        forms.state(Motion(0.0, h11)),
+        np.array(forms.rest),
         crossing,
         cancellation,
     )
+
+
+def _require_frequency(omega):
+    if not omega > 0:
+        raise NotABifurcation(f"A Hopf point needs a positive frequency, not {omega}.")
+
+
+def _eigenvectors(forms: MotionForms, s: complex, q: np.ndarray):
+    """Right vector of unit state and left vector with ``p* T'(s) q = 1``."""
+    pencil = forms.pencil(s)
+    q = q / np.linalg.norm(q)
+    p = forms.slope(Motion(s, q))
+    if np.linalg.norm(p) <= 1e-12:
+        p = q
+    try:
+        for _ in range(3):
+            _, q, p, _ = null_pair(pencil, p / np.linalg.norm(p), q / np.linalg.norm(q))
+    except SingularSystem as error:
+        raise NotABifurcation(f"The critical eigenvalue is not simple: {error}") from error
+    q = q / np.linalg.norm(forms.state(Motion(s, q)))
+    slope = forms.slope(Motion(s, q))
+    overlap = np.vdot(p, slope)
+    if abs(overlap) <= 1e-10 * np.linalg.norm(p) * max(np.linalg.norm(slope), 1e-300):
+        raise NotABifurcation("The critical eigenvalue is not simple: p* T' q vanishes.")
+    return q, p / np.conj(overlap)
 
 
 def cubic_coefficient(second, third, solve, q, p, s):

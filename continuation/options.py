@@ -1,9 +1,46 @@
-"""Settings, frozen and checked once, in sentences."""
+"""Options, frozen and checked once, in sentences; and the errors of this package."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+
+
+class ContinuationError(Exception):
+    """Base class of the errors of this package."""
+
+
+class DerivativeMissing(ContinuationError, NotImplementedError):
+    """The system does not supply a derivative that the analysis needs."""
+
+
+class SingularSystem(ContinuationError):
+    """A linear system stayed singular after bordering and repair."""
+
+
+class NotConverged(ContinuationError):
+    """An iteration ended without a solution; ``result`` holds what there is.
+
+    Attributes
+    ----------
+    reason : str
+        One word or short phrase, e.g. ``"diverged"``.
+    result : object
+        The unfinished result, for diagnosis only.
+    """
+
+    def __init__(self, message: str, reason: str = "", result=None):
+        super().__init__(message)
+        self.reason = reason
+        self.result = result
+
+
+class NotABifurcation(ContinuationError):
+    """A point handed over as a bifurcation does not qualify as one."""
+
+
+class OutOfDomain(ContinuationError):
+    """Model cannot be evaluated at a state; models raise it, and the step is then tried shorter."""
 
 
 def require(condition: bool, sentence: str) -> None:
@@ -51,7 +88,7 @@ class NewtonOptions:
 
 @dataclass(frozen=True)
 class ContinuationOptions:
-    """How a branch or curve is followed.
+    """Options of a branch or curve.
 
     Lengths are measured in ``ds^2 = sum w_i (du_i / state_scale)^2 + sum (dmu / scale)^2``
     with weights ``w_i = 1/n`` unless the system has its own ``state_weights``.

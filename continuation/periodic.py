@@ -1,4 +1,4 @@
-"""What a system gives so that its periodic motions can be found as Fourier series, and its linearisation about one.
+"""Contract of a system whose periodic motions are found as Fourier series, and its linearisation about one.
 
 A motion x(t) of n unknowns is periodic with angular frequency omega; a system answers with its residual at N samples of
 one period, and is free to use rates, and filters in time for what it remembers, see `continuation.harmonics.Rates`. It
@@ -21,8 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from continuation.blocks import SparseBlocks, sum_of_products
-from continuation.dense_blocks import DenseBlocks
+from continuation.blocks import DenseBlocks, SparseBlocks, sum_of_products
 from continuation.harmonics import Harmonics, Rates
 
 #: Least size over the largest of parts that projections of terms through few numbers are sums of.
@@ -74,7 +73,7 @@ class PeriodicMotion:
         return basis @ self.coefficients, basis @ rate, basis @ (self.omega * h.rate(rate))
 
     def resized(self, count: int) -> PeriodicMotion:
-        """With another number of harmonics."""
+        """Copy with another number of harmonics."""
         other = Harmonics(count)
         return PeriodicMotion(other, other.resized(self.coefficients), self.omega)
 
@@ -105,7 +104,7 @@ class Term:
 
     @property
     def narrow(self) -> bool:
-        """Whether it goes through few numbers."""
+        """True where the term goes through few numbers."""
         return self.left is not None or self.right is not None
 
     def apply(self, samples: np.ndarray, rates: Rates) -> np.ndarray:
@@ -130,13 +129,13 @@ class Term:
 
     @property
     def polynomial(self) -> bool:
-        """Whether d/dt enters by powers up to the second."""
+        """True where d/dt enters by powers up to the second."""
         used = [self.outer, *(function for function, _ in self.middle)]
         return all(isinstance(f, int) or getattr(f, "polynomial", False) for f in used)
 
     def reduced(self, basis: np.ndarray, known: Term | None = None, rough: bool = False) -> Term:
-        """Its projection on a basis (n, r), dense at each sample; `known` is that on the first columns of the basis,
-        `rough` asks for what `continuation.left_projection` needs.
+        """Projection on a basis (n, r), dense at each sample; `known` is that on the first columns of the basis,
+        `rough` asks for what `continuation.cycle_linearisation` needs.
         """
         if not self.narrow:
             before = [None] * len(self.middle) if known is None else [blocks for _, blocks in known.middle]
@@ -213,7 +212,7 @@ class PeriodicOperator:
 
     def __init__(self, motion: PeriodicMotion, terms: Sequence[Term], coarse: Sequence[Term] | None = None):
         self.motion, self.terms = motion, tuple(terms)
-        #: Whether projections are those of the operator itself.
+        #: True where projections are those of the operator itself.
         self.exact = coarse is None
         self._coarse = self.terms if coarse is None else tuple(coarse)
         self._rates = {0.0: motion.rates}
@@ -243,7 +242,7 @@ class PeriodicOperator:
 
     def reduced(self, basis: np.ndarray, known: ReducedOperator | None = None, rough: bool = False) -> ReducedOperator:
         """Projection on a basis (n, r) at every sample; `known` is that on the first columns of the basis, `rough` asks
-        for what `continuation.left_projection` needs.
+        for what `continuation.cycle_linearisation` needs.
         """
         before = [None] * len(self._coarse) if known is None else known.terms
         terms = [term.reduced(basis, old, rough) for term, old in zip(self._coarse, before)]
@@ -266,14 +265,14 @@ class ReducedOperator(PeriodicOperator):
     def __init__(self, motion: PeriodicMotion, terms: Sequence[Term], size: int):
         super().__init__(motion, terms)
         self.size = size
-        #: Whether exponents enter as powers up to the second.
+        #: True where exponents enter as powers up to the second.
         self.polynomial = all(term.polynomial for term in terms)
         #: Outer filter, inner filter and blocks of all of it.
         self.parts = [(t.outer, *some) for t in terms for some in t.widened(motion.rates)]
 
     @cached_property
     def between_harmonics(self) -> list[np.ndarray]:
-        """Of each of the parts, what weights of their parts make of coefficients; see `DenseBlocks`."""
+        """Matrices by which the weights of each part act on coefficients; see `DenseBlocks`."""
         return [blocks.between_harmonics(self.motion.harmonics) for *_, blocks in self.parts]
 
     @cached_property
@@ -319,10 +318,6 @@ class PeriodicSystem(Protocol):
         """Linearisation about a motion that need not solve the equations; a rough one, if that is cheaper, serves to
         correct the motion, which takes an error of some per cent in how the linearisation changes within a period.
         """
-        ...
-
-    def coarse_basis(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> np.ndarray:
-        """(n, r) directions in which the equations are coupled in time; all of them for a small system."""
         ...
 
     def smoother(

@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from continuation.bordered import bordered
-from continuation.errors import OutOfDomain, SingularSystem
+from continuation.linear import bordered
 from continuation.newton import residual_norm
+from continuation.options import OutOfDomain, SingularSystem
 
 
 class Problem:
-    """What is continued or located.
+    """Equations of a curve that is continued or of a point that is located.
 
     Parameters
     ----------

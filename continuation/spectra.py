@@ -1,6 +1,7 @@
-"""Ready-made eigenvalue callables: dense for small systems, shift-invert Arnoldi for others.
+"""Eigenvalues of ``A x = lambda B x`` near a point, and modes of neighbouring points matched.
 
-Any callable ``(u, mu, count, near) -> Spectrum`` may take their place.
+Dense QZ serves small systems, shift-invert Arnoldi others; any callable
+``(u, mu, count, near) -> Spectrum`` may take their place.
 """
 
 from __future__ import annotations
@@ -10,14 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sla
 import scipy.sparse.linalg as spla
+from scipy.optimize import linear_sum_assignment
 
 #: Up to this order a dense generalised eigenvalue solve is the quicker and safer way.
 DENSE_LIMIT = 300
+#: Imaginary part over size below which an eigenvalue is real.
+REAL = 1e-9
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Some eigenvalues of ``A x = lambda B x``.
+    """Eigenvalues, some of them, of ``A x = lambda B x``.
 
     Attributes
     ----------
@@ -36,7 +40,7 @@ class Spectrum:
     converged: np.ndarray
     iterations: int = 0
 
-    def upper_half(self, tolerance: float = 1e-9) -> tuple[np.ndarray, np.ndarray]:
+    def upper_half(self) -> tuple[np.ndarray, np.ndarray]:
         """Converged values with non-negative imaginary part, one of each pair, by growth rate."""
         keep = np.asarray(self.converged, bool) & np.isfinite(self.values)
         values = np.asarray(self.values, complex)[keep]
@@ -45,8 +49,8 @@ class Spectrum:
         values = np.where(flip, values.conj(), values)
         vectors = np.where(flip, vectors.conj(), vectors)
         # Solvers leave rounding in the imaginary part of a real eigenvalue.
-        scale = np.maximum(np.abs(values), tolerance)
-        values = np.where(np.abs(values.imag) <= tolerance * scale, values.real, values)
+        scale = np.maximum(np.abs(values), REAL)
+        values = np.where(np.abs(values.imag) <= REAL * scale, values.real, values)
         order = np.argsort(-values.real, kind="stable")
         values, vectors, flip = values[order], vectors[:, order], flip[order]
         chosen: list[int] = []
@@ -72,7 +76,7 @@ def dense_spectrum(linearisation, count=None, near=None) -> Spectrum:
     return Spectrum(values[order], vectors[:, order], np.ones(order.size, bool), 1)
 
 
-def shift_invert_spectrum(linearisation, count, near=0.0, tolerance=1e-10) -> Spectrum:
+def shift_invert_spectrum(linearisation, count, near=0.0) -> Spectrum:
     """``count`` eigenvalues nearest to ``near`` by ARPACK on ``(A - near B)^-1 B``.
 
     Raises
@@ -95,7 +99,7 @@ def shift_invert_spectrum(linearisation, count, near=0.0, tolerance=1e-10) -> Sp
     start = np.cos(np.arange(1.0, n + 1.0)).astype(complex)
     size = min(n - 1, max(2 * count + 1, 20))
     try:
-        theta, vectors = spla.eigs(operator, k=count, which="LM", v0=start, ncv=size, tol=tolerance)
+        theta, vectors = spla.eigs(operator, k=count, which="LM", v0=start, ncv=size, tol=1e-10)
     except spla.ArpackNoConvergence as error:
         theta, vectors = error.eigenvalues, error.eigenvectors
     if theta.size == 0:
@@ -111,7 +115,7 @@ def shift_invert_spectrum(linearisation, count, near=0.0, tolerance=1e-10) -> Sp
     return Spectrum(values[order], vectors[:, order], converged[order], applied)
 
 
-def spectrum_of(linearisation, count, near=None) -> Spectrum:
+def compute_spectrum(linearisation, count, near=None) -> Spectrum:
     """Dense when the matrices are small and at hand, shift-invert Arnoldi otherwise.
 
     Without ``near`` the iteration looks around 0: right for a loss of stability at low
@@ -120,3 +124,40 @@ def spectrum_of(linearisation, count, near=None) -> Spectrum:
     if hasattr(linearisation, "to_dense") and linearisation.size <= DENSE_LIMIT:
         return dense_spectrum(linearisation, count, near)
     return shift_invert_spectrum(linearisation, count, 0.0 if near is None else near)
+
+
+def count_unstable(values, tolerance=0.0) -> int:
+    """Unstable eigenvalues, given one of each conjugate pair."""
+    return int(sum((2 if value.imag > 0 else 1) for value in values if value.real > tolerance))
+
+
+def match_modes(first, second) -> list[tuple[int, int]]:
+    """Pair the modes of two nearby points by eigenvalue and shape.
+
+    Parameters
+    ----------
+    first, second : (values, vectors)
+        With one mode of each conjugate pair.
+
+    Returns
+    -------
+    list of (i, j)
+    """
+    if first[0].size == 0 or second[0].size == 0:
+        return []
+    rows, columns = linear_sum_assignment(mode_distance(first, second))
+    return list(zip(rows.tolist(), columns.tolist()))
+
+
+def mode_distance(first, second) -> np.ndarray:
+    """Dissimilarity of the modes of two points, shape (first, second), from 0 to about 2.5."""
+    (a, x), (b, y) = first, second
+    size = max(np.abs(a).max(), np.abs(b).max(), 1e-300)
+    near = np.abs(a[:, None] - b[None, :])
+    near = near / (np.abs(a)[:, None] + np.abs(b)[None, :] + 1e-3 * size)
+    overlap = np.abs(x.conj().T @ y)
+    norms = np.linalg.norm(x, axis=0)[:, None] * np.linalg.norm(y, axis=0)[None, :]
+    likeness = overlap / np.maximum(norms, 1e-300)
+    # A complex mode cannot have become a real one without another that met it.
+    kind = 0.5 * ((a.imag == 0)[:, None] != (b.imag == 0)[None, :])
+    return near + (1.0 - likeness) + kind

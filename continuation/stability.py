@@ -1,17 +1,72 @@
-"""Stability along a branch from a spectrum: counts, tracked modes, Hopf points."""
+"""Stability along a branch from a spectrum: counts, tracked modes, Hopf points.
+
+Modes of neighbouring points are paired by eigenvalue and shape.  A pair that crosses the imaginary axis is a Hopf
+point, located as a zero of the augmented system ``F = 0, det(F_u - i omega B) = 0``.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
+from continuation.branch import CurvePoint
 from continuation.branch_points import BranchPointMonitor
-from continuation.hopf import describe_hopf, solve_hopf
-from continuation.locate import SLACK, safeguarded, special_at
-from continuation.modes import count_unstable, match_modes, mode_distance
+from continuation.conditions import HopfCondition, null_pair
+from continuation.event_location import SLACK, locate_zero, solve_augmented, special_at
+from continuation.normal_form import hopf_normal_form
+from continuation.options import ContinuationError, DerivativeMissing
+from continuation.spectra import count_unstable, match_modes, mode_distance
+
+
+def hopf_borders(linear, omega, vector):
+    """Left and right vectors near the null vectors of ``A - i omega B``."""
+    shifted = linear.shifted(1j * omega)
+    q = np.asarray(vector, complex)
+    p = linear.mass_matvec(q)
+    if np.linalg.norm(p) <= 1e-12 * np.linalg.norm(q):
+        p = q
+    for _ in range(2):
+        _, q, p, _ = null_pair(shifted, p / np.linalg.norm(p), q / np.linalg.norm(q))
+    return p, q
+
+
+def solve_hopf(tracer, guess, omega, vector):
+    """Newton on ``F = 0, g = 0`` in state, parameter and frequency; see `solve_augmented`."""
+    p, q = hopf_borders(guess.local.linear, omega, vector)
+    frame = tracer.problem.frame(guess.tangent[:, None])
+    result = solve_augmented(tracer, HopfCondition(p, q), np.append(guess.z, omega), frame)
+    if not isinstance(result, str) and not result.z[-1] > 0:
+        return "Newton's method went to a frequency that is not positive"
+    return result
+
+
+def describe_hopf(tracer, result, tangent, index):
+    """Special point with frequency, normal form and a check of the eigenpair."""
+    problem, value = tracer.problem, result.local.condition
+    omega = float(result.z[-1])
+    linear, q = value.linear, value.v / np.linalg.norm(value.v)
+    aq, bq = linear.matvec(q), linear.mass_matvec(q)
+    defect = np.linalg.norm(aq - 1j * omega * bq) / max(np.linalg.norm(aq), 1e-300)
+    values = {"omega": omega, "iterations": result.iterations, "eigen_residual": float(defect)}
+    vectors = {"right": q, "left": value.w}
+    try:
+        form = hopf_normal_form(problem.system, result.local.u, result.local.mu, omega, q, problem.names[0])
+        values.update(
+            first_lyapunov_coefficient=form.l1,
+            c1_real=form.c1.real,
+            c1_imag=form.c1.imag,
+            crossing_real=form.crossing.real,
+            crossing_imag=form.crossing.imag,
+            criticality=form.criticality,
+            amplitude_coefficient=form.amplitude_coefficient(),
+        )
+        vectors["left"] = form.p
+    except (DerivativeMissing, ContinuationError) as error:
+        values["normal_form"] = str(error)
+    return special_at(tracer, "hopf", CurvePoint(result.z[:-1], tangent), index, True, "", values, vectors)
 
 
 class SpectrumMonitor:
-    """Counts unstable eigenvalues and finds Hopf points by tracking each mode.
+    """Count of unstable eigenvalues, and Hopf points by tracking each mode.
 
     A pair that enters the right half plane while another leaves it does not change the
     count, so the modes are matched one by one; and where matches and counts contradict each
@@ -28,22 +83,22 @@ class SpectrumMonitor:
         self._past = None
         self._recent: list = []
 
-    def modes(self, tracer, here):
+    def modes(self, tracer, point):
         """Values and vectors at a point, computed once."""
-        if "modes" not in here.data:
+        if "modes" not in point.data:
             options, problem = tracer.options, tracer.problem
             ask = self._spectrum or problem.system.spectrum
-            result = ask(problem.u(here.z), problem.mu(here.z), options.eigenvalues, options.near)
-            here.data["modes"] = result.upper_half()
-            here.eigenvalues = here.data["modes"][0]
+            result = ask(problem.u(point.z), problem.mu(point.z), options.eigenvalues, options.near)
+            point.data["modes"] = result.upper_half()
+            point.eigenvalues = point.data["modes"][0]
             complete = bool(np.all(result.converged))
-            here.unstable = -1
+            point.unstable = -1
             if complete:
-                here.unstable = count_unstable(here.eigenvalues, options.stability_tolerance)
-        return here.data["modes"]
+                point.unstable = count_unstable(point.eigenvalues, options.stability_tolerance)
+        return point.data["modes"]
 
-    def measure(self, tracer, here):
-        self.modes(tracer, here)
+    def measure(self, tracer, point):
+        self.modes(tracer, point)
 
     def between(self, tracer, before, after, index, found):
         special: list = []
@@ -62,7 +117,7 @@ class SpectrumMonitor:
         same sign at all of them comes near the axis; there one more spectrum is computed.
         """
         limit = tracer.options.stability_tolerance
-        modes = [self.modes(tracer, here) for here in (past, before, after)]
+        modes = [self.modes(tracer, point) for point in (past, before, after)]
         onward = dict(match_modes(modes[1], modes[2]))
         s = np.array([-tracer.problem.norm(before.z - past.z), 0.0, tracer.problem.norm(after.z - before.z)])
         for i, j in match_modes(modes[0], modes[1]):
@@ -143,13 +198,11 @@ class SpectrumMonitor:
 
         def attempt(guess, *_):
             vector = np.append(mode_at(guess)[1][:, 0].real, 0.0)
-            point = search.solve(tracer, guess, (vector, vector))
-            if isinstance(point, str):
-                return point
-            return point.z[:-1], point
+            result = search.solve(tracer, guess, (vector, vector))
+            return result if isinstance(result, str) else (result.z[:-1], result)
 
-        result, guess, reason = safeguarded(
-            tracer, before, after, lambda here: mode_at(here)[0][0].real - limit, attempt
+        result, guess, reason = locate_zero(
+            tracer, before, after, lambda point: mode_at(point)[0][0].real - limit, attempt
         )
         if result is None:
             reason = f"a real eigenvalue crossed zero; {reason}"
@@ -162,19 +215,19 @@ class SpectrumMonitor:
         """A function that gives one crossing mode at any point of the bracket."""
         key = ("followed mode", before.z.tobytes(), i)
         ends = []
-        for here, k in ((before, i), (after, j)):
-            values, vectors = self.modes(tracer, here)
+        for point, k in ((before, i), (after, j)):
+            values, vectors = self.modes(tracer, point)
             ends.append((values[[k]], vectors[:, [k]]))
-            here.data[key] = ends[-1]
+            point.data[key] = ends[-1]
 
-        def mode_at(here):
+        def mode_at(point):
             """The crossing mode at a point of the bracket: the one most like both ends."""
-            if key not in here.data:
-                values, vectors = self.modes(tracer, here)
+            if key not in point.data:
+                values, vectors = self.modes(tracer, point)
                 unlike = sum(mode_distance(end, (values, vectors))[0] for end in ends)
                 best = int(np.argmin(unlike))
-                here.data[key] = (values[[best]], vectors[:, [best]])
-            return here.data[key]
+                point.data[key] = (values[[best]], vectors[:, [best]])
+            return point.data[key]
 
         return mode_at
 
@@ -214,8 +267,8 @@ class SpectrumMonitor:
                     return "Newton's method found the same point again"
             return result.z[:-1], result
 
-        result, guess, reason = safeguarded(
-            tracer, before, after, lambda here: mode_at(here)[0][0].real - limit, attempt
+        result, guess, reason = locate_zero(
+            tracer, before, after, lambda point: mode_at(point)[0][0].real - limit, attempt
         )
         if result is None:
             return special_at(tracer, "hopf", guess, index, False, reason, {"omega": float(mode_at(before)[0][0].imag)})
@@ -227,23 +280,23 @@ def _sign(x) -> int:
 
 
 class CountMonitor(SpectrumMonitor):
-    """Counts unstable eigenvalues along a fold or Hopf curve, without the critical ones.
+    """Count of unstable eigenvalues along a fold or Hopf curve, without the critical ones.
 
     The count tells whether the bifurcation is the first loss of stability: 0 on the
     boundary of the stable region.
     """
 
-    def measure(self, tracer, here):
-        values, _ = self.modes(tracer, here)
-        extra = tracer.problem.extra(here.z)
+    def measure(self, tracer, point):
+        values, _ = self.modes(tracer, point)
+        extra = tracer.problem.extra(point.z)
         critical = 1j * abs(float(extra[0])) if extra.size else 0.0
-        if here.unstable < 0 or values.size == 0:
+        if point.unstable < 0 or values.size == 0:
             return
         nearest = int(np.argmin(np.abs(values - critical)))
         # The critical mode may lie outside of what the spectrum was asked for.
         found = abs(values[nearest] - critical) <= 1e-4 * max(1.0, abs(critical))
         rest = np.delete(values, nearest) if found else values
-        here.unstable = count_unstable(rest, tracer.options.stability_tolerance)
+        point.unstable = count_unstable(rest, tracer.options.stability_tolerance)
 
     def between(self, tracer, before, after, index, found):
         before.data.pop("modes", None)

@@ -1,8 +1,9 @@
-"""The contract a model fulfils so that its branches and bifurcations can be computed.
+"""Contract of a model whose branches and bifurcations are computed.
 
 A system is ``B(u, mu) u' = F(u, mu)`` with a state ``u`` of ``size`` numbers and a
 mapping ``mu`` of named parameters.  Everything here asks for residuals, matrix-vector
 products, solves and directional derivatives; never for a dense matrix of the full size.
+Directional derivatives take real vectors; `Derivatives` extends them to complex ones.
 """
 
 from __future__ import annotations
@@ -12,15 +13,15 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from continuation.errors import DerivativeMissing
-from continuation.spectra import Spectrum, spectrum_of
+from continuation.options import DerivativeMissing
+from continuation.spectra import Spectrum, compute_spectrum
 
 Parameters = Mapping[str, float]
 
 
 @runtime_checkable
 class ShiftedSolver(Protocol):
-    """Solves with ``A - lambda B`` for one complex ``lambda``."""
+    """Products and solves with ``A - lambda B`` for one complex ``lambda``."""
 
     def matvec(self, x: np.ndarray) -> np.ndarray: ...
 
@@ -36,18 +37,10 @@ class ShiftedSolver(Protocol):
 
 
 @runtime_checkable
-class Linearisation(Protocol):
+class Linearisation(ShiftedSolver, Protocol):
     """``A = dF/du`` and ``B`` at one state; all vectors of shape (n,), real or complex."""
 
     size: int
-
-    def matvec(self, x: np.ndarray) -> np.ndarray: ...
-
-    def rmatvec(self, x: np.ndarray) -> np.ndarray: ...
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray: ...
-
-    def solve_transpose(self, rhs: np.ndarray) -> np.ndarray: ...
 
     def mass_matvec(self, x: np.ndarray) -> np.ndarray: ...
 
@@ -119,7 +112,7 @@ class SystemBase:
     """
 
     size: int = 0
-    #: Whether ``mass_d`` vanishes, and whether ``B`` is the identity; spares some work.
+    #: True where ``mass_d`` vanishes, and where ``B`` is the identity; spares some work.
     constant_mass: bool = True
     identity_mass: bool = False
     #: Relative step for the central differences in parameters.
@@ -167,4 +160,66 @@ class SystemBase:
         return np.zeros(self.size)
 
     def spectrum(self, u, mu, count, near=None):
-        return spectrum_of(self.linear(u, mu), count, near)
+        return compute_spectrum(self.linear(u, mu), count, near)
+
+
+def expand(function, *vectors):
+    """Apply a real multilinear ``function`` to complex vectors by splitting them."""
+    for i, vector in enumerate(vectors):
+        if np.iscomplexobj(vector):
+            head, tail = vectors[:i], vectors[i + 1 :]
+            result = 0.0
+            if np.any(vector.real):
+                result = result + expand(function, *head, np.ascontiguousarray(vector.real), *tail)
+            if np.any(vector.imag):
+                result = result + 1j * expand(function, *head, np.ascontiguousarray(vector.imag), *tail)
+            return np.zeros(vector.size, complex) if np.isscalar(result) else result
+    return np.asarray(function(*vectors))
+
+
+class Derivatives:
+    """``F`` and ``B`` and their derivatives at ``(u, mu)``.
+
+    Parameters
+    ----------
+    system : System
+    u : ndarray, shape (n,)
+    mu : mapping of str to float
+    """
+
+    def __init__(self, system, u, mu):
+        self.system, self.u, self.mu = system, u, mu
+
+    def d2(self, a, b):
+        return expand(lambda x, y: self.system.d2(self.u, self.mu, x, y), a, b)
+
+    def d3(self, a, b, c):
+        return expand(lambda x, y, z: self.system.d3(self.u, self.mu, x, y, z), a, b, c)
+
+    def d2_parameter(self, name, a):
+        return expand(lambda x: self.system.d2_parameter(self.u, self.mu, name, x), a)
+
+    def mass_d(self, c, a):
+        return expand(lambda x, y: self.system.mass_d(self.u, self.mu, x, y), c, a)
+
+    def mass_d2(self, c, a, b):
+        return expand(lambda x, y, z: self.system.mass_d2(self.u, self.mu, x, y, z), c, a, b)
+
+    def mass_parameter(self, name, c):
+        return expand(lambda x: self.system.mass_parameter(self.u, self.mu, name, x), c)
+
+    def jacobian_along(self, v, du, dmu):
+        """``d(F_u v)`` for a change ``du`` of the state and ``dmu`` (dict) of the parameters."""
+        result = self.d2(v, du) if np.any(du) else np.zeros(v.size, np.result_type(v, du))
+        for name, change in dmu.items():
+            if change != 0.0:
+                result = result + change * self.d2_parameter(name, v)
+        return result
+
+    def mass_along(self, c, du, dmu):
+        """``d(B c)`` for the same change."""
+        result = self.mass_d(c, du) if np.any(du) else np.zeros(c.size, np.result_type(c, du))
+        for name, change in dmu.items():
+            if change != 0.0:
+                result = result + change * self.mass_parameter(name, c)
+        return result

@@ -1,28 +1,113 @@
-"""Follows a curve: predictor, corrector, step control, limits, monitors, resumption."""
+"""Pseudo-arclength continuation of a curve: predictor, corrector, step control, limits, monitors, observers.
+
+From a point ``z`` with unit tangent ``t`` the next one is sought in the hyperplane through ``z + ds t`` normal to ``t``
+(Keller 1977).  The step follows the number of corrections and the angle between tangents.  Monitors measure test
+functions at each point and look for events between two of them; observers are told of points and never print here.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 
-from continuation.branch import Branch
-from continuation.errors import NotConverged, SingularSystem
-from continuation.here import Here
-from continuation.observers import as_observers
+from continuation.branch import Branch, CurvePoint
+from continuation.options import NotConverged, SingularSystem
 from continuation.problem import Local, Problem, correct
 
 
+class Observer:
+    """Hooks of a run, which do nothing by default; override those of interest."""
+
+    def started(self, branch) -> None:
+        """Before the first step."""
+
+    def accepted(self, branch) -> None:
+        """After each new point; ``branch.points[-1]`` is the point."""
+
+    def refused(self, branch, reason: str, step: float) -> None:
+        """A step failed or turned too far and is tried again, shorter."""
+
+    def found(self, branch, special) -> None:
+        """A special point was detected."""
+
+    def ended(self, branch) -> None:
+        """After the last step, also when interrupted."""
+
+
+class Checkpoint(Observer):
+    """Save the branch every few points, so that a killed run can be resumed.
+
+    Parameters
+    ----------
+    path : path
+    every : int
+        Points between writes.
+    """
+
+    def __init__(self, path: str | Path, every: int = 10):
+        if every < 1:
+            raise ValueError(f"A checkpoint needs at least one point in between, not {every}.")
+        self.path, self.every = Path(path), every
+
+    def accepted(self, branch):
+        if len(branch) % self.every == 0:
+            branch.save(self.path)
+
+    def ended(self, branch):
+        branch.save(self.path)
+
+
+def as_observers(observers) -> list[Observer]:
+    """Accept one observer, a plain callable, or a sequence of either."""
+    if observers is None:
+        return []
+    if isinstance(observers, Observer) or callable(observers):
+        observers = [observers]
+    return [o if isinstance(o, Observer) else _observer_of(o) for o in observers]
+
+
+def _observer_of(function: Callable) -> Observer:
+    observer = Observer()
+    observer.accepted = function
+    return observer
+
+
+def run_observed(branch, observers: list[Observer], steps: Callable[[], str]):
+    """Run the steps of a branch between its first and last call of the observers; the branch itself.
+
+    The steps return why they ended.  An interruption ends the branch; an error goes on to the caller, with the branch
+    so far as its attribute ``branch``.
+    """
+    for observer in observers:
+        observer.started(branch)
+    try:
+        branch.reason = steps()
+    except KeyboardInterrupt:
+        branch.reason = "interrupted"
+    except Exception as error:
+        branch.reason = f"error: {error}"
+        error.branch = branch
+        raise
+    finally:
+        for observer in observers:
+            observer.ended(branch)
+    return branch
+
+
 class Tracer:
-    """One run along one curve.
+    """Run along one curve.
 
     Parameters
     ----------
     problem : Problem
     options : ContinuationOptions
     monitors : sequence
-        Objects with ``measure(tracer, here)`` and
+        Objects with ``measure(tracer, point)`` and
         ``between(tracer, before, after, index, found)``.
     observers
-        See `continuation.observers`.
+        See `Observer`.
     """
 
     def __init__(self, problem: Problem, options, monitors=(), observers=None):
@@ -36,16 +121,18 @@ class Tracer:
     def correct(self, z, normal):
         return correct(self.problem, z, self.frame, self.options.newton, normal, self.options.location_tolerance)
 
-    def here(self, correction, reference, measure=True) -> Here:
-        """A corrected point with tangent (to the side of ``reference``) and tests."""
+    def corrected_point(self, correction, reference) -> CurvePoint:
+        """Corrected point with its tangent, to the side of ``reference``."""
         local = correction.local
-        result = Here(correction.z, local.tangent(reference), local, correction.iterations)
-        if measure:
-            for monitor in self.monitors:
-                monitor.measure(self, result)
-        return result
+        return CurvePoint(
+            correction.z,
+            local.tangent(reference),
+            iterations=correction.iterations,
+            residual=float(local.size),
+            local=local,
+        )
 
-    def at(self, before: Here, after: Here, fraction: float, measure=False) -> Here | None:
+    def at(self, before: CurvePoint, after: CurvePoint, fraction: float) -> CurvePoint | None:
         """The point of the curve over a fraction of the chord, or None if not reached."""
         chord = after.z - before.z
         normal = self.problem.weights * chord
@@ -53,32 +140,32 @@ class Tracer:
         correction = self.correct(before.z + fraction * chord, normal / scale)
         if not correction.converged:
             return None
-        return self.here(correction, chord, measure)
+        return self.corrected_point(correction, chord)
 
-    def fraction(self, before: Here, after: Here, z) -> tuple[float, float]:
-        """Where ``z`` lies along the chord, and its distance from it in chord lengths."""
+    def fraction(self, before: CurvePoint, after: CurvePoint, z) -> tuple[float, float]:
+        """Position of ``z`` along the chord, and its distance from it, both in chord lengths."""
         chord = after.z - before.z
         length2 = max(self.problem.dot(chord, chord), 1e-300)
         s = self.problem.dot(z - before.z, chord) / length2
         away = self.problem.norm(z - before.z - s * chord) / np.sqrt(length2)
         return s, away
 
-    def root(self, before: Here, after: Here, function, tolerance=1e-10, steps=60) -> Here | None:
+    def root(self, before: CurvePoint, after: CurvePoint, function, tolerance=1e-10) -> CurvePoint | None:
         """Zero of a function of points between two of opposite sign (Illinois)."""
         a, b = 0.0, 1.0
         fa, fb = function(before), function(after)
         best, side = None, 0
-        for _ in range(steps):
+        for _ in range(60):
             s = (a * fb - b * fa) / (fb - fa)
             width = b - a
             s = min(max(s, a + 1e-3 * width), b - 1e-3 * width)
-            here = self.at(before, after, s)
-            if here is None:
+            point = self.at(before, after, s)
+            if point is None:
                 return best
-            f = function(here)
-            best = here
+            f = function(point)
+            best = point
             if abs(f) == 0.0 or width < tolerance:
-                return here
+                return point
             if (f > 0) == (fb > 0):
                 b, fb = s, f
                 fa = fa / 2 if side == 1 else fa
@@ -91,7 +178,7 @@ class Tracer:
 
     # -- the run
 
-    def start(self, z, direction, frame=None) -> Here:
+    def start(self, z, direction, frame=None) -> CurvePoint:
         """Correct the first point and choose the side to leave it on.
 
         Raises
@@ -116,65 +203,57 @@ class Tracer:
                 correction.reason,
                 correction,
             )
-        here = self.here(correction, direction, measure=False)
-        self.frame = self.problem.frame(here.local.basis)
-        here.local = Local(self.problem, here.z, self.frame)
-        here.tangent = here.local.tangent(here.tangent)
+        point = self.corrected_point(correction, direction)
+        self.frame = self.problem.frame(point.local.basis)
+        point.local = Local(self.problem, point.z, self.frame)
+        point.tangent = point.local.tangent(point.tangent)
         for monitor in self.monitors:
-            monitor.measure(self, here)
-        return here
+            monitor.measure(self, point)
+        return point
 
-    def run(self, branch: Branch, here: Here, step: float) -> Branch:
-        """Add points to ``branch`` from ``here`` on until something ends it.
+    def resume(self, branch: Branch) -> Branch:
+        """Copy of a branch with the points that follow its last one."""
+        options, last = self.options, branch.points[-1]
+        start = self.start(last.z, last.tangent, branch.restart.get("frame"))
+        step = float(np.clip(branch.next_step or options.step, options.min_step, options.max_step))
+        return self.run(branch.reopen(), start, step)
 
-        An interruption ends the branch; an error of the model goes on to the caller, with
-        the branch so far as its attribute ``branch``.
-        """
-        self._tell("started", branch)
-        try:
-            branch.reason = self._steps(branch, here, step)
-        except KeyboardInterrupt:
-            branch.reason = "interrupted"
-        except Exception as error:
-            branch.reason = f"error: {error}"
-            self._tell("ended", branch)
-            error.branch = branch
-            raise
-        self._tell("ended", branch)
-        return branch
+    def run(self, branch: Branch, before: CurvePoint, step: float) -> Branch:
+        """Add points to ``branch`` from a point on until something ends it; see `run_observed`."""
+        return run_observed(branch, self.observers, lambda: self._steps(branch, before, step))
 
-    def _steps(self, branch, here, step) -> str:
+    def _steps(self, branch, before, step) -> str:
         options = self.options
         self._branch = branch
         first = branch.points[0]
         for _ in range(options.max_points):
             self._remember(branch, step)
-            outcome = self._advance(branch, here, step)
+            outcome = self._advance(branch, before, step)
             if isinstance(outcome, str):
                 return outcome
             after, step, ending = outcome
             found: list = []
             for monitor in self.monitors:
-                found += monitor.between(self, here, after, len(branch) - 1, found)
+                found += monitor.between(self, before, after, len(branch) - 1, found)
             last = [s for s in found if s.values.pop("beyond", None)]
             if last:
                 branch.special += found
                 for special in found:
-                    self._tell("found", branch, special)
+                    self._notify("found", branch, special)
                 return f"stopped at: {last[0].kind}"
             # In the order in which the branch meets them.
-            found.sort(key=lambda s: (s.index, self.fraction(here, after, s.z)[0]))
-            branch.points.append(after.point())
+            found.sort(key=lambda s: (s.index, self.fraction(before, after, s.z)[0]))
+            branch.points.append(after.record())
             branch.special += found
             self.frame = self.problem.frame(after.local.basis)
             if self.problem.condition is not None:
                 self.problem.condition.adapt(after.local.condition)
-            closed = options.detect_closed and self._closed(branch, first, here, after)
-            here = after
+            closed = options.detect_closed and self._closed(branch, first, before, after)
+            before = after
             self._remember(branch, step)
-            self._tell("accepted", branch)
+            self._notify("accepted", branch)
             for special in found:
-                self._tell("found", branch, special)
+                self._notify("found", branch, special)
             stopping = [s.kind for s in found if s.kind in options.stop_at or s.values.get("stop")]
             if stopping:
                 return f"stopped at: {stopping[0]}"
@@ -187,18 +266,15 @@ class Tracer:
     def _remember(self, branch, step):
         branch.next_step = float(step)
         branch.restart = {"frame": self.frame}
-        own = getattr(self.problem.system, "restart_data", None)
-        if own is not None:
-            branch.restart.update(own())
         condition = self.problem.condition
         if condition is not None:
             branch.restart.update(p=condition.p, q=condition.q)
 
-    def _advance(self, branch, here, step):
+    def _advance(self, branch, before, step):
         """One accepted step: the point, the next step, and why the branch ends, if it does."""
         problem, options = self.problem, self.options
         while True:
-            z, used, normal, ending = self._predict(here, step)
+            z, used, normal, ending = self._predict(before, step)
             if ending and used == 0.0:
                 return ending
             correction = self.correct(z, normal)
@@ -207,28 +283,28 @@ class Tracer:
                 trouble = correction.reason
             else:
                 try:
-                    after = self.here(correction, here.tangent, measure=False)
+                    after = self.corrected_point(correction, before.tangent)
                 except SingularSystem:
                     trouble = "singular"
             if trouble is None:
-                cosine = np.clip(problem.dot(after.tangent, here.tangent), -1.0, 1.0)
+                cosine = np.clip(problem.dot(after.tangent, before.tangent), -1.0, 1.0)
                 angle = float(np.arccos(cosine))
                 if options.method == "arclength" and angle > options.max_angle:
                     trouble = "the tangent turns too far"
                 elif options.method == "natural" and angle > 1.0:
                     trouble = "the tangent turns too far"
-                elif self._jumped(here, after, z):
+                elif self._jumped(before, after, z):
                     trouble = "the corrector went far from the prediction"
             if trouble is None:
                 break
-            self._tell("refused", branch, trouble, used)
+            self._notify("refused", branch, trouble, used)
             if used <= options.min_step * (1 + 1e-9):
                 return f"step below its minimum: {trouble}"
             step = max(used * options.shrink, options.min_step)
         after.step = used
         crossed = None if ending else self._beyond(after.z)
         if crossed:
-            landed = self._land(here, after, *crossed)
+            landed = self._land(before, after, *crossed)
             if landed is not None:
                 after, ending = landed, f"limit of {crossed[0]} reached"
         for monitor in self.monitors:
@@ -241,22 +317,22 @@ class Tracer:
             step = float(np.clip(used * factor, options.min_step, options.max_step))
         return after, step, ending
 
-    def _jumped(self, here, after, prediction) -> bool:
-        """Whether the correction is too long for the step: likely another branch."""
+    def _jumped(self, before, after, prediction) -> bool:
+        """True when the correction is too long for the step: likely another branch."""
         share = max(0.5, np.tan(self.options.max_angle))
         correction = self.problem.norm(after.z - prediction)
-        return correction > share * self.problem.norm(prediction - here.z)
+        return correction > share * self.problem.norm(prediction - before.z)
 
-    def _predict(self, here, step):
+    def _predict(self, before, step):
         problem, options = self.problem, self.options
         n = problem.n
-        direction, used, ending = here.tangent, step, None
-        normal = problem.weights * here.tangent
+        direction, used, ending = before.tangent, step, None
+        normal = problem.weights * before.tangent
         normal = normal / np.abs(normal).max()
         if options.method == "natural":
             # The step counts in the parameter, in its own unit.
-            rate = abs(here.tangent[n]) * np.sqrt(problem.weights[n])
-            direction = here.tangent / max(rate, 1e-12)
+            rate = abs(before.tangent[n]) * np.sqrt(problem.weights[n])
+            direction = before.tangent / max(rate, 1e-12)
             used = step
             normal = np.zeros(problem.n + problem.k + problem.e)
             normal[n] = 1.0
@@ -265,12 +341,12 @@ class Tracer:
                 continue
             low, high = options.limits[name]
             limit = high if direction[n + i] > 0 else low
-            reach = (limit - here.z[n + i]) / direction[n + i]
+            reach = (limit - before.z[n + i]) / direction[n + i]
             if 0.0 <= reach <= used * (1 + 1e-9):
                 used, ending = reach, f"limit of {name} reached"
                 normal = np.zeros(problem.n + problem.k + problem.e)
                 normal[n + i] = 1.0
-        z = here.z + used * direction
+        z = before.z + used * direction
         return z, used, normal, ending
 
     def _beyond(self, z):
@@ -282,19 +358,19 @@ class Tracer:
                     return name, self.problem.n + i, low if value < low else high
         return None
 
-    def _land(self, here, after, name, index, limit):
-        landed = self.root(here, after, lambda point: point.z[index] - limit)
+    def _land(self, before, after, name, index, limit):
+        landed = self.root(before, after, lambda point: point.z[index] - limit)
         if landed is not None:
-            landed.step = self.problem.norm(landed.z - here.z)
+            landed.step = self.problem.norm(landed.z - before.z)
         return landed
 
-    def _closed(self, branch, first, here, after) -> bool:
+    def _closed(self, branch, first, before, after) -> bool:
         if len(branch) < 6:
             return False
-        s, away = self.fraction(here, after, first.z)
+        s, away = self.fraction(before, after, first.z)
         same_way = self.problem.dot(first.tangent, after.tangent) > 0.9
         return 0.0 < s <= 1.0 and away < 0.1 and same_way
 
-    def _tell(self, hook, *arguments):
+    def _notify(self, hook, *arguments):
         for observer in self.observers:
             getattr(observer, hook)(*arguments)

@@ -13,8 +13,8 @@ from itertools import product
 
 import numpy as np
 
-from continuation.memory import Motion
-from continuation.multilinear import expand
+from continuation.normal_form import Motion
+from continuation.system import expand
 from eigen import CoupledPencil
 from eigen.pencil import real_apply
 
@@ -27,7 +27,7 @@ _STEP = 1e-4
 
 
 class ValveMemoryForms:
-    """`continuation.memory.MemoryForms` of a steady valve: vectors are (q, U), (n + l,), states (q, v, U).
+    """`continuation.normal_form.MotionForms` of a steady valve: vectors are (q, U), (n + l,), states (q, v, U).
 
     Parameters
     ----------

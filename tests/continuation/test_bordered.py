@@ -6,9 +6,9 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from continuation.bordered import Bordered, bordered
-from continuation.errors import SingularSystem
-from continuation.linear import DenseSolver, solver_for
+from continuation import linear
+from continuation.linear import Bordered, DenseSolver, bordered, factorise
+from continuation.options import SingularSystem
 
 
 def singular(rng, n, smallest=0.0, complex_numbers=False):
@@ -35,14 +35,14 @@ def test_solution_is_accurate_however_singular_the_block(seed, smallest, complex
     # Random borders can come out nearly dependent; such draws test nothing.
     condition = np.linalg.cond(full)
     x = rng.standard_normal(n + 1)
-    border = Bordered(solver_for(a), b, c, 0.3)
+    border = Bordered(factorise(a), b, c, 0.3)
     # A solve is as good as a backward stable one of the full matrix, give or take 100.
     bound = 1e2 * condition * np.finfo(float).eps
     assert np.linalg.norm(border.solve(full @ x) - x) <= bound * np.linalg.norm(x)
     assert np.linalg.norm(border.solve_transpose(full.T @ x) - x) <= bound * np.linalg.norm(x)
 
 
-def test_plain_block_elimination_would_fail_here():
+def test_plain_block_elimination_would_fail_here(monkeypatch):
     """The case for the mixed scheme: one pass loses most digits, this keeps them."""
     rng = np.random.default_rng(3)
     n = 12
@@ -55,7 +55,8 @@ def test_plain_block_elimination_would_fail_here():
     v, z = inner.solve(b), inner.solve(f[:-1])
     y = (f[-1] - c @ z) / (0.0 - c @ v)
     plain = np.append(z - v * y, y)
-    mixed = Bordered(inner, b, c, 0.0, refinements=0).solve(f)
+    monkeypatch.setattr(linear, "REFINEMENTS", 0)
+    mixed = Bordered(inner, b, c, 0.0).solve(f)
     assert np.linalg.norm(plain - x) > 1e-4
     assert np.linalg.norm(mixed - x) < 1e-11
 
@@ -65,13 +66,13 @@ def test_exactly_singular_matrix_with_zero_row(sparse):
     a = np.diag([1.0, 2.0, 0.0])
     matrix = sp.csc_matrix(a) if sparse else a
     e = np.array([0.0, 0.0, 1.0])
-    border = Bordered(solver_for(matrix), e, e)
-    assert solver_for(matrix).repaired
+    border = Bordered(factorise(matrix), e, e)
+    assert factorise(matrix).repaired
     assert np.allclose(border.solve(np.array([1.0, 2.0, 3.0, 4.0])), [1.0, 1.0, 4.0, 3.0], rtol=0, atol=1e-13)
 
 
 def test_zero_matrix_of_order_one():
-    border = Bordered(solver_for(np.zeros((1, 1))), np.ones(1), np.ones(1))
+    border = Bordered(factorise(np.zeros((1, 1))), np.ones(1), np.ones(1))
     assert np.allclose(border.solve(np.array([2.0, 5.0])), [5.0, 2.0], rtol=0, atol=1e-13)
 
 
@@ -83,7 +84,7 @@ def test_nested_borders_equal_the_dense_matrix(k):
     columns = [rng.standard_normal(n) for _ in range(k)]
     rows = rng.standard_normal((k, n + k))
     full = np.vstack([np.hstack([a, np.stack(columns, axis=1)]), rows])
-    solver = bordered(solver_for(a), columns, rows)
+    solver = bordered(factorise(a), columns, rows)
     x = rng.standard_normal(n + k)
     assert np.allclose(solver.matvec(x), full @ x, rtol=0, atol=1e-13)
     assert np.allclose(solver.rmatvec(x), full.T @ x, rtol=0, atol=1e-13)
@@ -94,4 +95,4 @@ def test_nested_borders_equal_the_dense_matrix(k):
 
 def test_regular_block_with_singular_border_is_refused():
     with pytest.raises(SingularSystem, match="border does not lift"):
-        Bordered(solver_for(np.eye(2)), np.zeros(2), np.zeros(2), 0.0)
+        Bordered(factorise(np.eye(2)), np.zeros(2), np.zeros(2), 0.0)

@@ -9,10 +9,10 @@ import scipy.sparse as sp
 
 from continuation import blocks, hill
 from continuation.blocks import BlockRows, SparseBlocks
-from continuation.cycle_prediction import by_arclength, by_parameter, parameter_is_better
+from continuation.cycle_linearisation import LeftProjection
+from continuation.cycle_points import parameter_predicts_better, predict_by_arclength, predict_by_parameter
 from continuation.cycles import CycleOptions, CycleSolver
 from continuation.harmonics import Harmonics
-from continuation.left_projection import LeftProjection
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
 from tests.systems import periodic
 
@@ -123,11 +123,11 @@ def beside_onset(value: float):
 
 def test_predictions_beside_an_onset_are_exact():
     points, there = [beside_onset(v) for v in (0.99, 0.95, 0.8)], beside_onset(0.5)
-    found = by_parameter(points, 0.5, SERIES, np.ones(2))
+    found = predict_by_parameter(points, 0.5, SERIES, np.ones(2))
     assert np.allclose(found.coefficients, there.motion.coefficients, atol=1e-12)
     assert np.isclose(found.omega, there.motion.omega)
-    assert parameter_is_better(points, np.ones(2))
-    assert by_parameter(points, 0.9, SERIES, np.ones(2)) is None  # behind the last
+    assert parameter_predicts_better(points, np.ones(2))
+    assert predict_by_parameter(points, 0.9, SERIES, np.ones(2)) is None  # behind the last
 
 
 def test_predictions_beside_a_fold_go_by_arclength():
@@ -137,8 +137,8 @@ def test_predictions_beside_a_fold_go_by_arclength():
         return point_of(1.0 - way**2, np.outer(np.arange(SERIES.size), [1.0, way]), 2.0 + way, way)
 
     points = [folding(way) for way in (-0.9, -0.6, -0.35, -0.15, -0.05)]
-    assert not parameter_is_better(points, np.ones(2))
-    found = by_arclength(points[-3:], 0.1, SERIES)
+    assert not parameter_predicts_better(points, np.ones(2))
+    found = predict_by_arclength(points[-3:], 0.1, SERIES)
     assert np.allclose(found.coefficients, folding(0.1).motion.coefficients)
 
 

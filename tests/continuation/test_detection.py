@@ -6,10 +6,10 @@ import pytest
 
 from continuation import ContinuationOptions, Spectrum, continue_branch
 from continuation.branches import branch_tracer
+from continuation.event_location import locate_zero
 from continuation.jax_system import JaxSystem
-from continuation.locate import safeguarded
-from continuation.modes import count_unstable, match_modes
 from continuation.normal_form import hopf_normal_form
+from continuation.spectra import count_unstable, match_modes
 from tests.systems.brusselator import brusselator, brusselator_1d
 from tests.systems.normal_forms import (
     bogdanov_takens,
@@ -86,9 +86,9 @@ def test_a_located_point_outside_of_its_bracket_is_refused():
         x = -fold if len(calls) < 3 else fold  # the other fold, at first
         return np.array([x, x**3 - x]), x
 
-    result, _, reason = safeguarded(tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, attempt)
+    result, _, reason = locate_zero(tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, attempt)
     assert result == fold and len(calls) == 3 and reason == ""
-    never, guess, reason = safeguarded(
+    never, guess, reason = locate_zero(
         tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, lambda *_: (np.array([-fold, 0.0]), 0.0)
     )
     assert never is None and "left the bracket" in reason
@@ -223,9 +223,7 @@ def test_only_products_and_solves_are_used():
     assert np.isclose(
         hidden.values["first_lyapunov_coefficient"], shown.values["first_lyapunov_coefficient"], rtol=1e-7
     )
-    form = hopf_normal_form(
-        system, hidden.u, hidden.mu, hidden.values["omega"], hidden.vectors["right"], hidden.vectors["left"], "l"
-    )
+    form = hopf_normal_form(system, hidden.u, hidden.mu, hidden.values["omega"], hidden.vectors["right"], "l")
     assert np.isclose(form.l1, hidden.values["first_lyapunov_coefficient"], rtol=1e-9)
 
 

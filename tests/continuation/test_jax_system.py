@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from continuation.colouring import colour_columns
-from continuation.jax_system import JaxSystem
+from continuation.jax_system import JaxSystem, colour_columns
 from continuation.system import Linearisation, System, SystemBase
 from tests.systems.brusselator import brusselator_1d
 from tests.systems.normal_forms import warped_stuart_landau

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from continuation.errors import SingularSystem
-from continuation.linear import MatrixLinearisation, solver_for
+from continuation.linear import MatrixLinearisation, factorise
+from continuation.options import SingularSystem
 from continuation.spectra import dense_spectrum, shift_invert_spectrum
 from continuation.system import Spectrum
 
@@ -66,9 +66,9 @@ def test_constraints_give_no_eigenvalues():
 
 def test_not_finite_matrices_are_refused():
     with pytest.raises(SingularSystem, match="not finite"):
-        solver_for(np.array([[np.nan]]))
+        factorise(np.array([[np.nan]]))
     with pytest.raises(SingularSystem, match="not finite"):
-        solver_for(sp.csc_matrix([[np.inf]]))
+        factorise(sp.csc_matrix([[np.inf]]))
 
 
 def test_upper_half_keeps_one_of_each_pair_and_drops_what_did_not_converge():

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from continuation import NotABifurcation, hopf_normal_form
 from continuation.jax_system import JaxSystem
-from continuation.memory import Motion, hopf_normal_form_with_memory
+from continuation.normal_form import Motion, hopf_normal_form_of
 
 #: Spring force k x + k2 x^2 + k3 x^3 with Maxwell branches, and a cubic spring of its own that does not relax.
 SPRING, OWN = (4.0, 1.7, -2.3), 0.8
@@ -102,8 +102,8 @@ def point():
 @pytest.mark.parametrize("parameter", ["c", "stiff"])
 def test_the_coefficient_is_that_with_the_memory_as_states(point, parameter):
     system, c, omega, right, left = point
-    whole = hopf_normal_form(system, np.zeros(4), {"c": c, "stiff": 1.0}, omega, right, left, parameter)
-    found = hopf_normal_form_with_memory(Oscillator(c), omega, right[:1], parameter)
+    whole = hopf_normal_form(system, np.zeros(4), {"c": c, "stiff": 1.0}, omega, right, parameter)
+    found = hopf_normal_form_of(Oscillator(c), omega, right[:1], parameter)
     assert found.c1 == pytest.approx(whole.c1, rel=1e-10)
     assert found.l1 == pytest.approx(whole.l1, rel=1e-10) and found.criticality == whole.criticality
     assert found.crossing == pytest.approx(whole.crossing, rel=1e-10)
@@ -117,29 +117,29 @@ def test_the_coefficient_is_that_with_the_memory_as_states(point, parameter):
 def test_a_memory_left_out_of_the_second_order_shows(point):
     """The comparison notices the memory of products of motions, not of the linear part alone."""
     system, c, omega, right, left = point
-    whole = hopf_normal_form(system, np.zeros(4), {"c": c, "stiff": 1.0}, omega, right, left)
+    whole = hopf_normal_form(system, np.zeros(4), {"c": c, "stiff": 1.0}, omega, right)
     forms = Oscillator(c)
     forms.second = lambda a, b: 2 * SPRING[1] * a.vector * b.vector
-    assert abs(hopf_normal_form_with_memory(forms, omega, right[:1]).c1 / whole.c1 - 1) > 0.01
+    assert abs(hopf_normal_form_of(forms, omega, right[:1]).c1 / whole.c1 - 1) > 0.01
 
 
 def test_phase_and_size_of_the_vector_do_not_matter(point):
     _, c, omega, right, _ = point
-    found = hopf_normal_form_with_memory(Oscillator(c), omega, right[:1])
-    again = hopf_normal_form_with_memory(Oscillator(c), omega, (3 - 4j) * right[:1])
+    found = hopf_normal_form_of(Oscillator(c), omega, right[:1])
+    again = hopf_normal_form_of(Oscillator(c), omega, (3 - 4j) * right[:1])
     assert again.c1 == pytest.approx(found.c1, rel=1e-12) and np.linalg.norm(again.q) == pytest.approx(1.0)
 
 
 def test_what_is_no_hopf_point_is_refused(point):
     with pytest.raises(NotABifurcation, match="positive frequency"):
-        hopf_normal_form_with_memory(Oscillator(point[1]), 0.0, np.ones(1))
+        hopf_normal_form_of(Oscillator(point[1]), 0.0, np.ones(1))
 
 
 def test_the_motion_to_second_order_leaves_a_defect_of_third_order(point):
     """x = z q + z^2 h20 / 2 + |z|^2 h11 with all pairs of its parts put into the forms."""
     _, c, omega, right, _ = point
     forms = Oscillator(c)
-    form = hopf_normal_form_with_memory(forms, omega, right[:1])
+    form = hopf_normal_form_of(forms, omega, right[:1])
     s, z = 1j * omega, 1e-3
     q, h20, h11 = form.q[:1], form.h20[:1], form.h11[:1]
     parts = [Motion(s, z * q), Motion(-s, z * q.conj()), Motion(0.0, z**2 * h11)]

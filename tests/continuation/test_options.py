@@ -4,9 +4,7 @@ import dataclasses
 
 import pytest
 
-from continuation import ContinuationOptions, NewtonOptions
-from continuation.newton import Deflation
-from continuation.orbits import OrbitOptions
+from continuation import ContinuationOptions, Deflation, NewtonOptions, OrbitOptions
 
 BAD = [
     (NewtonOptions, {"tolerance": 0.0}),
@@ -31,9 +29,11 @@ BAD = [
     (ContinuationOptions, {"target_iterations": 0}),
     (Deflation, {"power": 0.0}),
     (Deflation, {"shift": -1.0}),
-    (OrbitOptions, {"degree": 1}),
-    (OrbitOptions, {"intervals": 2}),
-    (OrbitOptions, {"adaptations": -1}),
+    (OrbitOptions, {"harmonics": 0}),
+    (OrbitOptions, {"harmonics": 20, "max_harmonics": 10}),
+    (OrbitOptions, {"tail": 0.0}),
+    (OrbitOptions, {"tolerance": 1.0}),
+    (OrbitOptions, {"exponents": 0}),
 ]
 
 

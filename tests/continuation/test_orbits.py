@@ -1,33 +1,40 @@
-"""Periodic orbits with exact solutions; collocation's order; multipliers."""
+"""Periodic orbits with exact solutions; multipliers; branches and their files."""
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from continuation import Branch, ContinuationOptions, NewtonOptions, NotABifurcation, NotConverged, continue_branch
-from continuation.collocation import OrbitSystem
-from continuation.jax_system import JaxSystem
-from continuation.orbits import (
+from continuation import (
+    Branch,
+    Checkpoint,
+    ContinuationOptions,
+    JaxSystem,
+    NotABifurcation,
+    NotConverged,
     OrbitOptions,
+    continue_branch,
     continue_orbits,
     find_orbit,
     orbit_at,
     orbits_from_hopf,
     resume_orbits,
 )
+from continuation.harmonics import Harmonics
+from continuation.orbits import FirstOrderSystem
+from continuation.periodic import PeriodicMotion
 from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
 from tests.systems.van_der_pol import van_der_pol
 
 MU = {"mu": 0.3, "w": 2.0, "c": 0.7}
 PHASE = 2 * np.pi * np.arange(60) / 60
 CIRCLE = np.stack([np.cos(PHASE), np.sin(PHASE)], axis=1)
-NEWTON = NewtonOptions(tolerance=1e-9)
 
 
 @pytest.mark.parametrize("make", [stuart_landau, warped_stuart_landau])
 def test_stuart_landau_is_exact(make):
     """Radius sqrt(mu), frequency w - c mu, exponent -2 mu; with a state-dependent mass too."""
-    orbit = find_orbit(make(), 0.4 * CIRCLE, 3.0, MU, OrbitOptions(intervals=24))
+    orbit = find_orbit(make(), 0.4 * CIRCLE, 3.0, MU)
     assert np.isclose(orbit.period, 2 * np.pi / (2.0 - 0.21), rtol=1e-11)
     assert np.allclose(orbit.amplitude(), np.sqrt(0.3), rtol=1e-9)
     assert np.allclose(orbit.exponents, -0.6, rtol=1e-8)
@@ -36,59 +43,41 @@ def test_stuart_landau_is_exact(make):
     assert np.allclose(np.linalg.norm(orbit(t), axis=1), np.sqrt(0.3), rtol=1e-9)
 
 
-@pytest.mark.parametrize("degree", [2, 3, 4])
-def test_period_converges_with_twice_the_degree(degree):
-    """Superconvergence at the mesh points: order 2 m (de Boor & Swartz 1973)."""
-    errors = []
-    counts = (10, 20) if degree < 4 else (16, 32)
-    for intervals in counts:
-        orbit = find_orbit(
-            van_der_pol(),
-            2 * CIRCLE * [1, -1],
-            2 * np.pi,
-            {"mu": 0.5},
-            OrbitOptions(intervals, degree, 0, NewtonOptions(1e-11)),
-        )
-        errors.append(abs(orbit.period - 6.3806758017736))
-    assert 2 * degree - 0.7 < np.log2(errors[0] / errors[1]) < 2 * degree + 1.2
+def test_linearisation_by_differences():
+    """With a mass that depends on the state."""
+    system, rng = FirstOrderSystem(warped_stuart_landau()), np.random.default_rng(0)
+    motion = PeriodicMotion(Harmonics(4), 0.3 * rng.standard_normal((9, 2)), 2.0)
+    change, h = rng.standard_normal((9, 2)), 1e-6
+    up, down = (PeriodicMotion(motion.harmonics, motion.coefficients + s * h * change, 2.0) for s in (1, -1))
+    difference = motion.harmonics.project(system.residual(up, MU) - system.residual(down, MU)) / (2 * h)
+    assert np.allclose(system.linearise(motion, MU).apply(change), difference, rtol=1e-6, atol=1e-7)
 
 
-def test_jacobian_of_the_collocation_equations_by_differences():
-    system = warped_stuart_landau()
-    rng = np.random.default_rng(0)
-    mesh = np.array([0, 0.2, 0.5, 0.7, 1.0])
-    frame = OrbitSystem(system, mesh, 3, 0.5 * rng.standard_normal((12, 2)))
-    u = np.append(0.4 * rng.standard_normal(24), 3.0)
-    x = rng.standard_normal(25)
-    h = 1e-6
-    difference = (frame.residual(u + h * x, MU) - frame.residual(u - h * x, MU)) / (2 * h)
-    assert np.allclose(frame.linear(u, MU).matvec(x), difference, rtol=1e-6, atol=1e-7)
-    up, down = ({**MU, "mu": MU["mu"] + s * h} for s in (1, -1))
-    difference = (frame.residual(u, up) - frame.residual(u, down)) / (2 * h)
-    assert np.allclose(frame.d_parameter(u, MU, "mu"), difference, rtol=1e-6, atol=1e-7)
+def test_series_grow_for_relaxation_oscillations():
+    """The period of van der Pol's oscillator at mu = 3 by integration; harmonics are added as they are needed."""
+    system, orbit = van_der_pol(), find_orbit(van_der_pol(), 2 * CIRCLE * [1, -1], 2 * np.pi, {"mu": 1.0})
+    options = OrbitOptions(max_harmonics=200)
+    for mu in (2.0, 3.0):
+        guess = orbit(np.linspace(0, orbit.period, 400, endpoint=False))
+        orbit = find_orbit(system, guess, orbit.period, {"mu": mu}, options)
 
+    def upwards(t, u):
+        return u[0]
 
-def test_mesh_adaptation_pays_for_relaxation_oscillations():
-    guess = 2 * CIRCLE * [1, -1]
-    mild = find_orbit(van_der_pol(), guess, 2 * np.pi, {"mu": 1.0})
-    states, period = mild.nodes[::4], mild.period
-    for mu in (2.0, 3.0, 4.0, 5.0):
-        fine = find_orbit(van_der_pol(), _resample(states, 400), period, {"mu": mu}, OrbitOptions(intervals=100))
-        period = fine.period
-        states = fine(np.linspace(0, period, 100, endpoint=False))
-    error = {}
-    for adaptations in (0, 3):
-        orbit = find_orbit(
-            van_der_pol(), states, period, {"mu": 5.0}, OrbitOptions(intervals=40, adaptations=adaptations)
-        )
-        error[adaptations] = abs(orbit.period - fine.period)
-    assert error[3] < 0.05 * error[0]
-
-
-def _resample(states, count):
-    closed = np.vstack([states, states[:1]])
-    old, new = np.linspace(0, 1, closed.shape[0]), np.linspace(0, 1, count, endpoint=False)
-    return np.stack([np.interp(new, old, c) for c in closed.T], axis=1)
+    upwards.direction = 1
+    run = solve_ivp(
+        lambda t, u: [u[1], 3 * (1 - u[0] ** 2) * u[1] - u[0]],
+        (0, 60),
+        [2.0, 0.0],
+        "DOP853",
+        events=upwards,
+        rtol=1e-12,
+        atol=1e-12,
+    )
+    assert np.isclose(orbit.period, np.diff(run.t_events[0])[-1], rtol=1e-9)
+    assert orbit.motion.harmonics.count > 100
+    with pytest.raises(NotConverged, match="harmonics are too few"):
+        find_orbit(system, guess, orbit.period, {"mu": 3.0}, OrbitOptions(max_harmonics=60))
 
 
 def test_cycles_from_a_hopf_point_follow_the_square_root():
@@ -96,9 +85,7 @@ def test_cycles_from_a_hopf_point_follow_the_square_root():
     hopf = continue_branch(
         system, [0, 0], {**MU, "mu": -0.5}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
     ).of_kind("hopf")[0]
-    branch = orbits_from_hopf(
-        system, hopf, "mu", 0.1, ContinuationOptions(limits={"mu": (0, 0.5)}, newton=NEWTON), OrbitOptions(intervals=16)
-    )
+    branch = orbits_from_hopf(system, hopf, "mu", 0.1, ContinuationOptions(limits={"mu": (0, 0.5)}))
     assert branch.reason == "limit of mu reached"
     assert np.allclose(branch.values("period"), 2 * np.pi / (2 - 0.7 * branch.values()), rtol=1e-8)
     assert set(branch.unstable) == {0}
@@ -113,32 +100,20 @@ def test_fold_of_cycles_of_the_bautin_system(tmp_path):
         system, [0, 0], mu, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
     ).of_kind("hopf")[0]
     assert hopf.values["criticality"] == "sub"
-    branch = orbits_from_hopf(
-        system,
-        hopf,
-        "mu",
-        0.2,
-        ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON, max_step=0.2),
-        OrbitOptions(intervals=12),
-    )
+    branch = orbits_from_hopf(system, hopf, "mu", 0.2, ContinuationOptions(limits={"mu": (-1, 0.3)}, max_step=0.2))
     (fold,) = branch.of_kind("fold of cycles")
     assert abs(fold.mu["mu"] + 0.25) < 1e-8
     at = fold.index
     assert set(branch.unstable[: at + 1]) == {1} and set(branch.unstable[at + 1 :]) == {0}
     branch.save(tmp_path / "cycles.h5")
     part = orbits_from_hopf(
-        system,
-        hopf,
-        "mu",
-        0.2,
-        ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON, max_step=0.2, max_points=5),
-        OrbitOptions(intervals=12),
+        system, hopf, "mu", 0.2, ContinuationOptions(limits={"mu": (-1, 0.3)}, max_step=0.2, max_points=5)
     )
     part.save(tmp_path / "part.h5")
     longer = resume_orbits(
         system,
         Branch.load(tmp_path / "part.h5"),
-        ContinuationOptions(limits={"mu": (-1, 0.3)}, newton=NEWTON, max_step=0.2),
+        ContinuationOptions(limits={"mu": (-1, 0.3)}, max_step=0.2),
     )
     assert np.allclose(longer.values(), branch.values(), rtol=0, atol=1e-7)
     again = orbit_at(system, Branch.load(tmp_path / "cycles.h5"), -1)
@@ -172,21 +147,47 @@ def test_period_doubling_of_a_twisted_band():
 
     system = JaxSystem(residual, 4)
     guess = np.hstack([CIRCLE, np.zeros_like(CIRCLE)])
-    orbit = find_orbit(system, guess, 6.0, {"mu": 0.0}, OrbitOptions(intervals=16))
+    orbit = find_orbit(system, guess, 6.0, {"mu": 0.0})
     real = orbit.nontrivial[np.argmin(np.abs(orbit.nontrivial + np.exp(-2 * np.pi * a)))]
     assert np.isclose(real, -np.exp(-2 * np.pi * a), rtol=1e-6)
-    branch = continue_orbits(
-        system, orbit, "mu", ContinuationOptions(limits={"mu": (0, 0.6)}, newton=NEWTON, max_step=0.1)
-    )
+    branch = continue_orbits(system, orbit, "mu", ContinuationOptions(limits={"mu": (0, 0.6)}, max_step=0.1))
     (point,) = branch.of_kind("period doubling")
     assert abs(point.mu["mu"] - a) < 1e-7
     assert branch.unstable[0] == 0 and branch.unstable[-1] == 1
 
 
+def test_a_branch_whose_series_grow(tmp_path):
+    """Van der Pol's oscillator from mu = 0.5 to 1, periods to the printed digits, checkpoints on the way."""
+    system = van_der_pol()
+    orbit = find_orbit(system, 2 * CIRCLE * [1, -1], 2 * np.pi, {"mu": 0.5})
+    seen = []
+    options = ContinuationOptions(limits={"mu": (0.1, 1.0)}, step=0.1, max_step=0.2)
+    path = tmp_path / "orbits.h5"
+    branch = continue_orbits(
+        system, orbit, "mu", options, observers=[lambda b: seen.append(len(b)), Checkpoint(path, 2)]
+    )
+    assert branch.reason == "limit of mu reached" and seen == list(range(1, len(branch) + 1))
+    assert abs(branch.values("period")[0] - 6.380676) < 5.1e-7 and abs(branch.values("period")[-1] - 6.663287) < 5.1e-7
+    assert np.all(np.diff(branch.values("harmonics")) >= 0) and np.ptp(branch.values("harmonics")) > 0
+    assert branch.states.shape == Branch.load(path).states.shape and set(branch.unstable) == {0}
+    assert np.isclose(orbit_at(system, branch, 0).period, orbit.period, rtol=1e-12)
+    with pytest.raises(ValueError, match="starts at its limit"):
+        continue_orbits(system, orbit_at(system, branch, -1), "mu", options)
+
+
+def test_a_branch_stops_where_it_is_asked_to():
+    system, mu = bautin(), {"mu": 0.4**4 - 0.4**2, "nu": 1.0}
+    orbit = find_orbit(system, 0.4 * CIRCLE, 2 * np.pi, mu)
+    assert not orbit.stable and np.allclose(orbit.exponents, 2 * 0.4**2 - 4 * 0.4**4, atol=1e-9)
+    options = ContinuationOptions(limits={"mu": (-1, 0.3)}, direction=-1, stop_at=frozenset({"fold of cycles"}))
+    branch = continue_orbits(system, orbit, "mu", options)
+    assert branch.reason == "stopped at: fold of cycles" and branch.special[-1].index >= len(branch) - 3
+
+
 def test_a_guess_that_is_no_orbit():
     decay = JaxSystem(lambda u, mu: jnp.stack([-u[0] - u[1], u[0] - u[1]]), 2)
     with pytest.raises(NotConverged):
-        find_orbit(decay, CIRCLE, 6.0, {"mu": 0.0}, OrbitOptions(intervals=10))
+        find_orbit(decay, CIRCLE, 6.0, {"mu": 0.0})
 
 
 def test_orbits_start_at_hopf_points_only():

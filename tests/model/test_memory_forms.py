@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from continuation.memory import Motion
-from continuation.multilinear import expand
+from continuation.normal_form import Motion
+from continuation.system import expand
 from dbvfiv.model.memory_forms import PencilAt, ValveMemoryForms, slope_of
 from dbvfiv.model.system import ValveSystem, pencil_at
 

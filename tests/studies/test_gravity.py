@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from continuation.memory import Motion
+from continuation.normal_form import Motion
 from dbvfiv.case import CaseError
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY

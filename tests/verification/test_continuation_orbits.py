@@ -4,15 +4,21 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from continuation import ContinuationOptions, NewtonOptions, continue_branch, hopf_normal_form
-from continuation.orbits import OrbitOptions, find_orbit, orbit_at, orbits_from_hopf, special_orbit
+from continuation import (
+    ContinuationOptions,
+    continue_branch,
+    find_orbit,
+    hopf_normal_form,
+    orbit_at,
+    orbits_from_hopf,
+    special_orbit,
+)
 from tests.systems.brusselator import brusselator
 from tests.systems.langford import langford
 from tests.systems.lorenz import lorenz
 from tests.systems.van_der_pol import van_der_pol
 
 PHASE = 2 * np.pi * np.arange(80) / 80
-NEWTON = NewtonOptions(tolerance=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -43,14 +49,7 @@ def test_langford():
     # On the axis z = mu the growth is 2 mu - 3 + 0.2 (1 - mu^2).
     assert np.isclose(hopf.mu["mu"], 5 - np.sqrt(11), rtol=1e-10)
     assert abs(hopf.mu["mu"] - 1.683) < 5e-4 and np.isclose(hopf.values["omega"], 0.25)
-    branch = orbits_from_hopf(
-        system,
-        hopf,
-        "mu",
-        0.1,
-        ContinuationOptions(limits={"mu": (1.6, 2.05)}, newton=NEWTON),
-        OrbitOptions(intervals=40),
-    )
+    branch = orbits_from_hopf(system, hopf, "mu", 0.1, ContinuationOptions(limits={"mu": (1.6, 2.05)}))
     (torus,) = branch.of_kind("torus")
     assert abs(torus.mu["mu"] - 2.0) < 1e-9
     assert branch.unstable[0] == 0 and branch.unstable[-1] == 2
@@ -74,9 +73,7 @@ def hopf_form(system, u, mu, parameter, low, high):
         ContinuationOptions(eigenvalues=3, step=0.2, max_step=2.0, limits={parameter: (low, high)}),
     )
     (point,) = branch.of_kind("hopf")
-    return point, hopf_normal_form(
-        system, point.u, point.mu, point.values["omega"], point.vectors["right"], point.vectors["left"], parameter
-    )
+    return point, hopf_normal_form(system, point.u, point.mu, point.values["omega"], point.vectors["right"], parameter)
 
 
 def swing(system, start, mu, time, functional):
@@ -142,12 +139,7 @@ def test_cycles_of_the_brusselator_agree_with_the_normal_form_to_first_order():
     system = brusselator()
     point, form = hopf_form(system, [1.0, 1.5], {"A": 1.0, "B": 1.5}, "B", 0.5, 3.0)
     branch = orbits_from_hopf(
-        system,
-        point,
-        "B",
-        0.08,
-        ContinuationOptions(limits={"B": (1.9, 2.06)}, newton=NEWTON, step=0.02, max_step=0.05),
-        OrbitOptions(intervals=16),
+        system, point, "B", 0.08, ContinuationOptions(limits={"B": (1.9, 2.06)}, step=0.02, max_step=0.05)
     )
     change = branch.values() - 2.0
     x = np.array([1.0, 0.0])

@@ -7,9 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from continuation import ContinuationError
-from continuation.hopf import hopf_borders
-from continuation.memory import hopf_normal_form_with_memory
-from continuation.normal_form import hopf_normal_form
+from continuation.normal_form import hopf_normal_form, hopf_normal_form_of
 
 from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...errors import SolveError
@@ -58,8 +56,7 @@ def normal_form(case: Case, walk: StabilityWalk, place: Mu, mode, parameter: str
     model = system.model(mu)
     if place.loss_factor and model.relaxation.groups:
         forms = ValveMemoryForms(model, walk.equilibrium(place), mu)
-        return hopf_normal_form_with_memory(forms, omega, np.concatenate([mode.q, mode.u]), name)
+        return hopf_normal_form_of(forms, omega, np.concatenate([mode.q, mode.u]), name)
     u = system.state(walk.equilibrium(place), mu)
     vector = np.concatenate([mode.q, 1j * omega * mode.q, mode.u])
-    left, right = hopf_borders(system.linear(u, mu), omega, vector / np.linalg.norm(vector))
-    return hopf_normal_form(system, u, mu, omega, right, left, name)
+    return hopf_normal_form(system, u, mu, omega, vector, name)

@@ -7,10 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from continuation import ContinuationError
-from continuation.bordered_cycle import Condition
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import CycleBranchOptions, CyclePoint
-from continuation.cycles import Cycle, CycleOptions, CycleSolver
+from continuation.cycles import Cycle, CycleOptions, CycleSolver, cycles_beside_onset
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
 
@@ -87,28 +86,10 @@ class Follower:
         wave = np.zeros((HARMONICS + 1, self.system.size), complex)
         wave[0], wave[1] = np.concatenate([q, inner]), 0.5 * amplitude * shape / shape[self.lip]
         small = PeriodicMotion(h, h.real(wave), abs(onset.eigenvalue.imag))
-        first = self._of_amplitude(onset, small, mu, amplitude)
-        # to leading order parameter, frequency and mean change with the square of the amplitude, as the normal form has
-        # it, and harmonic k with its power k
-        change = first.motion.coefficients - small.coefficients
-        powers = np.append(2.0, np.repeat(np.arange(1.0, HARMONICS + 1), 2))[:, None]
-        guess = PeriodicMotion(
-            h,
-            small.coefficients * np.append(1.0, np.full(h.size - 1, SECOND))[:, None] + change * SECOND**powers,
-            small.omega + (first.motion.omega - small.omega) * SECOND**2,
-        )
-        value = mu[self.name] + (first.mu[self.name] - mu[self.name]) * SECOND**2
-        still = small.coefficients * (np.arange(h.size) == 0)[:, None]
-        rest = Cycle(PeriodicMotion(h, still, small.omega), mu, 0.0, 0, 0)
-        return rest, first, self._of_amplitude(onset, guess, mu | {self.name: value}, SECOND * amplitude)
-
-    def _of_amplitude(self, onset: Onset, guess: PeriodicMotion, mu: dict, amplitude: float) -> Cycle:
-        """The cycle near a guess whose first harmonic moves the lip by an amplitude, m."""
-        row = np.zeros_like(guess.coefficients)
+        row = np.zeros_like(small.coefficients)
         row[1, self.lip] = 1.0
-        condition = Condition(row, np.zeros(2), float(amplitude / np.sqrt(2.0)))
         try:
-            return self.solver.solve(guess, mu, (self.name,), (condition,))
+            return cycles_beside_onset(self.solver, small, mu, self.name, row, SECOND)
         except ContinuationError as error:
             raise SolveError(
                 f"The oscillation that starts at {self.parameter} = {onset.value:.6g} was not found with an amplitude "

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from continuation.memory import hopf_normal_form_with_memory
+from continuation.normal_form import hopf_normal_form_of
 from dbvfiv.model.memory_forms import ValveMemoryForms
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.onset.normal_form import normal_form
@@ -23,7 +23,7 @@ def test_without_relaxation_both_ways_give_the_same():
     plain = normal_form(case, search.walk, point.place, mode, "density")
     model = search.walk.built(point.place).model
     forms = ValveMemoryForms(model, search.walk.equilibrium(point.place), point.place.for_system())
-    found = hopf_normal_form_with_memory(forms, plain.omega, np.concatenate([mode.q, mode.u]), "density")
+    found = hopf_normal_form_of(forms, plain.omega, np.concatenate([mode.q, mode.u]), "density")
     assert found.c1 == pytest.approx(plain.c1, rel=1e-8) and found.l1 == pytest.approx(plain.l1, rel=1e-8)
     assert found.crossing == pytest.approx(plain.crossing, rel=1e-8)
     turn = np.vdot(found.q, plain.q)

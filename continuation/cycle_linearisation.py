@@ -1,17 +1,21 @@
-"""The linear equations of a correction to a periodic motion, and their two-level preconditioner."""
+"""Linear equations of a correction to a periodic motion, and their two-level preconditioner.
+
+On a small basis V the linearisation is projected and solved as one dense matrix, with free unknowns and conditions as
+borders; a smoother answers in all other directions; GMRES does the rest.  The preconditioner needs V^T A x of full
+vectors x: matrices at the samples are sums of a few, A_i = sum w_ik A_k, so that V^T A_k, held in single precision,
+serve all samples in one dense product.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
 
-from continuation.errors import SingularSystem
-from continuation.krylov import gmres
-from continuation.left_projection import LeftProjection
-from continuation.periodic import PeriodicMotion
+from continuation.options import SingularSystem
+from continuation.periodic import PeriodicMotion, PeriodicOperator, ReducedOperator, Term
 
 #: Name of omega among free unknowns.
 FREQUENCY = "frequency"
@@ -35,16 +39,16 @@ class Condition:
     value: float
 
     def miss(self, coefficients: np.ndarray, free: np.ndarray) -> float:
-        """What is left of it."""
+        """Residual of the condition."""
         return float(np.vdot(self.row, coefficients) + self.extra @ free - self.value)
 
 
-def values_of(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence[str]) -> np.ndarray:
+def free_values(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence[str]) -> np.ndarray:
     """Values (k,) of the free unknowns."""
     return np.array([motion.omega if name == FREQUENCY else mu[name] for name in free], float)
 
 
-def moved(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence[str], change: np.ndarray):
+def apply_change(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence[str], change: np.ndarray):
     """Motion and parameters after a change of coefficients and free unknowns, one vector."""
     size = motion.coefficients.size
     step = dict(zip(free, change[size:].tolist()))
@@ -65,7 +69,7 @@ class CycleLinearisation:
     basis : (n, r) array
         Orthonormal in unknowns over their scales.
     rough : bool
-        Whether it is for corrections, which a rough one serves.
+        True for corrections, which a rough linearisation serves.
     smoother : callable, optional
         That of a motion nearby with as many harmonics.
     """
@@ -81,10 +85,10 @@ class CycleLinearisation:
 
     def _column(self, name: str, force: np.ndarray) -> np.ndarray:
         """Derivative (2 H + 1, n) of the residual, `force` at the motion, by a free unknown."""
-        at = values_of(self.motion, self.mu, (name,))[0]
+        at = free_values(self.motion, self.mu, (name,))[0]
         step = _STEP * max(abs(at), 1e-6)
         still = np.zeros(self.motion.coefficients.size)
-        motion, mu = moved(self.motion, self.mu, (name,), np.append(still, step))
+        motion, mu = apply_change(self.motion, self.mu, (name,), np.append(still, step))
         return (motion.harmonics.project(self.system.residual(motion, mu)) - force) / step
 
     @property
@@ -153,7 +157,7 @@ class CycleLinearisation:
         return np.append(force.ravel(), [np.vdot(c.row, rows) + c.extra @ extra for c in self.conditions])
 
     def _on_basis(self, rows: np.ndarray) -> np.ndarray:
-        """What the operator makes of coefficients, on the basis."""
+        """Operator applied to coefficients, projected on the basis."""
         if not self._by_rows:
             return self.operator.apply(rows) @ self._v
         if self._rough is None:
@@ -185,7 +189,106 @@ class CycleLinearisation:
     @property
     def units(self) -> np.ndarray:
         """Sizes that changes of coefficients and free unknowns are measured in."""
-        free = np.maximum(np.abs(values_of(self.motion, self.mu, self.free)), 1e-9)
+        free = np.maximum(np.abs(free_values(self.motion, self.mu, self.free)), 1e-9)
         c = self.motion.coefficients
         whole = max(float(np.abs(c[1:] / self.scale).max()), 1e-300)
         return np.append(np.tile(whole * self.scale, len(c)), free)
+
+
+class LeftProjection:
+    """V^T A of an operator whose terms are all blocks.
+
+    Parameters
+    ----------
+    operator : PeriodicOperator
+    reduced : ReducedOperator
+        Projection on the basis, with its rough rows.
+    """
+
+    def __init__(self, operator: PeriodicOperator, reduced: ReducedOperator):
+        self._motion, self._rates = operator.motion, operator.rates()
+        # terms through few numbers are cheap as they are
+        self._narrow = [
+            Term([(f, small.left @ blocks) for f, blocks in t.middle], right=t.right, outer=t.outer)
+            for t, small in zip(operator.terms, reduced.terms)
+            if t.narrow
+        ]
+        rates, size = self._rates, self._motion.harmonics.size
+        self._parts = []
+        for (outer, function, blocks), between in zip(reduced.parts, reduced.between_harmonics):
+            if blocks.rows is not None:
+                weights = rates.matrix(outer) @ between[: len(blocks.rows)] @ rates.matrix(function)
+                self._parts.append((weights.transpose(1, 0, 2).reshape(size, -1), blocks.rows))
+
+    def apply(self, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients (2 H + 1, r) for real ones (2 H + 1, n) of a change of the motion."""
+        size = np.abs(coefficients).max() or 1.0  # single precision has a short range
+        columns = np.ascontiguousarray((coefficients / size).T, np.float32)
+        total = 0.0
+        for weights, rows in self._parts:
+            products = (rows.reshape(-1, rows.shape[2]) @ columns).reshape(*rows.shape[:2], -1)
+            products = products.transpose(0, 2, 1).reshape(-1, rows.shape[1]).astype(float)
+            total = total + weights @ products
+        total = size * total
+        if self._narrow:
+            h = self._motion.harmonics
+            samples = h.evaluate(coefficients)
+            total = total + h.project(sum(term.apply(samples, self._rates) for term in self._narrow))
+        return total
+
+
+def gmres(
+    apply: Callable[[np.ndarray], np.ndarray], rhs: np.ndarray, tolerance: float, most: int
+) -> tuple[np.ndarray, int, float]:
+    """Minimal-residual solution of ``apply(x) = rhs`` from zero (Saad & Schultz 1986), without restarts.
+
+    Parameters
+    ----------
+    apply : callable
+        Linear; may make complex vectors of real ones.
+    rhs : (n,) array
+    tolerance : float
+        Residual over that of zero at which to stop.
+    most : int
+        Iterations.
+
+    Returns
+    -------
+    x : (n,) array
+    count : int
+        Applications.
+    missed : float
+        Residual that is left over that of zero.
+
+    Examples
+    --------
+    >>> x, count, missed = gmres(lambda x: np.array([2.0, 4.0]) * x, np.array([2.0, 4.0]), 1e-12, 5)
+    >>> x.round(12), count
+    (array([1., 1.]), 2)
+    """
+    size = np.linalg.norm(rhs)
+    if size == 0.0:
+        return np.zeros_like(rhs), 0, 0.0
+    vectors, columns = [rhs / size], []
+    weights, missed = np.zeros(0), 1.0
+    for count in range(1, most + 1):
+        w = apply(vectors[-1])
+        column = np.zeros(count + 1, np.result_type(w, rhs))
+        for _ in range(2):  # twice is enough
+            for i, v in enumerate(vectors):
+                part = np.vdot(v, w)
+                column[i] += part
+                w = w - part * v
+        column[count] = np.linalg.norm(w)
+        columns.append(column)
+        matrix = np.zeros((count + 1, count), column.dtype)
+        for j, one in enumerate(columns):
+            matrix[: len(one), j] = one
+        target = np.zeros(count + 1, column.dtype)
+        target[0] = size
+        weights = la.lstsq(matrix, target)[0]
+        missed = float(np.linalg.norm(matrix @ weights - target) / size)
+        if missed <= tolerance or abs(column[count]) <= 1e-14 * size:
+            break
+        vectors.append(w / column[count])
+    return sum(c * v for c, v in zip(weights, vectors)), count, missed

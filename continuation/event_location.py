@@ -1,0 +1,210 @@
+"""Event location along a curve: bifurcations and events of the user's own between two of its points.
+
+A test function that changes sign detects an event.  A bifurcation is then a regular zero of an augmented system, found
+by Newton's method from a point of the bracket, with halving as the safety net; an event of the user's own is found by
+false position along the curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from continuation.branch import CurvePoint, SpecialPoint
+from continuation.conditions import FoldCondition, null_pair
+from continuation.normal_form import fold_coefficient
+from continuation.options import DerivativeMissing, SingularSystem
+from continuation.problem import Problem, correct
+
+#: Largest distance of a located point from its bracket, in chord lengths.
+SLACK = 0.02
+#: Halvings of a bracket, after which an event stays bracketed.
+HALVINGS = 16
+
+
+def special_at(tracer, kind, point, index, located, reason="", values=None, vectors=None) -> SpecialPoint:
+    """Special point at a point of the curve."""
+    problem = tracer.problem
+    return SpecialPoint(
+        kind,
+        index,
+        problem.u(point.z).copy(),
+        problem.mu(point.z),
+        point.z.copy(),
+        point.tangent.copy(),
+        located,
+        reason,
+        values or {},
+        vectors or {},
+    )
+
+
+def solve_augmented(tracer, condition, z, frame, names=None, system=None, mu=None):
+    """Newton's method for a point of a curve that fulfils conditions besides.
+
+    Parameters
+    ----------
+    tracer : Tracer
+        Its units and tolerances are taken.
+    condition : object
+        See `continuation.conditions`.
+    z : ndarray
+        Guess: state, freed parameters, extra unknowns.
+    frame : ndarray, shape (k, n + k)
+        Rows that complete ``[F_u, F_p]``.
+    names, system, mu : optional
+        In place of the tracer's own.
+
+    Returns
+    -------
+    Correction or str
+        The solution, or a sentence that says why there is none.
+    """
+    problem, options = tracer.problem, tracer.options
+    augmented = Problem(
+        system or problem.system,
+        mu or problem.fixed,
+        names or problem.names,
+        condition,
+        options.state_scale,
+        options.parameter_scales,
+    )
+    result = correct(augmented, z, frame, options.newton, None, options.location_tolerance)
+    return result if result.converged else f"Newton's method on the augmented system: {result.reason}"
+
+
+def locate_zero(tracer, before, after, indicator, attempt):
+    """Newton from a guess in the bracket; if it leaves the bracket, halve that and try again.
+
+    Parameters
+    ----------
+    before, after : CurvePoint
+        Points where ``indicator`` has opposite signs.
+    indicator : callable
+        Of a point; its zero is the point sought.
+    attempt : callable
+        ``attempt(guess, before, after)`` returns ``(z, result)`` or a sentence that says why
+        it failed.  ``z`` is checked to lie in the bracket.
+
+    Returns
+    -------
+    (result, guess, reason)
+        ``result`` is None if nothing was located; ``guess`` is then the best bracket point.
+    """
+    f0, f1 = indicator(before), indicator(after)
+    reason = "no attempt was made"
+    first = (before, after)
+    guess = None
+    for _ in range(HALVINGS):
+        share = f0 / (f0 - f1) if f0 != f1 else 0.5
+        # Close to an end the other half of the bracket would never shrink.
+        guess = tracer.at(before, after, float(np.clip(share, 0.02, 0.98)))
+        if guess is None:
+            return None, before if abs(f0) < abs(f1) else after, "the curve was lost in the bracket"
+        try:
+            outcome = attempt(guess, before, after)
+        except DerivativeMissing as error:
+            return None, guess, str(error)
+        except SingularSystem as error:
+            outcome = str(error)
+        if not isinstance(outcome, str):
+            z, result = outcome
+            s, away = tracer.fraction(*first, z)
+            if -SLACK <= s <= 1 + SLACK and away <= 1.0:
+                return result, guess, ""
+            outcome = "Newton's method left the bracket"
+        reason = outcome
+        middle = tracer.at(before, after, 0.5)
+        f = np.nan if middle is None else indicator(middle)
+        if not np.isfinite(f):
+            break
+        if (f > 0) == (f0 > 0):
+            before, f0 = middle, f
+        else:
+            after, f1 = middle, f
+    return None, guess, reason
+
+
+class FoldMonitor:
+    """Folds: the parameter's part of the tangent changes sign."""
+
+    def measure(self, tracer, point):
+        point.tests["fold"] = float(point.tangent[tracer.problem.n])
+
+    def between(self, tracer, before, after, index, found):
+        if before.tests["fold"] * after.tests["fold"] >= 0 and after.tests["fold"] != 0:
+            return []
+        problem = tracer.problem
+        if not tracer.options.locate:
+            return [special_at(tracer, "fold", after, index, False, "location was not asked for")]
+
+        def attempt(guess, *_):
+            result = solve_fold(tracer, guess)
+            return result if isinstance(result, str) else (result.z, result)
+
+        result, guess, reason = locate_zero(tracer, before, after, lambda point: point.tangent[problem.n], attempt)
+        if result is None:
+            return [special_at(tracer, "fold", guess, index, False, reason)]
+        local = result.local
+        v, w = local.condition.v, local.condition.w
+        coefficient = fold_coefficient(problem.system, local.u, local.mu, v, w)
+        values = {"iterations": result.iterations, "quadratic_coefficient": coefficient}
+        tangent = np.append(v, 0.0)
+        fold = CurvePoint(result.z, tangent / problem.norm(tangent))
+        return [special_at(tracer, "fold", fold, index, True, "", values, {"right": v, "left": w})]
+
+
+def solve_fold(tracer, guess):
+    """Newton on ``F = 0, g = 0`` from a point of the branch; see `solve_augmented`."""
+    problem = tracer.problem
+    q, p = problem.u(guess.tangent), guess.local.columns[0]
+    for _ in range(2):
+        _, q, p, _ = null_pair(guess.local.linear, p / np.linalg.norm(p), q / np.linalg.norm(q))
+    return solve_augmented(tracer, FoldCondition(p, q), guess.z, problem.frame(guess.tangent[:, None]))
+
+
+@dataclass(frozen=True)
+class Event:
+    """Quantity of the user's own to watch along a branch.
+
+    Attributes
+    ----------
+    name : str
+        Becomes the kind of the special point.
+    function : callable
+        ``function(u, mu)`` -> float; its sign changes are located.
+    stop : bool
+        End the branch there.
+    """
+
+    name: str
+    function: Callable
+    stop: bool = False
+
+
+class EventMonitor:
+    """Sign changes of an `Event`."""
+
+    def __init__(self, event: Event):
+        self.event = event
+
+    def value(self, tracer, point):
+        return float(self.event.function(tracer.problem.u(point.z), tracer.problem.mu(point.z)))
+
+    def measure(self, tracer, point):
+        point.tests[self.event.name] = self.value(tracer, point)
+
+    def between(self, tracer, before, after, index, found):
+        name = self.event.name
+        f0, f1 = before.tests[name], after.tests[name]
+        # A value that is not finite is no crossing, and a zero was reported when it was reached.
+        if not (f0 * f1 < 0 or (f1 == 0 and f0 != 0)):
+            return []
+        values = {"stop": float(self.event.stop)} if self.event.stop else {}
+        if f1 == 0:
+            return [special_at(tracer, name, after, index, True, "", values)]
+        zero = tracer.root(before, after, lambda point: self.value(tracer, point))
+        reason = "" if zero is not None else "the curve was lost in the bracket"
+        return [special_at(tracer, name, zero or after, index, zero is not None, reason, values)]

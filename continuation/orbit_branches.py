@@ -1,0 +1,309 @@
+"""Branches of periodic orbits of ``B(u, mu) u' = F(u, mu)`` in one parameter, and those born at a Hopf point.
+
+The orbits are Fourier series, followed by `continuation.cycle_branch.CycleTracer`; the result is a `Branch` like that
+of equilibria.  Its state holds the coefficients of the series, shape (2 H + 1, n), flattened, and the period; shorter
+series of other points are filled with zeros.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from continuation.branch import Branch, CurvePoint, SpecialPoint
+from continuation.cycle_branch import CycleTracer
+from continuation.cycle_points import FOLD, TORUS, CycleBranchOptions, CyclePoint, SpecialCycle
+from continuation.cycles import Cycle, cycles_beside_onset
+from continuation.harmonics import Harmonics
+from continuation.options import ContinuationOptions, NotABifurcation, NotConverged, require
+from continuation.orbits import Orbit, OrbitOptions, add_exponents, orbit_solver
+from continuation.periodic import PeriodicMotion
+from continuation.tracer import as_observers, run_observed
+
+#: Largest amplitude of the second orbit of a branch over that of the first.
+SECOND = 2.0
+
+
+def continue_orbits(
+    system,
+    orbit: Orbit,
+    parameter: str,
+    options: ContinuationOptions | None = None,
+    discretisation: OrbitOptions | None = None,
+    observers=None,
+) -> Branch:
+    """Follow a periodic orbit in one parameter.
+
+    Folds of cycles, period doublings and torus bifurcations are located by the Floquet exponents.
+
+    Parameters
+    ----------
+    system : System
+    orbit : Orbit
+        The first point.
+    parameter : str
+    options : ContinuationOptions
+        Used are the steps, ``max_points``, ``limits``, ``direction``, the scales, ``location_tolerance`` and
+        ``stop_at``.
+    discretisation : OrbitOptions
+    observers : Observer, callable or sequence of them
+
+    Returns
+    -------
+    Branch
+        Of kind ``"orbits"``; tests hold ``period`` and ``harmonics``, ``eigenvalues`` of a point the multipliers, the
+        tangent is the chord from the point before; `orbit_at` turns a point into an `Orbit`.
+
+    Raises
+    ------
+    NotConverged
+        No second orbit was found beside the first.
+    ValueError
+        The first orbit lies at the limit of the parameter.
+    """
+    follower = _Follower(system, parameter, options, discretisation, orbit.mu)
+    first = Cycle(orbit.motion, dict(orbit.mu), 0.0, 0, 0)
+
+    def steps():
+        follower.tracer.begin(first, False, follower.take)
+        follower.tracer.extend(follower.second_orbit(first), False, follower.take)
+        return follower.tracer.run(follower.take)
+
+    return follower.run(steps, observers)
+
+
+def orbits_from_hopf(
+    system,
+    special: SpecialPoint,
+    parameter: str,
+    amplitude: float,
+    options: ContinuationOptions | None = None,
+    discretisation: OrbitOptions | None = None,
+    observers=None,
+) -> Branch:
+    """Follow the periodic orbits born at a located Hopf point.
+
+    Parameters
+    ----------
+    system : System
+    special : SpecialPoint
+        A located Hopf point.
+    parameter : str
+    amplitude : float
+        Of the first orbit: largest norm of the critical mode in it, in units of the state.
+    options, discretisation, observers
+        As in `continue_orbits`.
+
+    Raises
+    ------
+    NotABifurcation
+        The point is no located Hopf point.
+    NotConverged
+        No orbit of that amplitude was found.
+    """
+    if special.kind != "hopf" or not special.located:
+        raise NotABifurcation(f"Orbits start at a located Hopf point, not at a {special.kind}.")
+    require(amplitude > 0, f"The first amplitude must be positive, not {amplitude}.")
+    follower = _Follower(system, parameter, options, discretisation, special.mu)
+    h, q = Harmonics(follower.shape.harmonics), np.asarray(special.vectors["right"], complex)
+    turn = 2 * (np.exp(2j * np.pi * np.arange(64) / 64)[:, None] * q).real
+    wave = np.zeros((h.count + 1, system.size), complex)
+    wave[0], wave[1] = special.u, amplitude / np.linalg.norm(turn, axis=1).max() * q
+    small = PeriodicMotion(h, h.real(wave), float(special.values["omega"]))
+    size = np.linalg.norm(small.coefficients[1:])
+    row = small.coefficients / size
+    row[0] = 0.0
+    ratio = min(SECOND, 1.0 + follower.tracer.options.step * follower.tracer.options.motion_scale / size)
+
+    def steps():
+        rest, first, second = cycles_beside_onset(
+            follower.tracer.solver, small, dict(special.mu), parameter, row, ratio
+        )
+        follower.tracer.begin(first, False, follower.take, rest)
+        follower.tracer.extend(second, False, follower.take)
+        return follower.tracer.run(follower.take)
+
+    return follower.run(steps, observers)
+
+
+def resume_orbits(
+    system,
+    branch: Branch,
+    options: ContinuationOptions | None = None,
+    discretisation: OrbitOptions | None = None,
+    observers=None,
+) -> Branch:
+    """Go on from the last point of a branch of orbits, e.g. one loaded from a file.
+
+    The branch handed over stays as it is; the one returned holds its points and the new ones.
+    """
+    require(branch.kind == "orbits", f"This needs a branch of orbits, not {branch.kind}.")
+    require(len(branch) > 1, "A branch of orbits goes on from two points at least.")
+    follower = _Follower(system, branch.names[0], options, discretisation, branch.fixed)
+    follower.restore(branch)
+    step = float(np.clip(branch.next_step or follower.options.step, *follower.step_limits))
+    return follower.run(lambda: follower.tracer.run(follower.take, step), observers)
+
+
+def orbit_at(system, branch: Branch, index: int, discretisation: OrbitOptions | None = None) -> Orbit:
+    """Orbit at a point of a branch of orbits, also one loaded from a file."""
+    require(branch.kind == "orbits", f"This needs a branch of orbits, not {branch.kind}.")
+    return _orbit(system, branch.points[index].z[: branch.size], branch.mu(index), discretisation)
+
+
+def special_orbit(system, branch: Branch, special: SpecialPoint, discretisation: OrbitOptions | None = None) -> Orbit:
+    """Orbit at a special point of a branch of orbits."""
+    return _orbit(system, special.u, special.mu, discretisation)
+
+
+def _orbit(system, u, mu, options):
+    options = options or OrbitOptions()
+    cycle = Cycle(_motion(u, system.size), mu, 0.0, 0, 0)
+    return add_exponents(orbit_solver(system, options), cycle, options)
+
+
+def _motion(u: np.ndarray, size: int) -> PeriodicMotion:
+    """Fourier series and frequency of the state of a branch of orbits, without trailing zeros."""
+    coefficients = u[:-1].reshape(-1, size)
+    kept = np.flatnonzero(np.abs(coefficients).max(axis=1)).max(initial=1)
+    h = Harmonics((int(kept) + 1) // 2)
+    return PeriodicMotion(h, h.resized(coefficients), 2 * np.pi / float(u[-1]))
+
+
+class _Follower:
+    """Tracer of orbits of a `System` that records what it finds in a `Branch`."""
+
+    def __init__(self, system, parameter, options, discretisation, mu):
+        self.options, self.shape = options or ContinuationOptions(), discretisation or OrbitOptions()
+        options, n = self.options, system.size
+        self.branch = Branch("orbits", 0, (parameter,), (), {name: float(value) for name, value in mu.items()})
+        self.step_limits = options.min_step, options.max_step
+        low, high = options.limits.get(parameter, (-np.inf, np.inf))
+        kept = CycleBranchOptions(
+            step=options.step,
+            min_step=options.min_step,
+            max_step=options.max_step,
+            scale=options.parameter_scales.get(parameter, 1.0),
+            motion_scale=options.state_scale * np.sqrt(n),
+            limits=(low, high),
+            max_points=options.max_points + 1,
+            exponents=min(self.shape.exponents, max(n - 1, 1)),
+            tail=self.shape.tail,
+            max_harmonics=self.shape.max_harmonics,
+            located=options.location_tolerance,
+        )
+        self.parameter, self.tracer = parameter, CycleTracer(orbit_solver(system, self.shape), parameter, kept)
+        self.observers: list = []
+        self._met: list[str] = []
+
+    def second_orbit(self, first: Cycle) -> Cycle:
+        """Orbit a first step along the parameter away from the first one."""
+        options, value = self.tracer.options, first.mu[self.parameter]
+        step, reason = options.step * options.scale, ""
+        while step >= options.min_step * options.scale:
+            target = float(np.clip(value + self.options.direction * step, *options.limits))
+            require(target != value, f"The branch starts at its limit, {self.parameter} = {value:g}.")
+            try:
+                return self.tracer.solver.solve(first.motion, first.mu | {self.parameter: target})
+            except NotConverged as error:
+                reason, step = str(error), 0.5 * step
+        raise NotConverged(f"No second orbit was found beside the first: {reason}", "first step")
+
+    def restore(self, branch: Branch) -> None:
+        """Take the points of a branch; the last one with its exponents."""
+        self.branch = branch.reopen()
+        lengths = np.cumsum([point.step for point in branch.points])
+        points = []
+        for i, (point, length) in enumerate(zip(branch.points, lengths)):
+            motion = _motion(point.z[: branch.size], self.tracer.solver.system.size)
+            cycle = Cycle(motion, branch.mu(i), point.residual, point.iterations, 0)
+            points.append(CyclePoint(cycle, cycle.mu[self.parameter], float(length), None))
+        points[-1] = replace(points[-1], exponents=self.tracer.describe(points[-1].cycle, after=points[-1]).exponents)
+        self.tracer.restore(points)
+        self.tracer.options = replace(self.tracer.options, max_points=len(points) + self.options.max_points)
+
+    def run(self, steps: Callable[[], str], observers) -> Branch:
+        self.observers = as_observers(observers)
+        return run_observed(self.branch, self.observers, lambda: self._until_stopped(steps))
+
+    def _until_stopped(self, steps) -> str:
+        try:
+            return steps()
+        except _Stop as stop:
+            return f"stopped at: {stop}"
+
+    def take(self, item: CyclePoint | SpecialCycle) -> None:
+        """Record a point or a special point, and notify the observers."""
+        branch = self.branch
+        branch.next_step = self.tracer.next_step
+        if isinstance(item, CyclePoint):
+            branch.points.append(self._point(item))
+            self._fill()
+            for observer in self.observers:
+                observer.accepted(branch)
+            stopping, self._met = [kind for kind in self._met if kind in self.options.stop_at], []
+            if stopping:
+                raise _Stop(stopping[0])
+            return
+        special = self._special(item)
+        branch.special.append(special)
+        self._met.append(special.kind)
+        for observer in self.observers:
+            observer.found(branch, special)
+
+    def _z(self, cycle: Cycle) -> np.ndarray:
+        return np.concatenate([cycle.motion.coefficients.ravel(), [cycle.motion.period, cycle.mu[self.parameter]]])
+
+    def _orbit(self, point: CyclePoint) -> Orbit:
+        return Orbit(point.cycle.mu, point.motion, point.exponents)
+
+    def _point(self, item: CyclePoint) -> CurvePoint:
+        z, cycle = self._z(item.cycle), item.cycle
+        before = self.tracer.points[-2].arclength if len(self.tracer.points) > 1 else item.arclength
+        tests = {"period": cycle.motion.period, "harmonics": float(cycle.motion.harmonics.count)}
+        return CurvePoint(
+            z,
+            np.zeros_like(z),
+            item.arclength - before,
+            cycle.iterations,
+            cycle.correction,
+            tests,
+            item.exponents.unstable,
+            self._orbit(item).multipliers,
+        )
+
+    def _fill(self) -> None:
+        """Give all points the length of the longest series, and the last one its tangent."""
+        points, longest = self.branch.points, max(len(point.z) for point in self.branch.points)
+        for point in points:
+            if len(point.z) < longest:
+                point.z, point.tangent = (_padded(x, longest) for x in (point.z, point.tangent))
+        self.branch.size = longest - 1
+        if len(points) > 1:
+            chord = points[-1].z - points[-2].z
+            points[-1].tangent = chord / max(np.linalg.norm(chord), 1e-300)
+
+    def _special(self, item: SpecialCycle) -> SpecialPoint:
+        orbit = self._orbit(item.point)
+        kind = "fold of cycles" if item.kind == FOLD else item.kind
+        lengths = [point.arclength for point in self.tracer.points]
+        index = int(np.clip(np.searchsorted(lengths, item.point.arclength, "right") - 1, 0, len(lengths) - 2))
+        values = {"period": orbit.period}
+        if item.kind == TORUS:
+            values["angle"] = 2 * np.pi * item.frequency * orbit.period
+        z = self._z(item.point.cycle)
+        mu = orbit.mu | {self.parameter: item.value}
+        z[-1] = item.value
+        reason = "" if item.located else "the location did not settle"
+        vectors = {"multipliers": orbit.multipliers}
+        return SpecialPoint(kind, index, z[:-1], mu, z, np.zeros_like(z), item.located, reason, values, vectors)
+
+
+def _padded(z: np.ndarray, size: int) -> np.ndarray:
+    return np.concatenate([z[:-2], np.zeros(size - len(z)), z[-2:]])
+
+
+class _Stop(Exception):
+    """End of a branch at a special point of a kind in ``stop_at``."""
