@@ -65,11 +65,15 @@ def test_every_layer_relaxes_with_the_same_times_and_none_does_under_rayleigh_da
     assert relaxation_from_case(thesis_case(), "CR") is None
 
 
+#: Load and flow model of the thesis's case.
+AT_18_KPA = {"pressure": 18e3, "storage": 0.0}
+
+
 def test_laws_and_conditions_of_rayleigh_cases_are_what_they_were():
-    assert Mu.of(thesis_case()) == Mu(density=1000.0, alpha=5.0, beta=0.003, loss_factor=0.0)
-    assert Mu.of(thesis_case(LOSS)) == Mu(density=1000.0, alpha=0.0, beta=0.0, loss_factor=1.0)
+    assert Mu.of(thesis_case()) == Mu(AT_18_KPA, density=1000.0, alpha=5.0, beta=0.003, loss_factor=0.0)
+    assert Mu.of(thesis_case(LOSS)) == Mu(AT_18_KPA, density=1000.0, alpha=0.0, beta=0.0, loss_factor=1.0)
     assert Mu.of(thesis_case(LOSS | {"damping.loss_factor": 0.5, "damping.alpha": 2})) == Mu(
-        density=1000.0, alpha=2.0, beta=0.0, loss_factor=0.5
+        AT_18_KPA, density=1000.0, alpha=2.0, beta=0.0, loss_factor=0.5
     )
     slow, relaxing = build_section(thesis_case()), build_section(thesis_case(LOSS))
     assert [layer.law for layer in slow.layers] == [layer.law for layer in relaxing.layers]

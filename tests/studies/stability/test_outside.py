@@ -35,7 +35,7 @@ def test_columns_over_density_agree_with_full_spectra(law, fluid):
         assert column.growth_rate[i] == pytest.approx(full.growth_rate[0], abs=1e-4)
         assert column.frequency[i] == pytest.approx(full.frequency[0], abs=1e-4)
         single = leading_modes(
-            linearise(walk.built(base).model, walk.equilibrium(base), 6e3).pencil(places[i].conditions),
+            linearise(walk.built(base).model, walk.equilibrium(base), 6e3).pencil(places[i]),
             3,
             SearchOptions(limit_point=-1 / 0.00116),
         )

@@ -26,7 +26,7 @@ def family(walk, coarse_case) -> ValveFamily:
 def test_fluid_parts_go_with_powers_of_the_root_of_density(family):
     from dbvfiv.model.dynamics import fluid_parts
 
-    linear, unit = family.linear, family.parts(0.3)
+    linear, unit = family.linear, family.parts(Mu(storage=0.3))
     parts = fluid_parts(linear.model.flow, linear.area, linear.inlet, 7.0, 0.3)
     for name, power in POWERS.items():
         power += name[0] in "BS"  # the velocity there is not scaled
@@ -47,10 +47,10 @@ def test_block_solves_with_the_transpose(family):
 
 def test_cells_agree_with_the_full_pencil(family, storage):
     solver = ColumnSolver()
-    column = solver.solve(family, [(rho, 0.0, 0.003, storage) for rho in DENSITIES])
+    column = solver.solve(family, [(rho, 0.0, 0.003, Mu(storage=storage)) for rho in DENSITIES])
     assert column.certified.all() and (column.how == 0).all()
     for i in range(0, len(DENSITIES), 2):
-        full = solver.direct(family, (DENSITIES[i], 0.0, 0.003, storage))
+        full = solver.direct(family, (DENSITIES[i], 0.0, 0.003, Mu(storage=storage)))
         found = complex(column.growth_rate[i], 2 * np.pi * column.frequency[i])
         assert abs(found - full.eigenvalues[0]) < 1e-6 * abs(full.eigenvalues[0])
         assert column.unstable[i] == full.unstable_count
@@ -58,7 +58,7 @@ def test_cells_agree_with_the_full_pencil(family, storage):
 
 def test_the_count_needs_no_hints_and_sees_both_verdicts(family, storage):
     coarse = FamilyReduction(family).coarse
-    conditions = [Condition(rho, 0.0, 0.003, storage) for rho in DENSITIES]
+    conditions = [Condition(rho, 0.0, 0.003, Mu(storage=storage)) for rho in DENSITIES]
     counts = phase_counts(coarse, conditions)
     full = coarse.eigenvalues(conditions)
     assert counts.certain.all()
@@ -67,7 +67,7 @@ def test_the_count_needs_no_hints_and_sees_both_verdicts(family, storage):
 
 
 def test_the_error_estimate_sees_a_poor_space(family):
-    reduction, condition = FamilyReduction(family), Condition(10.0, 0.0, 0.003, 0.0)
+    reduction, condition = FamilyReduction(family), Condition(10.0, 0.0, 0.003, Mu(storage=0.0))
     good, poor = (
         np.abs(reduction.correction(pairs, condition) / pairs.values)
         for pairs in (
@@ -80,7 +80,7 @@ def test_the_error_estimate_sees_a_poor_space(family):
 
 def test_damping_may_change_within_a_column(family):
     solver = ColumnSolver()
-    conditions = [(10.0, alpha, beta, 0.0) for alpha in (0.0, 5.0) for beta in (0.001, 0.003)]
+    conditions = [(10.0, alpha, beta, Mu(storage=0.0)) for alpha in (0.0, 5.0) for beta in (0.001, 0.003)]
     column = solver.solve(family, conditions)
     assert column.certified.all()
     for i, condition in enumerate(conditions):
