@@ -147,7 +147,7 @@ def test_onset_over_the_loss_factor_is_where_bisection_finds_it(lossy_case, loss
 @pytest.mark.slow
 def test_the_normal_form_of_an_onset_over_the_loss_factor(lossy_case):
     case = lossy_case.replace(
-        {"onset.over": "loss_factor=1.5:2.5:2", "onset.coarse_mesh": 0, "fluid.continuity": "storage"}
+        {"onset.over": "loss_factor=1:4:3:log", "onset.coarse_mesh": 0, "fluid.continuity": "storage"}
     )
     (point,) = (p for p in run_onset(case).points if p.edge)
     assert point.criticality in ("super", "sub")

@@ -20,7 +20,7 @@ from dbvfiv.record.journal import Journal
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.part import RecordPart
 from dbvfiv.record.record import GrowingRecord, StoredRecord
-from dbvfiv.studies.case import Case
+from dbvfiv.studies.case import THESIS, Case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient import keeping
 from dbvfiv.studies.transient.keeping import rows_to_keep
@@ -262,9 +262,8 @@ def test_killed_with_signal_9_at_any_moment(tmp_path, valve):
     )
     whole = transient(case)
     path = tmp_path / "killed.h5"
-    command = [sys.executable, "-m", "dbvfiv", "transient", "-o", str(path)] + [
-        w for c in changes for w in ("--set", c)
-    ]
+    changes += [f"{key}={value}" for key, value in THESIS.items()]
+    command = [sys.executable, "-m", "dbvfiv", "transient", "-o", str(path), *(f"--set={c}" for c in changes)]
     rng = np.random.default_rng(0)
     found = []
     for wait in [0.0, 0.02, *rng.uniform(0.1, 6.0, 5)]:
