@@ -17,16 +17,16 @@ from tests.verification.doors import Asked, ask_all, random_cases, rates_in_time
 COARSE = (4, 6)
 
 
-def judge(asked: list[Asked], few: int) -> None:
-    """Check one outcome by all studies, and that few states are left open or lead with different modes."""
+def judge(asked: list[Asked], left_open: int, differing: int) -> None:
+    """Check one outcome by all studies, and how many states may be left open or lead with different modes."""
     failed = [a for a in asked if a.failure]
     decided = [a for a in asked if not a.failure]
     print(f"\n{len(asked)} states, {len(failed)} without a steady state, {sum(a.left_open for a in decided)} left open")
     assert len(failed) <= 0.05 * len(asked), "\n".join(map(str, failed))
     assert all(a.agree for a in decided), "\n".join(str(a) for a in decided if not a.agree)
-    assert sum(a.left_open for a in decided) <= few, [str(a) for a in decided if a.left_open]
-    differing = [a for a in decided if not lead_alike(a)]
-    assert len(differing) <= few, "\n".join(map(str, differing))
+    assert sum(a.left_open for a in decided) <= left_open, [str(a) for a in decided if a.left_open]
+    others = [a for a in decided if not lead_alike(a)]
+    assert len(others) <= differing, "\n".join(map(str, others))
     assert not any(v.outcome == "not valid" for a in decided if not is_published(a) for v in a.verdicts.values())
 
 
@@ -47,13 +47,14 @@ def is_published(asked: Asked) -> bool:
 def test_every_study_gives_one_outcome(group):
     """A hundred states, five of a valve, a line and a pressure in each group."""
     valves = "cases/dbv18.toml", "cases/dbv6.toml", "cases/dbv12-in-line.toml", "cases/dbv12.toml"
-    judge(list(ask_all(random_cases(5, seed=100 + group, valves=(valves[group % 4],), each=5, mesh=COARSE))), few=0)
+    asked = list(ask_all(random_cases(5, seed=100 + group, valves=(valves[group % 4],), each=5, mesh=COARSE)))
+    judge(asked, left_open=2, differing=0)
 
 
 @pytest.mark.slow
 def test_every_study_gives_one_outcome_on_many_valves():
     fine, coarse = random_cases(100, seed=6), random_cases(900, seed=7, mesh=COARSE)
-    judge([*ask_all(fine), *ask_all(coarse)], few=10)
+    judge([*ask_all(fine), *ask_all(coarse)], left_open=20, differing=10)
 
 
 def check_kicks(number: int, seed: int) -> None:
