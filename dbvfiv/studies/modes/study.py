@@ -111,7 +111,8 @@ def _critical_factor(session: Session, state: SteadyState, verdict: Verdict) -> 
     walk = StabilityWalk(session.case, model=session.model)
     walk.give(place, state.q)
     try:
-        return critical_damping_factor(walk, place, verdict)
+        # eight digits: rounding of factorisations beyond them would part a resumed run from a whole one
+        return float(f"{critical_damping_factor(walk, place, verdict):.8g}")
     except SolveError:
         return np.nan
 
