@@ -84,7 +84,7 @@ class Column:
         return cls(**cells, error=max(part.error for part in parts), leading=leading)
 
     def spread(self, cells: Sequence[int], number: int) -> Column:
-        """The same cells at places among so many, the others blank: neither listed nor counted."""
+        """Column of more cells: these at the given places, the others blank, neither listed nor counted."""
         out = Column.blank(number)
         for own in fields(self):
             values = getattr(self, own.name)

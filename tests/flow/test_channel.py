@@ -166,7 +166,7 @@ def test_storage_conserves_volume():
 
 
 def test_integral_of_the_speed_between_stations():
-    """Of speeds that run straight it is a parabola, whose mean over a section lies h (U_b - U_a)/12
+    """Integral of a piecewise linear speed: a parabola, whose mean over a section lies h (U_b - U_a)/12
     from that of a straight course; stations take it by the lengths of their sections, the ends keep their own.
     """
     z, _ = passage()

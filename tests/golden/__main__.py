@@ -6,7 +6,7 @@ import json
 import sys
 import time
 
-from .compare import DOCUMENTS, differences, document, path_of
+from .compare import DOCUMENTS, differences, document, path_of, steady
 from .runs import RUNS
 
 
@@ -24,7 +24,7 @@ def main(words: list[str]) -> int:
             path_of(name).write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
             left = []
         else:
-            left = list(differences(found, json.loads(path_of(name).read_text())))
+            left = list(differences(found, steady(json.loads(path_of(name).read_text()))))
         wrong += bool(left)
         print(f"{name:32s} {time.time() - start:6.1f} s  {found.get('message', '')} {len(left) or ''}", flush=True)
         for line in left[:8]:

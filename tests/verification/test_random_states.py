@@ -49,7 +49,7 @@ def examined(around: int, along: int, number: int, seed: int, pressures: int) ->
 
 
 def examined_relaxing(around: int, along: int, number: int, seed: int, pressures: int, mesh=FORMER) -> list[Examined]:
-    """The same of walls of stable rubbers that relax, each with a basis of its own."""
+    """Random states of viscoelastic walls of stable rubbers, each with a basis of its own."""
     changes = {"damping.model": "loss factor", "materials.constants": "stable", **mesh}
     states = linearised_states(around, along, random_pressures(pressures, seed), **changes)
     out = []

@@ -111,8 +111,7 @@ def _critical_factor(session: Session, state: SteadyState, verdict: Verdict) -> 
     walk = StabilityWalk(session.case, model=session.model)
     walk.give(place, state.q)
     try:
-        # eight digits: rounding of factorisations beyond them would part a resumed run from a whole one
-        return float(f"{critical_damping_factor(walk, place, verdict):.8g}")
+        return critical_damping_factor(walk, place, verdict)
     except SolveError:
         return np.nan
 

@@ -16,14 +16,11 @@ import numpy as np
 from eigen import CoupledPencil, Mode, Relaxation
 from eigen.derivative import difference, eigenvalue_derivative
 
-from ...case.parameters import DESIGN, PARAMETERS, PIPES, SURROUNDINGS, Mu
+from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
 from ...errors import CaseError, SolveError
 from ...model import ValveModel, linearise
 from ...model.newton import EquilibriumSolver, NewtonOptions
 from ..stability.place import is_surrounding, redesigned, require_parameter
-
-#: Parameters of the surroundings that a pencil takes.
-_OF_PENCIL = tuple(name for name in SURROUNDINGS if name in {"density", "alpha", "beta", "loss_factor", *PIPES})
 
 
 @dataclass(frozen=True)
@@ -207,15 +204,8 @@ def _layer(name: str) -> tuple[int, str]:
 def _value(model, pressure, mu, name) -> float:
     if name == "pressure":
         return pressure
-    if name in _OF_PENCIL:
-        own = {
-            "pipe_length": model.case.upstream.whole_length,
-            "tail_length": model.case.downstream.length,
-            "wave_speed": model.case.upstream.first_wave_speed,
-        }
-        return mu[name] if name in mu else own[name]
-    if name == "storage":
-        return 1.0 if model.case.fluid.continuity == "storage" else 0.0
+    if name in SURROUNDINGS:
+        return Mu.of(model.case).at(**mu)[name]
     if name == "thickness":
         return 1.0
     if name == "angle":
@@ -229,15 +219,14 @@ def _value(model, pressure, mu, name) -> float:
 
 def _pencil(model, q, pressure, mu, name, value):
     """Pencil at the steady state with one parameter changed."""
-    if name in _OF_PENCIL and is_surrounding(model.case, name):
-        return linearise(model, q, pressure).pencil(mu.at(**{name: value}))
-    if name == "storage":
-        return linearise(model, q, pressure).pencil(mu.at(storage=value))
+    if name in SURROUNDINGS:
+        mu = mu.at(**{name: value})
+        if is_surrounding(model.case, name):
+            return linearise(model, q, pressure).pencil(mu)
     changed = model
     if name == "pressure":
         pressure = value
-    elif name in DESIGN or name in _OF_PENCIL:
-        mu = mu.at(**({} if name in DESIGN else {name: value}))
+    elif name in DESIGN or name in SURROUNDINGS:
         changed = ValveModel(redesigned(model.case, {name: value}))
     else:
         changed = ValveModel(model.case, _section(model.shell.section, name, value))

@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 from ...case.parameters import PARAMETERS, Mu
 from .place import condition_of
-from .verdict import FLUTTERS, STABLE, Verdict
+from .verdict import FLUTTERS, STABLE, Verdict, oscillates
 from .walk import StabilityWalk
 
 #: Factors asked, from that of the case outwards; below a twentieth a wall is as good as undamped.
@@ -48,8 +48,9 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
     column = walk.column(places, len(places), edges=True)
 
     def growth(values) -> float:
-        swings = np.asarray(values)[np.asarray(values).imag > 0]
-        return float(swings.real.max()) if swings.size else np.nan
+        values = np.asarray(values)
+        modes = values[oscillates(values)]
+        return float(modes.real.max()) if modes.size else np.nan
 
     def at(factor: float) -> float:
         return growth(column.eigenvalues(condition_of(place.at(**{name: own * factor}))))
@@ -59,5 +60,6 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
         if not (np.isfinite(low) and np.isfinite(high)):
             return np.nan
         if low * high <= 0:
-            return float(brentq(at, min(a, b), max(a, b), rtol=ACCURACY)) if column.eigenvalues else np.nan
+            found = brentq(at, min(a, b), max(a, b), rtol=ACCURACY) if column.eigenvalues else np.nan
+            return float(f"{found:.8g}")  # rounding of factorisations would part a resumed run from a whole one
     return np.nan

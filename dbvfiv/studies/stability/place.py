@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from eigen import Condition
 
 from ...case.materials import RUBBERS
-from ...case.parameters import PARAMETERS, PIPES, Mu
+from ...case.parameters import OUTSIDE, PARAMETERS, PIPES, Mu
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ..case import Case
@@ -26,24 +26,13 @@ def point_under(mu: Mu, condition: Condition) -> Mu:
 
 def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
     """Load, fluid and damping of a case in SI units, those that are moved left out."""
-    given = {
-        "pressure": case.drive.pressure,
-        "density": case.fluid.density,
-        "storage": case.fluid.continuity,
-        "alpha": case.damping.alpha,
-        "beta": case.damping.beta,
-        "loss_factor": case.damping.loss_factor,
-    }
-    if case.has_line:
-        given["pipe_length"] = case.upstream.whole_length
-    if case.has_tail and case.downstream.length:
-        given["tail_length"] = case.downstream.length
-    if case.has_waves and not case.upstream.pieces:
-        given["wave_speed"] = case.upstream.wave_speed
-    given = {name: value for name, value in given.items() if not case.damping.lacks(name)}
+    given: dict[str, float | str] = {**Mu.of(case), "storage": case.fluid.continuity}
+    given.pop(OUTSIDE, None)
     if case.outside.is_there:
-        given["outside"] = case.outside.words
-    return {name: value for name, value in given.items() if name not in moved}
+        given[OUTSIDE] = case.outside.words
+    if case.upstream.pieces:  # pipes in series have wave speeds of their own
+        given.pop("wave_speed", None)
+    return {name: value for name, value in given.items() if name not in moved and not case.damping.lacks(name)}
 
 
 def describe_fixed(case: Case, *moved: str) -> str:

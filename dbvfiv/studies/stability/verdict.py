@@ -101,15 +101,15 @@ class Verdict:
         statement = statement or describe_counts(unstable, counted, certain, line, band)
         if not values.size:
             return cls(UNDECIDED, f"No mode was found in the search, which says nothing of the state. {statement}")
-        oscillates = np.abs(values.imag) > NEUTRAL * np.abs(values)
+        modes = oscillates(values)
         growing = values.real > np.maximum(line, NEUTRAL * np.abs(values))
-        still = values[growing & ~oscillates]
-        measures = {"certain": bool(agrees), "band": float(band)} | _of_modes(values[oscillates])
+        still = values[growing & ~modes]
+        measures = {"certain": bool(agrees), "band": float(band)} | _of_modes(values[modes])
         if growing.any() and (agrees or proven):
             if still.size:
                 rate = float(still.real.max())
                 measures |= {"growth_rate": rate, "frequency": 0.0}
-                also = " An oscillating mode grows besides." if (growing & oscillates).any() else ""
+                also = " An oscillating mode grows besides." if (growing & modes).any() else ""
                 reason = f"A motion grows by {rate:.4g} 1/s without oscillating.{also} {statement}"
                 return cls(DIVERGES, reason, **measures)
             return cls(FLUTTERS, statement, **measures)
@@ -179,6 +179,11 @@ class Verdict:
         given = {field.name: summary[field.name] for field in fields(cls)}
         missing = {name: np.nan for name in numbers if given[name] is None}
         return cls(**given | missing)
+
+
+def oscillates(values: np.ndarray) -> np.ndarray:
+    """True for eigenvalues (k,) whose imaginary part is more than rounding."""
+    return np.abs(values.imag) > NEUTRAL * np.abs(values)
 
 
 def _of_modes(modes: np.ndarray) -> dict[str, float]:

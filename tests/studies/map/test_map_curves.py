@@ -37,7 +37,7 @@ def test_linked_tongue_is_one_curve(case):
 
 @pytest.mark.parametrize("solved", [True, False])
 def test_a_change_at_the_lower_edge_calls_for_columns(case, solved):
-    """Where no curve ends there; beside a column whose cells are not valid nothing is known of it."""
+    """No curve ends there; beside a column whose cells are not valid nothing is known of it."""
     plan = MapPlan.of(case)
     columns = []
     for value, number in ((1000.0, 0), (2000.0, 1)):
