@@ -18,7 +18,6 @@ from .region import Oval, SearchedRegion
 from .relaxation import Relaxation
 from .search import leading_modes
 from .spectrum import Mode, Spectrum
-from .sweep import Sweep, sweep
 from .tracking import Branches, TrackOptions, track
 from .transfer import TransferBasis, lowest_frequencies
 from .winding import Count, unstable_count
@@ -46,7 +45,6 @@ __all__ = [
     "SearchedRegion",
     "SingularShiftError",
     "Spectrum",
-    "Sweep",
     "TrackOptions",
     "TransferBasis",
     "Workspace",
@@ -57,7 +55,6 @@ __all__ = [
     "leading_modes",
     "listed_unstable",
     "lowest_frequencies",
-    "sweep",
     "track",
     "unstable_count",
 ]

@@ -9,6 +9,7 @@ import numpy as np
 
 from .agreement import Certificate
 from .family import Condition
+from .pencil import CoupledPencil
 
 #: Estimated relative error of an eigenvalue above which a cell is treated directly.
 TOLERANCE = 1e-6
@@ -46,6 +47,8 @@ class Column:
         From a condition and an eigenvalue of the small model to Newton's correction of it by the full matrices.
     cell : callable or None
         From any further condition at the same state to a column of this one cell.
+    pencil : callable or None
+        From any condition at the same state to its pencil on the small model.
     leading : list of arrays
         Leading eigenvalues of the cells.
     """
@@ -64,6 +67,7 @@ class Column:
     nearest: Callable[[Condition, complex], complex] | None = None
     corrected: Callable[[Condition, complex], complex] | None = None
     cell: Callable[[Condition], Column] | None = None
+    pencil: Callable[[Condition], CoupledPencil] | None = None
     leading: list[np.ndarray] = field(default_factory=list)
 
     @classmethod
@@ -92,7 +96,7 @@ class Column:
                 getattr(out, own.name)[list(cells)] = values
         for i, row in zip(cells, self.leading):
             out.leading[i] = row
-        small = {name: getattr(self, name) for name in ("eigenvalues", "nearest", "corrected", "cell")}
+        small = {name: getattr(self, name) for name in ("eigenvalues", "nearest", "corrected", "cell", "pencil")}
         return replace(out, error=self.error, **small)
 
     @property

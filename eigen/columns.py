@@ -43,7 +43,9 @@ class ColumnSolver:
             self._last = FamilyReduction(family, self._static, self._stiffened, self._structures)
         return self._last
 
-    def solve(self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False, spectra=None) -> Column:
+    def solve(
+        self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False, spectra=None, count: int = 2
+    ) -> Column:
         """All conditions at one state.
 
         Parameters
@@ -58,6 +60,8 @@ class ColumnSolver:
             certificate.
         spectra : sequence of Spectrum, optional
             Of the full pencils of fewer than three conditions, where they are known.
+        count : int
+            Leading modes of each condition that the second space is made for.
 
         Raises
         ------
@@ -70,7 +74,7 @@ class ColumnSolver:
         reduction = self.reduction(family)
         if len(conditions) < 3:
             return self._directly(reduction, conditions, spectra)
-        first, fine, error = _accurate(reduction, conditions, snapshots)
+        first, fine, error = _accurate(reduction, conditions, snapshots, count)
         column = self._on(first, fine, conditions, error, edges)
 
         def eigenvalues(condition):
@@ -87,7 +91,10 @@ class ColumnSolver:
         def cell(condition):
             return self._on(first, fine, [Condition(*condition)], error)
 
-        return replace(column, eigenvalues=eigenvalues, nearest=nearest, corrected=corrected, cell=cell)
+        def pencil(condition):
+            return fine.pencil(Condition(*condition))
+
+        return replace(column, eigenvalues=eigenvalues, nearest=nearest, corrected=corrected, cell=cell, pencil=pencil)
 
     def _on(self, first: ReducedFamily, fine: ReducedFamily, conditions, error: float, edges: bool = False) -> Column:
         """Cells on a small model, counted on that of the first stage; those without a certificate directly."""
@@ -201,7 +208,7 @@ def _modes_of(family: PencilFamily, condition: Condition, spectrum):
     return spectrum.select(np.flatnonzero(family.reach(condition).is_mode(spectrum.eigenvalues)))
 
 
-def _accurate(reduction: FamilyReduction, conditions, snapshots: int):
+def _accurate(reduction: FamilyReduction, conditions, snapshots: int, count: int):
     """Both small models, and the error of leading eigenvalues on the second: with vectors corrected again and more of
     them as far as it takes, which is far cheaper than every cell with the full pencil.
     """
@@ -213,6 +220,7 @@ def _accurate(reduction: FamilyReduction, conditions, snapshots: int):
         taken = [conditions[i] for i in places]
         banded = any(_is_banded(family, c) for c in taken)
         first, most = (reduction.wide, MOST_IN_BAND) if banded else (reduction.coarse, MOST)
+        most = max(most, count)
         checked = between(places)
         if mixed:  # few corrections leave most where most relaxes, and of the quick modes that lead where least does
             checked += [int(np.argmax(losses)), int(np.argmin(losses))]

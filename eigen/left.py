@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .compact import oscillating_pairs
@@ -12,6 +14,7 @@ from .pairs import SAME
 from .pencil import CoupledPencil
 from .products import coupling_of_modes
 from .residual import factored_beside
+from .spectrum import Spectrum
 
 
 def attach_left(
@@ -66,6 +69,17 @@ def left_by_inverse_iteration(pencil, value, workspace):
         size = np.linalg.norm(w) or np.linalg.norm(W)
         w, W = w / size, W / size
     return w, W
+
+
+def with_left_vectors(pencil: CoupledPencil, spectrum: Spectrum) -> Spectrum:
+    """Spectrum with left vectors, by inverse iteration on a small pencil."""
+    workspace = Workspace()
+    found = [left_by_inverse_iteration(pencil, value, workspace) for value in spectrum.eigenvalues]
+    if not found:
+        return replace(spectrum, left_q=spectrum.q, left_u=spectrum.u)
+    w, W = (np.array(part).reshape(len(found), -1).T.conj() for part in zip(*found))
+    w, W, _, _ = biorthogonalise(pencil, spectrum.eigenvalues, spectrum.q, spectrum.u, w, W)
+    return replace(spectrum, left_q=w, left_u=W)
 
 
 def biorthogonalise(pencil: CoupledPencil, eigenvalues, q, u, w, W, cluster: float = 1e-7):

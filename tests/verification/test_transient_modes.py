@@ -1,5 +1,5 @@
-"""Three routes to one number: the full pencil, its reduction to the fluid's transfer function, and the ringing of the
-nonlinear valve after a small push.
+"""Three routes to one number: the full pencil, its reduced-order model, and the ringing of the nonlinear valve after a
+small push.
 
 The push follows the leading oscillating mode. Growth rate and frequency are read off the lip by fitting x_{k+1} + g^2
 x_{k-1} = 2 g cos(omega h) x_k, which holds for one mode exactly; without numerical damping the step leaves errors of
@@ -15,13 +15,13 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case.parameters import Mu
-from dbvfiv.model import linearise
 from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.stability.place import condition_of
+from dbvfiv.studies.stability.walk import StabilityWalk
 from dbvfiv.studies.transient.run import Runner
-from eigen import SearchOptions, sweep
 
 PUSH = 1e-8  # m; at 2 kPa, where stops at the corners of the lips part, 1e-6 m changes the frequency by 0.5 %
 BETA = 0.003
@@ -61,19 +61,11 @@ def three_routes(
     full = next(m for m in valve.modes(count=8).modes if m.frequency > 0)
     eigenvalue = complex(full.growth_rate, 2 * np.pi * full.frequency)
     q = steady_positions(model, pressure)
-    state = linearise(model, q, pressure)
-    densities = density * np.array(
-        [0.9, 0.95, 1.0, 1.05, 1.1]
-    )  # judged at the ends and fed in the middle: the state itself is none of the checks
-    resolved = model.flow.resolved({})
-    found = sweep(
-        lambda d: state.pencil(Mu(density=float(d), alpha=0.0, beta=BETA)),
-        densities,
-        4,
-        SearchOptions(resolved if np.isfinite(resolved) else None, limit_point=-1 / BETA),
-        checks=2,
-    )
-    reduced = found.eigenvalues[2][np.argmin(np.abs(found.eigenvalues[2] - eigenvalue))]
+    walk, place = StabilityWalk(valve.case, model=model), Mu.of(valve.case)
+    walk.give(place, q)
+    # the reduced-order model is made beside the state itself
+    column = walk.column([place.at(density=share * density) for share in (0.9, 0.95, 1.05, 1.1)])
+    reduced = column.nearest(condition_of(place), eigenvalue)
     lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
     rings = []
     for count in steps:

@@ -12,13 +12,14 @@ import numpy as np
 from eigen import Column, ColumnSolver, Workspace
 from eigen.column import DIRECT
 
-from ...case.parameters import Mu
+from ...case.parameters import PARAMETERS, Mu
 from ...errors import NotValidError, SolveError
 from ...model import ValveModel
 from ...model.classes import linearise_class
 from ...model.equilibria import LoadPath, SteadyOptions
 from ...model.leading import LeadingSearch
 from ...model.material_stability import material_stability
+from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...observer import Observer
 from ..case import Case
@@ -38,6 +39,7 @@ class _Built:
     path: LoadPath
     solver: ColumnSolver
     known: dict[float, np.ndarray]
+    described: dict[float, SteadyState] = field(default_factory=dict)
     trail: list[tuple[float, np.ndarray, np.ndarray]] = field(
         default_factory=list
     )  # pressure, state and slope of the last two
@@ -136,9 +138,26 @@ class StabilityWalk:
         if not self._key(place):  # states of other designs are found from rest each
             self._recalled.append(place)
 
-    def give(self, place: Mu, q: np.ndarray) -> None:
-        """Hand over the steady state of a place that was found elsewhere."""
-        self.built(place).known[place.pressure] = q
+    def give(self, place: Mu, state: SteadyState | np.ndarray) -> None:
+        """Hand over the steady state of a place that was found elsewhere, or its displacements q (n,) alone."""
+        built = self.built(place)
+        if isinstance(state, SteadyState):
+            built.described[place.pressure], state = state, state.q
+        built.known[place.pressure] = state
+
+    def is_moved_by(self, name: str) -> bool:
+        """True for a parameter that every value of has a steady state of its own."""
+        return name == "pressure" or name in self._moving or not PARAMETERS[name].surrounding
+
+    def state(self, place: Mu) -> SteadyState:
+        """Steady state of a place with what is read off it.
+
+        Raises
+        ------
+        SolveError
+        """
+        self.equilibrium(place)
+        return self.built(place).described[place.pressure]
 
     def apart(self) -> StabilityWalk:
         """A walk that knows no states yet, on the model of this one."""
@@ -163,13 +182,14 @@ class StabilityWalk:
             path.pressure, path.q, path.slope = nearest, built.known[nearest], None
         built.aim(place.pressure)
         try:
-            path.go_to(place.pressure)
+            built.described[place.pressure] = path.go_to(place.pressure)
         except SolveError:
             path.pressure, path.q, path.slope = before  # where a run that goes on without this place stands too
             raise
         built.passed()
         if len(built.known) > 400:
             built.known.clear()
+            built.described.clear()
         built.known[place.pressure] = path.q
         return path.q
 
@@ -232,7 +252,7 @@ class StabilityWalk:
         with _explained(place):
             return self.built(place).solver.direct(family, condition_of(place), count)
 
-    def column(self, places: list[Mu], snapshots: int = 3, edges: bool = False, spectra=None) -> Column:
+    def column(self, places: list[Mu], snapshots: int = 3, edges: bool = False, spectra=None, count: int = 2) -> Column:
         """Cells that share a steady state; those whose rubber has lost stability are left blank.
 
         Parameters
@@ -244,6 +264,8 @@ class StabilityWalk:
             Certify only the places between which the number of unstable modes changes.
         spectra : sequence of Spectrum, optional
             Of one or two places, where they are known.
+        count : int
+            Leading modes of each place that the small model is made for.
 
         Raises
         ------
@@ -263,12 +285,12 @@ class StabilityWalk:
         family = self.family(places[0])
         with _explained(places[0]):
             conditions = [condition_of(places[i]) for i in sound]
-            column = self.built(places[0]).solver.solve(family, conditions, snapshots, edges, spectra)
+            column = self.built(places[0]).solver.solve(family, conditions, snapshots, edges, spectra, count)
         return column if refusal is None else column.spread(sound, len(places))
 
     def verdicts(self, places: list[Mu], column: Column) -> list[Verdict]:
         """Verdicts on places from the cells that `column` gave of them."""
-        return [self._verdict(place, column, i) for i, place in enumerate(places)]
+        return [self.verdict_of(place, column, i) for i, place in enumerate(places)]
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
         """Verdict on one place; its leading modes with the full pencil may be known.
@@ -283,7 +305,8 @@ class StabilityWalk:
         except NotValidError as error:
             return Verdict.not_valid(str(error))
 
-    def _verdict(self, place: Mu, column: Column, cell: int) -> Verdict:
+    def verdict_of(self, place: Mu, column: Column, cell: int) -> Verdict:
+        """Verdict on a place from its cell of a column."""
         try:
             self.require_valid(place)
         except NotValidError as error:

@@ -122,7 +122,7 @@ class SweepResult(StudyResult):
     unstable_count : (p,) int
         Both eigenvalues of a pair count.
     checks : tuple of dict
-        See `dbvfiv.studies.sweep.family.Check`.
+        See `dbvfiv.studies.sweep.spectra.Check`.
     certified : bool
     points : tuple of dict
         States, see `dbvfiv.record.states.SUMMARY`: one for each value over pressure, a single one otherwise.

@@ -18,11 +18,12 @@ from ...model import ValveModel
 from ...model.equilibria import require_equilibrium
 from ...model.leading import growth_floor
 from ...model.state import SteadyState
-from ...model.symmetry import EQUILIBRIA, chosen_symmetries
+from ...model.symmetry import EQUILIBRIA, chosen_symmetries, symmetry_named
 from ...observer import Observer
 from ..solving import solving
 from ..stability.verdict import Verdict, not_valid_at
-from .family import Check, Family, FluidFamily, PressureFamily
+from ..stability.walk import StabilityWalk
+from .spectra import Check, SpectraAlong
 
 #: Writing what is done may take this share of the time; a sweep of small cost is written once.
 _KEEPING = 0.05
@@ -41,10 +42,9 @@ class SweepOptions:
     margin : int
         Further modes computed, so that a mode that changes its rank is not lost.
     checks : int
-        Values at which the reduced basis is compared with the full pencil and the unstable eigenvalues are counted
-        independently.
+        Values at which eigenvalues are compared with the full matrices and both counts of unstable ones.
     tolerance : float
-        Accepted relative error of eigenvalues on the reduced basis.
+        Accepted relative error of eigenvalues of the reduced-order model.
     least_confidence : float
         A step is halved while the match of a leading mode is less certain.
     search : SearchOptions
@@ -135,9 +135,10 @@ def run_sweep(
 ) -> FoundBranches:
     """Follow the leading modes along a parameter.
 
-    Over density and damping the state stays, so modes are found on a basis that is certified against full solves; over
-    pressure every value has its own equilibrium, found from the nearest one known, and its own full solve. An
-    interrupt, or a pressure that is not reached, ends the sweep and keeps what was found.
+    Over density and damping the steady state stays as a rule, so modes are those of one reduced-order model, checked
+    with the full matrices; over pressure, and wherever else the parameter moves the steady state, every value has its
+    own, found from the nearest one known, and its own full solve. An interrupt, or a value that has no steady state,
+    ends the sweep and keeps what was found.
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ def run_sweep(
     observer : Observer, optional
         Gets a `SweepPoint` for every value.
     state : SteadyState, optional
-        Equilibrium for whatever leaves it as it is; needed there.
+        Steady state at the pressure of the sweep, where it is known.
     keep : callable, optional
         Gets what is done so far, marked as interrupted, every few seconds, so that a sweep that is killed is not lost.
 
@@ -169,19 +170,19 @@ def run_sweep(
             "sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose "
             "pressure, alpha or beta."
         )
-    if axis.parameter == "pressure":
-        family: Family = PressureFamily(model, mu, options, observer)
-    else:
-        if state is None:
-            raise ValueError("A sweep over density or damping needs the state at which it is made.")
+    symmetry = symmetry_named(options.symmetry)
+    walk = StabilityWalk(model.case, observer, model, symmetry)
+    start = Mu.of(model.case).at(**mu)
+    if state is not None:
         require_equilibrium(model, state)
-        family = FluidFamily(model, state, axis, mu, options, observer)
+        start = start.at(pressure=state.pressure)
+        walk.give(start, state)
+    line = SpectraAlong(walk, start, axis.parameter, options)
     observer.begin(f"sweep over {axis.parameter}", len(axis.values))
-    run = _Run(model, family, axis, options, observer, keep)
+    run = _Run(model, line, axis, options, observer, keep)
     interrupted, failures = False, ()
     try:
-        with solving(family.pressure):
-            family.prepare(axis)
+        with solving(start.pressure):
             run.follow(axis.values)
     except KeyboardInterrupt:
         interrupted = True
@@ -212,8 +213,8 @@ def _outside(model: ValveModel, result: FoundBranches) -> tuple[str, ...]:
 class _Run:
     """A walk along the values; spectra are kept, so that an interrupted one can be followed as far as it came."""
 
-    def __init__(self, model: ValveModel, family: Family, axis: Axis, options: SweepOptions, observer: Observer, keep):
-        self.model, self.family, self.axis, self.observer, self.keep = model, family, axis, observer, keep
+    def __init__(self, model, line: SpectraAlong, axis: Axis, options: SweepOptions, observer: Observer, keep):
+        self.model, self.line, self.axis, self.observer, self.keep = model, line, axis, observer, keep
         self.keep_at = time.monotonic() + _KEEP_AFTER
         self.track = TrackOptions(options.count, options.margin, least_confidence=options.least_confidence)
         self.pencils: dict[float, object] = {}
@@ -227,7 +228,7 @@ class _Run:
         sound, failure = [], None
         for value in values:
             try:
-                refusal = self.family.refusal(float(value))
+                refusal = self.line.refusal(float(value))
             except SolveError as error:  # what lies before it is followed
                 failure = error
                 break
@@ -237,6 +238,8 @@ class _Run:
             else:
                 sound.append(float(value))
         if sound:
+            self.observer.progress("reduced-order model")
+            self.line.prepare(sound)
             self.branches = track(self._pencil, sound, self.track, solver=self._solve, observer=self._done)
         if failure is not None:
             raise failure
@@ -244,12 +247,12 @@ class _Run:
     def _pencil(self, value: float):
         value = float(value)
         if value not in self.pencils:
-            self.pencils[value] = self.family.pencil(value)
+            self.pencils[value] = self.line.pencil(value)
         return self.pencils[value]
 
     def _solve(self, pencil) -> Spectrum:
         if id(pencil) not in self.spectra:
-            self.spectra[id(pencil)] = self.family.solve(pencil, self.track.count + self.track.margin)
+            self.spectra[id(pencil)] = self.line.solve(pencil, self.track.count + self.track.margin)
         return self.spectra[id(pencil)]
 
     def _done(self, value: float, _solves: int) -> None:
@@ -271,12 +274,17 @@ class _Run:
         if found is None and len(sound):  # as far as it came, from the spectra kept
             found = track(self._pencil, sound, self.track, solver=self._solve)
         branches = (
-            _shown(found, self.family, sound)
+            _shown(found, self.line, sound)
             if len(sound)
             else Branches(np.zeros(0, int), sound, *np.zeros((2, 0, 0)), 0)
         )
-        checks, notes = self.family.checks(sound) if len(sound) and not interrupted else (self.family.done, ())
-        known = {} if interrupted else self.family.verdicts(sound, [self._solve(self._pencil(v)) for v in sound])
+        checks, notes, known = (), (), {}
+        if len(sound) and not interrupted:
+            spectra = {float(value): self._solve(self._pencil(value)) for value in sound}
+            self.observer.progress("verdicts")
+            checks = [self.line.check(value, spectra[value]) for value in self.line.checked(sound)]
+            notes = self.line.notes(sound)
+            known = {value: self.line.verdict(value, spectrum) for value, spectrum in spectra.items()}
         known |= {value: Verdict.not_valid(sentence) for value, sentence in self.refused.items()}
         if self.refused:
             notes = (*notes, not_valid_at(self.axis.parameter, self.refused))
@@ -294,7 +302,7 @@ class _Run:
             tuple(checks),
             certified,
             tuple(known.get(value, _UNKNOWN) for value in values),
-            self.family.states(values),
+            self.line.states(values),
             tuple(notes),
             tuple(failures),
             interrupted,
@@ -310,11 +318,11 @@ def _with_gaps(branches: Branches, sound: np.ndarray, values: np.ndarray) -> Bra
     return Branches(branches.ids, values, eigenvalues, confidence, branches.solves)
 
 
-def _shown(branches: Branches, family: Family, values: np.ndarray) -> Branches:
+def _shown(branches: Branches, line: SpectraAlong, values: np.ndarray) -> Branches:
     """Branches clearly right of the limit point -1/beta, numbered from 1 by their largest growth rate."""
     eigenvalues, confidence = branches.eigenvalues.copy(), branches.confidence.copy()
     for column, value in enumerate(values):
-        beyond = eigenvalues[:, column].real <= growth_floor(family.mu_at(value).beta)
+        beyond = eigenvalues[:, column].real <= growth_floor(line.place(value).beta)
         eigenvalues[beyond, column] = np.nan
         confidence[beyond, column] = np.nan
     there = np.isfinite(eigenvalues.real)

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import CaseError
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
 from ...record.states import SUMMARY
 from ..case import Case
 from ..session import Session
-from ..stability.place import require_parameter, why_it_moves
+from ..stability.place import is_surrounding, require_parameter
 from ..study import Study
 from .printed import head, point_row
 from .result import BRANCHES, CHECKS, POINTS, STATES, SweepResult, tables_of
@@ -25,14 +24,8 @@ def run(session: Session, record: GrowingRecord) -> None:
     """Modes along `sweep.over` of the case; what is done is kept every few seconds."""
     axis = session.case.sweep.axis
     require_parameter(session.case, axis.parameter)
-    moves = why_it_moves(session.case, axis.parameter)
-    if moves:
-        mended = "give upstream.loss in place of friction, or" if axis.parameter == "pipe_length" else "choose"
-        raise CaseError(
-            f"sweep.over ranges over {axis.parameter}, but {moves} (onset and map follow that); {mended} another "
-            "parameter."
-        )
-    state = None if axis.parameter == "pressure" else session.equilibrium(record)
+    stays = is_surrounding(session.case, axis.parameter)
+    state = session.equilibrium(record) if stays else None
     found = run_sweep(
         session.model,
         axis,
