@@ -177,9 +177,7 @@ def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, fi
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
     if (model is not pencil or basis is None) and winding.number > listed_unstable(spectrum, winding):
-        space = basis or TransferBasis(pencil)  # a small pencil is counted as it is
-        reduced = space.reduced(pencil)
-        distant = distant_pairs(pencil, spectrum, reduced, space, winding.line, options or SearchOptions())
+        distant = distant_pairs(pencil, spectrum, basis, winding.line, options or SearchOptions())
         if distant is not None:
             spectrum = joined(spectrum, distant, winding.line)
             if basis is not None:

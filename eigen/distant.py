@@ -19,8 +19,6 @@ from .transfer import TransferBasis
 
 #: Pairs beyond the band that are looked for at most, and real ones.
 MOST = 4
-#: Relative distance that a pair may move from the reduced pencil to the full one.
-MOVED = 0.05
 #: Newton steps at most; what lies beyond the band is known roughly.
 STEPS = 8
 
@@ -28,16 +26,15 @@ STEPS = 8
 def distant_pairs(
     pencil: CoupledPencil,
     spectrum: Spectrum,
-    reduced: CoupledPencil,
-    basis: TransferBasis,
+    basis: TransferBasis | None,
     line: float,
     options: SearchOptions,
 ) -> Found | None:
-    """Unstable pairs of the full pencil near those that the reduced pencil has beyond the band of a spectrum, if that
-    was not asked for, and on the real axis, which every band holds.
+    """Unstable pairs of the full pencil near those that the pencil on a basis has beyond the band of a spectrum, if
+    that was not asked for, and on the real axis, which every band holds; without a basis those of a small pencil.
 
-    Each is brought to the full pencil by Newton steps and has to pass the residual test like any other; the fastest
-    growing ones are tried.
+    Each is brought to the full pencil by Newton steps and has to pass the residual test like any other, however far it
+    moves on the way: a basis may know it roughly. The fastest growing ones are tried.
 
     Parameters
     ----------
@@ -51,21 +48,20 @@ def distant_pairs(
     """
     if spectrum.left_q is not None:
         return None
-    values, q, u, _, _ = all_pairs(reduced, left=False)
+    values, q, u, _, _ = all_pairs(pencil if basis is None else basis.reduced(pencil), left=False)
     unstable = np.flatnonzero(values.real > line)
     unstable = unstable[np.argsort(-values.real[unstable])]
     chosen = list(unstable[values.imag[unstable] == 0][:MOST])
     if options.max_frequency is None:
         chosen += list(unstable[values.imag[unstable] > 2 * np.pi * spectrum.band][:MOST])
-    starts = [(values[i], basis.lift(q[:, i]), u[:, i]) for i in chosen]
+    starts = [(values[i], q[:, i] if basis is None else basis.lift(q[:, i]), u[:, i]) for i in chosen]
     workspace = Workspace()
     pairs = []
     for start in starts:
         pair = newton(pencil, *start, workspace=workspace, tolerance=options.tolerance, steps=STEPS)
         value, _, _, residual, backward = pair
-        near = abs(value - start[0]) <= MOVED * abs(start[0])
         known = [abs(value - x) <= SAME * abs(x) for x in (*spectrum.eigenvalues, *(other[0] for other in pairs))]
-        if near and value.real > line and acceptable(residual, backward, options.tolerance) and not any(known):
+        if value.real > line and acceptable(residual, backward, options.tolerance) and not any(known):
             pairs.append(pair)
     if not pairs:
         return None

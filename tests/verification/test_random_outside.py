@@ -37,13 +37,8 @@ def look_at(number: int, seed: int) -> list[str]:
         storage, beta = float(rng.choice([0.0, 1.0])), float(10.0 ** rng.uniform(-4, -2.3))
         model = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 14} | keys))
         loss = 1.0 if model.relaxation.groups else 0.0
-        conditions = Mu(
-            density=density,
-            alpha=0.0,
-            beta=0.0 if loss else beta,
-            loss_factor=loss,
-            pipe_length=keys.get("upstream.length"),
-        )
+        line = {"pipe_length": keys["upstream.length"]} if "upstream.length" in keys else {}
+        conditions = Mu(density=density, alpha=0.0, beta=0.0 if loss else beta, loss_factor=loss, **line)
         pencil = linearise(model, LoadPath(model).go_to(pressure).q, pressure).pencil(conditions.at(storage=storage))
         search = select_search(SearchOptions(), conditions, lambda n: lowest_frequencies(pencil, n), 6)
         found = certified_spectrum(pencil, 6, search.options)
