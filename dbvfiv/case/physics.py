@@ -44,12 +44,11 @@ LoadPressure = Annotated[Pressure, Field(**PARAMETERS["pressure"].limits)]
 class Shell(Section):
     """Choices of the shell theory."""
 
-    metric: Literal["first-order", "true", "shifted"] = key(
+    metric: Literal["first-order", "shifted"] = key(
         "first-order",
-        'Through-thickness metric, one of three words: "first-order" of Budiansky and Sanders (the thesis) gives every '
-        'layer the length of the mid-surface; "true" is the exact one, refused where half the wall exceeds the radius '
-        'of the mid-surface; "shifted" gives layers their own length, which is what layers of unlike stiffness want, '
-        "and is bounded where the wall folds.",
+        'Through-thickness metric: "first-order" of Budiansky and Sanders (the thesis) gives every layer the length of '
+        'the mid-surface; "shifted" gives layers their own length, which is what layers of unlike stiffness want, and '
+        "is bounded where the wall folds.",
     )
     shear_correction_plies: Number = key(5 / 6, "Transverse-shear factor of fibre plies.", gt=0, le=1.5)
     shear_correction_rubber: Number = key(1.0, "Transverse-shear factor of all other layers.", gt=0, le=1.5)
@@ -59,12 +58,6 @@ class Shell(Section):
         "whose errors of frequencies are a third or less; or that of its shape functions alone (consistent, earlier "
         "versions).",
     )
-
-    @field_validator("metric", mode="before")
-    @classmethod
-    def _name_the_true_one(cls, given: Any) -> Any:
-        """The word "true" is easily written without quotes."""
-        return "true" if given is True else given
 
 
 class Fluid(Section):

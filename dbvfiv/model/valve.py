@@ -71,7 +71,7 @@ class ValveModel:
     Raises
     ------
     ValueError
-        If the case's geometry cannot be meshed or its shell metric is not valid on it.
+        If the case's geometry cannot be meshed.
     """
 
     def __init__(self, case: Case, section: Section | None = None):

@@ -6,8 +6,6 @@ treatments:
 
 ``first-order``
     Mid-surface metric and area; E(t) = c0 + t (c1 - sym(kappa c0)), Budiansky-Sanders' best first-order theory.
-``true``
-    Metric, area and quadratic strain of each parallel surface; valid while half the wall stays below the radius.
 ``shifted``
     The strains of ``first-order`` on parallel surfaces of their own length and area: S^-1/2 E(t) S^-1/2 over det S,
     S = 1 + t kappa (Winkler and Bach's curved bar), see `reference.shifted_layers`. Right to first order in thickness
@@ -30,21 +28,18 @@ from .assumed_strain import FACTORS, PAIRS, VECTORS, AssumedStrains
 from .reference import (
     SHEAR_EDGES,
     SHEAR_WEIGHTS,
-    SLOPE,
     ReferenceGeometry,
     shifted_layers,
-    strain_map,
-    thickness_over_radius,
 )
 from .rotation import director
 from .section import Section
 
-FIRST_ORDER, TRUE_METRIC, SHIFTED = METRICS = "first-order", "true", "shifted"
+FIRST_ORDER, SHIFTED = METRICS = "first-order", "shifted"
 _LAWS = {LINEAR_ELASTIC: linear_elastic_energy, MOONEY_RIVLIN: rubber_energy}
 
 
-def section_arrays(section: Section, geometry: ReferenceGeometry, metric: str) -> dict:
-    """Layer-point data for `element_energy`; with the true metric also maps per element and point."""
+def section_arrays(section: Section) -> dict:
+    """Layer-point data for `element_energy`."""
     data = {
         "zeta": section.points[:, 0],
         "weight": section.points[:, 1],
@@ -71,34 +66,9 @@ def element_arrays(mesh, geometry: ReferenceGeometry, points: np.ndarray, metric
     }
     if points.ndim > 2:
         data |= {"zeta": points[..., 0], "weight": points[..., 1]}
-    if metric != TRUE_METRIC:
-        data |= {"q": geometry.q, "qk": geometry.qk, "p": geometry.p}
-        if metric == SHIFTED:
-            data |= dict(zip(("shift", "turn", "mu"), shifted_layers(geometry, points)))
-    else:
-        t = geometry.thickness[:, None] * points[..., 0]  # (ne, np)
-        shift = np.eye(2) + t[:, None, :, None, None] * geometry.curvature[:, :, None]
-        jacobian = np.linalg.det(shift)
-        folded = thickness_over_radius(geometry).max(
-            axis=1
-        )  # at the faces: the points inside the layers may still be sound
-        if folded.max() >= 1:
-            element = int(np.argmax(folded))
-            place = ", ".join(f"{value:.4g}" for value in geometry.position[element].mean(axis=0))
-            raise ValueError(
-                f"The true metric is not valid at ({place}) m: half the wall exceeds the radius there, so "
-                f"the inner face folds over itself; "
-                f"use {SHIFTED!r} or {FIRST_ORDER!r}."
-            )
-        p = np.einsum("epac,eplcd->eplad", geometry.p, np.linalg.inv(shift))
-        turn = np.einsum("pac,eai->epci", SLOPE, mesh.directors[mesh.quads])
-        second = np.einsum("epci,epdi->epcd", turn, turn)
-        data |= {
-            "q": strain_map(p),
-            "p": p,
-            "mu": jacobian,
-            "m2": np.stack([0.5 * second[..., 0, 0], 0.5 * second[..., 1, 1], second[..., 0, 1]], axis=-1),
-        }
+    data |= {"q": geometry.q, "qk": geometry.qk, "p": geometry.p}
+    if metric == SHIFTED:
+        data |= dict(zip(("shift", "turn", "mu"), shifted_layers(geometry, points)))
     return {key: jnp.asarray(value) for key, value in data.items()}
 
 
@@ -130,20 +100,13 @@ def strains_of_shape(place, element, layers, metric):
     shear = SHEAR_WEIGHTS * (edge - element["s0"])
     gamma = jnp.stack([shear[:, 0] + shear[:, 1], shear[:, 2] + shear[:, 3]], axis=1)
     t = element["h"] * (element if "zeta" in element else layers)["zeta"]
-    if metric != TRUE_METRIC:
-        membrane = jnp.einsum("pij,pj->pi", element["q"], c0)
-        bending = jnp.einsum("pij,pj->pi", element["q"], c1) - jnp.einsum("pij,pj->pi", element["qk"], c0)
-        plane = membrane[:, None] + t[None, :, None] * bending[:, None]
-        across = jnp.broadcast_to(jnp.einsum("pac,pc->pa", element["p"], gamma)[:, None], plane.shape[:2] + (2,))
-        if metric == SHIFTED:
-            plane = jnp.einsum("plij,plj->pli", element["shift"], plane)
-            across = jnp.einsum("plab,plb->pla", element["turn"], across)
-    else:
-        turn = jnp.einsum("pac,ai->pci", SLOPE, d)
-        c2 = _half_metric(turn) - element["m2"]
-        cov = c0[:, None] + t[None, :, None] * c1[:, None] + (t**2)[None, :, None] * c2[:, None]
-        plane = jnp.einsum("plij,plj->pli", element["q"], cov)
-        across = jnp.einsum("plac,pc->pla", element["p"], gamma)
+    membrane = jnp.einsum("pij,pj->pi", element["q"], c0)
+    bending = jnp.einsum("pij,pj->pi", element["q"], c1) - jnp.einsum("pij,pj->pi", element["qk"], c0)
+    plane = membrane[:, None] + t[None, :, None] * bending[:, None]
+    across = jnp.broadcast_to(jnp.einsum("pac,pc->pa", element["p"], gamma)[:, None], plane.shape[:2] + (2,))
+    if metric == SHIFTED:
+        plane = jnp.einsum("plij,plj->pli", element["shift"], plane)
+        across = jnp.einsum("plab,plb->pla", element["turn"], across)
     return jnp.concatenate([plane, across], axis=-1)
 
 
@@ -153,12 +116,6 @@ def inplane_products(x, d):
     i, j = PAIRS.T
     products = FACTORS * jnp.sum(u[i] * u[j], axis=1)
     return jnp.concatenate([products, FACTORS * jnp.sum(u[i] * v[j] + v[i] * u[j], axis=1)])
-
-
-def _half_metric(a):
-    """Half the metric of pairs of vectors (4, 2, 3) as [11, 22, 2 * 12]."""
-    product = 0.5 * jnp.einsum("pci,pdi->pcd", a, a)
-    return jnp.stack([product[:, 0, 0], product[:, 1, 1], 2 * product[:, 0, 1]], axis=-1)
 
 
 def material_strains(strains, layers):
@@ -247,7 +204,7 @@ class EnergyFunctions:
         self.kinds = tuple(int(kind) for kind in section.kinds)
         points = section.points if points is None else points
         self.elements = element_arrays(mesh, geometry, points, metric, assumed)
-        self.layers = section_arrays(section, geometry, metric)
+        self.layers = section_arrays(section)
 
     def energy(self, unknowns):
         """(ne,) energies from unknowns (ne, 4, 5)."""

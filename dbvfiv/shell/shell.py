@@ -54,7 +54,7 @@ class Shell:
     section : Section
     free : (nn, 5) bool array, optional
         Free unknowns of each node; all by default.
-    metric : "first-order", "true" or "shifted"
+    metric : "first-order" or "shifted"
         Through-thickness treatment, see `dbvfiv.shell.energy`. Only the first-order treatment has a compiled element
         loop; the other is evaluated by automatic differentiation of its energy, several times slower.
     element : str

@@ -105,13 +105,7 @@ class Session:
     @cached_property
     def described(self) -> ValveModel:
         """The model before anything is solved: rubbers whose strain levels are sought have the lowest tested ones."""
-
-        def build() -> ValveModel:
-            model = ValveModel(self.case)
-            model.shell.energies  # built on first use otherwise, and it is here that an invalid metric shows
-            return model
-
-        return _attempt(build)
+        return _attempt(lambda: ValveModel(self.case))
 
     @cached_property
     def mesh(self) -> MeshData:

@@ -209,12 +209,13 @@ def test_pressures_of_steady(tmp_path, text, overrides, expected):
     assert Case().steady_pressures() == Case().steady.pressures
 
 
-def test_the_true_metric_by_its_word_or_as_truth(tmp_path):
-    """`--set shell.metric=true` was refused because TOML reads a truth value there."""
-    assert load_case(None, ["shell.metric=true"]).shell.metric == "true"
-    assert load_case(None, ['shell.metric="true"']).shell.metric == "true"
-    with pytest.raises(CaseError, match='shell.metric is given as false; it must be "first-order" or "true"'):
-        load_case(None, ["shell.metric=false"])
+@pytest.mark.parametrize("given", ["true", '"true"', "false"])
+def test_a_metric_that_does_not_exist(one_sentence, given):
+    """Earlier versions had the metric of every parallel surface, "true"."""
+    expected = f'shell.metric is given as .*{given}.*; it must be "first-order" or "shifted"'
+    with pytest.raises(CaseError, match=expected) as caught:
+        load_case(None, [f"shell.metric={given}"])
+    assert one_sentence(str(caught.value))
 
 
 def test_a_mass_that_does_not_exist(one_sentence):

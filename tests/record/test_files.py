@@ -1,5 +1,6 @@
 """Result files: what is written is read back, a stopped run keeps its states, broken files are told in a sentence."""
 
+import json
 import shutil
 import subprocess
 import sys
@@ -184,6 +185,19 @@ def test_broken_files_are_one_sentence(tmp_path, coarse_run, one_sentence, kind)
     with pytest.raises(CaseError) as caught:
         dbvfiv.load_result(path)
     assert one_sentence(str(caught.value)), str(caught.value)
+
+
+def test_a_file_of_a_metric_that_is_no_more(tmp_path, coarse_run, one_sentence):
+    path = tmp_path / "r.h5"
+    path.write_bytes(coarse_run.path.read_bytes())
+    with h5py.File(path, "r+") as file:
+        case = json.loads(file["case/json"].asstr()[()])
+        case["shell"]["metric"] = "true"
+        del file["case/json"]
+        file["case/json"] = json.dumps(case)
+    with pytest.raises(CaseError, match='shell.metric .*"first-order" or "shifted"') as caught:
+        dbvfiv.load_result(path)
+    assert one_sentence(str(caught.value))
 
 
 def test_missing_files_and_folders(tmp_path, one_sentence):

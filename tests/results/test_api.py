@@ -36,7 +36,7 @@ def test_failures_are_raised(coarse_valve, one_sentence):
         with pytest.raises((CaseError, TypeError)):
             coarse_valve.steady(pressure=pressure)
     with pytest.raises(CaseError) as caught:
-        dbvfiv.load(thesis_case(), {"shell.metric": "true", "valve.thickness_factor": 2}).model
+        dbvfiv.load(thesis_case(), {"shell.metric": "true"})
     assert one_sentence(str(caught.value))
 
 

@@ -93,7 +93,7 @@ def test_what_the_package_offers():
         (["drive.pressure=6 kPa"], "drive.pressure", 6e3),
         ('drive.pressure = "6 kPa"', "drive.pressure", 6e3),
         ({"mesh.around": "8"}, "mesh.around", 8),
-        (["mesh.around=8", "shell.metric=true"], "shell.metric", "true"),
+        (["mesh.around=8", "shell.metric=shifted"], "shell.metric", "shifted"),
         ({"mesh.around": np.int64(8)}, "mesh.around", 8),
         ({"drive.pressure": np.float64(3e3)}, "drive.pressure", 3e3),
         ({"steady.pressures": np.array([1e3, 2e3])}, "steady.pressures", (1e3, 2e3)),

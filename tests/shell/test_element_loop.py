@@ -166,13 +166,3 @@ def test_third_derivative(saddle_shell):
     third = shell.third(q, a, b, c)
     assert np.linalg.norm(third - slope) < 1e-7 * np.linalg.norm(slope)
     assert np.linalg.norm(third - shell.third(q, c, a, b)) < 1e-12 * np.linalg.norm(third)
-
-
-def test_true_metric_is_differentiated_too(cylinder_mesh, one_layer):
-    shell = Shell(cylinder_mesh, one_layer, metric="true")
-    q = shell.dofs.restrict(random_state(cylinder_mesh, 23, 0.05, 0.2))
-    direction = unit_direction(shell, 24)
-    force, data = shell.force_and_tangent(q)
-    assert force @ direction == pytest.approx(difference(shell.energy, q, direction, 1e-3), rel=1e-7)
-    slope = difference(shell.force, q, direction, 1e-3)
-    assert np.linalg.norm(shell.dofs.matrix(data) @ direction - slope) < 1e-7 * np.linalg.norm(slope)

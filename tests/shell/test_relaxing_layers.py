@@ -85,9 +85,9 @@ def test_at_rest_nothing_but_material_is_in_the_tangent(mesh):
     assert np.abs(found - whole).max() < 1e-12 * np.abs(whole).max()
 
 
-def test_the_true_metric_has_it_too(cylinder_mesh, one_layer):
+def test_the_shifted_metric_has_it_too(cylinder_mesh, one_layer):
     section = Section((replace(one_layer.layers[0], relaxation=SLOW),))
-    shell = Shell(cylinder_mesh, section, metric="true")
+    shell = Shell(cylinder_mesh, section, metric="shifted")
     (found,) = shell.relaxing_tangents(np.zeros(shell.size))
     _, whole = shell.force_and_tangent(np.zeros(shell.size))
     assert np.abs(found - whole).max() < 1e-12 * np.abs(whole).max()

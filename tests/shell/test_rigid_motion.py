@@ -41,12 +41,6 @@ def test_strains_do_not_see_a_rotation(mixed_shell, axis, angle):
     assert np.abs(one - other).max() < 1e-12
 
 
-def test_true_metric_too(cylinder_mesh, one_layer):
-    shell = Shell(cylinder_mesh, one_layer, metric="true")
-    q = shell.dofs.restrict(rigid_motion(cylinder_mesh, rotation_about((1, 1, 0.2), 2.0)))
-    assert np.abs(shell.strains(q)).max() < 1e-14
-
-
 def test_director_turns_by_the_length_of_the_rotation(cylinder_mesh, one_layer):
     shell = Shell(cylinder_mesh, one_layer)
     theta = np.random.default_rng(0).uniform(-1.8, 1.8, (cylinder_mesh.node_count, 2))

@@ -113,8 +113,8 @@ def test_staggered_coupling_has_the_same_wall(valve):
     assert losses[1] == pytest.approx(losses[0], rel=0.1)
 
 
-def test_the_true_metric_is_refused_in_time(valve, one_sentence):
-    model = valve(LOSSY | {"shell.metric": "true", "valve.thickness_factor": 0.1})
+def test_the_shifted_metric_is_refused_in_time(valve, one_sentence):
+    model = valve(LOSSY | {"shell.metric": "shifted"})
     with pytest.raises(CaseError) as refused:
         ValveMotion(model)
     assert one_sentence(str(refused.value))
