@@ -22,7 +22,7 @@ import numpy as np
 from . import derivatives
 from .heads import outward_head, reversible_head
 from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
-from .reversed import ReversibleFluid
+from .stepping import MovingFluid
 from .term import VISCOSITY, FlowTerm, Stream, upstream_integral, wall_share
 
 
@@ -234,9 +234,9 @@ class Channel(FlowLaw):
         leaves[self.DATA.index("terms")] = self.losses
         return self._unflatten(kept, leaves)
 
-    def stepping(self, density: float) -> ReversibleFluid:
+    def stepping(self, density: float) -> MovingFluid:
         """Evaluators for time steps, in which the flow may run either way."""
-        return ReversibleFluid(self, density)
+        return MovingFluid(self, density)
 
 
 def _trial(count: int, size: float) -> Stream:

@@ -28,13 +28,16 @@ from ..errors import SolveError
 from . import gas_books
 from .gas_books import BOOKS, POWERS, Instant
 from .law import above_floor
+from .stepping import Load, StepFluid
 
 if TYPE_CHECKING:
-    from .gas import GasChannel
+    pass
 
 #: Newton steps within which the flow of a step must be found, and the size of the last one, relative and m/s; what
 #: rounding may leave of it, where steps no longer fall.
 _STEPS, _TOLERANCE, _SMALLEST, _ROUNDING = 40, 1e-11, 1e-12, 1e-9
+#: Absolute pressure, Pa, below which a fluid is a gas: by no more can its pressure fall.
+GAS = 1e6
 #: Share of a step at which its equations are met, and r, for the difference of second order.
 SECOND_ORDER = 1.0, 1.5
 
@@ -185,17 +188,26 @@ class GasInstant:
         return self.state
 
 
-class GasFluid:
-    """Evaluators for time steps.
+class GasFluid(StepFluid):
+    """Evaluators of a `dbvfiv.flow.gas.GasChannel` for time steps."""
 
-    Parameters
-    ----------
-    law : GasChannel
-    density : float, kg/m3
-    """
+    @property
+    def quiet_inward(self) -> bool:
+        """True for a gas, which is soft; the water hammer of a liquid hits walls as an incompressible fluid does."""
+        return self.density * self.law.sound_speed**2 / self.law.ratio < GAS
 
-    def __init__(self, law: GasChannel, density: float):
-        self.law, self.density = law, float(density)
+    def load(self, mid, new, step, speed=None):
+        flow = step.gas.at(*new)
+        psi_rate = step.psi_weight * flow.psi + step.psi_known
+        moved = new[0], flow.speed, flow.psi, psi_rate, step.inlet, float(flow.speed[-1])
+        return Load(None, 0.0, flow.pressure, *moved, gas=flow)
+
+    def load_slopes(self, mid, new, load, theta, velocity, psi_weight):
+        by_area, by_rate = load.gas.slopes()
+        return by_area + velocity * by_rate, None
+
+    def speeds(self, area, rate, state):
+        return self.law.own_velocities(state.gas.inner)
 
     def parameters(self, inlet: float) -> dict[str, float]:
         """Parameters of the law under an inlet pressure, Pa."""

@@ -16,7 +16,7 @@ from scipy.linalg import solve_banded
 
 from ..case.quantity import GRAVITY
 from .line_elements import DEGREE, chain, element
-from .reversed import ReversibleFluid
+from .stepping import MovingFluid, Step
 
 if TYPE_CHECKING:
     from .channel import Channel
@@ -314,7 +314,7 @@ class LineStep:
         )
 
 
-class LineFluid(ReversibleFluid):
+class LineFluid(MovingFluid):
     """The unsteady flow of a time step behind an elastic line.
 
     Parameters
@@ -333,16 +333,14 @@ class LineFluid(ReversibleFluid):
         """The line's equations for the part's area of the inlet, m2."""
         return LineWaves(self.line, inlet_area, self.density)
 
-    def velocity_behind(
-        self, line: LineStep, mid: tuple, new: tuple, old: float, theta: float, psi_weight: float, psi_known: float
-    ) -> float:
-        """New inlet velocity at which the outlet pressure vanishes; arguments as `velocity` has them."""
-        return self._searched(mid, new, 0.0, old, theta, psi_weight, psi_known, line)
+    def _velocity(self, mid: tuple, new: tuple, step: Step) -> float:
+        known = step.speed, step.theta, step.psi_weight, float(step.psi_known[0])
+        return self._searched(mid, new, 0.0, *known, step.line)
 
-    def flange(self, line: LineStep | LineInstant, velocity: float) -> tuple[float, float]:
-        """Static pressure at the flange, Pa, and its derivative by the inlet velocity, where the equations are met."""
-        head, slope = line.at(velocity)
-        return self.density * (head - 0.5 * velocity**2), self.density * (slope - velocity)
+    def flange(self, step: Step, velocity: float) -> tuple[float, float, LineState]:
+        head, slope = step.line.at(velocity)
+        static = self.density * (head - 0.5 * velocity**2), self.density * (slope - velocity)
+        return *static, step.line.end(velocity)
 
 
 def _solve(banded: np.ndarray, rhs: np.ndarray) -> np.ndarray:

@@ -13,19 +13,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..flow.stepping import Load
 from ..model.linear import SingularMatrix
 from .numerical import numerical_loss
 from .predictor import Predictor
 from .scheme import Scheme
 from .scheme import scheme as member
 from .state import MotionState
-from .terms import Load
 from .trial import Trial
 
 #: Speed inwards, relative to the largest speed, that is none.
 INWARD = 1e-6
 #: Least numerical damping of steps that start with fluid drawn in: without any, the kicks that walls get then alternate
-#: from step to step for good. A motion that is `quiet_inward` takes no such steps.
+#: from step to step for good. A fluid that is `quiet_inward` takes no such steps.
 DAMPING = 0.2
 
 
@@ -120,7 +120,7 @@ class Stepper:
         self, motion, scheme: Scheme, pressure: Callable[[float], float], options: StepOptions = StepOptions()
     ):
         self.motion, self.scheme, self.pressure, self.options = motion, scheme, pressure, options
-        quiet = getattr(motion, "quiet_inward", False)
+        quiet = motion.fluid.quiet_inward
         self._inward = scheme if quiet else member("generalised-alpha", max(DAMPING, scheme.gamma - 0.5))
         self.residuals = self.solves = self.factorisations = 0
         self.forget()

@@ -3,13 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..flow.gas_stepping import SECOND_ORDER
+from ..flow.gas_stepping import SECOND_ORDER, GasStep
+from ..flow.line_stepping import LineStep
+from ..flow.stepping import Step
 from .scheme import Scheme
 from .state import MotionState
-from .terms import Step, Weights
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the parts of a step's equations: their dependence on the new unknowns.
+
+    Attributes
+    ----------
+    theta : float
+        Point in the step at which the fluid's equations are met: the share of the new state there.
+    load : float
+        Factor of G p there.
+    inertia : float
+        Factor of M, 1/s2; mass damping included.
+    force : float
+        Factor of the tangent of F.
+    velocity : float
+        Derivative of the new velocities with respect to the new positions, 1/s.
+    psi : float
+        Derivative of the rate of psi with respect to the new psi, 1/s.
+    outside : float
+        Factor of the added mass of fluid outside, 1/s2: no damping acts on it.
+    """
+
+    theta: float
+    load: float
+    inertia: float
+    force: float
+    velocity: float
+    psi: float
+    outside: float = 0.0
 
 
 class Trial:
@@ -51,8 +84,8 @@ class Trial:
             rate / h,
             (1.0 - rate) * old.psi_rate - (rate / h) * old.psi,
             inlet,
-            None if old.line is None else motion.line_step(old.line, h, theta, rate, inlet),
-            None if old.gas is None else motion.fluid_step(old.gas, h, rate, inlet),
+            None if old.line is None else LineStep(motion.waves, old.line, h, theta, rate, inlet),
+            None if old.gas is None else GasStep(motion.fluid, old.gas, h, rate, inlet),
         )
 
         # stiffness damping is by the slow law, and its force is known apart only where there is some
