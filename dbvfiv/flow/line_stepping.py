@@ -9,18 +9,14 @@ channel's psi: equations met at a share theta of the step, rates by differences,
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import solve_banded
 
 from ..case.quantity import GRAVITY
+from .law import FlowLaw, Traceable
 from .line_elements import DEGREE, chain, element
 from .stepping import MovingFluid, Step
-
-if TYPE_CHECKING:
-    from .channel import Channel
-    from .elastic_line import ElasticLine
 
 #: Newton steps within which velocities in the line must be found, and the relative size of the last one.
 _STEPS, _TOLERANCE = 40, 1e-14
@@ -78,7 +74,7 @@ class LineWaves:
     density : float, kg/m3
     """
 
-    def __init__(self, line: ElasticLine, inlet_area: float, density: float):
+    def __init__(self, line: Traceable, inlet_area: float, density: float):
         one, count = element(), line.elements
         own = {"pipe_length": line.line.length, "wave_speed": line.wave_speed}
         segments = line.segments(inlet_area, own)
@@ -325,7 +321,7 @@ class LineFluid(MovingFluid):
     line : ElasticLine
     """
 
-    def __init__(self, channel: Channel, density: float, line: ElasticLine):
+    def __init__(self, channel: FlowLaw, density: float, line: Traceable):
         super().__init__(channel, density)
         self.line = line
 

@@ -21,7 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..flow import FlowMotion
-from ..flow.derivatives import along
+from ..flow.law import along
 from ..shell.reference import SHAPE, SLOPE
 from ..shell.rotation import director
 from .outside_forms import OutsideForms

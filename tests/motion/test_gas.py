@@ -5,8 +5,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case.parameters import Mu
-from dbvfiv.flow.gas_books import BOOKS
-from dbvfiv.flow.gas_stepping import GasFluid
+from dbvfiv.flow.gas_stepping import BOOKS, GasFluid
 from dbvfiv.model.dynamics import linearise
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
