@@ -24,7 +24,7 @@ from ..flow import FlowMotion
 from ..flow.law import along
 from ..shell.reference import SHAPE, SLOPE
 from ..shell.rotation import director
-from .outside_forms import OutsideForms
+from .outside import OutsideForms
 from .valve import ValveModel
 
 #: Parameters of the damping; those of the flow law come before them.
@@ -138,7 +138,8 @@ class ValveResidual:
             out[self._forces] += self.model.contact.form(motion[0], *(direction[0] for direction in directions))
         if self.model.outside is not None:
             if self._outside is None or not np.array_equal(self._outside.q, motion[0]):
-                self._outside = OutsideForms(self.model, motion[0])
+                structure = self.model.shell.dofs.matrix(self.model.structure(motion[0])[1])
+                self._outside = OutsideForms(self.model.outside, motion[0], structure)
             form = self._outside.second if len(directions) == 2 else self._outside.third
             density = self.model.case.outside.density(parameters["density"])
             out[self._forces] += density * form(*(direction[:3] for direction in directions))

@@ -20,9 +20,8 @@ from ..case.materials import HIGHEST_LEVEL, LOWEST_LEVEL, RUBBERS
 from ..case.model import Case
 from ..errors import SolveError
 from ..observer import Observer
-from .equilibria import LoadPath, SteadyOptions
+from .equilibria import LoadPath, SteadyOptions, operating_pressure
 from .layer_strains import LayerLevel, layer_levels
-from .operating_point import operating_pressure
 from .state import SteadyState
 from .valve import ValveModel
 

@@ -27,11 +27,10 @@ from ..geometry import ValveMesh
 from ..shell import Section, StepWall, Weight
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_flow, build_shell, build_weight
-from .faces import FaceContact, face_contact
 from .linear import CoupledFactor
 from .outside import OutsideFluid
 from .relaxing import WallRelaxation
-from .supports import lip_stops
+from .supports import FaceContact, face_contact, lip_stops
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@
 
 F is the internal force of shell and stops and w its rate. F and the flow's psi (see `dbvfiv.flow.stepping`) are kept in
 the state as quantities of first order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent with the
-tangent without an evaluation of it. f_c is the contact of inner faces, see `dbvfiv.motion.contact`.
+tangent without an evaluation of it. f_c is the contact of inner faces, see `dbvfiv.model.supports`.
 
 Equation (T.15) of docs/theory.md.
 """
@@ -18,11 +18,10 @@ from ..flow.gas_stepping import GasFluid, GasInstant, GasState
 from ..flow.line_stepping import LineInstant, LineState, LineWaves
 from ..flow.stepping import FrozenFluid, Load, SteadyFluid, Step, StepFluid
 from ..model import ValveModel
-from ..model.linear import CoupledFactor
+from ..model.linear import CoupledFactor, DirectFactor
+from ..model.supports import FaceStep
 from ..shell import Memory, StepWall, WallMemory
-from .contact import FaceStep, MassSolver
-from .energies import wall_energies
-from .kernels import row_motion
+from .kernels import row_motion, strain_energy
 from .outside import MovingOutside, OutsideCorrection
 from .trial import Weights
 
@@ -354,3 +353,39 @@ class ValveMotion:
     def outside_energy(self, q: np.ndarray, v: np.ndarray) -> float:
         """Kinetic energy of the fluid outside, J of the part; zero where there is none."""
         return 0.0 if self.outside is None else self.outside.energy(q, v)
+
+
+def wall_energies(model: ValveModel, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+    """Kinetic energy and strain energy at positions and velocities (n,), J of the part."""
+    shell = model.shell
+    nodal = model.nodal(q)
+    d = shell.directors(nodal)[0]
+    if shell.metric == "first-order":
+        parts = zip(shell.parts, shell.wall)
+        strain = sum(strain_energy(p.quads, shell.mesh.nodes, nodal, d, p.reference, wall) for p, wall in parts)
+    else:
+        strain = shell.energy(q)
+    return shell.kinetic_energy(q, v), float(strain)
+
+
+class MassSolver:
+    """Accelerations that a force gives the wall, with the added mass of fluid outside.
+
+    Parameters
+    ----------
+    model : ValveModel
+    """
+
+    def __init__(self, model: ValveModel):
+        self._model = model
+        self._factor = DirectFactor(*model.shell.dofs.pattern)
+
+    def solve(self, q: np.ndarray, force: np.ndarray, outside: MovingOutside | None = None) -> np.ndarray:
+        """Accelerations (n,) at positions (n,) by a force (n,)."""
+        factor = self._factor
+        factor.values[:] = self._model.mass(q)
+        factor.refactor()
+        if outside is None:
+            return factor.solve(force)
+        none = np.zeros(0)
+        return outside.correction(lambda f, _: (factor.solve(f), none), 1.0).solve(force, none)[0]

@@ -12,10 +12,8 @@ from ...errors import SolveError
 from ...model import ValveModel
 from ...model.equilibria import model_warnings
 from ...model.material_stability import material_stability
-from ...motion.control import step_control
-from ...motion.drive import Drive
+from ...motion.control import Drive, RunOptions, step_control
 from ...motion.equations import ValveMotion
-from ...motion.options import RunOptions
 from ...motion.start import first_state
 from ...motion.state import MotionState
 from ...motion.stepper import StepFailure, Stepper
