@@ -12,9 +12,8 @@ from ..case.quantity import GRAVITY
 from ..errors import SolveError
 from ..geometry.divisions import grading
 from ..observer import Observer
-from .layer_strains import beyond_levels
 from .load_steps import Loading, LoadStepOptions, LoadSteps, Way
-from .material_stability import material_stability
+from .material_stability import beyond_levels, material_stability
 from .newton import NewtonOptions
 from .state import SteadyState, describe_state
 from .valve import ValveModel

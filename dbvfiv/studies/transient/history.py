@@ -8,7 +8,7 @@ import numpy as np
 
 from ...flow.gas_stepping import BOOKS, GasState
 from ...flow.line_stepping import LineState
-from ...model.lip import LipCentre
+from ...model.state import LipCentre
 from ...motion.equations import ValveMotion
 from ...motion.stepper import StepResult
 
