@@ -5,7 +5,7 @@ from __future__ import annotations
 import resource
 from time import process_time
 
-from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.control import RunOptions
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import Session

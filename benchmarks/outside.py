@@ -10,7 +10,7 @@ import numpy as np
 from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
-from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.control import RunOptions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.walk import StabilityWalk
 from dbvfiv.studies.transient.run import Runner

@@ -10,7 +10,7 @@ from time import perf_counter, process_time
 import numpy as np
 
 from dbvfiv.model import ValveModel
-from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.control import RunOptions
 from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header
 from dbvfiv.record.mesh import MeshData

@@ -19,10 +19,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from . import derivatives
-from .heads import outward_head, reversible_head
-from .law import FlowLaw, FlowMotion, FlowParameter, above_floor
-from .reversed import ReversibleFluid
+from .law import FlowLaw, FlowMotion, FlowParameter, above_floor, solve_steady
+from .stepping import MovingFluid
 from .term import VISCOSITY, FlowTerm, Stream, upstream_integral, wall_share
 
 
@@ -48,7 +46,7 @@ class Channel(FlowLaw):
         Pressure of the fluid inside at rest under its weight, Pa, over that at the outlet; those of the fluid outside
         in `levels_outside`. The levels keep their places, as the stations do.
     reversible : bool
-        Let flow that is drawn in lose its head; see `dbvfiv.flow.heads`. Small motions of an outward flow are the same.
+        Let flow that is drawn in lose its head; see `reversible_head`. Small motions of an outward flow are the same.
     perimeter : (m,) array, optional
         Arcs of the wall that the fluid wets, m; terms of a viscous fluid need them.
     density : float, kg/m3
@@ -214,7 +212,7 @@ class Channel(FlowLaw):
         An inlet velocity that no pressure holds back is infinite.
         """
         if self.viscous:
-            return derivatives.solve_steady(self.without_drives(), area, parameters)
+            return solve_steady(self.without_drives(), area, parameters)
         open_ = above_floor(area, self.floor)
         total = open_**-2.0
         still = jnp.zeros_like(area)
@@ -234,9 +232,9 @@ class Channel(FlowLaw):
         leaves[self.DATA.index("terms")] = self.losses
         return self._unflatten(kept, leaves)
 
-    def stepping(self, density: float) -> ReversibleFluid:
+    def stepping(self, density: float) -> MovingFluid:
         """Evaluators for time steps, in which the flow may run either way."""
-        return ReversibleFluid(self, density)
+        return MovingFluid(self, density)
 
 
 def _trial(count: int, size: float) -> Stream:
@@ -244,3 +242,64 @@ def _trial(count: int, size: float) -> Stream:
     area = np.linspace(2.0, 5.0, count)
     speed = size / area
     return Stream(area, size * np.linspace(0.1, 0.3, count), speed, speed[-1:], area)
+
+
+def outward_head(speed, velocity):
+    """Bernoulli's head (m,) of speeds (m,) with the inlet velocity."""
+    return 0.5 * (speed**2 - velocity**2)
+
+
+def reversible_head(speed, velocity):
+    """Head (m,) of a flow that may run backwards, as a whole or in a part of the passage.
+
+    Drawn in through the lips, the fluid starts from rest outside, where the pressure vanishes, gains speed at the cost
+    of pressure as far as sections get narrower, and wherever they widen it goes on as a jet whose velocity head is
+    lost. Bernoulli's law would give that head back at the inlet, so that a reversed flow gained pressure where it
+    should lose it, and ran away.
+    """
+    out, back = jnp.maximum(speed, 0.0), jnp.minimum(speed, 0.0)
+    gained = jnp.maximum(jnp.diff(back * back), 0.0)
+    lost = jnp.concatenate([jnp.cumsum(gained[::-1])[::-1], jnp.zeros(1)])
+    outside = jnp.zeros_like(speed).at[0].set(back[0] ** 2)  # what stands for the outlet is the still water outside
+    return 0.5 * (out * out - out[-1] ** 2 - lost - outside)
+
+
+class AroundChannel(FlowLaw):
+    """Flow law that extends a channel, as by an elastic line or a compressible fluid.
+
+    Attributes
+    ----------
+    channel : Channel
+        Gives the law its stations, levels and blend of the continuity laws.
+    """
+
+    channel: Channel
+
+    @property
+    def count(self) -> int:
+        return self.channel.count
+
+    @property
+    def terms(self):
+        """Loss and inertance terms of the channel."""
+        return self.channel.terms
+
+    @property
+    def back(self) -> float:
+        """Driving pressure at which nothing flows, Pa; that of the channel."""
+        return self.channel.back
+
+    @property
+    def level(self) -> float:
+        """Hydrostatic pressure between the ends of the passage, Pa; that of the channel."""
+        return self.channel.level
+
+    @property
+    def static(self):
+        """Hydrostatic pressures (m,) across the wall at the stations, Pa; those of the channel."""
+        return self.channel.static
+
+    @property
+    def storage(self) -> float:
+        """Blend of the continuity laws."""
+        return self.channel.storage

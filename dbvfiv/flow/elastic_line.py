@@ -25,8 +25,7 @@ from typing import Any, ClassVar, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from .around import AroundChannel
-from .channel import Channel
+from .channel import AroundChannel, Channel
 from .law import FlowMotion, FlowParameter, Traceable
 from .line_elements import DEGREE, chain, element
 from .line_stepping import LineFluid

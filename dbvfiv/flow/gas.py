@@ -33,10 +33,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .around import AroundChannel
-from .channel import Channel
+from .channel import AroundChannel, Channel, outward_head, reversible_head
 from .gas_stepping import GasFluid
-from .heads import outward_head, reversible_head
 from .law import FlowMotion, FlowParameter, above_floor
 
 #: Relative error of the frequency of waves that counts as resolved; the box scheme's is (k h)^2/12.

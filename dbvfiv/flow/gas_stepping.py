@@ -11,32 +11,76 @@ differenced, not density, so none is lost where a section shrinks to a fraction 
 
 The unknowns x are eliminated in each evaluation: the wall sees pressures and their derivatives by areas.
 
-Equations (T.23) and (T.24) of docs/theory.md.
+The balances of mass and momentum of each cell at the end of a step, multiplied by the cell's mean discharge G and mean
+head H = w + U^2/2 and summed, say what the fluid does with its energy E over the step, to the last digit:
+
+    E_1 - E_0 = supply - outflow - loss - work - (what differences in time take) - (what the cells take)
+
+The sums G dH + H dG over a cell are its ends' difference, so convection takes nothing. Supply, outflow and loss are by
+the powers at the end of a step of first order, as its balances are, and by the mean powers of one of second order. The
+work is that of the mean pressure on the wall, p the pressure of sigma and A its area. With m = rho A the mass and O the
+open area, d what changes in the step and q' the last rate of q,
+
+- differences in time take the convex energy's distance from its tangent, O_0 [e(rho_0) - e(rho_1) - w_1 (rho_0 -
+  rho_1)] with e = rho w - p, that of the kinetic one, m_0 dU^2/2 + dm U_1 dU, the work of half the pressure's change,
+  dp dA/2, what the second order adds, (r - 1)(dq - h q') by G or H, and half the change of the powers, which in a
+  smooth motion is the same with the opposite sign: what is left then is of the third order in h;
+- the cells take the difference between the products of means and the means of the products, and what walls do to gas
+  below the floor of the area and in the cell at the lips, where the density stored is that inside.
+
+Neither is a property of the fluid: the first falls with the step, the second with the mesh.
+
+Equations (T.23), (T.24) and (T.28) of docs/theory.md.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ..errors import SolveError
-from . import gas_books
-from .gas_books import BOOKS, POWERS, Instant
-from .law import above_floor
-
-if TYPE_CHECKING:
-    from .gas import GasChannel
+from .law import FlowLaw, above_floor
+from .stepping import Load, StepFluid
 
 #: Newton steps within which the flow of a step must be found, and the size of the last one, relative and m/s; what
 #: rounding may leave of it, where steps no longer fall.
 _STEPS, _TOLERANCE, _SMALLEST, _ROUNDING = 40, 1e-11, 1e-12, 1e-9
+#: Absolute pressure, Pa, below which a fluid is a gas: by no more can its pressure fall.
+GAS = 1e6
 #: Share of a step at which its equations are met, and r, for the difference of second order.
 SECOND_ORDER = 1.0, 1.5
+
+
+#: What has become of a fluid's energy: taken in at the flange, left through the lips, done on the wall, lost in the
+#: passage, taken by differences in time and by cells of finite length.
+BOOKS = ("supply", "outflow", "work", "loss", "step_loss", "mesh_loss")
+
+#: Number of powers that a state keeps, see `_powers`.
+POWERS = 3
+
+
+class Instant(NamedTuple):
+    """A fluid at the beginning or end of a step.
+
+    Attributes
+    ----------
+    area : (m,) array, m2
+    inner, stored, rate : (l,) arrays
+        The law's unknowns, m/s, what its balances hold, m2/s and m3, and the scheme's rate of that.
+    power : (3,) array, W
+        See `_powers`.
+    """
+
+    area: jnp.ndarray
+    inner: jnp.ndarray
+    stored: jnp.ndarray
+    rate: jnp.ndarray
+    power: jnp.ndarray
 
 
 def packed_size(inner: int) -> int:
@@ -57,9 +101,9 @@ class GasState:
     area : (m,) array, m2
         Of the passage.
     power : (3,) array, W
-        Of a quarter; see `dbvfiv.flow.gas_books.powers`.
+        Of a quarter; see `_powers`.
     books : (6,) array
-        What has become of its energy since the start, J of the part; see `dbvfiv.flow.gas_books.BOOKS`.
+        What has become of its energy since the start, J of the part; see `BOOKS`.
     """
 
     inner: np.ndarray
@@ -165,7 +209,7 @@ class GasStep:
         power = self.fluid.powers(flow.area, flow.area_rate, flow.inner)
         new = GasState(flow.inner, flow.stored, rate, flow.area, power, old.books)
         given = self.fluid.law, self.parameters, old.instant, new.instant
-        return replace(new, books=old.books + np.asarray(gas_books.step_books(*given, h, self._rate)))
+        return replace(new, books=old.books + np.asarray(_step_books(*given, h, self._rate)))
 
 
 class GasInstant:
@@ -185,17 +229,26 @@ class GasInstant:
         return self.state
 
 
-class GasFluid:
-    """Evaluators for time steps.
+class GasFluid(StepFluid):
+    """Evaluators of a `dbvfiv.flow.gas.GasChannel` for time steps."""
 
-    Parameters
-    ----------
-    law : GasChannel
-    density : float, kg/m3
-    """
+    @property
+    def quiet_inward(self) -> bool:
+        """True for a gas, which is soft; the water hammer of a liquid hits walls as an incompressible fluid does."""
+        return self.density * self.law.sound_speed**2 / self.law.ratio < GAS
 
-    def __init__(self, law: GasChannel, density: float):
-        self.law, self.density = law, float(density)
+    def load(self, mid, new, step, speed=None):
+        flow = step.gas.at(*new)
+        psi_rate = step.psi_weight * flow.psi + step.psi_known
+        moved = new[0], flow.speed, flow.psi, psi_rate, step.inlet, float(flow.speed[-1])
+        return Load(None, 0.0, flow.pressure, *moved, gas=flow)
+
+    def load_slopes(self, mid, new, load, theta, velocity, psi_weight):
+        by_area, by_rate = load.gas.slopes()
+        return by_area + velocity * by_rate, None
+
+    def speeds(self, area, rate, state):
+        return self.law.own_velocities(state.gas.inner)
 
     def parameters(self, inlet: float) -> dict[str, float]:
         """Parameters of the law under an inlet pressure, Pa."""
@@ -216,11 +269,11 @@ class GasFluid:
 
     def powers(self, area, area_rate, inner) -> np.ndarray:
         """Powers (3,) of `GasState`, W."""
-        return np.asarray(gas_books.powers(self.law, self.parameters(0.0), area, area_rate, inner))
+        return np.asarray(_powers(self.law, self.parameters(0.0), area, area_rate, inner))
 
     def energy(self, area, inner) -> float:
         """Kinetic energy of the fluid and that of its compression, J of the part."""
-        return float(gas_books.energy(self.law, self.parameters(0.0), area, inner))
+        return float(_energy(self.law, self.parameters(0.0), area, inner))
 
     def readings(self, area, inner) -> tuple[float, float, float]:
         """Mass flows at outlet and inlet, kg/s of the part, and the largest Mach number."""
@@ -309,3 +362,95 @@ def _readings(law, parameters, area, inner):
     sigma = sigma.at[0].add(law.drawn(speed[0], parameters))
     flow = parameters["density"] * jnp.exp(sigma / parameters["sound_speed"]) * above_floor(area, law.floor) * speed
     return flow[0], flow[-1], jnp.max(jnp.abs(speed) / law.local_sound_speed(sigma, parameters))
+
+
+class _Stations(NamedTuple):
+    """Flow at the stations (m,) at an instant; `thick`, `mass`, `held` and `within` belong to the stored mass."""
+
+    area: jnp.ndarray
+    open: jnp.ndarray
+    speed: jnp.ndarray
+    thick: jnp.ndarray
+    mass: jnp.ndarray
+    held: jnp.ndarray
+    within: jnp.ndarray
+    head: jnp.ndarray
+    flow: jnp.ndarray
+    pressure: jnp.ndarray
+
+
+def _stations(law: FlowLaw, parameters, area, inner) -> _Stations:
+    speed, sigma = law.split(inner, parameters)
+    c, density, open_, held = parameters["sound_speed"], parameters["density"], above_floor(area, law.floor), law.inside
+    inside, entering = held(sigma), sigma.at[0].add(law.drawn(speed[0], parameters))
+    thick = density * jnp.exp(inside / c)
+    return _Stations(
+        area,
+        open_,
+        speed,
+        thick,
+        open_ * thick,
+        law.enthalpy(inside, parameters),
+        law.pressure(inside, parameters),
+        law.enthalpy(sigma, parameters) + 0.5 * speed**2,
+        density * jnp.exp(entering / c) * open_ * speed,
+        law.pressure(sigma, parameters),
+    )
+
+
+@jax.jit
+def _energy(law: FlowLaw, parameters, area, inner):
+    """Kinetic energy and that of compression, J of the part, with areas (m,) and unknowns (l,)."""
+    at = _stations(law, parameters, area, inner)
+    return _integral(law, at.mass * (at.held + 0.5 * at.speed**2) - at.open * at.within)
+
+
+@jax.jit
+def _powers(law: FlowLaw, parameters, area, area_rate, inner):
+    """Power taken in at the flange, leaving through the lips and lost in the passage (3,), W of the computed part."""
+    at = _stations(law, parameters, area, inner)
+    head = law.sources(area, area_rate, inner, parameters)[: law.count - 1]
+    lost = _mean(at.flow) * (head - (at.head[:-1] - at.head[1:]))  # what the cells take besides Bernoulli's heads
+    return jnp.array([at.flow[-1] * at.head[-1], at.flow[0] * at.head[0], jnp.sum(lost)])
+
+
+@jax.jit
+def _step_books(law: FlowLaw, parameters, old: Instant, new: Instant, h, weight):
+    """Energy budget of one time step (6,), J of the computed part; see `BOOKS`.
+
+    Parameters
+    ----------
+    h : float, s
+    weight : float
+        r, of the new rate; see this module.
+    """
+    a, b = (_stations(law, parameters, at.area, at.inner) for at in (old, new))
+    count, flow, head = law.count, _mean(b.flow), parameters["density"] * _mean(b.head)
+
+    def of_cells(held):  # the sum of balances of cells, J, by what is held in them (l,)
+        return jnp.sum(flow * held[: count - 1]) + jnp.sum(head * held[count:])
+
+    before = jnp.where(weight == 1.0, 0.0, 0.5)
+    mean = new.power + before * (old.power - new.power)
+    ahead = before * h * jnp.sum((old.power - new.power) * jnp.array([1.0, -1.0, -1.0]))
+    change = new.stored - old.stored
+    faster, widened = b.speed - a.speed, b.area - a.area
+    tangent = a.open * ((a.thick * a.held - a.within) - (b.thick * b.held - b.within) - b.held * (a.thick - b.thick))
+    kinetic = 0.5 * a.mass * faster**2 + (b.mass - a.mass) * b.speed * faster
+    in_time = tangent + kinetic + 0.5 * (b.pressure - a.pressure) * widened
+    at_stations = b.mass * b.speed * faster + (b.held + 0.5 * b.speed**2) * (b.mass - a.mass)
+    below = b.within * (b.open - a.open) - b.pressure * widened
+    work = _integral(law, 0.5 * (a.pressure + b.pressure) * widened)
+    step_loss = _integral(law, in_time) + (weight - 1.0) * of_cells(change - h * old.rate) + ahead
+    mesh_loss = of_cells(change) - _integral(law, at_stations - below)
+    return jnp.array([h * mean[0], h * mean[1], work, h * mean[2], step_loss, mesh_loss])
+
+
+def _mean(values):
+    """Means (m - 1,) of values (m,) in the cells."""
+    return 0.5 * (values[1:] + values[:-1])
+
+
+def _integral(law: FlowLaw, values):
+    """Integral of values (m,) along the passage."""
+    return jnp.sum(law.channel.step * _mean(values))

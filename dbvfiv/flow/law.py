@@ -1,9 +1,10 @@
 """Base class of flow laws: one traceable definition, and the methods that callers use.
 
 A law relates m station pressures to the areas of a passage, their first two rates, and l unknowns of its own, which l
-equations fix. `FlowLaw.equations` writes this down once, in jax. Steady flow, linearised operators and second and third
-derivatives follow from it in `dbvfiv.flow.derivatives`, for any law. Time steps evaluate the law thousands of times and
-have faster forms of it (`dbvfiv.flow.stepping`), tested against it.
+equations fix. `FlowLaw.equations` writes this down once, in jax. Steady flow and linearised operators follow from it by
+differentiation, for any law; what follows is compiled once for each kind of law and number of stations, and areas,
+parameters and the law's own numbers may change freely. Time steps evaluate the law thousands of times and have faster
+forms of it (`dbvfiv.flow.stepping`), tested against it.
 """
 
 from __future__ import annotations
@@ -11,13 +12,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-
-from . import derivatives
 
 
 class FlowMotion(NamedTuple):
@@ -198,7 +198,7 @@ class FlowLaw(Traceable, ABC):
 
     def steady(self, area, parameters: Mapping[str, Any]) -> tuple[Any, Any]:
         """Pressures (m,) and inner unknowns (l,) of the steady flow; traceable. Not numbers where there is none."""
-        return derivatives.solve_steady(self, area, parameters)
+        return solve_steady(self, area, parameters)
 
     def stepping(self, density: float):
         """Evaluators for time steps; see `dbvfiv.flow.stepping.MovingFluid`.
@@ -245,24 +245,16 @@ class FlowLaw(Traceable, ABC):
         """Pressures (m,), Pa, of steady flow driven by the inlet pressure, Pa; independent of the density of a fluid
         without viscosity.
         """
-        return np.asarray(derivatives.steady_pressure(self, area, self._driven(inlet)))
+        return np.asarray(_steady_pressure(self, area, self._driven(inlet)))
 
     def steady_operator(self, area: np.ndarray, inlet: float) -> tuple[np.ndarray, np.ndarray]:
         """Steady pressures (m,) and their derivative (m, m) with respect to the areas."""
-        pressure, slope = derivatives.steady_operator(self, area, self._driven(inlet))
+        pressure, slope = _steady_operator(self, area, self._driven(inlet))
         return np.asarray(pressure), np.asarray(slope)
-
-    def steady_second(self, area, inlet, a, b) -> np.ndarray:
-        """Second directional derivative (m,) of the steady pressures along a and b (m,)."""
-        return np.asarray(derivatives.steady_form(self, area, self._driven(inlet), (a, b)))
-
-    def steady_third(self, area, inlet, a, b, c) -> np.ndarray:
-        """Third directional derivative (m,) of the steady pressures."""
-        return np.asarray(derivatives.steady_form(self, area, self._driven(inlet), (a, b, c)))
 
     def steady_slope(self, area: np.ndarray, inlet: float) -> np.ndarray:
         """Derivative (m,) of the steady pressures by the inlet pressure."""
-        return np.asarray(derivatives.steady_slope(self, area, self._driven(inlet)))
+        return np.asarray(_steady_slope(self, area, self._driven(inlet)))
 
     def _driven(self, inlet: float) -> dict[str, float]:
         """Parameters for steady pressures."""
@@ -276,7 +268,7 @@ class FlowLaw(Traceable, ABC):
 
     def steady_inner(self, area: np.ndarray, given: Mapping[str, float]) -> np.ndarray:
         """Inner unknowns (l,) of the steady flow under given parameters."""
-        return np.asarray(derivatives.steady_inner(self, area, self.values(given)))
+        return np.asarray(_steady_inner(self, area, self.values(given)))
 
     def inlet_velocity(self, area: np.ndarray, inlet: float, density: float) -> float:
         """Steady inlet velocity, m/s: the first inner unknown of every law with a fluid."""
@@ -311,12 +303,12 @@ class FlowLaw(Traceable, ABC):
 
     def evaluate(self, motion: FlowMotion, given: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         """Pressures (m,) and residuals (l,) of `equations`, as numpy arrays."""
-        pressure, residual = derivatives.equations(self, self._shaped(motion), self.values(given))
+        pressure, residual = _equations(self, self._shaped(motion), self.values(given))
         return np.array(pressure), np.array(residual)
 
     def linearise(self, motion: FlowMotion, given: Mapping[str, float]) -> FluidOperators:
         """Derivatives of pressures and equations at a motion."""
-        parts = derivatives.linearised(self, self._shaped(motion), self.values(given))
+        parts = _linearised(self, self._shaped(motion), self.values(given))
         return FluidOperators(*(np.asarray(part) for part in parts))
 
     def linearise_still(self, area: np.ndarray, given: Mapping[str, float], inner=None) -> FluidOperators:
@@ -328,3 +320,127 @@ class FlowLaw(Traceable, ABC):
         shape = (self.inner,)
         inner, rate = np.reshape(motion.inner, shape), np.reshape(motion.inner_rate, shape)
         return motion._replace(inner=inner.astype(float), inner_rate=rate.astype(float))
+
+
+#: Newton steps within which the steady flow must be found, and the relative size of the last one.
+_STEPS, _TOLERANCE = 60, 1e-12
+
+
+def along(function, *directions):
+    """The function of one argument (a pytree) that is the derivative of `function` along all directions."""
+    for direction in directions:
+        function = partial(lambda inner, v, u: jax.jvp(inner, (u,), (v,))[1], function, direction)
+    return function
+
+
+@jax.jit
+def _equations(law, motion, parameters):
+    """Pressures (m,) and residuals (l,)."""
+    return law.equations(motion, parameters)
+
+
+@jax.jit
+def _linearised(law, motion, parameters):
+    """A0, A1, A2, B0, B1, R0, R1, R2, S0, S1 of `dbvfiv.flow.law.FluidOperators`."""
+    pressure, residual = jax.jacfwd(lambda m: law.equations(m, parameters))(motion)
+    return (*pressure, *residual)
+
+
+@jax.jit
+def _steady_pressure(law, area, parameters):
+    """Steady pressures (m,)."""
+    return law.steady(area, parameters)[0]
+
+
+@jax.jit
+def _steady_inner(law, area, parameters):
+    """Steady inner unknowns (l,)."""
+    return law.steady(area, parameters)[1]
+
+
+@jax.jit
+def _steady_operator(law, area, parameters):
+    """Steady pressures (m,) and their derivative (m, m) by the areas."""
+    pressure = lambda x: law.steady(x, parameters)[0]  # noqa: E731
+    return pressure(area), jax.jacfwd(pressure)(area)
+
+
+@jax.jit
+def _steady_slope(law, area, parameters):
+    """Derivative (m,) of the steady pressures by the inlet pressure."""
+    inlet = parameters["inlet"]
+    return jax.jacfwd(lambda p: law.steady(area, parameters | {"inlet": p})[0])(inlet)
+
+
+def solve_steady(law, area, parameters):
+    """Pressures (m,) and inner unknowns (l,) at which the law's equations are met in a passage at rest; traceable.
+
+    Newton's method finds the unknowns. Two more steps, through which derivatives are traced, leave them where they are
+    and make their derivatives by areas and parameters exact up to the third: each step doubles the order, as it does
+    the digits. Not numbers where the search fails.
+    """
+    inner = jnp.zeros(0)
+    if law.inner:
+        inner = _root(*jax.lax.stop_gradient((law, area, parameters)))
+        for _ in range(2):
+            inner = inner + _newton_step(law, area, parameters, inner)
+    return law.at_rest(area, inner, parameters)[0], inner
+
+
+def _newton_step(law, area, parameters, inner):
+    equations = lambda x: law.at_rest(area, x, parameters)[1]  # noqa: E731
+    return -jnp.linalg.solve(jax.jacfwd(equations)(inner), equations(inner))
+
+
+def _root(law, area, parameters):
+    """Inner unknowns (l,) by Newton's method, a step halved as long as it makes the next one longer."""
+    step_at = partial(_newton_step, law, area, parameters)
+
+    def better(inner, step, fraction):
+        return jnp.linalg.norm(step_at(inner + fraction * step)) <= jnp.linalg.norm(step)
+
+    def advance(carried):
+        inner, step, count = carried
+        fraction = jax.lax.while_loop(lambda f: (f > 1e-3) & ~better(inner, step, f), lambda f: 0.5 * f, jnp.ones(()))
+        inner = inner + fraction * step
+        return inner, step_at(inner), count + 1
+
+    def goes_on(carried):
+        inner, step, count = carried
+        return (count < _STEPS) & (jnp.linalg.norm(step) > _TOLERANCE * jnp.linalg.norm(inner))
+
+    start = law.steady_start(area, parameters)
+    inner, step, _ = jax.lax.while_loop(goes_on, advance, (start, step_at(start), 0))
+    found = jnp.linalg.norm(step) <= _TOLERANCE * jnp.linalg.norm(inner)
+    return jnp.where(found, inner, jnp.nan)
+
+
+class UniformLoad(FlowLaw):
+    """A uniform pressure without flow: no inner unknowns, p = sign * P at every station.
+
+    Parameters
+    ----------
+    count : int
+        Number of stations.
+    sign : +1 (inside) or -1 (outside)
+    """
+
+    DATA = ("sign",)
+    STATIC = ("_count",)
+    has_fluid = False
+    unsteady = False
+
+    def __init__(self, count: int, sign: float):
+        self._count = int(count)
+        self.sign = float(sign)
+
+    @property
+    def count(self) -> int:
+        return self._count
+
+    @property
+    def parameters(self) -> tuple[FlowParameter, ...]:
+        return (FlowParameter("inlet", "Pa", "pressure on the wall"),)
+
+    def equations(self, motion, parameters):
+        return jnp.full(self._count, self.sign * parameters["inlet"]), jnp.zeros(0)

@@ -9,18 +9,14 @@ channel's psi: equations met at a share theta of the step, rates by differences,
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import solve_banded
 
 from ..case.quantity import GRAVITY
+from .law import FlowLaw, Traceable
 from .line_elements import DEGREE, chain, element
-from .reversed import ReversibleFluid
-
-if TYPE_CHECKING:
-    from .channel import Channel
-    from .elastic_line import ElasticLine
+from .stepping import MovingFluid, Step
 
 #: Newton steps within which velocities in the line must be found, and the relative size of the last one.
 _STEPS, _TOLERANCE = 40, 1e-14
@@ -78,7 +74,7 @@ class LineWaves:
     density : float, kg/m3
     """
 
-    def __init__(self, line: ElasticLine, inlet_area: float, density: float):
+    def __init__(self, line: Traceable, inlet_area: float, density: float):
         one, count = element(), line.elements
         own = {"pipe_length": line.line.length, "wave_speed": line.wave_speed}
         segments = line.segments(inlet_area, own)
@@ -314,7 +310,7 @@ class LineStep:
         )
 
 
-class LineFluid(ReversibleFluid):
+class LineFluid(MovingFluid):
     """The unsteady flow of a time step behind an elastic line.
 
     Parameters
@@ -325,7 +321,7 @@ class LineFluid(ReversibleFluid):
     line : ElasticLine
     """
 
-    def __init__(self, channel: Channel, density: float, line: ElasticLine):
+    def __init__(self, channel: FlowLaw, density: float, line: Traceable):
         super().__init__(channel, density)
         self.line = line
 
@@ -333,16 +329,14 @@ class LineFluid(ReversibleFluid):
         """The line's equations for the part's area of the inlet, m2."""
         return LineWaves(self.line, inlet_area, self.density)
 
-    def velocity_behind(
-        self, line: LineStep, mid: tuple, new: tuple, old: float, theta: float, psi_weight: float, psi_known: float
-    ) -> float:
-        """New inlet velocity at which the outlet pressure vanishes; arguments as `velocity` has them."""
-        return self._searched(mid, new, 0.0, old, theta, psi_weight, psi_known, line)
+    def _velocity(self, mid: tuple, new: tuple, step: Step) -> float:
+        known = step.speed, step.theta, step.psi_weight, float(step.psi_known[0])
+        return self._searched(mid, new, 0.0, *known, step.line)
 
-    def flange(self, line: LineStep | LineInstant, velocity: float) -> tuple[float, float]:
-        """Static pressure at the flange, Pa, and its derivative by the inlet velocity, where the equations are met."""
-        head, slope = line.at(velocity)
-        return self.density * (head - 0.5 * velocity**2), self.density * (slope - velocity)
+    def flange(self, step: Step, velocity: float) -> tuple[float, float, LineState]:
+        head, slope = step.line.at(velocity)
+        static = self.density * (head - 0.5 * velocity**2), self.density * (slope - velocity)
+        return *static, step.line.end(velocity)
 
 
 def _solve(banded: np.ndarray, rhs: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The unsteady flow as a time step sees it: station speeds, their integral from the inlet, and derivatives.
+"""The flow as a time step sees it: station speeds, their integral from the inlet, pressures, and derivatives.
 
     p_k = P_in - rho [ head_k + d psi_k/dt ],      psi_k = integral_in^k U ds
 
@@ -7,24 +7,219 @@ whereas U falls by orders of magnitude within a step when lips slam, and a schem
 values, at which the ideal jet runs away. Numpy forms of the definition in `dbvfiv.flow.channel`, for speed: a step asks
 for them several times. Terms of a channel are evaluated by their definition.
 
+Drawn in through the lips, the fluid starts from rest outside, where the pressure vanishes, and loses the head of its
+jets: `dbvfiv.flow.channel.reversible_head`.
+
 The unknown of a step is one number, the inlet velocity: it is eliminated by a scalar root, which is what lets a step
-choose between an outward flow and one drawn in. Laws with more unknowns have no evaluators here.
+choose between an outward flow and one drawn in. Elastic lines and compressed fluids keep that contract, `StepFluid`:
+what else they have is found within each evaluation.
 
 Equation (T.9) of docs/theory.md.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import Any
 
 import jax
 import numpy as np
 
+from .law import FlowLaw
 from .term import wall_share
 
-if TYPE_CHECKING:
-    from .channel import Channel
+
+@dataclass(frozen=True)
+class Step:
+    """Start of the fluid in a step.
+
+    Attributes
+    ----------
+    theta : float
+        Point in the step at which the fluid's equations are met: the share of the new state there.
+    speed : float
+        Inlet velocity at the start, m/s.
+    psi_weight : float
+    psi_known : (m,) array
+        The rate of psi is psi_weight psi + psi_known, with the new psi.
+    inlet : float
+        Inlet pressure where the equations are met, Pa.
+    line : `dbvfiv.flow.line_stepping.LineStep` or LineInstant, optional
+        Waves in an elastic upstream pipe; `inlet` is then the pressure at its far end.
+    gas : `dbvfiv.flow.gas_stepping.GasStep` or GasInstant, optional
+        State of a compressible fluid.
+    """
+
+    theta: float
+    speed: float
+    psi_weight: float
+    psi_known: np.ndarray
+    inlet: float
+    line: Any = None
+    gas: Any = None
+
+
+@dataclass
+class Load:
+    """Fluid of a step and its force on the wall.
+
+    Attributes
+    ----------
+    force : (n,) array
+        G p, where the equations are met; the wall's part to find.
+    outlet : float
+        Pressure at the outlet, Pa, to vanish; zero where U is no unknown.
+    pressure : (m,) array
+        Pa, where the equations are met.
+    area, speed, psi : (m,) arrays
+        At the end of the step: m2 of the part, m/s, m2/s.
+    psi_rate : (m,) array
+        Where the equations are met, m2/s2.
+    inlet : float
+        Inlet pressure there, Pa.
+    mid_speed : float
+        Inlet velocity there, m/s.
+    line : LineState, optional
+        Waves in an elastic line at the end of the step.
+    flange_slope : float
+        Derivative of the pressure at the flange by the inlet velocity, both where the equations are met, Pa s/m.
+    gas : GasFlow, optional
+        A fluid that is compressed, at the end of the step.
+    """
+
+    force: np.ndarray | None
+    outlet: float
+    pressure: np.ndarray
+    area: np.ndarray
+    speed: np.ndarray
+    psi: np.ndarray
+    psi_rate: np.ndarray
+    inlet: float
+    mid_speed: float
+    line: Any = None
+    flange_slope: float = 0.0
+    gas: Any = None
+
+
+class StepFluid:
+    """Evaluators of a flow law for time steps.
+
+    Parameters
+    ----------
+    law : FlowLaw
+    density : float, kg/m3
+
+    Attributes
+    ----------
+    moves : bool
+        Whether the fluid has inertia, so that psi is part of the state.
+    eliminated : bool
+        Whether pressures follow from the wall's motion alone, so that a step has no unknown of the fluid; it is the
+        inlet velocity otherwise.
+    quiet_inward : bool
+        Whether steps with inward flow need no numerical damping.
+    """
+
+    moves = eliminated = True
+    quiet_inward = False
+
+    def __init__(self, law: FlowLaw, density: float):
+        self.law, self.density = law, float(density)
+
+    def load(self, mid: tuple, new: tuple, step: Step, speed: float | None = None) -> Load:
+        """Fluid of a step but for its force.
+
+        Parameters
+        ----------
+        mid, new : pairs of (m,) arrays
+            Areas and their rates where the equations are met and at the end of the step.
+        step : Step
+        speed : float, optional
+            Inlet velocity at the end, m/s; by default the one at which the outlet pressure vanishes.
+        """
+        raise NotImplementedError
+
+    def load_slopes(self, mid: tuple, new: tuple, load: Load, theta: float, velocity: float, psi_weight: float):
+        """Derivatives of its pressures by the new areas (m, m) and, if it is an unknown, the new inlet velocity (m,).
+
+        Parameters
+        ----------
+        theta, psi_weight : float
+            See `Step`.
+        velocity : float
+            Derivative of the area rates with respect to the areas at the end of the step, 1/s.
+        """
+        raise NotImplementedError
+
+    def speeds(self, area: np.ndarray, rate: np.ndarray, state) -> np.ndarray:
+        """Speeds (m,) of the fluid in a state, m/s, in its passage; zeros where they are none of the unknowns."""
+        return np.zeros(self.law.count)
+
+    def momenta(self, psi: np.ndarray, speed: np.ndarray) -> np.ndarray:
+        """Momentum per density and area of the fluid between stations (m - 1,), m2/s, by psi and the speeds."""
+        return -np.diff(psi)
+
+    def waves(self, inlet_area: float):
+        """Equations of an elastic line for the part's area of the inlet, m2; None without one."""
+        return None
+
+    def begin_step(self, passage: tuple, state, h: float, inlet: float) -> None:
+        """A step of h, s, starts from a state with areas and their rates."""
+
+    def at_an_instant(self) -> StepFluid:
+        """Fluid that the accelerations of an instant are found with."""
+        return self
+
+
+class SteadyFluid(StepFluid):
+    """The steady law at every instant."""
+
+    moves = False
+
+    def load(self, mid, new, step, speed=None):
+        law, inlet, area = self.law, step.inlet, new[0]
+        speed = law.inlet_velocity(area, inlet, self.density) if inlet > law.back else 0.0
+        zero = np.zeros(law.count)
+        pressure = law.steady_pressure(mid[0], inlet)
+        return Load(None, 0.0, pressure, area, law.velocities(area, speed), zero, zero, inlet, speed)
+
+    def load_slopes(self, mid, new, load, theta, velocity, psi_weight):
+        return theta * self.law.steady_operator(mid[0], load.inlet)[1], None
+
+
+class FrozenFluid(StepFluid):
+    """The thesis's coupling (App. A), for comparison: the fluid first, in the passage of the last state, then the wall
+    under its pressures.
+
+    The inlet velocity takes a backward difference in the areas of the last state; the pressures act on the wall as it
+    moves, but are not changed by it.
+
+    Parameters
+    ----------
+    fluid : StepFluid
+        That is advanced.
+    """
+
+    moves = False
+
+    def __init__(self, fluid: StepFluid):
+        super().__init__(fluid.law, fluid.density)
+        self._fluid, self._kept = fluid, None
+
+    def begin_step(self, passage, state, h, inlet):
+        self._kept = self._fluid.load(passage, passage, Step(1.0, state.speed, 1.0 / h, -state.psi / h, inlet))
+
+    def load(self, mid, new, step, speed=None):
+        if self._kept is None:
+            return SteadyFluid(self.law, self.density).load(mid, new, step)
+        return replace(self._kept, outlet=0.0, inlet=step.inlet)
+
+    def load_slopes(self, mid, new, load, theta, velocity, psi_weight):
+        return np.zeros((self.law.count, self.law.count)), None
+
+    def at_an_instant(self):
+        self._kept = None
+        return self._fluid
 
 
 @dataclass(frozen=True)
@@ -46,8 +241,8 @@ class FlowState:
     lost: np.ndarray | float = 0.0
 
 
-class MovingFluid:
-    """Flow through a channel whose areas move.
+class MovingFluid(StepFluid):
+    """Flow through a channel whose areas move; it may run backwards, as a whole or in a part of the valve.
 
     Parameters
     ----------
@@ -55,8 +250,11 @@ class MovingFluid:
     density : float, kg/m3
     """
 
-    def __init__(self, channel: Channel, density: float):
-        self.channel, self.density = channel, float(density)
+    eliminated = False
+
+    def __init__(self, channel: FlowLaw, density: float):
+        super().__init__(channel, density)
+        self.channel = channel
         count = channel.count
         self._upstream = np.zeros((count, count))
         for k in range(count):
@@ -104,13 +302,44 @@ class MovingFluid:
         lost, momentum = self._terms(area, rate, velocity)
         return FlowState(speed, psi + momentum, lost)
 
+    def load(self, mid, new, step, speed=None):
+        if speed is None:
+            speed = self._velocity(mid, new, step)
+        mid_speed = step.speed + step.theta * (speed - step.speed)
+        flow = self.state(*new, speed)
+        psi_rate = step.psi_weight * flow.psi + step.psi_known
+        flange, slope, line = self.flange(step, mid_speed)
+        p = self.pressure(self.state(*mid, mid_speed), psi_rate, flange)
+        outlet, p[0] = float(p[0]), 0.0
+        return Load(None, outlet, p, new[0], flow.speed, flow.psi, psi_rate, step.inlet, mid_speed, line, slope)
+
+    def _velocity(self, mid: tuple, new: tuple, step: Step) -> float:
+        """Inlet velocity at the end of a step, m/s, at which the outlet pressure vanishes."""
+        known = step.speed, step.theta, step.psi_weight, float(step.psi_known[0])
+        return self.velocity(mid, new, step.inlet, *known)
+
+    def flange(self, step: Step, velocity: float) -> tuple[float, float, Any]:
+        """Static pressure at the flange, Pa, its derivative by the inlet velocity, where the equations are met, and an
+        elastic line at the end of the step.
+        """
+        return step.inlet, 0.0, None
+
+    def load_slopes(self, mid, new, load, theta, velocity, psi_weight):
+        speeds = load.mid_speed, load.speed[-1]
+        by_area, by_speed = self.pressure_slopes(mid, new, *speeds, theta, velocity, psi_weight)
+        return by_area, by_speed + theta * load.flange_slope
+
+    def speeds(self, area, rate, state):
+        return self.state(area, rate, state.speed).speed
+
     def velocity(
         self, mid: tuple, new: tuple, inlet: float, old: float, theta: float, psi_weight: float, psi_known: float
     ) -> float:
-        """New inlet velocity at which the outlet pressure vanishes.
+        """New inlet velocity at which the outlet pressure vanishes; not a number if there is none.
 
-        Quadratic in the velocity; the root is taken at which more velocity means less pressure. The other one is a
-        reversed jet, which would run away. Not a number if there is none.
+        Outwards and without terms the pressure is quadratic in the velocity; the root is taken at which more velocity
+        means less pressure. Where a speed would be inward there, and with terms, the root is the one next to the old
+        velocity, in the direction in which that misses it.
 
         Parameters
         ----------
@@ -132,11 +361,13 @@ class MovingFluid:
         b = s0[0] * s1[0] + psi_weight * p1 / theta
         c = 0.5 * s0[0] * s0[0] + psi_weight * (p0 - p1 * start / theta) + psi_known - self._driving(inlet)
         square = b * b - 4.0 * a * c
-        if not square >= 0.0:
-            return np.nan
-        root = np.sqrt(square)
-        mean = -2.0 * c / (b + root) if b >= 0.0 else (root - b) / (2.0 * a)
-        return float((mean - start) / theta)
+        if square >= 0.0:
+            root = np.sqrt(square)
+            mean = -2.0 * c / (b + root) if b >= 0.0 else (root - b) / (2.0 * a)
+            outward = float((mean - start) / theta)
+            if np.min(s0 + (start + theta * outward) * s1) >= 0.0:
+                return outward
+        return self._searched(mid, new, inlet, old, theta, psi_weight, psi_known)
 
     def _searched(self, mid, new, inlet, old, theta, psi_weight, psi_known, supply=None) -> float:
         """New inlet velocity at which the outlet pressure vanishes, next to the old one in the direction in which that
@@ -191,12 +422,26 @@ class MovingFluid:
 
     def head(self, speed: np.ndarray) -> np.ndarray:
         """Velocity head between the inlet and each station (m,), m2/s2, of speeds (m,): pressure over density."""
-        return 0.5 * (speed * speed - speed[-1] ** 2)
+        if speed.min() >= 0.0:
+            return 0.5 * (speed * speed - speed[-1] ** 2)
+        out, back = np.maximum(speed, 0.0), np.minimum(speed, 0.0)
+        head = 0.5 * (out * out - out[-1] ** 2)
+        head[:-1] -= 0.5 * _upstream(np.maximum(np.diff(back * back), 0.0))
+        head[0] -= 0.5 * back[0] ** 2  # what stands for the outlet is the still water outside
+        return head
 
     def head_slope(self, speed: np.ndarray, change: np.ndarray) -> np.ndarray:
         """Its derivative along changes (m,) or (m, l) of the speeds."""
-        products = (speed * change.T).T
-        return products - products[-1]
+        out = np.maximum(speed, 0.0)
+        slope = (out * change.T).T
+        slope -= slope[-1]
+        if speed.min() >= 0.0:
+            return slope
+        back = np.minimum(speed, 0.0)
+        gains = ((np.diff(back * back) > 0.0) * np.diff(back * change.T)).T
+        slope[:-1] -= _upstream(gains)
+        slope[0] -= back[0] * change[0]
+        return slope
 
     def slopes(self, area: np.ndarray, rate: np.ndarray, velocity: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Derivatives of the speeds with respect to areas (m, m), area rates (m, m) and inlet velocity (m,)."""
@@ -256,6 +501,11 @@ class MovingFluid:
             area, rate, own = self._term_slopes(*new, new_speed)[1]
             by_area, by_speed = by_area + psi_weight * (area + velocity * rate), by_speed + psi_weight * own
         return -self.density * by_area, -self.density * by_speed
+
+
+def _upstream(values: np.ndarray) -> np.ndarray:
+    """Sums of values (m, ...) from each station to the inlet."""
+    return np.cumsum(values[::-1], axis=0)[::-1]
 
 
 def _term_parts(channel, parameters, area, rate, velocity):

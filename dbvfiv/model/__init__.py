@@ -1,7 +1,7 @@
 """The coupled valve and its exact linearisation."""
 
 from ..case.parameters import Mu
-from .dynamics import LinearisedState, dynamic_residual, linearise
+from .dynamics import LinearisedState, linearise
 from .leading import BandOrigin, LeadingSearch, growth_floor, limit_point, select_search
 from .valve import Tangent, ValveModel
 
@@ -12,7 +12,6 @@ __all__ = [
     "LinearisedState",
     "Tangent",
     "ValveModel",
-    "dynamic_residual",
     "growth_floor",
     "limit_point",
     "linearise",

@@ -1,15 +1,9 @@
-"""The valve in motion: the time-dependent residual of the coupled system and its exact linearisation about a steady
-state.
+"""Exact linearisation of the valve's equations of motion (`dbvfiv.model.residual`) about a state at rest.
 
-    M(q) a + h(q, v) + alpha M v + beta K_s(q) v + f(q) - G(q) p = 0,     e = 0
+The unknowns are q and those of the flow law, the inlet velocity U for one. Small motions see K_s and, of layers with
+Maxwell branches, sum_g phi_g(lambda) K_g, with K_g the material part of the tangent of layers that relax alike.
 
-with h the inertia quadratic in the velocities (turning directors), K_s the structure's own tangent, which has no part
-of the contact of inner faces in f, p the station pressures of the unsteady flow through the areas A(q) with rates A' =
-J v and A'' = J a + d2A[v, v]. The unknowns are q and those of the flow law, the inlet velocity U for one. Small motions
-see K_s and, of layers with Maxwell branches, sum_g phi_g(lambda) K_g, with K_g the material part of the tangent of
-layers that relax alike.
-
-Equations (T.15) and (T.16) of docs/theory.md.
+Equation (T.16) of docs/theory.md.
 """
 
 from __future__ import annotations
@@ -23,42 +17,11 @@ import numpy as np
 from eigen import CoupledPencil, Relaxation
 from eigen.pencil import FLUID_PARTS
 
-from ..case.parameters import Mu
+from ..case.parameters import PIPES
 from ..errors import SolveError
-from ..flow import FlowLaw, FlowMotion
+from ..flow import FlowMotion
 from .outside import AddedMass
 from .valve import ValveModel
-
-
-def dynamic_residual(model: ValveModel, mu: Mu, inlet: float, q, v, a, inner, inner_rate):
-    """Residual of the coupled equations of motion.
-
-    Parameters
-    ----------
-    inlet : float
-        Inlet pressure, Pa.
-    q, v, a : (n,) arrays
-        Unknowns, their velocities and accelerations.
-    inner, inner_rate : (l,) arrays
-        The flow's own unknowns and their rates; one number will do where there is one, the inlet velocity, m/s.
-
-    Returns
-    -------
-    force : (n,) array, N and N m
-    rest : (l,) array
-        Residuals of the flow's own equations: the pressure at the outlet, Pa, to vanish.
-    """
-    matrix = model.shell.dofs.matrix
-    nodal, nodal_rate = model.nodal(q), model.nodal(v)
-    force, structure = model.structure(q)
-    force += model.contact_force(q)
-    mass = matrix(model.mass(q))
-    force += mass @ (a + mu.alpha * v) + mu.beta * (matrix(structure) @ v) + model.shell.convective_inertia(q, v)
-    slope = model.rows.jacobian(nodal)
-    passage = model.rows.areas(nodal), slope @ v, slope @ a + model.rows.second(nodal_rate, nodal_rate)
-    given = {"inlet": inlet, "density": mu.density}
-    p, rest = model.flow.evaluate(FlowMotion(*passage, inner, inner_rate), given)
-    return force - model.pressure_force(nodal, p), rest
 
 
 @dataclass(frozen=True)
@@ -79,6 +42,8 @@ class LinearisedState:
     area : (m,) array, m2
     added : AddedMass or None
         Of the fluid outside, at unit density; None where there is none.
+    inner : (l,) array or None
+        Unknowns of a flow that is not that of an equilibrium.
     """
 
     model: ValveModel
@@ -91,6 +56,7 @@ class LinearisedState:
     slope: object
     area: np.ndarray
     added: AddedMass | None = None
+    inner: np.ndarray | None = None
     _damped: dict = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
@@ -104,9 +70,11 @@ class LinearisedState:
         return (self.forces, self.slope) if self.added is None else self.added.coupling(self.forces, self.slope)
 
     def fluid_parts(self, density: float, storage: float | None = None, line: Mapping[str, float] = {}):
-        """Matrices of the unsteady fluid's response to `slope`, see `fluid_parts` of this module."""
+        """A0 to S1 of `eigen.CoupledPencil`: response of the unsteady fluid to `slope`; `line` as `Mu.pipes`."""
         self.check_pump()
-        return fluid_parts(self.model.flow, self.area, self.inlet, density, storage, line)
+        given = {"inlet": self.inlet, "density": density, **line}
+        given = given if storage is None else given | {"storage": storage}
+        return self.model.flow.linearise_still(self.area, given).parts()
 
     def steady_parts(self) -> dict[str, np.ndarray]:
         """Matrix of the response of a fluid without inertia to `slope`."""
@@ -149,26 +117,33 @@ class LinearisedState:
                 f"{1e3 * pump.flow[0]:.4g} to {1e3 * pump.flow[-1]:.4g} L/s."
             )
 
-    def pencil(self, mu: Mu, fluid: bool = True) -> CoupledPencil:
+    def pencil(self, mu: Mapping[str, float], fluid: bool = True) -> CoupledPencil:
         """Pencil of small motions.
 
         Parameters
         ----------
-        mu : Mu
+        mu : mapping
             Fluid, damping and pipes; where the flow model (storage) or a pipe is not held, the law's own is taken.
         fluid : bool
             False leaves the flow out: motions of the stressed structure, the steady pressures kept as follower loads,
             in vacuo or in the fluid outside.
         """
-        damped = self.damped(mu.alpha, mu.beta, mu.loss_factor)
-        flowing = fluid and self.model.flow.has_fluid
+        damped = self.damped(*(mu.get(name, 0.0) for name in ("alpha", "beta", "loss_factor")))
+        flowing = fluid and (self.model.flow.has_fluid or self.inner is not None)
         if not flowing and self.added is None:
             return CoupledPencil(damped.M, damped.C, damped.K, relaxation=damped.relaxation)
-        parts = self.flow_parts(mu.density, mu.get("storage"), mu.pipes) if flowing else {}
+        parts = self._flow_parts(mu) if flowing else {}
         if self.added is not None:
-            density = self.model.case.outside.density(mu.density)
+            density = self.model.case.outside.density(mu["density"])
             parts = self.added.parts(parts or self.no_flow(), density)
         return damped.replace(**parts)
+
+    def _flow_parts(self, mu: Mapping[str, float]) -> dict[str, np.ndarray]:
+        """A0 to S1 of the flow at a parameter point."""
+        if self.inner is not None:
+            return self.model.flow.linearise(FlowMotion.still(self.area, self.inner), mu).parts()
+        pipes = {name: mu[name] for name in PIPES if name in mu}
+        return self.flow_parts(mu["density"], mu.get("storage"), pipes)
 
     def flow_parts(self, density: float, storage: float | None = None, line: dict | None = None) -> dict:
         """A0 to S1 of the flow alone at a density; of a steady flow A0 is all."""
@@ -182,26 +157,33 @@ class LinearisedState:
         return {name: np.zeros(shapes[name[0]]) for name in FLUID_PARTS}
 
 
-def fluid_parts(
-    flow: FlowLaw,
-    area: np.ndarray,
+def linearise(
+    model: ValveModel,
+    q: np.ndarray,
     inlet: float,
-    density: float,
-    storage: float | None = None,
-    line: Mapping[str, float] = {},
-) -> dict[str, np.ndarray]:
-    """Fluid part of a pencil: A0 to S1 of `eigen.CoupledPencil`, at steady flow; `line` as `Mu.pipes`."""
-    given = {"inlet": inlet, "density": density, **line}
-    return flow.linearise_still(area, given if storage is None else given | {"storage": storage}).parts()
+    mu: Mapping[str, float] | None = None,
+    inner: np.ndarray | None = None,
+) -> LinearisedState:
+    """Linearise a state at rest.
 
-
-def linearise(model: ValveModel, q: np.ndarray, inlet: float) -> LinearisedState:
-    """Linearise a steady state at an inlet pressure, Pa."""
-    tangent = model.tangent(q, inlet)
-    stiffness, forces, slope = model.matrices(tangent)
-    matrix = model.shell.dofs.matrix
-    structure = matrix(tangent.structure)
+    Parameters
+    ----------
+    model : ValveModel
+    q : (n,) array
+    inlet : float
+        Inlet pressure, Pa.
+    mu, inner : mapping and (l,) array, optional
+        Parameters of the flow law and its unknowns, where the flow is not that of an equilibrium at `inlet`.
+    """
+    nodal = model.nodal(q)
+    area, matrix = model.rows.areas(nodal), model.shell.dofs.matrix
+    if inner is None:
+        pressure = model.flow.steady_pressure(area, inlet)
+    else:
+        inner = np.asarray(inner, float)
+        pressure, _ = model.flow.evaluate(FlowMotion.still(area, inner), mu)
+    _, values = model.structure(q)
+    structure, stiffness = matrix(values), matrix(model.stiffness(q, pressure, values))
     added = None if model.outside is None else model.outside.added_mass(q, structure)
-    return LinearisedState(
-        model, q, inlet, matrix(model.mass(q)), structure, stiffness, forces, slope, tangent.area, added
-    )
+    coupled = model.station_forces(nodal), model.rows.jacobian(nodal), area, added, inner
+    return LinearisedState(model, q, inlet, matrix(model.mass(q)), structure, stiffness, *coupled)

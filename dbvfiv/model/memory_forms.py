@@ -18,8 +18,9 @@ from continuation.system import expand
 from eigen import CoupledPencil
 from eigen.pencil import real_apply
 
-from .analytic import AnalyticResidual
-from .system import factored, pencil_at
+from .dynamics import linearise
+from .residual import ValveResidual
+from .system import factored
 from .valve import ValveModel
 
 #: Relative step of central differences by the factor on loss factors.
@@ -40,12 +41,11 @@ class ValveMemoryForms:
 
     def __init__(self, model: ValveModel, q: np.ndarray, mu: Mapping[str, float]):
         self.model, self.q, self.mu = model, np.asarray(q, float), dict(mu)
-        self._analytic = AnalyticResidual(model)
+        self._analytic = ValveResidual(model)
         inner = model.flow.steady_inner(model.rows.areas(model.nodal(self.q)), self.mu)
         zero = np.zeros(model.size)
         self._motion = (self.q, zero, zero, inner, np.zeros_like(inner))
-        self._values = model.flow.values(self.mu) | {name: float(self.mu[name]) for name in ("alpha", "beta")}
-        self._coupled = pencil_at(model, self.q, inner, self.mu)
+        self._coupled = linearise(model, self.q, self.mu["inlet"], self.mu, inner).pencil(self.mu)
         self._pencils: dict[complex, PencilAt] = {}
         self.rest = np.concatenate([self.q, zero, inner])
 
@@ -77,12 +77,12 @@ class ValveMemoryForms:
         """Derivative (n + l,) of the residual by a parameter; what relaxes has none at rest."""
         if name == "loss_factor":
             return np.zeros(self.model.size + self.model.flow.inner)
-        return self._analytic.parameter_slope(self._motion, self._values, name)
+        return self._analytic.parameter_slope(self._motion, self.mu, name)
 
     def mixed(self, motion: Motion, name: str) -> np.ndarray:
         """Derivative of T(s) x, complex (n + l,), by a parameter."""
         if name != "loss_factor":
-            form = lambda x: self._analytic.mixed(self._motion, self._values, self._split(x), name)  # noqa: E731
+            form = lambda x: self._analytic.mixed(self._motion, self.mu, self._split(x), name)  # noqa: E731
             return expand(form, self._joined(motion))
         factor, n = self.mu["loss_factor"], self.model.size
         above, below = (self._relaxed(motion.rate, factor * (1 + sign * _STEP)) for sign in (1, -1))
@@ -99,12 +99,12 @@ class ValveMemoryForms:
 
     def _form(self, *motions: Motion) -> np.ndarray:
         def remainder(*directions):
-            return self._analytic.remainder_form(self._motion, self._values, *map(self._split, directions))
+            return self._analytic.remainder_form(self._motion, self.mu, *map(self._split, directions))
 
         out = expand(remainder, *map(self._joined, motions)).astype(complex)
         n, rates = self.model.size, [motion.rate for motion in motions]
         # beta damps with the tangent of the unrelaxed wall, so its force is the rate of the elastic one
-        damped = self._values["beta"] * sum(rates)
+        damped = self.mu["beta"] * sum(rates)
         vectors = [motion.vector[:n] for motion in motions]
         out[:n] += self.model.shell.relaxed_form(self.q, vectors, self._factors(rates) + damped)
         if self.model.weight is not None:

@@ -1,15 +1,18 @@
-"""One steady state of the valve and what a user reads off it."""
+"""One steady state of the valve and what a user reads off it: areas, flow, opening of the lips, and hydraulic
+results (heads, head loss, loss and flow coefficients K, Kv, Cv).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..case.quantity import GRAVITY, head_of
+from ..case.quantity import GRAVITY, WATER, head_of
 from ..errors import SolveError
-from .hydraulics import Behind, Hydraulics, hydraulics_of
-from .lip import LipCentre
+from ..geometry import ValveMesh
+from ..shell import Shell
 from .valve import ValveModel
 
 
@@ -52,7 +55,7 @@ class SteadyState:
         Where it occurs, on the mid-surface at rest.
     lip_opening : float, m
         Full clear opening between the inner faces of both lips at x = z = 0; never below zero, see
-        `dbvfiv.model.lip.LipCentre.opening`.
+        `dbvfiv.model.state.LipCentre.opening`.
     lip_displacement : float, m
         Displacement in y of the mid-surface of one lip there.
     station_area, station_velocity, station_pressure : (m,) arrays, m2 (of the part), m/s, Pa
@@ -206,4 +209,185 @@ def _boundless(model: ValveModel, area: np.ndarray, pressure: float) -> str:
     return begin + (
         f"its passage at the lips, {lips}, is not smaller than that of the flange, {flange}, so no pressure would be "
         "left to hold the fluid back."
+    )
+
+
+class LipCentre:
+    """The node in the middle of the lip.
+
+    Parameters
+    ----------
+    mesh : ValveMesh
+    shell : Shell
+        On this mesh.
+    """
+
+    def __init__(self, mesh: ValveMesh, shell: Shell):
+        node = mesh.centre_line[0]
+        surface = shell.mesh
+        around = np.any(surface.quads == node, axis=1)
+        self.half_wall = 0.5 * float(surface.thickness[around].mean())
+        self._height = float(surface.nodes[node, 1])
+        self._director, self._frame = surface.directors[node], surface.frames[node]
+        self._unknowns = shell.dofs.index[node]
+
+    def displacement(self, q: np.ndarray) -> float:
+        """Displacement in y, m, of the mid-surface of one lip, from the free unknowns (n,); below zero where the lip
+        lies beyond its place at rest.
+        """
+        return float(self._local(q)[1])
+
+    def opening(self, q: np.ndarray) -> float:
+        """Full clear opening, m: the distance between the inner faces of both lips, never below zero.
+
+        The inner face lies half a wall h/2 inside the mid-surface along the director d, so with the height Y of the
+        mid-surface at rest and its displacement v the opening is 2 (Y + v - h/2 d_y). At rest it is what the shape
+        leaves between the faces, 2 (Y - h/2): 0.38 mm in the 12-inch valve, whose mid-surface is 6.19 mm high and whose
+        wall is 12 mm thick; none where the lip radius is half the wall. `valve.initial_gap`, which keeps the flow
+        section open at rest, is no part of it.
+        """
+        local = self._local(q)
+        turn = float(np.hypot(*local[3:]))
+        across = np.cos(turn) * self._director[1] + np.sinc(turn / np.pi) * float(local[3:] @ self._frame[:, 1])
+        return max(0.0, 2.0 * (self._height + float(local[1]) - self.half_wall * float(across)))
+
+    def _local(self, q: np.ndarray) -> np.ndarray:
+        """Displacements and rotations (5,) of the node."""
+        return np.where(self._unknowns >= 0, np.asarray(q)[np.maximum(self._unknowns, 0)], 0.0)
+
+
+#: Kv in m3/h at 1 bar over Cv in US gallons a minute at 1 psi (IEC 60534-1).
+CV_OVER_KV = 1.156
+
+
+@dataclass(frozen=True)
+class Behind:
+    """Flow downstream of the valve; the defaults are those of a free discharge.
+
+    Attributes
+    ----------
+    pressure : float, Pa
+        Static pressure around the jet, over that of the surroundings.
+    jet_velocity : float, m/s
+        NaN where it is not known.
+    recovered : float, Pa
+        Pressure rise where the jet has widened to a pipe; 0 where its energy is lost.
+    velocity : float, m/s
+        Velocity in that pipe; 0 without one.
+    loss : float, m
+        Head lost in that pipe up to its far end.
+    """
+
+    pressure: float = 0.0
+    jet_velocity: float = math.nan
+    recovered: float = 0.0
+    velocity: float = 0.0
+    loss: float = 0.0
+
+
+@dataclass(frozen=True)
+class Hydraulics:
+    """Heads, head loss and coefficients of the valve in a steady flow.
+
+    The whole head of a valve that discharges freely ends in its jet. In a downstream pipe the jet gives back a part.
+
+    Attributes
+    ----------
+    flange_velocity : float, m/s
+    total_head : float, m
+        Total head at the flange, static and velocity head, of the fluid, over that of the surroundings.
+    head_loss : float, m
+        Total head that ends in the valve and its jet: from the flange to the fluid at rest around a free discharge, or
+        to the downstream pipe where the jet has widened.
+    loss_coefficient : float
+        K, the loss over the velocity head at the flange; infinite without a flow.
+    discharge_coefficient : float
+        Flow over that of the flange's section at the jet velocity of the head that is lost; 1/sqrt(K).
+    kv : float, m3/h
+        Flow of water at a static pressure of 1 bar between flange and fluid behind (IEC 60534-1), at this opening.
+    cv : float, US gallons a minute
+        The same at 1 psi.
+    line_loss : float, m
+        Head lost by friction and fittings of an upstream pipe; 0 without one.
+    supply_head : float, m
+        Total head at the far end of the upstream pipe, or at the flange without one.
+    jet_velocity : float, m/s
+    recovered_pressure, recovered_head : float, Pa, m
+        Pressure and head that the jet gives back in a downstream pipe.
+    tail_loss : float, m
+        Head lost in the downstream pipe.
+    downstream_head : float, m
+        Static head at its far end, or around a free discharge, over that of the surroundings.
+    """
+
+    flange_velocity: float
+    total_head: float
+    head_loss: float
+    loss_coefficient: float
+    discharge_coefficient: float
+    kv: float
+    cv: float
+    line_loss: float
+    supply_head: float
+    jet_velocity: float
+    recovered_pressure: float
+    recovered_head: float
+    tail_loss: float
+    downstream_head: float
+
+    def summary(self) -> dict[str, float]:
+        """Plain numbers, SI but for kv and cv."""
+        return asdict(self)
+
+
+def hydraulics_of(
+    pressure: float,
+    density: float,
+    volume_flow: float,
+    flange_velocity: float,
+    line_loss: float = 0.0,
+    behind: Behind | None = None,
+) -> Hydraulics:
+    """Hydraulics of a flow.
+
+    Parameters
+    ----------
+    pressure : float, Pa
+        Static, at the flange, over that of the surroundings.
+    density : float, kg/m3
+    volume_flow : float, m3/s
+    flange_velocity : float, m/s
+    line_loss : float, m
+    behind : Behind, optional
+        Free discharge into the surroundings without it.
+
+    Examples
+    --------
+    >>> found = hydraulics_of(1e5, 1000.0, 0.01, 1.0)
+    >>> round(found.kv, 6), round(found.loss_coefficient, 6)
+    (36.0, 201.0)
+    """
+    behind = Behind() if behind is None else behind
+    velocity_head = flange_velocity**2 / (2 * GRAVITY)
+    total = head_of(pressure, density) + velocity_head
+    flows = velocity_head > 0
+    static = behind.pressure + behind.recovered
+    loss = total - head_of(static, density) - behind.velocity**2 / (2 * GRAVITY)
+    drop = pressure - static
+    kv = 3600 * volume_flow * math.sqrt(density / WATER * 1e5 / drop) if drop > 0 else math.nan
+    return Hydraulics(
+        flange_velocity=flange_velocity,
+        total_head=total,
+        head_loss=loss,
+        loss_coefficient=loss / velocity_head if flows else math.inf,
+        discharge_coefficient=flange_velocity / math.sqrt(2 * GRAVITY * loss) if flows and loss > 0 else 0.0,
+        kv=kv,
+        cv=CV_OVER_KV * kv,
+        line_loss=line_loss,
+        supply_head=total + line_loss,
+        jet_velocity=behind.jet_velocity,
+        recovered_pressure=behind.recovered,
+        recovered_head=head_of(behind.recovered, density),
+        tail_loss=behind.loss,
+        downstream_head=head_of(static, density) - behind.loss,
     )

@@ -4,7 +4,7 @@ The constants of a tested rubber hold up to the strain they were fitted over, so
 occurs (Eq. 7.1 guesses it for all rubbers from the arc of the lip). Here it is found: with the constants of a level the
 valve is solved, what its layers strain is the next level, until both agree.
 
-As Eq. 7.1 asks for the largest strain, the next level of a rubber is the peak of its layers (`layer_strains`).
+As Eq. 7.1 asks for the largest strain, the next level of a rubber is the peak of its layers (`material_stability`).
 `agree_levels` does that at one pressure, `settle_levels` for all that is asked of a case.
 """
 
@@ -20,9 +20,8 @@ from ..case.materials import HIGHEST_LEVEL, LOWEST_LEVEL, RUBBERS
 from ..case.model import Case
 from ..errors import SolveError
 from ..observer import Observer
-from .equilibria import LoadPath, SteadyOptions
-from .layer_strains import LayerLevel, layer_levels
-from .operating_point import operating_pressure
+from .equilibria import LoadPath, SteadyOptions, operating_pressure
+from .material_stability import LayerLevel, layer_levels
 from .state import SteadyState
 from .valve import ValveModel
 

@@ -25,8 +25,8 @@ from eigen.pencil import real_apply
 
 from ..case.parameters import SYSTEM_NAMES
 from ..errors import SolveError
-from ..flow import FlowMotion
-from .analytic import DAMPING, AnalyticResidual
+from .dynamics import linearise
+from .residual import DAMPING, ValveResidual
 from .valve import ValveModel
 
 _MEMORY = (
@@ -64,7 +64,7 @@ class ValveSystem(SystemBase):
         self._base = model
         self._rebuild = rebuild
         self._models: dict[tuple, ValveModel] = {(): model}
-        self._residuals: dict[tuple, AnalyticResidual] = {}
+        self._residuals: dict[tuple, ValveResidual] = {}
         self._search = search or SearchOptions()
         self._length = float(np.ptp(model.mesh.nodes[:, 2]))
         self.parameters = (*model.flow.names, *DAMPING)
@@ -115,20 +115,16 @@ class ValveSystem(SystemBase):
             self._models[key] = self._rebuild(dict(key))
         return self._models[key]
 
-    def _analytic(self, mu) -> AnalyticResidual:
+    def _analytic(self, mu) -> ValveResidual:
         key = self._design(mu)
         if key not in self._residuals:
-            self._residuals[key] = AnalyticResidual(self._models_get(key))
+            self._residuals[key] = ValveResidual(self._models_get(key))
         return self._residuals[key]
 
     def _at(self, u, mu):
         q, v, inner = self.split(np.asarray(u, float))
         zero = np.zeros_like(q)
-        return (q, v, zero, inner, np.zeros_like(inner)), self._values(mu)
-
-    def _values(self, mu) -> dict[str, float]:
-        """Parameters by name, those of the flow that are not in mu by default."""
-        return self.model(mu).flow.values(mu) | {name: float(mu[name]) for name in DAMPING}
+        return (q, v, zero, inner, np.zeros_like(inner)), mu
 
     def _static(self, u_direction, n):
         q, v, inner = self.split(u_direction)
@@ -184,8 +180,12 @@ class ValveSystem(SystemBase):
         return float(np.linalg.norm(self._base.pressure_derivative(self._base.rest(), self._base.flow.back + 1.0)))
 
     def linear(self, u, mu) -> ValveLinearisation:
+        return ValveLinearisation(self._pencil(u, mu))
+
+    def _pencil(self, u, mu) -> CoupledPencil:
+        """Pencil at a state at rest, in equilibrium or not."""
         q, _, inner = self.split(np.asarray(u, float))
-        return ValveLinearisation(pencil_at(self.model(mu), q, inner, mu))
+        return linearise(self.model(mu), q, mu["inlet"], mu, inner).pencil(mu)
 
     def d_parameter(self, u, mu, name):
         if name not in self.parameters:
@@ -236,37 +236,11 @@ class ValveSystem(SystemBase):
         return np.concatenate([np.zeros(n), self._analytic(mu).mixed(motion, parameters, self._rates(c, n), name)])
 
     def spectrum(self, u, mu, count, near=None):
-        q, _, inner = self.split(np.asarray(u, float))
-        pencil = pencil_at(self.model(mu), q, inner, mu)
+        pencil = self._pencil(u, mu)
         options = self._search if near is None else replace(self._search, shifts=(near,))
         found = leading_modes(pencil, count, options)
         vectors = np.concatenate([found.q, found.eigenvalues * found.q, found.u])
         return Spectrum(found.eigenvalues, vectors, np.ones(len(found), bool), found.applications)
-
-
-def pencil_at(model: ValveModel, q, inner, mu) -> CoupledPencil:
-    """Pencil at any state at rest, in equilibrium or not, with the flow's unknowns (l,); mu holds the parameters, and
-    `loss_factor` where the wall is to relax.
-    """
-    matrix = model.shell.dofs.matrix
-    nodal = model.nodal(q)
-    area = model.rows.areas(nodal)
-    still = FlowMotion.still(area, np.asarray(inner, float))
-    p, _ = model.flow.evaluate(still, mu)
-    _, structure = model.structure(q)
-    values = model.follower_stiffness(nodal, p, structure)
-    model.add_contact(q, values)
-    stiffness = matrix(values)
-    mass, own = matrix(model.mass(q)), matrix(structure)
-    damping = mu["alpha"] * mass + mu["beta"] * own
-    parts = model.flow.linearise(still, mu).parts()
-    relaxation = model.relaxation.stiffness(mu.get("loss_factor", 0.0), lambda: model.relaxing_stiffness(q))
-    coupling = model.station_forces(nodal), model.rows.jacobian(nodal)
-    if model.outside is not None:
-        added = model.outside.added_mass(q, own)
-        parts = added.parts(parts, model.case.outside.density(mu["density"]))
-        coupling = added.coupling(*coupling)
-    return CoupledPencil(mass, damping, stiffness, *coupling, relaxation=relaxation, **parts)
 
 
 class ValveLinearisation:

@@ -27,11 +27,10 @@ from ..geometry import ValveMesh
 from ..shell import Section, StepWall, Weight
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
 from .build import build_flow, build_shell, build_weight
-from .faces import FaceContact, face_contact
 from .linear import CoupledFactor
 from .outside import OutsideFluid
 from .relaxing import WallRelaxation
-from .supports import lip_stops
+from .supports import FaceContact, face_contact, lip_stops
 
 
 @dataclass(frozen=True)
@@ -144,12 +143,10 @@ class ValveModel:
         p, slope = (share * part for part in self.flow.steady_operator(area, pressure))
         force, structure = self.structure(q, share=share)
         force += self.contact_force(q) - self.pressure_force(nodal, p)
-        stiffness = self.follower_stiffness(nodal, p, structure)
-        self.add_contact(q, stiffness)
         return Tangent(
             residual=force,
             structure=structure,
-            stiffness=stiffness,
+            stiffness=self.stiffness(q, p, structure),
             forces=self.station_forces(nodal).data,
             areas_slope=self.rows.jacobian(nodal).data,
             pressure_slope=slope,
@@ -217,6 +214,12 @@ class ValveModel:
             surface.quads, surface.nodes, nodal, p[self.station_of_node], self.loaded, self.shell.dofs.slots, -1.0, data
         )
         return data
+
+    def stiffness(self, q: np.ndarray, p: np.ndarray, structure: np.ndarray) -> np.ndarray:
+        """Values (nnz,) of K: structure and contact of faces less the follower stiffness of pressures (m,), Pa."""
+        values = self.follower_stiffness(self.nodal(q), p, structure)
+        self.add_contact(q, values)
+        return values
 
     def station_forces(self, nodal: np.ndarray) -> sp.csr_matrix:
         """G (n, m): forces of unit station pressures on the deformed wall."""

@@ -1,11 +1,18 @@
-"""Length of the steps: a fixed grid with halvings where the iteration fails, or by the estimated local error."""
+"""A run in time: the pressure that drives it, its options, and the length of its steps, on a fixed grid with halvings
+where the iteration fails, or by the estimated local error.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..case.drive_table import read_drive_table
+from ..case.model import Case
+from .scheme import Scheme, scheme
 from .state import MotionState
-from .stepper import StepFailure, Stepper, StepResult
+from .stepper import StepFailure, StepOptions, Stepper, StepResult
 
 
 @dataclass(frozen=True)
@@ -129,3 +136,92 @@ class AdaptiveSteps:
 def step_control(stepper: Stepper, options: ControlOptions):
     """The control that the options ask for."""
     return AdaptiveSteps(stepper, options) if options.adaptive else FixedSteps(stepper, options)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Pressure through points in time, linear between them and constant beyond; applied at once before the first point.
+
+    Attributes
+    ----------
+    times : tuple of float, s
+    pressures : tuple of float, Pa
+
+    Examples
+    --------
+    >>> Drive((0.0, 0.1), (0.0, 6e3))(0.05)
+    3000.0
+    """
+
+    times: tuple[float, ...]
+    pressures: tuple[float, ...]
+
+    def __call__(self, time: float) -> float:
+        return float(np.interp(time, self.times, self.pressures))
+
+    def constant_after(self, time: float) -> bool:
+        """True where the pressure is constant from a time, s, on."""
+        return (
+            all(p == self.pressures[-1] for t, p in zip(self.times, self.pressures) if t > time)
+            and self(time) == self.pressures[-1]
+        )
+
+    @classmethod
+    def of(cls, case: Case) -> Drive:
+        """Drive of a case: constant, a ramp, or a table."""
+        transient = case.transient
+        if transient.drive_table is not None:
+            times, pressures = zip(*read_drive_table(transient.drive_table))
+            return cls(times, pressures)
+        if transient.ramp > 0:
+            return cls((0.0, transient.ramp), (0.0, case.drive.pressure))
+        return cls((0.0,), (case.drive.pressure,))
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of a run.
+
+    Attributes
+    ----------
+    duration : float, s
+    scheme : Scheme
+    control : ControlOptions
+    step : StepOptions
+    save_every : float
+        Distance in time of full states, s; zero for none but the last.
+    restart_every : int
+        Steps between restart points.
+    stop_when : tuple of str
+        Verdicts that end the run once they are certain.
+    judge_every : int
+        Smallest number of steps between two verdicts.
+    """
+
+    duration: float
+    scheme: Scheme
+    control: ControlOptions
+    step: StepOptions = StepOptions()
+    save_every: float = 0.0
+    restart_every: int = 500
+    stop_when: tuple[str, ...] = ()
+    judge_every: int = 100
+
+    @property
+    def end(self) -> float:
+        """Time, s, from which on no further step is made: that of the last step but for rounding."""
+        return self.duration * (1 - 1e-12) - 1e-9 * self.control.step
+
+    @classmethod
+    def of(cls, case: Case) -> RunOptions:
+        """Options of a case file."""
+        t = case.transient
+        return cls(
+            duration=t.duration,
+            scheme=scheme(t.scheme, t.numerical_damping),
+            control=ControlOptions(t.step, t.adaptive, t.local_error, t.smallest_step),
+            step=StepOptions(tolerance=t.tolerance),
+            save_every=t.save_every,
+            restart_every=t.restart_every,
+            stop_when=tuple(t.stop_when),
+        )

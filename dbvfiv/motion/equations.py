@@ -4,7 +4,7 @@
 
 F is the internal force of shell and stops and w its rate. F and the flow's psi (see `dbvfiv.flow.stepping`) are kept in
 the state as quantities of first order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent with the
-tangent without an evaluation of it. f_c is the contact of inner faces, see `dbvfiv.motion.contact`.
+tangent without an evaluation of it. f_c is the contact of inner faces, see `dbvfiv.model.supports`.
 
 Equation (T.15) of docs/theory.md.
 """
@@ -14,16 +14,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..case.parameters import Mu
-from ..flow.gas_stepping import GasState
-from ..flow.line_stepping import LineFluid, LineInstant, LineState, LineStep, LineWaves
+from ..flow.gas_stepping import GasFluid, GasInstant, GasState
+from ..flow.line_stepping import LineInstant, LineState, LineWaves
+from ..flow.stepping import FrozenFluid, Load, SteadyFluid, Step, StepFluid
 from ..model import ValveModel
-from ..model.linear import CoupledFactor
+from ..model.linear import CoupledFactor, DirectFactor
+from ..model.supports import FaceStep
 from ..shell import Memory, StepWall, WallMemory
-from .contact import FaceStep, MassSolver
-from .energies import wall_energies
-from .kernels import row_motion
+from .kernels import row_motion, strain_energy
 from .outside import MovingOutside, OutsideCorrection
-from .terms import Load, Step, Weights
+from .trial import Weights
 
 
 class ValveMotion:
@@ -34,6 +34,8 @@ class ValveMotion:
     model : ValveModel
     mu : Mu, optional
         Density and damping; those of the model's case by default.
+    staggered : bool
+        The thesis's coupling, fluid first.
 
     Attributes
     ----------
@@ -47,14 +49,17 @@ class ValveMotion:
         Of the inner faces; None where the valve has stops.
     """
 
-    def __init__(self, model: ValveModel, mu: Mu | None = None):
+    def __init__(self, model: ValveModel, mu: Mu | None = None, staggered: bool = False):
         self.model, self.contact = model, model.contact
         self.mu = Mu.of(model.case) if mu is None else mu
         branches = model.relaxation.branches(self.mu.loss_factor)
         self.wall = WallMemory(model.shell, branches.strengths, branches.times) if branches else None
-        self.moving_fluid = model.flow.unsteady
-        self.fluid = model.flow.stepping(self.mu.density) if self.moving_fluid else None
-        self.waves = self._waves()
+        density = self.mu.density
+        fluid = model.flow.stepping(density) if model.flow.unsteady else SteadyFluid(model.flow, density)
+        self.fluid = FrozenFluid(fluid) if staggered else fluid
+        self.moving_fluid = self.fluid.moves
+        # the flange is clamped
+        self.waves: LineWaves | None = self.fluid.waves(float(model.rows.areas(model.nodal(model.rest()))[-1]))
         self.size = model.size
         self.resolution = float(np.finfo(float).eps * np.abs(model.shell.mesh.nodes).max())
         self.stations = model.stations
@@ -71,12 +76,6 @@ class ValveMotion:
             density = model.case.outside.density(self.mu.density)
             self.outside = MovingOutside(model, density, self.length)
         self._rotations = np.flatnonzero(np.broadcast_to(np.arange(free.shape[1]) >= 3, free.shape)[free])
-
-    def _waves(self) -> LineWaves | None:
-        if not isinstance(self.fluid, LineFluid):
-            return None
-        rest = self.model.nodal(self.model.rest())
-        return self.fluid.waves(float(self.model.rows.areas(rest)[-1]))  # the flange is clamped
 
     # -- forces
     # ----
@@ -99,7 +98,7 @@ class ValveMotion:
         """M(q) v, (n,)."""
         return self.inertia(q, np.zeros_like(v), v)
 
-    def load(self, q, v, q_new, v_new, step: Step, speed: float | None = None) -> Load:
+    def load(self, q, v, q_new, v_new, step: Step, speed: float | None = None, fluid: StepFluid | None = None) -> Load:
         """Fluid of a step and its force.
 
         Parameters
@@ -111,52 +110,15 @@ class ValveMotion:
         step : Step
         speed : float, optional
             Inlet velocity at the end, m/s; by default the one at which the outlet pressure vanishes.
+        fluid : StepFluid, optional
+            Another one than the motion's.
         """
-        model = self.model
-        nodal = model.nodal(q)
-        nodal_new = nodal if q_new is q else model.nodal(q_new)
-        new = self._passage(nodal_new, v_new)
+        nodal = self.model.nodal(q)
+        new = self._passage(nodal if q_new is q else self.model.nodal(q_new), v_new)
         mid = new if q_new is q else self._passage(nodal, v)
-        area, area_new, inlet = mid[0], new[0], step.inlet
-        if self.moving_fluid:
-            if speed is None:
-                speed = self._velocity(mid, new, step)
-            mid_speed = step.speed + step.theta * (speed - step.speed)
-            flow = self.fluid.state(*new, speed)
-            psi_rate = step.psi_weight * flow.psi + step.psi_known
-            flange, slope, line = inlet, 0.0, None
-            if step.line is not None:
-                flange, slope = self.fluid.flange(step.line, mid_speed)
-                line = step.line.end(mid_speed)
-            p = self.fluid.pressure(self.fluid.state(*mid, mid_speed), psi_rate, flange)
-            outlet, p[0] = float(p[0]), 0.0
-            moved = area_new, flow.speed, flow.psi, psi_rate, inlet, mid_speed
-            return Load(model.pressure_force(nodal, p), outlet, p, *moved, line, slope)
-        p = model.flow.steady_pressure(area, inlet)
-        speed = model.flow.inlet_velocity(area_new, inlet, self.mu.density) if inlet > model.flow.back else 0.0
-        zero = np.zeros(self.stations)
-        return Load(
-            model.pressure_force(nodal, p),
-            0.0,
-            p,
-            area_new,
-            model.flow.velocities(area_new, speed),
-            zero,
-            zero,
-            inlet,
-            speed,
-        )
-
-    def _velocity(self, mid: tuple, new: tuple, step: Step) -> float:
-        """Inlet velocity at the end of a step, m/s, at which the outlet pressure vanishes."""
-        known = step.speed, step.theta, step.psi_weight, float(step.psi_known[0])
-        if step.line is None:
-            return self.fluid.velocity(mid, new, step.inlet, *known)
-        return self.fluid.velocity_behind(step.line, mid, new, *known)
-
-    def line_step(self, old: LineState, h: float, theta: float, rate: float, inlet: float) -> LineStep:
-        """The elastic line in a step of length h, s; see `LineStep`."""
-        return LineStep(self.waves, old, h, theta, rate, inlet)
+        load = (fluid or self.fluid).load(mid, new, step, speed)
+        load.force = self.model.pressure_force(nodal, load.pressure)
+        return load
 
     def _passage(self, nodal: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Areas (m,) and their rates (m,)."""
@@ -167,13 +129,11 @@ class ValveMotion:
 
     def speeds(self, state) -> np.ndarray:
         """Speeds (m,) of the fluid in a state, m/s; zeros where it is none of the unknowns."""
-        if not self.moving_fluid:
-            return np.zeros(self.stations)
-        return self.fluid.state(*self._passage(self.model.nodal(state.q), state.v), state.speed).speed
+        return self.fluid.speeds(*self._passage(self.model.nodal(state.q), state.v), state)
 
     def momenta(self, psi: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Momentum per density and area of the fluid between stations (m - 1,), m2/s."""
-        return self.fluid.momenta(psi, speed) if self.moving_fluid else -np.diff(psi)
+        return self.fluid.momenta(psi, speed)
 
     def _position(self, nodal):
         out = nodal.copy()
@@ -235,26 +195,10 @@ class ValveMotion:
         forces = weights.load * model.station_forces(nodal).data
         slope = model.rows.jacobian(nodal).data
         mid = self._passage(nodal, v_load)
-        if self.eliminated:
-            self._solver(0).refactor(values, forces, slope, self._pressure_slope(mid[0], load, weights))
-            self._add_outside(weights.outside)
-            return
         new = self._passage(model.nodal(q_new), v_new)
-        found = self.fluid.pressure_slopes(
-            mid, new, load.mid_speed, load.speed[-1], weights.theta, weights.velocity, weights.psi
-        )
-        by_area, by_speed = found
-        self._refactor_moving(values, forces, slope, by_area, by_speed + weights.theta * load.flange_slope)
+        by_area, by_speed = self.fluid.load_slopes(mid, new, load, weights.theta, weights.velocity, weights.psi)
+        self._refactor(values, forces, slope, by_area, by_speed)
         self._add_outside(weights.outside)
-
-    @property
-    def eliminated(self) -> bool:
-        """True where pressures follow from the wall's motion alone, so that a step has no unknown of the fluid."""
-        return not self.moving_fluid
-
-    def _pressure_slope(self, area: np.ndarray, load: Load, weights: Weights) -> np.ndarray:
-        """Derivative (m, m) of pressures that follow from the wall's motion alone by the new areas."""
-        return weights.theta * self.model.flow.steady_operator(area, load.inlet)[1]
 
     def _add_outside(self, weight: float) -> None:
         """Take a multiple of the added mass, if there is one, into the solves with the factors just made."""
@@ -263,7 +207,11 @@ class ValveMotion:
             solve = self._factor.solve_with_inner
             self._correction = self.outside.correction(lambda f, r: solve(f, none if r is None else r), weight)
 
-    def _refactor_moving(self, values, forces, slope, by_area, by_speed):
+    def _refactor(self, values, forces, slope, by_area, by_speed):
+        """Factor with the pressures' derivatives by areas (m, m) and, if it is an unknown, the inlet velocity (m,)."""
+        if by_speed is None:
+            self._solver(0).refactor(values, forces, slope, by_area)
+            return
         row, corner = by_area[0].copy(), by_speed[0]
         by_area[0], by_speed[0] = 0.0, 0.0
         self._solver(1).refactor(values, forces, slope, by_area, by_speed, row, corner)
@@ -271,8 +219,8 @@ class ValveMotion:
     def solve(self, force: np.ndarray, outlet: float) -> tuple[np.ndarray, float]:
         """Changes of q (n,) and U that the last factored matrix gives for a force (n,) and an outlet pressure."""
         solve = self._factor.solve_with_inner if self._correction is None else self._correction.solve
-        dq, du = solve(force, np.zeros(0) if self.eliminated else np.array([outlet]))
-        return dq, 0.0 if self.eliminated else float(du[0])
+        dq, du = solve(force, np.full(self._factor.inner, outlet))
+        return dq, float(du[0]) if len(du) else 0.0
 
     def contact_step(self, q: np.ndarray, h: float) -> FaceStep:
         """Contact of the faces in a step of length h, s, from positions (n,)."""
@@ -284,9 +232,10 @@ class ValveMotion:
         return self._masses.solve(q, force, self.outside)
 
     def begin_step(self, state, h: float, inlet: float) -> None:
-        """A step starts from a state, whose shape says whether the added mass still holds."""
+        """Begin a step from a state: the added mass is renewed where it no longer holds, a staggered fluid advanced."""
         if self.outside is not None:
             self.outside.begin_step(state.q, state.v)
+        self.fluid.begin_step(self._passage(self.model.nodal(state.q), state.v), state, h, inlet)
 
     def drop_factors(self) -> None:
         """Forget the factorisation with its analysis, so that later numbers do not depend on matrices seen before."""
@@ -298,7 +247,7 @@ class ValveMotion:
         return self._factor is not None and self._factor.factorisations > 0
 
     def _solver(self, inner: int) -> CoupledFactor:
-        if self._factor is None:
+        if self._factor is None or self._factor.inner != inner:
             model = self.model
             rest = model.nodal(model.rest())
             pattern = model.shell.dofs.matrix(np.ones(len(model.shell.dofs.pattern[1])))
@@ -328,39 +277,44 @@ class ValveMotion:
             self.outside.begin_step(q, v)
         forces = self.internal_force(q, wall) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
         forces += model.contact_force(q)
-        mass = model.mass(q)
-        if self.eliminated:
-            load = self.load(q, v, q, v, self._first_instant(q, v, speed, inlet, gas))
-            none = np.zeros((self.stations, self.stations))
-            self._solver(0).refactor(mass, model.station_forces(nodal).data, model.rows.jacobian(nodal).data, none)
+        rows, fluid = model.rows, self.fluid.at_an_instant()
+        coupled = model.mass(q), model.station_forces(nodal).data, rows.jacobian(nodal).data
+        none = np.zeros(self.stations)
+        if fluid.eliminated:
+            gas = self.gas_at(q, v, speed, inlet) if gas is None else gas
+            load = self.load(q, v, q, v, self._instant(speed, none, inlet, gas=gas), fluid=fluid)
+            self._refactor(*coupled, np.zeros((self.stations, self.stations)), None)
             self._add_outside(1.0)
             return self.solve(load.force - forces, 0.0)[0], load
-        rows, fluid = model.rows, self.fluid
         area, rate = self._passage(nodal, v)
         by_area, by_rate, by_speed = fluid.psi_slopes(area, rate, speed)
         bend = rows.second(model.nodal(v), model.nodal(v))
         known = by_area @ rate + by_rate @ bend
         line = self.line_at(speed, inlet) if line is None else line
-        load = self.load(q, v, q, v, self._instant(speed, known, inlet, self._line_moving(line, inlet, 0.0)), speed)
+        instant = self._instant(speed, known, inlet, self._line_moving(line, inlet, 0.0))
+        load = self.load(q, v, q, v, instant, speed, fluid)
         density = self.mu.density
         if line is not None:
             by_speed = by_speed + self.waves.inertance
-        self._refactor_moving(
-            mass, model.station_forces(nodal).data, rows.jacobian(nodal).data, -density * by_rate, -density * by_speed
-        )
+        self._refactor(*coupled, -density * by_rate, -density * by_speed)
         self._add_outside(1.0)
         a, speed_rate = self.solve(load.force - forces, -load.outlet)
         if line is not None:
             by_speed = by_speed - self.waves.inertance
         psi_rate = known + by_rate @ rows.second(self._position(nodal), model.nodal(a)) + by_speed * speed_rate
         line = self._line_moving(line, inlet, speed_rate)
-        return a, self.load(q, v, q, v, self._instant(speed, psi_rate, inlet, line), speed)
+        return a, self.load(q, v, q, v, self._instant(speed, psi_rate, inlet, line), speed, fluid)
 
-    def gas_on_mode(self, q, moved, v, speed: float, inlet: float, flow: np.ndarray) -> GasState | None:
-        """A compressed fluid, steady at positions q, on a mode that moves its unknowns by `flow` (l,) and the wall to
-        positions `moved` with velocities v; None where it is not compressed.
+    def gas_at(self, q, v, speed: float, inlet: float, moved=None, flow: np.ndarray | float = 0.0) -> GasState | None:
+        """A compressed fluid, steady at positions q or at rest where there is no speed; on a mode that moves its
+        unknowns by `flow` (l,) and the wall to positions `moved`; None where it is not compressed.
         """
-        return None
+        if not isinstance(self.fluid, GasFluid):
+            return None
+        model = self.model
+        steady = self.fluid.steady_inner(model.rows.areas(model.nodal(q)), inlet) if speed else 0.0
+        passage = self._passage(model.nodal(q if moved is None else moved), v)
+        return self.fluid.moving(*passage, np.zeros(model.flow.inner) + steady + flow, inlet)
 
     def line_at(self, speed: float, inlet: float) -> LineState | None:
         """An elastic line with a steady flow, or at rest without pressure where nothing flows; None without one."""
@@ -371,17 +325,21 @@ class ValveMotion:
     def _line_moving(self, line: LineState | None, inlet: float, speed_rate: float) -> LineState | None:
         return None if line is None else self.waves.moving(line, inlet, speed_rate)
 
-    def _first_instant(self, q, v, speed: float, inlet: float, gas: GasState | None) -> Step:
-        """A step of no length at positions and velocities whose fluid is eliminated."""
-        return self._instant(speed, np.zeros(self.stations), inlet)
-
     def instant(self, state, inlet: float) -> Step:
         """A step of no length at a state."""
-        return self._instant(state.speed, state.psi_rate, inlet, state.line)
+        return self._instant(state.speed, state.psi_rate, inlet, state.line, state.gas)
 
-    def _instant(self, speed: float, psi_rate: np.ndarray, inlet: float, line: LineState | None = None) -> Step:
-        """A step of no length, with a given rate of psi and waves in an elastic line with their rates."""
-        return Step(1.0, speed, 0.0, psi_rate, inlet, None if line is None else LineInstant(self.waves, line))
+    def _instant(
+        self,
+        speed: float,
+        psi_rate: np.ndarray,
+        inlet: float,
+        line: LineState | None = None,
+        gas: GasState | None = None,
+    ) -> Step:
+        """A step of no length, with a given rate of psi, waves in an elastic line with their rates, and compression."""
+        waves = None if line is None else LineInstant(self.waves, line)
+        return Step(1.0, speed, 0.0, psi_rate, inlet, waves, gas and GasInstant(self.fluid, gas, inlet))
 
     # -- energies
     # ----
@@ -395,3 +353,39 @@ class ValveMotion:
     def outside_energy(self, q: np.ndarray, v: np.ndarray) -> float:
         """Kinetic energy of the fluid outside, J of the part; zero where there is none."""
         return 0.0 if self.outside is None else self.outside.energy(q, v)
+
+
+def wall_energies(model: ValveModel, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+    """Kinetic energy and strain energy at positions and velocities (n,), J of the part."""
+    shell = model.shell
+    nodal = model.nodal(q)
+    d = shell.directors(nodal)[0]
+    if shell.metric == "first-order":
+        parts = zip(shell.parts, shell.wall)
+        strain = sum(strain_energy(p.quads, shell.mesh.nodes, nodal, d, p.reference, wall) for p, wall in parts)
+    else:
+        strain = shell.energy(q)
+    return shell.kinetic_energy(q, v), float(strain)
+
+
+class MassSolver:
+    """Accelerations that a force gives the wall, with the added mass of fluid outside.
+
+    Parameters
+    ----------
+    model : ValveModel
+    """
+
+    def __init__(self, model: ValveModel):
+        self._model = model
+        self._factor = DirectFactor(*model.shell.dofs.pattern)
+
+    def solve(self, q: np.ndarray, force: np.ndarray, outside: MovingOutside | None = None) -> np.ndarray:
+        """Accelerations (n,) at positions (n,) by a force (n,)."""
+        factor = self._factor
+        factor.values[:] = self._model.mass(q)
+        factor.refactor()
+        if outside is None:
+            return factor.solve(force)
+        none = np.zeros(0)
+        return outside.correction(lambda f, _: (factor.solve(f), none), 1.0).solve(force, none)[0]

@@ -170,7 +170,7 @@ def on_mode(
     memory = None if motion.wall is None else motion.wall.on_mode(q, shape, eigenvalue, moved)
     line = None if motion.waves is None else motion.waves.steady(speed, inlet).changed(flow)
     v = (eigenvalue * shape).real
-    gas = motion.gas_on_mode(q, moved, v, speed, inlet, flow)
+    gas = motion.gas_at(q, v, speed, inlet, moved, flow)
     return consistent_state(motion, 0.0, moved, v, speed + flow[0], inlet, memory, line, gas)
 
 

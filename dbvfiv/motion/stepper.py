@@ -13,19 +13,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..flow.stepping import Load
 from ..model.linear import SingularMatrix
-from .numerical import numerical_loss
-from .predictor import Predictor
 from .scheme import Scheme
 from .scheme import scheme as member
 from .state import MotionState
-from .terms import Load
-from .trial import Trial
+from .trial import Trial, numerical_loss
 
 #: Speed inwards, relative to the largest speed, that is none.
 INWARD = 1e-6
 #: Least numerical damping of steps that start with fluid drawn in: without any, the kicks that walls get then alternate
-#: from step to step for good. A motion that is `quiet_inward` takes no such steps.
+#: from step to step for good. A fluid that is `quiet_inward` takes no such steps.
 DAMPING = 0.2
 
 
@@ -85,7 +83,7 @@ class StepResult:
     contact_loss : float
         Energy that touching faces took and did not store, J.
     numerical_loss : float
-        Energy that the numerical damping took, J; see `dbvfiv.motion.numerical`.
+        Energy that the numerical damping took, J; see `dbvfiv.motion.trial`.
     """
 
     state: MotionState
@@ -120,7 +118,7 @@ class Stepper:
         self, motion, scheme: Scheme, pressure: Callable[[float], float], options: StepOptions = StepOptions()
     ):
         self.motion, self.scheme, self.pressure, self.options = motion, scheme, pressure, options
-        quiet = getattr(motion, "quiet_inward", False)
+        quiet = motion.fluid.quiet_inward
         self._inward = scheme if quiet else member("generalised-alpha", max(DAMPING, scheme.gamma - 0.5))
         self.residuals = self.solves = self.factorisations = 0
         self.forget()
@@ -311,3 +309,40 @@ class Stepper:
 def _outward(speed: np.ndarray) -> bool:
     """True where no speed (m,), or momentum of a section, points inwards."""
     return not np.any(speed < -INWARD * np.abs(speed).max(initial=0.0))
+
+
+class Predictor:
+    """Accelerations (n,) at the last instants, four at most, and what follows from them."""
+
+    def __init__(self) -> None:
+        self._points: list[tuple[float, np.ndarray]] = []
+
+    @property
+    def last(self) -> tuple[float, np.ndarray] | None:
+        """Time, s, and accelerations of the last step; None without any."""
+        return self._points[-1] if self._points else None
+
+    def add(self, time: float, accelerations: np.ndarray) -> None:
+        """Remember a step."""
+        self._points = [*self._points[-3:], (time, accelerations)]
+
+    def shorten(self) -> None:
+        """Forget all but the last step."""
+        self._points = self._points[-1:]
+
+    def accelerations(self, time: float) -> np.ndarray:
+        """Accelerations (n,) at a later instant, s; at least one step must be known.
+
+        On even steps by formulas that are exact for a parabola (or a straight line) plus a part of alternating sign:
+        without numerical damping, stiff modes with much stiffness damping alternate, and a parabola alone would throw
+        that part up sevenfold.
+        """
+        points = self._points
+        gaps = np.diff([t for t, _ in points] + [time])
+        if len(points) >= 3 and np.ptp(gaps) <= 1e-6 * gaps[-1]:
+            values = [value for _, value in points]
+            if len(values) >= 4:
+                return 2.0 * (values[-1] - values[-3]) + values[-4]
+            return values[-1] + values[-2] - values[-3]
+        (before, old), (here, new) = points[-2:] if len(points) > 1 else (points[0], (points[0][0] + 1.0, points[0][1]))
+        return new + (time - here) / (here - before) * (new - old)

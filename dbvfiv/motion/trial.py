@@ -1,15 +1,63 @@
-"""A candidate for the new state of a step: its equations, their iteration matrix, and the state that it becomes."""
+"""A candidate for the new state of a step: its equations, their iteration matrix, and the state that it becomes.
+
+A one-step scheme of the generalised-alpha family weights accelerations by 1 - alpha_m and forces by 1 - alpha_f, where
+the work of a step has their means. With M and a linear force F
+the difference, which numerical damping takes, is known (Erlicher, Bonaventura and Bursi
+2002 have its like), D what a quantity changes by, v the mean velocity and a without the part of contact's impulses:
+
+    loss = mu h v' M Da + k h Da' M (Dv + h mu Da) + (1/2 - alpha_f) DF' Dq,
+    mu = 1 - alpha_m - gamma,     k = beta - gamma/2
+
+It is zero without numerical damping, and no square: over a smooth motion with steps of one kind it adds up to a loss,
+but steps that go from damped to not and back leave h v' M a at each turn, with either sign. What is nonlinear in F and
+M is left to the balance of energy.
+
+Equation (T.29) of docs/theory.md.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..flow.gas_stepping import SECOND_ORDER
+from ..flow.gas_stepping import SECOND_ORDER, GasStep
+from ..flow.line_stepping import LineStep
+from ..flow.stepping import Step
 from .scheme import Scheme
 from .state import MotionState
-from .terms import Step, Weights
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the parts of a step's equations: their dependence on the new unknowns.
+
+    Attributes
+    ----------
+    theta : float
+        Point in the step at which the fluid's equations are met: the share of the new state there.
+    load : float
+        Factor of G p there.
+    inertia : float
+        Factor of M, 1/s2; mass damping included.
+    force : float
+        Factor of the tangent of F.
+    velocity : float
+        Derivative of the new velocities with respect to the new positions, 1/s.
+    psi : float
+        Derivative of the rate of psi with respect to the new psi, 1/s.
+    outside : float
+        Factor of the added mass of fluid outside, 1/s2: no damping acts on it.
+    """
+
+    theta: float
+    load: float
+    inertia: float
+    force: float
+    velocity: float
+    psi: float
+    outside: float = 0.0
 
 
 class Trial:
@@ -51,8 +99,8 @@ class Trial:
             rate / h,
             (1.0 - rate) * old.psi_rate - (rate / h) * old.psi,
             inlet,
-            None if old.line is None else motion.line_step(old.line, h, theta, rate, inlet),
-            None if old.gas is None else motion.fluid_step(old.gas, h, rate, inlet),
+            None if old.line is None else LineStep(motion.waves, old.line, h, theta, rate, inlet),
+            None if old.gas is None else GasStep(motion.fluid, old.gas, h, rate, inlet),
         )
 
         # stiffness damping is by the slow law, and its force is known apart only where there is some
@@ -145,3 +193,33 @@ class Trial:
         if self.contact is None:
             return 0.0
         return float(self.touch @ (self.q - self.old.q)) - self.contact.stored(self.q)
+
+
+def numerical_loss(motion, trial: Trial, new: MotionState) -> float:
+    """Energy that the numerical damping of a step takes, J.
+
+    Parameters
+    ----------
+    motion : ValveMotion or anything with its methods
+    trial : Trial
+        The step's equations, met.
+    new : MotionState
+        What the step ends with.
+    """
+    s, old, h = trial.scheme, trial.old, trial.h
+    mu, shift, forward = 1.0 - s.alpha_m - s.gamma, s.beta - 0.5 * s.gamma, 0.5 - s.alpha_f
+    if not (mu or shift or forward):
+        return 0.0
+    change, faster = new.a - old.a, new.v - old.v
+    momentum = motion.momentum(trial.q_mid, change)
+    if motion.outside is not None:
+        momentum = momentum + motion.outside.force(trial.q_mid, change)
+    inertia = mu * (0.5 * (old.v + new.v)) + shift * (faster + h * mu * change)
+    return float(h * (inertia @ momentum) + forward * (_force_change(motion, old, new) @ (new.q - old.q)))
+
+
+def _force_change(motion, old: MotionState, new: MotionState) -> np.ndarray:
+    """Change (n,) of the force that has a potential: that of branches is in the books of their own."""
+    if motion.wall is None:
+        return new.force - old.force
+    return motion.internal_force(new.q) - motion.internal_force(old.q)

@@ -10,8 +10,7 @@ from typing import Any
 from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 from ..model import ValveModel
-from ..model.equilibria import find_equilibrium, redescribe, rest_state
-from ..model.operating_point import operating_pressure
+from ..model.equilibria import find_equilibrium, operating_pressure, redescribe, rest_state
 from ..model.state import SteadyState
 from ..model.strain_level import SettledLevels, settle_levels
 from ..observer import Observer

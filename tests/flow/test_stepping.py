@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from dbvfiv.flow import Channel
-from dbvfiv.flow.reversed import ReversibleFluid
 from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.flow.terms.line import Line
 from dbvfiv.flow.terms.tail import Tail
@@ -18,12 +17,11 @@ from tests.flow.test_channel import FLOOR, passage
 
 DENSITY, INLET = 850.0, 18e3
 KINDS = [
-    pytest.param(MovingFluid, False, (), id="outward"),
-    pytest.param(ReversibleFluid, True, (), id="either way"),
-    pytest.param(ReversibleFluid, True, (LipLoss(0.7), Pipe(3.0, 1.2)), id="with terms"),
-    pytest.param(ReversibleFluid, True, (Line(20.0, 0.15, 0.02, 0.0, 1.5),), id="with a line from a reservoir"),
-    pytest.param(ReversibleFluid, True, (Line(5.0, None, 0.0, 1e-4, 0.5, False),), id="with a line"),
-    pytest.param(ReversibleFluid, True, (Tail(0.16, 5.0, 0.5),), id="with a pipe behind"),
+    pytest.param((), id="either way"),
+    pytest.param((LipLoss(0.7), Pipe(3.0, 1.2)), id="with terms"),
+    pytest.param((Line(20.0, 0.15, 0.02, 0.0, 1.5),), id="with a line from a reservoir"),
+    pytest.param((Line(5.0, None, 0.0, 1e-4, 0.5, False),), id="with a line"),
+    pytest.param((Tail(0.16, 5.0, 0.5),), id="with a pipe behind"),
 ]
 #: outward, with one station of rest reversed by the moving walls, and drawn in
 VELOCITIES = [1.7, 0.02, -1.1]
@@ -48,19 +46,19 @@ def close(found, expected, scale=None):
     assert np.abs(found - expected).max() <= 1e-12 * scale
 
 
-def setting(kind, reversible, terms, storage):
+def setting(terms, storage):
     z, area = passage()
     area = np.concatenate([[3 * FLOOR], area[1:]])
     rate = 0.02 * np.random.default_rng(3).standard_normal(len(z))
-    law = Channel(z, FLOOR, storage, terms=terms, reversible=reversible)
-    return law, kind(law, DENSITY), area, rate, law.values({"inlet": INLET, "density": DENSITY})
+    law = Channel(z, FLOOR, storage, terms=terms, reversible=True)
+    return law, MovingFluid(law, DENSITY), area, rate, law.values({"inlet": INLET, "density": DENSITY})
 
 
 @pytest.mark.parametrize("velocity", VELOCITIES)
 @pytest.mark.parametrize("storage", [0.0, 0.6, 1.0])
-@pytest.mark.parametrize("kind, reversible, terms", KINDS)
-def test_values(kind, reversible, terms, storage, velocity):
-    law, fluid, area, rate, parameters = setting(kind, reversible, terms, storage)
+@pytest.mark.parametrize("terms", KINDS)
+def test_values(terms, storage, velocity):
+    law, fluid, area, rate, parameters = setting(terms, storage)
     flow = fluid.state(area, rate, velocity)
     inner = np.array([velocity])
     speed, psi, head = (np.asarray(part) for part in definition(law, area, rate, inner, parameters))
@@ -72,9 +70,9 @@ def test_values(kind, reversible, terms, storage, velocity):
 
 @pytest.mark.parametrize("velocity", VELOCITIES)
 @pytest.mark.parametrize("storage", [0.0, 0.6, 1.0])
-@pytest.mark.parametrize("kind, reversible, terms", KINDS)
-def test_slopes(kind, reversible, terms, storage, velocity):
-    law, fluid, area, rate, parameters = setting(kind, reversible, terms, storage)
+@pytest.mark.parametrize("terms", KINDS)
+def test_slopes(terms, storage, velocity):
+    law, fluid, area, rate, parameters = setting(terms, storage)
     inner = np.array([velocity])
     speeds, psis, _ = definition_slopes(law, area, rate, inner, parameters)
     for evaluated, defined in ((fluid.slopes, speeds), (fluid.psi_slopes, psis)):
@@ -84,10 +82,10 @@ def test_slopes(kind, reversible, terms, storage, velocity):
 
 @pytest.mark.parametrize("velocity", VELOCITIES)
 @pytest.mark.parametrize("storage", [0.0, 1.0])
-@pytest.mark.parametrize("kind, reversible, terms", KINDS)
-def test_slopes_of_the_pressures_in_a_step(kind, reversible, terms, storage, velocity):
+@pytest.mark.parametrize("terms", KINDS)
+def test_slopes_of_the_pressures_in_a_step(terms, storage, velocity):
     """The pressures of a step as a function of the new areas and inlet velocity, by the definition and chain rule."""
-    law, fluid, old_area, old_rate, parameters = setting(kind, reversible, terms, storage)
+    law, fluid, old_area, old_rate, parameters = setting(terms, storage)
     theta, per_step, weight, old = 0.6, 80.0, 60.0, velocity + 0.05
 
     area, new_rate = 1.05 * old_area, old_rate + per_step * 0.05 * old_area
@@ -105,7 +103,7 @@ def test_slopes_of_the_pressures_in_a_step(kind, reversible, terms, storage, vel
 @pytest.mark.parametrize("storage", [0.0, 1.0])
 @pytest.mark.parametrize("terms", [(), (LipLoss(0.7), Pipe(3.0, 1.2))], ids=["bare", "with terms"])
 def test_the_velocity_of_a_step_meets_the_outlet(terms, storage, inlet):
-    _, fluid, area, rate, _ = setting(ReversibleFluid, True, terms, storage)
+    _, fluid, area, rate, _ = setting(terms, storage)
     mid, new, old, theta, weight, known = (area, rate), (1.1 * area, -rate), 0.3, 0.6, 80.0, 2.0
     u = fluid.velocity(mid, new, inlet, old, theta, weight, known)
     psi_rate = weight * fluid.state(*new, u).psi + known
@@ -115,7 +113,7 @@ def test_the_velocity_of_a_step_meets_the_outlet(terms, storage, inlet):
 
 @pytest.mark.parametrize("terms", [(LipLoss(0.7),), (Pipe(3.0, 1.2),)], ids=["lips", "pipe"])
 def test_steady_flow_of_a_long_step_is_that_of_the_law(terms):
-    law, fluid, area, _, _ = setting(ReversibleFluid, True, terms, 1.0)
+    law, fluid, area, _, _ = setting(terms, 1.0)
     at = (area, np.zeros(law.count))
     u = fluid.velocity(at, at, INLET, 0.1, 1.0, 0.0, 0.0)
     assert u == pytest.approx(law.inlet_velocity(area, INLET, DENSITY), rel=1e-12)

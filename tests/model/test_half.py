@@ -11,16 +11,16 @@ from dbvfiv.case.part import HALF, QUARTER
 from dbvfiv.exchange.bodies import shape_of
 from dbvfiv.exchange.faces import WallFaces
 from dbvfiv.exchange.stl import triangulated
-from dbvfiv.model.analytic import AnalyticResidual
 from dbvfiv.model.classes import linearise_class
+from dbvfiv.model.residual import ValveResidual
 from dbvfiv.model.symmetry import HALF_SYMMETRIES, SYMMETRIES
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.whole_valve import WholeValve
 from eigen.search import leading_modes
-from tests.model.test_analytic_forms import difference as mixed_difference
-from tests.model.test_analytic_forms import motions
 from tests.model.test_coupled_tangent import difference, direction_of
+from tests.model.test_residual_forms import difference as mixed_difference
+from tests.model.test_residual_forms import motions
 from tests.small_valves import find_open_state, make_valve
 
 PRESSURE = 12e3
@@ -200,7 +200,7 @@ def test_tangent_of_a_flat_bottom_against_differences(flat, flat_state):
 
 @pytest.mark.slow
 def test_second_derivatives_of_a_flat_bottom(flat, flat_state):
-    residual, still = AnalyticResidual(flat), np.zeros(flat.size)
+    residual, still = ValveResidual(flat), np.zeros(flat.size)
     speed = flat.flow.inlet_velocity(flat.rows.areas(flat.nodal(flat_state)), 4e3, 10.0)
     about = (flat_state, still, still, speed, 0.0)
     parameters = {"inlet": 4e3, "density": 10.0, "alpha": 2.0, "beta": 0.003, "storage": 1.0}

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from dbvfiv.case.quantity import GRAVITY
-from dbvfiv.model.hydraulics import hydraulics_of
+from dbvfiv.model.state import hydraulics_of
 
 
 def test_a_lossless_jet_loses_its_velocity_head():

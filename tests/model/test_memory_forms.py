@@ -7,8 +7,9 @@ import pytest
 
 from continuation.normal_form import Motion
 from continuation.system import expand
+from dbvfiv.model.dynamics import linearise
 from dbvfiv.model.memory_forms import PencilAt, ValveMemoryForms, slope_of
-from dbvfiv.model.system import ValveSystem, pencil_at
+from dbvfiv.model.system import ValveSystem
 
 from .test_relaxing_wall import relaxing_valve
 
@@ -60,7 +61,8 @@ def test_change_of_the_pencil_with_a_parameter(valve, steady, parameters, direct
     inner, step = forms.rest[2 * valve.size :], 1e-3 * parameters[name]
 
     def product(value):
-        pencil = pencil_at(valve, steady, inner, parameters | {name: value})
+        mu = parameters | {name: value}
+        pencil = linearise(valve, steady, mu["inlet"], mu, inner).pencil(mu)
         return PencilAt(pencil, RATES[0]).matvec(directions[0])
 
     difference = (product(parameters[name] + step) - product(parameters[name] - step)) / (2 * step)

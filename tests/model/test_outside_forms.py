@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from dbvfiv.model.outside_forms import BASIS, OutsideForms
+from dbvfiv.model.outside import BASIS, OutsideForms
 
 from .test_outside import valve
 
@@ -16,7 +16,8 @@ STEP = 3e-4  # m, fifteen times the forms' own
 
 @cache
 def forms() -> OutsideForms:
-    return OutsideForms(*valve())
+    model, q = valve()
+    return OutsideForms(model.outside, q, model.shell.dofs.matrix(model.structure(q)[1]))
 
 
 def whole(shift: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from dbvfiv.errors import SolveError
 from dbvfiv.materials.prony import Prony
 from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.build import build_section
-from dbvfiv.model.system import ValveSystem, pencil_at
+from dbvfiv.model.system import ValveSystem
 from dbvfiv.shell import Section
 from dbvfiv.studies.case import thesis_case
 
@@ -73,7 +73,7 @@ def test_a_system_has_the_same_pencil(valve, state):
     mu = {"inlet": 6e3, "density": 10.0, "storage": 0.0, "alpha": 5.0, "beta": 0.0, "loss_factor": 1.0}
     speed = valve.flow.steady_inner(valve.rows.areas(valve.nodal(state.q)), mu)
     found, expected = (
-        pencil_at(valve, state.q, speed, mu),
+        linearise(valve, state.q, 6e3, mu, speed).pencil(mu),
         state.pencil(Mu(density=10.0, alpha=5.0, beta=0.0, loss_factor=1.0)),
     )
     assert np.array_equal(found.relaxation.strengths, expected.relaxation.strengths)

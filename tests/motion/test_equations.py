@@ -7,7 +7,7 @@ import pytest
 
 from dbvfiv.flow import FlowMotion
 from dbvfiv.flow.stepping import MovingFluid
-from dbvfiv.model.dynamics import dynamic_residual
+from dbvfiv.model.residual import ValveResidual
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
@@ -20,19 +20,25 @@ LAWS = [
 ]
 
 
-@pytest.mark.parametrize("law", LAWS + [{"fluid.unsteady": False}])
+@pytest.mark.parametrize("law", LAWS + [{"fluid.unsteady": False}, {"shell.mass": "averaged"}, {"layers.2.begin": 0.3}])
 def test_consistent_accelerations_meet_the_model(valve, open_state, law):
+    """Whatever the mass, and where layers end."""
     model = valve({"fluid.density": 50.0} | law)
-    motion = ValveMotion(model)
+    motion, definition = ValveMotion(model), ValveResidual(model)
     v = 0.05 * open_state / np.abs(open_state).max()
     state = consistent_state(motion, 0.0, open_state, v, 0.4, 9e3)
+    given = {"inlet": 9e3, "density": 50.0, "alpha": motion.mu.alpha, "beta": motion.mu.beta}
+
+    def residual(r):
+        return definition.value((open_state, v, state.a, state.speed, r), given)
+
     rate = 0.0
     if (
         motion.moving_fluid
     ):  # psi = U times an integral, at the areas' rates; only the outlet's equation fixes the rate of U
-        rates = [dynamic_residual(model, motion.mu, 9e3, open_state, v, state.a, state.speed, r)[1] for r in (0.0, 1.0)]
+        rates = [residual(r)[-1] for r in (0.0, 1.0)]
         rate = -rates[0] / (rates[1] - rates[0])
-    force, outlet = dynamic_residual(model, motion.mu, 9e3, open_state, v, state.a, state.speed, rate)
+    force, outlet = np.split(residual(rate), [model.size])
     scale = np.abs(state.force).max()
     assert np.abs(force).max() < 1e-9 * scale
     if motion.moving_fluid:

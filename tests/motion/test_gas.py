@@ -5,11 +5,9 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case.parameters import Mu
-from dbvfiv.flow.gas_books import BOOKS
+from dbvfiv.flow.gas_stepping import BOOKS, GasFluid
 from dbvfiv.model.dynamics import linearise
-from dbvfiv.motion.choice import motion_of
 from dbvfiv.motion.equations import ValveMotion
-from dbvfiv.motion.gas import GasMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.start import Push, kicked, steady_positions
 from dbvfiv.motion.stepper import Stepper
@@ -34,7 +32,7 @@ def leading(model, inlet):
 
 def swung(model, inlet, step, duration, opening=1e-5):
     """Lip's swing, m, after a small kick along the leading mode, and its eigenvalue."""
-    motion = motion_of(model)
+    motion = ValveMotion(model)
     q = steady_positions(model, inlet)
     speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(q)), inlet, model.case.fluid.density)
     state, kick = kicked(motion, q, speed, inlet, Push(1, opening, 6, SearchOptions()))
@@ -62,7 +60,7 @@ def test_a_kick_grows_as_the_eigenvalue_says(valve):
     errors = []
     for step in (4e-4, 2e-4):
         swing, rate, motion = swung(model, 2e3, step, duration)
-        assert isinstance(motion, GasMotion)
+        assert isinstance(motion.fluid, GasFluid)
         growth = np.exp(rate * step * np.arange(len(swing)))  # the lip swings in phase: the mode is scaled by it
         errors.append(np.abs(swing / swing[0] - growth.real)[-1])
     assert errors[1] < 3e-4 and errors[0] > 3.0 * errors[1]
@@ -70,7 +68,7 @@ def test_a_kick_grows_as_the_eigenvalue_says(valve):
 
 def test_a_stiff_gas_moves_as_the_incompressible_law(valve):
     """c = 1e5 m/s: what is left is the difference of two schemes of second order for the same equations."""
-    assert type(motion_of(valve(AIR))) is ValveMotion
+    assert not isinstance(ValveMotion(valve(AIR)).fluid, GasFluid)
     plain, gas = (swung(valve(AIR | more), 2e3, 4e-4, 4e-3)[0] for more in ({}, {"fluid.sound_speed": 1e5}))
     assert np.abs(plain - gas).max() < 1e-4 * np.abs(plain).max()
 
@@ -79,7 +77,7 @@ def test_a_gas_is_drawn_in_without_numerical_damping(valve):
     """A liquid is not: without it a valve in water rings from step to step after its first hammer."""
     water = {"fluid.density": 1e3, "fluid.sound_speed": 1480.0, "fluid.heat_capacity_ratio": 7.15}
     for more, damping in ((SOUND, 0.0), (water, 0.2)):
-        stepper = Stepper(motion_of(valve(AIR | more)), scheme("generalised-alpha"), lambda t: 2e3)
+        stepper = Stepper(ValveMotion(valve(AIR | more)), scheme("generalised-alpha"), lambda t: 2e3)
         assert stepper._inward.gamma - 0.5 == pytest.approx(damping)
 
 

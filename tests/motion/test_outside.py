@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.equations import ValveMotion
-from dbvfiv.motion.options import RunOptions
 from dbvfiv.motion.outside import OutsideCorrection
 from dbvfiv.studies.transient.run import Runner
 from tests.small_valves import make_valve

@@ -8,9 +8,8 @@ import pytest
 from continuation import blocks
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
-from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import SolveError
-from dbvfiv.model.dynamics import dynamic_residual
+from dbvfiv.model.residual import ValveResidual
 from dbvfiv.motion.periodic import PeriodicValve
 from dbvfiv.motion.start import steady_positions
 from tests.small_valves import find_open_state, make_valve
@@ -109,10 +108,10 @@ def test_residual_is_that_of_the_equations_of_motion(name):
     n = model.size
     rates = fine.rates
     q, v, a = (rates.apply(k, fine.samples) for k in range(3))
-    conditions = Mu(density=mu["density"], alpha=mu["alpha"], beta=mu["beta"])
+    residual = ValveResidual(model)
     for i in (0, 13, 29):
         state = (q[i, :n], v[i, :n], a[i, :n], q[i, n:], v[i, n:])
-        force, rest = dynamic_residual(model, conditions, mu["inlet"], *state)
+        force, rest = np.split(residual.value(state, mu), [n])
         assert np.linalg.norm(found[i, :n] - force) < 1e-6 * np.linalg.norm(force)
         assert np.allclose(found[i, n:] / float(model.mesh.rest_area[-1]), rest, rtol=1e-6, atol=1e-3)
 

@@ -12,10 +12,10 @@ from continuation.normal_form import Motion
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
-from dbvfiv.model.analytic import AnalyticResidual
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.equilibria import find_equilibrium, rest_state
 from dbvfiv.model.memory_forms import ValveMemoryForms
+from dbvfiv.model.residual import ValveResidual
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.stability.place import is_surrounding
@@ -120,7 +120,7 @@ def test_classes_of_motion_hold_the_weight():
 @pytest.mark.slow
 def test_higher_forms_hold_the_weight():
     model = make_valve(EVEN | DOWN)
-    residual = AnalyticResidual(model)
+    residual = ValveResidual(model)
     nodal = np.zeros((len(model.mesh.nodes), 5))
     nodal[:, 1] = 0.02 * np.clip(1 - model.mesh.nodes[:, 2] / 0.49, 0, 1) ** 2
     zero, random = np.zeros(model.size), np.random.default_rng(5)
@@ -171,7 +171,7 @@ def test_normal_forms_hold_the_weight(keys):
     model = load(keys, {"damping.beta": 1e-3} if "damping.model" not in keys else {}).model
     q = load(keys).steady(pressure=6e3).q
     mu = {"inlet": 6e3, "density": 1000.0, "storage": 1.0, "alpha": 1.0, "beta": 1e-3, "loss_factor": 0.0}
-    forms, residual = ValveMemoryForms(model, q, mu), AnalyticResidual(model)
+    forms, residual = ValveMemoryForms(model, q, mu), ValveResidual(model)
     random, zero = np.random.default_rng(2), np.zeros(model.size)
     a, b = (Motion(s, random.normal(size=model.size + 1) * 1e-3) for s in (3.0, -2.0))
     inner = model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.write import case_toml
-from dbvfiv.model.layer_strains import tension_of
+from dbvfiv.model.material_stability import tension_of
 from dbvfiv.model.strain_level import settle_levels
 from dbvfiv.studies.case import load_case, thesis_case
 

@@ -11,8 +11,9 @@ import scipy.linalg as la
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
-from dbvfiv.model.dynamics import dynamic_residual, linearise
+from dbvfiv.model.dynamics import linearise
 from dbvfiv.model.equilibria import LoadPath, rest_state
+from dbvfiv.model.residual import ValveResidual
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.modes.run import ModesOptions, run_modes
@@ -80,18 +81,12 @@ def test_the_motion_satisfies_the_time_dependent_equations(model, state, flutter
     q = dofs.restrict(shape)
     steady = model.flow.inlet_velocity(state.station_area, state.pressure, LIGHT.density)
 
+    residual = ValveResidual(model)
+
     def left(size):
         moved = [size * (value**k * q).real for k in range(3)]
-        force, outlet = dynamic_residual(
-            model,
-            LIGHT,
-            state.pressure,
-            state.q + moved[0],
-            moved[1],
-            moved[2],
-            steady + size * inlet.real,
-            size * (value * inlet).real,
-        )
+        motion = state.q + moved[0], moved[1], moved[2], steady + size * inlet.real, size * (value * inlet).real
+        force, outlet = np.split(residual.value(motion, {"inlet": state.pressure, **LIGHT}), [model.size])
         unit = np.linalg.norm(dofs.matrix(model.mass(state.q)) @ moved[2])
         return np.linalg.norm(force) / unit, abs(outlet[0]) / state.pressure
 

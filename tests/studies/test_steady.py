@@ -9,8 +9,8 @@ from dbvfiv.case.load import make_case, parse_toml
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions, find_equilibria, model_warnings
-from dbvfiv.model.lip import LipCentre
 from dbvfiv.model.newton import NewtonOptions
+from dbvfiv.model.state import LipCentre
 from dbvfiv.observer import Observer
 from dbvfiv.record.states import summarise
 from dbvfiv.studies.case import Case, thesis_case

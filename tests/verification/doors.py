@@ -12,7 +12,7 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, NotValidError, SolveError
 from dbvfiv.model.equilibria import SteadyOptions
 from dbvfiv.model.state import SteadyState
-from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.observer import Observer

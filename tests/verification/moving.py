@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import scipy.sparse as sp
 
+from dbvfiv.flow.stepping import Load, StepFluid
 from dbvfiv.model.linear import CoupledFactor
 from dbvfiv.model.relaxing import WallRelaxation
 from dbvfiv.motion.kernels import strain_energy
-from dbvfiv.motion.terms import Load
 from dbvfiv.shell import Shell, WallMemory
 from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
 
@@ -20,7 +20,7 @@ NONE = np.zeros(1)
 class Motion:
     """What the stepper asks of any motion without a fluid; the load is a force that the positions fix."""
 
-    moving_fluid = False
+    fluid, moving_fluid = StepFluid, False
     outside = None
     wall = None
     contact = None

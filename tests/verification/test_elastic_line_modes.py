@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.transient.run import Runner

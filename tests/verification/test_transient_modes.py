@@ -15,7 +15,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case.parameters import Mu
-from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import thesis_case

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import thesis_case

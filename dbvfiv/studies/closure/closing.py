@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
-from ...model.lip import LipCentre
+from ...model.state import LipCentre
 from ...motion.control import ControlOptions, FixedSteps
 from ...motion.scheme import scheme
 from ...motion.start import steady_positions
@@ -67,7 +67,7 @@ class ClosingSample:
     inlet_pressure : float, Pa
     lip_opening : float, m
         Full clear opening between the inner faces of both lips at x = z = 0; never below zero, see
-        `dbvfiv.model.lip.LipCentre.opening`.
+        `dbvfiv.model.state.LipCentre.opening`.
     lip_displacement : float, m
         Displacement in y of the mid-surface of one lip there.
     least_opening : float, m2

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...model.lip import LipCentre
+from ...model.state import LipCentre
 from ...shell.recovery import layer_fields
 from .balance import force_balance
 from .model import ClosureModel
@@ -48,7 +48,7 @@ class ClosureState:
     least_opening_position : float, m
     lip_opening : float, m
         Full clear opening between the inner faces of both lips at x = z = 0; never below zero, see
-        `dbvfiv.model.lip.LipCentre.opening`.
+        `dbvfiv.model.state.LipCentre.opening`.
     lip_displacement : float, m
         Displacement in y of the mid-surface of one lip there.
     max_displacement : float, m

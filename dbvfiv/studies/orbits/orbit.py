@@ -10,7 +10,7 @@ import numpy as np
 from continuation.periodic import PeriodicMotion
 
 from ...model import ValveModel
-from ...model.lip import LipCentre
+from ...model.state import LipCentre
 
 #: Instants of a period at which a cycle is looked at.
 INSTANTS = 240

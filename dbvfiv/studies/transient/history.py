@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ...flow.gas_books import BOOKS
-from ...flow.gas_stepping import GasState
+from ...flow.gas_stepping import BOOKS, GasState
 from ...flow.line_stepping import LineState
-from ...model.lip import LipCentre
+from ...model.state import LipCentre
 from ...motion.equations import ValveMotion
 from ...motion.stepper import StepResult
 

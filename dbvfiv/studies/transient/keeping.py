@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import CaseError
 from ...model import ValveModel
-from ...motion.options import RunOptions
+from ...motion.control import RunOptions
 from ...motion.state import MotionState
 from ...record.record import GrowingRecord, Record
 from ..case import Case

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...errors import CaseError
-from ...motion.options import RunOptions
+from ...motion.control import RunOptions
 from ...record.record import Record
 from ...record.vtkhdf import Step
 from ...record.whole_valve import WholeValve

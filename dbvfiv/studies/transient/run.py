@@ -12,10 +12,8 @@ from ...errors import SolveError
 from ...model import ValveModel
 from ...model.equilibria import model_warnings
 from ...model.material_stability import material_stability
-from ...motion.choice import motion_of
-from ...motion.control import step_control
-from ...motion.drive import Drive
-from ...motion.options import RunOptions
+from ...motion.control import Drive, RunOptions, step_control
+from ...motion.equations import ValveMotion
 from ...motion.start import first_state
 from ...motion.state import MotionState
 from ...motion.stepper import StepFailure, Stepper
@@ -91,7 +89,7 @@ class Runner:
         self.record = _in_memory(model, case) if record is None else record
         self.options = RunOptions.of(case) if options is None else options
         self.drive = Drive.of(case)
-        self.motion = motion_of(model, staggered=case.transient.coupling == "staggered")
+        self.motion = ValveMotion(model, staggered=case.transient.coupling == "staggered")
         self.stepper = Stepper(self.motion, self.options.scheme, self.drive, self.options.step)
         self.control = step_control(self.stepper, self.options.control)
         self.keeper = Keeper(self.record, model)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.model.outside_forms import OutsideForms
+from dbvfiv.model.outside import OutsideForms
 from dbvfiv.studies.case import thesis_case
 
 WATER = {

@@ -24,10 +24,8 @@ def family(walk, coarse_case) -> ValveFamily:
 
 
 def test_fluid_parts_go_with_powers_of_the_root_of_density(family):
-    from dbvfiv.model.dynamics import fluid_parts
-
     linear, unit = family.linear, family.parts(Mu(storage=0.3))
-    parts = fluid_parts(linear.model.flow, linear.area, linear.inlet, 7.0, 0.3)
+    parts = linear.fluid_parts(7.0, 0.3)
     for name, power in POWERS.items():
         power += name[0] in "BS"  # the velocity there is not scaled
         assert parts[name] == pytest.approx(

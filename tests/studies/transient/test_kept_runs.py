@@ -14,7 +14,7 @@ import pytest
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.motion import stepper
-from dbvfiv.motion.options import RunOptions
+from dbvfiv.motion.control import RunOptions
 from dbvfiv.record.header import Header
 from dbvfiv.record.journal import Journal
 from dbvfiv.record.mesh import MeshData

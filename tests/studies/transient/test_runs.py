@@ -6,7 +6,7 @@ import pytest
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.errors import SolveError
-from dbvfiv.motion.drive import Drive
+from dbvfiv.motion.control import Drive
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import load_result

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.flow.gas_books import BOOKS
+from dbvfiv.flow.gas_stepping import BOOKS
 from dbvfiv.studies.case import thesis_case
 
 AIR = {

@@ -1,8 +1,15 @@
-"""The dynamic residual once more, traceable, for its higher directional derivatives.
+"""The valve in motion: the residual of the coupled equations, traceable, and its directional derivatives.
 
-Normal forms and sensitivities need derivatives that the compiled loops do not give. Inertia, flow and load of
-`dynamics.dynamic_residual` are one jax function of the motion and of the parameters here; the structure's forms come
-from the element energy.
+    M(q) a + h(q, v) + alpha M v + beta K_s(q) v + f(q) - G(q) p = 0,     e = 0
+
+with h the inertia quadratic in the velocities (turning directors), K_s the structure's own tangent, which has no part
+of the contact of inner faces in f, p the station pressures of the unsteady flow through the areas A(q) with rates A' =
+J v and A'' = J a + d2A[v, v], and e the flow law's own equations.
+
+Inertia, flow and load are one jax function of the motion and of the parameters; the structure's force and forms come
+from the element energy. Time steps and periodic motions evaluate the same equations by compiled loops.
+
+Equation (T.15) of docs/theory.md.
 """
 
 from __future__ import annotations
@@ -14,17 +21,17 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..flow import FlowMotion
-from ..flow.derivatives import along
+from ..flow.law import along
 from ..shell.reference import SHAPE, SLOPE
 from ..shell.rotation import director
-from .outside_forms import OutsideForms
+from .outside import OutsideForms
 from .valve import ValveModel
 
 #: Parameters of the damping; those of the flow law come before them.
 DAMPING = ("alpha", "beta")
 
 
-class AnalyticResidual:
+class ValveResidual:
     """Residual of the equations of motion and its multilinear forms.
 
     Parameters
@@ -32,9 +39,9 @@ class AnalyticResidual:
     model : ValveModel
 
     The residual is a vector (n + l,): forces, then the flow's own equations. A motion is a tuple (q, v, a, inner,
-    inner_rate) with the flow's unknowns (l,), one number where there is one; parameters a dict with the keys of
-    `parameters`. Second and third derivatives are taken about motions with v = 0. Lip stops are piecewise linear and
-    have none; contact of inner faces has those of the pieces of its law.
+    inner_rate) with the flow's unknowns (l,), one number where there is one; parameters a mapping with alpha, beta and
+    those of the flow law that have no default. Second and third derivatives are taken about motions with v = 0. Lip
+    stops are piecewise linear and have none; contact of inner faces has those of the pieces of its law.
 
     Attributes
     ----------
@@ -73,7 +80,7 @@ class AnalyticResidual:
         return {key: 1.0 if key == name else 0.0 for key in self.parameters}
 
     def _given(self, parameters) -> dict:
-        return {key: parameters[key] for key in self.parameters}
+        return self.model.flow.values(parameters) | {name: float(parameters[name]) for name in DAMPING}
 
     def value(self, motion, parameters) -> np.ndarray:
         """Residual (n + l,)."""
@@ -131,7 +138,8 @@ class AnalyticResidual:
             out[self._forces] += self.model.contact.form(motion[0], *(direction[0] for direction in directions))
         if self.model.outside is not None:
             if self._outside is None or not np.array_equal(self._outside.q, motion[0]):
-                self._outside = OutsideForms(self.model, motion[0])
+                structure = self.model.shell.dofs.matrix(self.model.structure(motion[0])[1])
+                self._outside = OutsideForms(self.model.outside, motion[0], structure)
             form = self._outside.second if len(directions) == 2 else self._outside.third
             density = self.model.case.outside.density(parameters["density"])
             out[self._forces] += density * form(*(direction[:3] for direction in directions))
