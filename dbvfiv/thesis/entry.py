@@ -11,6 +11,8 @@ from ..report.content import Part, Picture, Table
 if TYPE_CHECKING:
     from .workshop import Workshop
 
+_HEAD = ("", "ours", "thesis", "difference")
+
 
 @dataclass(frozen=True)
 class Number:
@@ -94,10 +96,20 @@ class Entry:
         """Name of the figure or table in the thesis."""
         return f"Table {self.name[1:]}" if self.name.startswith("T") else f"Fig. {self.name}"
 
+    def lines(self, outcome: Outcome) -> list[str]:
+        """The outcome for people."""
+        lines = ["", f"{self.label}: {self.title}"]
+        if outcome.numbers:
+            rows = [_HEAD, *(n.row for n in outcome.numbers)]
+            widths = [max(len(row[i]) for row in rows) for i in range(4)]
+            lines += [
+                f"  {row[0]:<{widths[0]}}" + "".join(f"  {row[i]:>{widths[i]}}" for i in (1, 2, 3)) for row in rows
+            ]
+        return [*lines, *(f"  {sentence}" for sentence in outcome.sentences)]
+
     def part(self, outcome: Outcome) -> Part:
-        """For a page."""
-        head = ("", "ours", "thesis", "difference")
-        tables = (Table(head, tuple(n.row for n in outcome.numbers)),) if outcome.numbers else ()
+        """The outcome for a page."""
+        tables = (Table(_HEAD, tuple(n.row for n in outcome.numbers)),) if outcome.numbers else ()
         return Part(f"entry-{self.name}", f"{self.label}: {self.title}", outcome.sentences, tables, outcome.pictures)
 
 

@@ -37,6 +37,13 @@ class Workshop:
         around, along = QUICK if quick else FULL
         self.base = thesis_case({"mesh.around": around, "mesh.along": along})
 
+    @property
+    def setting(self) -> str:
+        """Valve, mesh and histories of the page, in a sentence or two."""
+        mesh = self.base.mesh
+        short = " Short histories on a coarse mesh, for a look and not for the numbers." if self.quick else ""
+        return f"The 12-inch valve on {mesh.around} x {mesh.along} elements of a quarter, beside the thesis.{short}"
+
     def steady(self, pressures: Sequence[float], changes: Mapping[str, Any] | None = None) -> SteadyResult:
         """States at pressures, Pa, of the 12-inch valve with some keys changed."""
         return self._run("steady", {"steady.pressures": list(pressures), **(changes or {})})

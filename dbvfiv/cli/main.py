@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import os
-import pkgutil
 import signal
 import sys
 import threading
@@ -19,10 +17,24 @@ import typer
 
 from .. import __version__
 from ..errors import CaseError, SolveError
-from ._study import make_command, study_commands
+from . import case, materials, pages, results, studies, verdict
 
 # Typer brings its own Click in newer versions and uses the separate package in older ones.
 _UsageProblem = typer.BadParameter.__mro__[2]
+
+#: Commands that the help lists before and behind those of the studies.
+_BEFORE = (case.case, materials.damping, materials.fit, materials.ply, pages.report)
+_AFTER = (
+    studies.resume,
+    verdict.verdict,
+    results.plot,
+    results.compare,
+    results.export,
+    results.cfd,
+    results.info,
+    case.doctor,
+    pages.reproduce,
+)
 
 
 def _version(show: bool) -> None:
@@ -44,17 +56,14 @@ def _root(
 
 
 def build() -> typer.Typer:
-    """Collect the command modules of this package."""
+    """All commands, in the order of their help."""
     app = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
     app.callback()(_root)
-    package = __package__
-    folder = importlib.import_module(package).__path__
-    names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
-    modules = [(name, importlib.import_module(f"{package}.{name}")) for name in names]
-    commands = [(name, module, module.command) for name, module in modules]
-    commands += [(kind, module, make_command(kind, module)) for kind, module in study_commands()]
-    for name, _, command in sorted(commands, key=lambda found: (getattr(found[1], "ORDER", 100), found[0])):
-        app.command(name.replace("_", "-"), no_args_is_help=False)(command)
+    commands = [(command.__name__, command) for command in _BEFORE]
+    commands += studies.study_commands()
+    commands += [(command.__name__, command) for command in _AFTER]
+    for name, command in commands:
+        app.command(name, no_args_is_help=False)(command)
     return app
 
 
@@ -96,15 +105,15 @@ class Ending:
     def __enter__(self) -> Ending:
         if threading.current_thread() is threading.main_thread():
             before = signal.getsignal(signal.SIGTERM)
-            if before is signal.SIG_DFL:  # who ignores it, or hears it already, goes on so
-                self._before = signal.signal(signal.SIGTERM, self._hear)
+            if before is signal.SIG_DFL:  # a handler that is set already, or none wanted, stays
+                self._before = signal.signal(signal.SIGTERM, self._interrupt)
         return self
 
     def __exit__(self, *error: object) -> None:
         if self._before is not None:
             signal.signal(signal.SIGTERM, self._before)
 
-    def _hear(self, _number: int, _frame: FrameType | None) -> None:
+    def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
         self.terminated = True
         last, self._since = self._since, time.monotonic()
         if self._since - last > self.SAME:
@@ -112,7 +121,7 @@ class Ending:
 
 
 def _outcome(arguments: Sequence[str], ending: Ending) -> int:
-    """Exit status of a command line; failures are told in a sentence."""
+    """Exit status of a command line; failures become sentences."""
     try:
         command = typer.main.get_command(build())
         status = command.main(list(arguments), prog_name="dbvfiv", standalone_mode=False)
@@ -121,12 +130,12 @@ def _outcome(arguments: Sequence[str], ending: Ending) -> int:
             raise KeyboardInterrupt
         return status if isinstance(status, int) else 0
     except CaseError as error:
-        return _say(str(error), 2)
+        return _report(str(error), 2)
     except SolveError as error:
-        return _say(str(error), 1)
+        return _report(str(error), 1)
     except (KeyboardInterrupt, typer.Abort):
         how, status = ("Terminated", 143) if ending.terminated else ("Interrupted", 130)
-        return _say(f"{how}; what was finished before has been kept.", status)
+        return _report(f"{how}; what was finished before has been kept.", status)
     except typer.Exit as leave:
         return leave.exit_code
     except _UsageProblem as problem:
@@ -134,26 +143,26 @@ def _outcome(arguments: Sequence[str], ending: Ending) -> int:
             print(problem.format_message())
             return 2
         text = " ".join(problem.format_message().split()).rstrip(".?").replace(". ", "; ")
-        return _say(f"{text}; `dbvfiv --help` lists what there is.", 2)
+        return _report(f"{text}; `dbvfiv --help` lists what there is.", 2)
     except BrokenPipeError:
         # the reader left (`dbvfiv ... | head`); keep Python from complaining at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
         name = f" {error.filename!r}" if error.filename else ""
-        return _say(f"The file{name} cannot be used ({error.strerror or error}).", 1)
+        return _report(f"The file{name} cannot be used ({error.strerror or error}).", 1)
     except Exception as error:  # the last line of defence: no traceback unless asked for
         if os.environ.get("DBVFIV_DEBUG"):
             traceback.print_exc()
         detail = " ".join(str(error).split())[:200].rstrip(".")
-        return _say(
+        return _report(
             f"The program failed unexpectedly ({type(error).__name__}: {detail}); "
             "set DBVFIV_DEBUG=1 for the details to report.",
             3,
         )
 
 
-def _say(sentence: str, status: int) -> int:
+def _report(sentence: str, status: int) -> int:
     sys.stdout.flush()
     print(sentence, file=sys.stderr)
     return status
