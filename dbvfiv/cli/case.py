@@ -59,7 +59,7 @@ def case(
 
 def _explain_keys(key: str | None, as_json: bool) -> None:
     """Explain a key, a section or everything."""
-    from ..case.reference import explain, explanation_text
+    from ..case.describe import explain, explanation_text
     from ..case.section import Section
     from ..studies.case import Case
 

@@ -35,7 +35,7 @@ def damping(
 
     dbvfiv damping my.toml --set damping.model="loss factor" --at 5,40 --plots figures
     """
-    from ..drawing.damping import damping_figure
+    from ..drawing.materials import damping_figure
     from ..materials.damping_report import describe_damping, read_frequencies
     from ..studies.case import load_case
 
@@ -110,9 +110,9 @@ def fit(
 
     dbvfiv fit tension.csv --planar shear.csv --constraint stable --plots figures
     """
-    from ..drawing.fit import fit_figure
+    from ..drawing.materials import fit_figure
     from ..materials.fit_report import describe_fits
-    from ..materials.loading_cycles import read_tests
+    from ..materials.rubber_tests import read_tests
 
     mass = _read_material(name, density)
     far = None if stable_to is None else _read_positive("--stable-to", stable_to, "%", "a strain greater than 0: 30 %")
@@ -140,7 +140,7 @@ def ply(
 
     dbvfiv ply warp.csv weft.csv --fraction "45 %" --at "30 %,60 %" --plots figures
     """
-    from ..drawing.ply import ply_figure
+    from ..drawing.materials import ply_figure
     from ..materials.ply_fit import fit_ply, read_strip_test
 
     mass = _read_material(name, density)

@@ -121,7 +121,7 @@ def plot(
     Of a case file: the valve with its measures, wall and layers, before anything is solved.
     """
     from ..api import load
-    from ..case.pressures import read_pressures
+    from ..case.axis import read_pressures
     from ..studies.session import load_result
 
     only, films = only or (), animate or ()
@@ -302,7 +302,7 @@ def export(
 
 def _choose_state(file: Path, pressure: str | None) -> State:
     """The steady state of a file nearest to a pressure ("36 kPa", "36kPa"), that of the highest without one."""
-    from ..case.pressures import read_pressures
+    from ..case.axis import read_pressures
     from ..studies.session import load_result
 
     result = load_result(file)
@@ -353,10 +353,9 @@ def cfd(
     dbvfiv cfd my.h5 --state "36 kPa" --pipe "330 mm" -o flow36 --plots figures
     """
     from ..cfd.comparison import FlowComparison
-    from ..cfd.fields import read_fields
     from ..cfd.figures import draw
     from ..cfd.flow_case import WATER_VISCOSITY, FlowCase
-    from ..cfd.run import run_openfoam
+    from ..cfd.foam import read_fields, run_openfoam
 
     state = _choose_state(file, pressure)
     result = state.results
@@ -380,7 +379,7 @@ def cfd(
 
 def _read_diameter(text: str) -> float | None:
     """Diameter of a pipe, m; None for a free jet."""
-    from ..case.downstream import Downstream
+    from ..case.pipes import Downstream
     from ..case.quantity import number_or_text
 
     if text.strip().lower() == "free":

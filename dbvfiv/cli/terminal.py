@@ -98,7 +98,7 @@ def print_written(written: Path | Sequence[Path], as_json: bool) -> None:
 
 def save_figures(drawers: Mapping[str, Callable[[], Any]], folder: Path | None) -> list[Path]:
     """Draw figures into a folder, none without one."""
-    from ..drawing.files import draw_figures, write_figures
+    from ..drawing.style import draw_figures, write_figures
 
     return [] if folder is None else write_figures(draw_figures(drawers, (), "result"), folder)
 

@@ -219,7 +219,7 @@ def _signals_of_run(file: Path, reading: Reading) -> list[Signal]:
 def _signals_of_table(table: Table, reading: Reading) -> list[Signal]:
     import numpy as np
 
-    from ..verdict.units import seconds_in
+    from ..verdict.table import seconds_in
 
     at = None if reading.rate is not None else table.index(reading.time)
     wanted = [table.index(name) for name in reading.columns] or [i for i in range(len(table.names)) if i != at]

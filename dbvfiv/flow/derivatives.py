@@ -61,12 +61,6 @@ def steady_slope(law, area, parameters):
     return jax.jacfwd(lambda p: law.steady(area, parameters | {"inlet": p})[0])(inlet)
 
 
-@jax.jit
-def steady_form(law, area, parameters, directions):
-    """Derivative (m,) of the steady pressures along all of a tuple of directions (m,)."""
-    return along(lambda x: law.steady(x, parameters)[0], *directions)(area)
-
-
 def solve_steady(law, area, parameters):
     """Pressures (m,) and inner unknowns (l,) at which the law's equations are met in a passage at rest; traceable.
 

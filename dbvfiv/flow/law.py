@@ -252,14 +252,6 @@ class FlowLaw(Traceable, ABC):
         pressure, slope = derivatives.steady_operator(self, area, self._driven(inlet))
         return np.asarray(pressure), np.asarray(slope)
 
-    def steady_second(self, area, inlet, a, b) -> np.ndarray:
-        """Second directional derivative (m,) of the steady pressures along a and b (m,)."""
-        return np.asarray(derivatives.steady_form(self, area, self._driven(inlet), (a, b)))
-
-    def steady_third(self, area, inlet, a, b, c) -> np.ndarray:
-        """Third directional derivative (m,) of the steady pressures."""
-        return np.asarray(derivatives.steady_form(self, area, self._driven(inlet), (a, b, c)))
-
     def steady_slope(self, area: np.ndarray, inlet: float) -> np.ndarray:
         """Derivative (m,) of the steady pressures by the inlet pressure."""
         return np.asarray(derivatives.steady_slope(self, area, self._driven(inlet)))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case.drive_table import read_drive_table
 from ..case.model import Case
+from ..case.tables import read_drive_table
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 
 from ..errors import CaseError
 from . import flutter, histories, materials, openings, strip
-from .entry import Entry, Number
-from .workshop import Workshop
+from .entry import Entry, Number, Workshop
 
 _SUBJECTS = (materials, strip, openings, histories, flutter)
 #: All entries, in the order of the thesis.

@@ -7,15 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..drawing.deformed import deformed
-from ..drawing.layers import layer_stress
+from ..drawing.views import deformed, layer_stress
 from ..report.content import Picture, picture, pictures_of
 from ..studies.case import Case
 from ..studies.steady import comparison, discharge, passage, shapes
 from ..studies.steady.published import HEAD_DISCHARGE
 from ..studies.steady.result import SteadyResult
-from .entry import Entry, Number, Outcome, spread
-from .workshop import Workshop
+from .entry import Entry, Number, Outcome, Workshop, spread
 
 #: Pressures with published flows, Pa, and the published loss factors of Eq. 7.2 there.
 PRESSURES = HEAD_DISCHARGE.pressure

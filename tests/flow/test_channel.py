@@ -75,18 +75,6 @@ def test_steady_operator(scale):
     assert np.abs(slope @ direction - other).max() < 1e-8 * np.abs(other).max()
 
 
-def test_higher_derivatives():
-    z, area = passage()
-    channel = Channel(z, FLOOR)
-    a, b, c = np.random.default_rng(2).standard_normal((3, len(z))) * area * 0.3
-    second = channel.steady_second(area, 18e3, a, b)
-    other = difference(lambda x: channel.steady_operator(x, 18e3)[1] @ a, area, b, 1e-3)
-    assert np.abs(second - other).max() < 1e-8 * np.abs(other).max()
-    third = channel.steady_third(area, 18e3, a, b, c)
-    other = difference(lambda x: channel.steady_second(x, 18e3, a, b), area, c, 1e-3)
-    assert np.abs(third - other).max() < 1e-7 * np.abs(other).max()
-
-
 @pytest.mark.parametrize("storage", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("unsteady, bowed", [(True, False), (True, True), (False, False)])
 def test_operators_at_a_moving_state(storage, unsteady, bowed):
