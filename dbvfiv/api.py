@@ -7,10 +7,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from .case.changes import Changes, change_case
-from .case.pressures import is_single, read_pressures
+from .case.axis import is_single, read_pressures
+from .case.model import Changes, change_case
 from .drawing import described
-from .drawing.files import draw_figures, write_figures
+from .drawing.style import draw_figures, write_figures
 from .errors import SolveError
 from .materials.damping_report import DampingReport, describe_damping
 from .model import ValveModel

@@ -58,6 +58,23 @@ class Report:
         """Plain data for JSON."""
         return asdict(self) | {"healthy": self.healthy}
 
+    def lines(self) -> list[str]:
+        """The report for people."""
+        petsc = self.petsc
+        rows = [
+            ("dbvfiv", self.dbvfiv),
+            ("Python", f"{self.python} ({self.executable})"),
+            ("platform", f"{self.platform}, {self.cores} cores"),
+            ("PETSc", f"{petsc['petsc'] or 'missing'}, {petsc['scalar'] or 'unknown'} scalars"),
+            ("SLEPc", petsc["slepc"] or "missing"),
+            ("direct solvers", ", ".join(petsc["solvers"]) or "none"),
+            *((name, version or "missing") for name, version in self.packages.items()),
+            ("cache", f"{self.cache['folder']} ({self.cache['bytes'] / 1e6:.1f} MB)"),
+        ]
+        rows += [("missing" if p.fatal else "note", f"{p.what} Remedy: {p.remedy}") for p in self.problems]
+        all_here = "Everything that is needed is here." if self.healthy else "Something that is needed is missing."
+        return [*(f"{name:<16}{value}" for name, value in rows), all_here]
+
 
 def examine() -> Report:
     """Look at packages, PETSc and SLEPc, the cache folder and the cores."""

@@ -50,9 +50,11 @@ def test_modules_and_lines_are_short():
 
 
 def test_own_modules_are_imported_at_the_top():
-    """Inside functions only libraries that are slow to import may be."""
+    """Inside functions only libraries that are slow to import may be, and in commands what they act with."""
     for package in ("dbvfiv", "eigen", "continuation"):
         for path in (ROOT / package).rglob("*.py"):
+            if path.parent == ROOT / "dbvfiv" / "cli":
+                continue
             functions = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.FunctionDef)]
             imports = [n for f in functions for n in ast.walk(f) if isinstance(n, ast.ImportFrom)]
             for found in imports:

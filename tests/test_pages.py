@@ -7,16 +7,15 @@ import pkgutil
 import re
 import shlex
 import sys
-from types import SimpleNamespace
+from functools import wraps
 
 import pytest
 
 import benchmarks
 from benchmarks.registry import BENCHMARKS
 from dbvfiv import cli
-from dbvfiv.cli import _run
-from dbvfiv.cli._actions import study
-from dbvfiv.studies.case import load_case
+from dbvfiv.cli import main, studies
+from dbvfiv.studies import case as cases
 from tests.pages import ROOT, blocks, command_lines, indented_commands, pages, tables
 
 #: The page on flow laws sets a key that its reader adds; tests/flow/test_adding_a_law.py carries it out.
@@ -29,31 +28,22 @@ def only_parsed(monkeypatch, capsys):
     """Give a command line to the program, up to the point at which it would begin to compute: options, case and keys
     are read and checked. A case file that is not there stands for the reader's own and is left out.
     """
-    seen = []
-
-    def read_case(path, overrides):
-        return load_case(path if path and (ROOT / path).exists() else None, overrides or ())
+    load = cases.load_case
+    kinds = [kind for kind, _ in studies.study_commands()]
 
     def perform(kind, case, request, *_):
         changes = {key: value for key, value in request.changes.items() if value is not None}
-        seen.append(case.replace(changes) if changes else case)
+        case.replace(changes)
 
-    class Silent:
-        def __getattr__(self, name):
-            return lambda *given, **named: None
-
-    def action(name):
-        return (
-            SimpleNamespace(read_case=read_case, perform=perform, report=study.report) if name == "study" else Silent()
-        )
-
-    names = [module.name for module in pkgutil.iter_modules(cli.__path__)]
-    modules = [importlib.import_module(f"dbvfiv.cli.{name}") for name in names]  # all of them before any is changed
-    for module in modules:
-        if hasattr(module, "action"):
-            monkeypatch.setattr(module, "action", action)
-    commands = _run.build()
-    monkeypatch.setattr(_run, "build", lambda: commands)
+    monkeypatch.setattr(
+        cases, "load_case", lambda path, overrides: load(path if path and (ROOT / path).exists() else None, overrides)
+    )
+    monkeypatch.setattr(studies, "perform", perform)
+    commands = main.build()
+    for command in commands.registered_commands:
+        if command.name not in kinds:
+            command.callback = wraps(command.callback)(lambda **given: None)
+    monkeypatch.setattr(main, "build", lambda: commands)
     monkeypatch.chdir(ROOT)
 
     def parse(line: str) -> str:

@@ -1,15 +1,17 @@
-"""Ranges of a parameter as one word: ``density=1:1000:40:log``, ``pressure=0.5 kPa:50 kPa:64``."""
+"""Ranges and pressures as words: ``density=1:1000:40:log``, ``pressure=0.5 kPa:50 kPa:64``, ``36 kPa``."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, StrictStr
 
+from ..errors import CaseError
 from .parameters import PARAMETERS, SWEPT, Parameter
+from .quantity import number_or_text
 
 FORM = 'PARAMETER=START:STOP:COUNT, with ":log" behind it for logarithmic steps'
 _LARGEST = 100_000
@@ -90,3 +92,58 @@ def _readable(text: str) -> str:
 
 #: A key that holds the text of a range.
 Range = Annotated[StrictStr, AfterValidator(_readable)]
+
+
+def parse_stability_axis(text: str) -> Axis:
+    """Read ``PARAMETER=START:STOP:COUNT[:log]``, or a parameter alone with its usual range.
+
+    Raises
+    ------
+    ValueError
+        With a clause that completes "key is given as X, ...".
+    """
+    if isinstance(text, str) and text.strip() in PARAMETERS:
+        text = PARAMETERS[text.strip()].usual_range
+    return parse_axis(text, tuple(PARAMETERS))
+
+
+def _readable_range(text: str) -> str:
+    parse_stability_axis(text)
+    return text
+
+
+#: A key that holds the text of such a range.
+StabilityRange = Annotated[StrictStr, AfterValidator(_readable_range)]
+
+
+_PRESSURE = PARAMETERS["pressure"]
+_ALLOWED = (
+    f"it must be a pressure greater than 0 kPa and at most {_PRESSURE.high / 1e3:g} kPa, such as '36 kPa' or 36e3 (Pa)"
+)
+
+
+def read_pressures(given: Iterable[Any], name: str, density: float | None = None) -> tuple[float, ...]:
+    """Pressures in Pa from numbers and texts with units, heads of a fluid of that density, kg/m3, included.
+
+    Raises
+    ------
+    CaseError
+        For anything that is not a pressure above zero and up to 10 MPa; `name` says in the sentence where it was given.
+    """
+    found = []
+    for value in given:
+        try:
+            pressure = _PRESSURE.quantity.parse(number_or_text(value), density)
+        except ValueError as error:
+            raise CaseError(f"{name} is given as {value!r}, {error}; {_ALLOWED}.") from None
+        if not 0 < pressure <= _PRESSURE.high:
+            raise CaseError(f"{name} is given as {value!r}; {_ALLOWED}.")
+        found.append(pressure)
+    if not found:
+        raise CaseError(f"{name} is an empty list; it needs at least one pressure.")
+    return tuple(found)
+
+
+def is_single(pressure: Any) -> bool:
+    """True for one pressure, False for several."""
+    return isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0

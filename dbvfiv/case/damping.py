@@ -1,17 +1,197 @@
-"""Damping of the wall: viscoelastic materials, or Rayleigh's two constants."""
+"""Damping: Rayleigh constants of the wall, or viscoelastic materials by loss factors, tables or Prony series."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, PrivateAttr, StrictInt, model_serializer, model_validator
+from pydantic import (
+    BeforeValidator,
+    PrivateAttr,
+    StrictInt,
+    ValidationInfo,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
-from .described import Described
 from .parameters import PARAMETERS
 from .quantity import Number, Quantity, Rate, Time
-from .section import BrokenRule, Section, key
+from .section import BrokenRule, Described, Section, key
+from .tables import existing_file
+
+#: Materials whose loss factors come with the program.
+SHIPPED_LOSSES = ("NR", "SBR", "CR", "EPDM", "NBR", "IIR", "fibre")
+#: Ways to say how a material relaxes; one of them at a time.
+WAYS = ("loss_factor", "loss_data", "relaxation_data", "prony")
+LARGEST_LOSS = 2.0
+_COLDEST, _HOTTEST = 100.0, 600.0
+_ZERO_CELSIUS = 273.15
+_LARGEST_SERIES = 40
+_PLAIN, _TIME = Quantity(""), Quantity("s", "s")
+#: Scale and zero of units of temperature, in K.
+_TEMPERATURES = {
+    "k": (1.0, 0.0),
+    "degc": (1.0, _ZERO_CELSIUS),
+    "°c": (1.0, _ZERO_CELSIUS),
+    "degf": (5 / 9, _ZERO_CELSIUS - 160 / 9),
+    "°f": (5 / 9, _ZERO_CELSIUS - 160 / 9),
+}
+
+
+def kelvin(value: float, unit: str) -> float:
+    """A temperature in K.
+
+    Raises
+    ------
+    ValueError
+        One clause, for a unit that is none of temperature.
+    """
+    word = unit.strip().lower()
+    word = {"c": "degc", "f": "degf"}.get(word, word)
+    if word not in _TEMPERATURES:
+        raise ValueError(f"{unit.strip()!r} is no unit of temperature; degC, K and degF are known")
+    scale, zero = _TEMPERATURES[word]
+    return scale * value + zero
+
+
+def celsius(temperature: float) -> str:
+    """A temperature in K as it stands in messages."""
+    return f"{round(temperature - _ZERO_CELSIUS, 2):g} degC"
+
+
+def _loss_factor(given: Any) -> Any:
+    if isinstance(given, str) and given.strip() in SHIPPED_LOSSES:
+        return given.strip()
+    if isinstance(given, str) and not any(c.isdigit() for c in given):
+        raise ValueError("which is no material whose loss factor is known")
+    value = _PLAIN.parse(given)
+    if not 0 <= value <= LARGEST_LOSS:
+        raise ValueError("which is out of range")
+    return value
+
+
+def _temperature(given: Any) -> float:
+    if isinstance(given, str):
+        text = given.strip()
+        number = text.rstrip("CFKcfkdeg° ")
+        try:
+            value = kelvin(float(number), text[len(number) :])
+        except ValueError:
+            raise ValueError("which is no temperature with its unit") from None
+    else:
+        value = _PLAIN.parse(given)
+    if not _COLDEST <= value <= _HOTTEST:
+        raise ValueError(f"which is {value:g} K" if math.isfinite(value) else "which is not finite")
+    return value
+
+
+def _series(given: Any) -> Any:
+    """((g, tau), ...) of a list of pairs; tau in s or with a unit."""
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise ValueError("which is no list of pairs")
+    if not 0 < len(given) <= _LARGEST_SERIES:
+        raise ValueError(f"which has {len(given)} pairs")
+    pairs = []
+    for number, pair in enumerate(given, 1):
+        if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
+            raise ValueError(f"whose entry {number} is no pair [g, tau]")
+        try:
+            strength, time = _PLAIN.parse(pair[0]), _TIME.parse(pair[1])
+        except ValueError as error:
+            raise ValueError(f"whose pair {number} holds a value {error}") from None
+        if strength < 0:
+            raise ValueError(
+                f"whose pair {number} has the strength {strength:g}: a negative one would give energy away"
+            )
+        if time <= 0:
+            raise ValueError(f"whose pair {number} has the time {time:g} s, which is not positive")
+        pairs.append((strength, time))
+    return tuple(pairs)
+
+
+LossFactor = Annotated[
+    float | str,
+    BeforeValidator(_loss_factor),
+    Described(
+        "plain number or text",
+        f"a number from 0 to {LARGEST_LOSS:g}, or one of {', '.join(SHIPPED_LOSSES)} for a value that comes with the "
+        "program",
+    ),
+]
+Temperature = Annotated[
+    float,
+    BeforeValidator(_temperature),
+    Described(
+        "temperature",
+        f'a temperature from {_COLDEST:g} to {_HOTTEST:g} K, such as "20 degC"; a bare number is in K',
+    ),
+]
+Series = Annotated[
+    tuple[tuple[float, float], ...],
+    BeforeValidator(_series),
+    Described(
+        "list of pairs",
+        'a list of pairs of a strength at least 0 and a time greater than 0 s, such as [[0.1, "10 ms"], [0.1, "1 ms"]]',
+    ),
+]
+
+
+class Relaxing(Section):
+    """Viscoelasticity of a material beyond its long-term (equilibrium) law, given in one of several ways."""
+
+    loss_factor: LossFactor | None = key(
+        None,
+        "Loss factor (tan delta), the same over damping.band; the name of a material takes the value shipped for it.",
+    )
+    loss_data: Path | None = key(
+        None,
+        "CSV file of tan delta, or of storage and loss modulus, over frequency, with units in its header; relative to "
+        "the case file.",
+    )
+    loss_temperature: Temperature | None = key(
+        None, "Which temperature of the table is meant, where loss_data or relaxation_data holds several."
+    )
+    relaxation_data: Path | None = key(
+        None, "CSV file of the relaxing modulus over time, with units in its header; relative to the case file."
+    )
+    prony: Series | None = key(
+        None, "Prony series [[g, tau], ...]: strengths over the slow modulus and relaxation times, taken as they are."
+    )
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        """Put the keys of the elastic law before those of viscoelasticity."""
+        super().__pydantic_init_subclass__(**options)
+        fields = cls.__pydantic_fields__
+        for name in Relaxing.model_fields:
+            fields[name] = fields.pop(name)
+
+    @field_validator("loss_data", "relaxation_data", mode="after")
+    @classmethod
+    def _find_table(cls, path: Path | None, info: ValidationInfo) -> Path | None:
+        return None if path is None else existing_file(path, info)
+
+    @model_validator(mode="after")
+    def _one_way(self):
+        given = self.ways
+        if len(given) > 1:
+            raise BrokenRule(given[1], f"given beside {given[0]}", f"it must be one of {', '.join(WAYS)} alone")
+        if self.loss_temperature is not None and not set(given) & {"loss_data", "relaxation_data"}:
+            raise BrokenRule(
+                "loss_temperature",
+                f"{celsius(self.loss_temperature)} without a table",
+                "it must stand beside loss_data or relaxation_data",
+            )
+        return self
+
+    @property
+    def ways(self) -> tuple[str, ...]:
+        """Names of the keys by which viscoelasticity is given: one at most in a valid table."""
+        return tuple(name for name in WAYS if getattr(self, name) is not None)
+
 
 _FREQUENCY = Quantity("Hz", "Hz")
 _SLOWEST, _FASTEST = 1e-6, 1e6

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .quantity import Quantity
-from .text_file import read_text_file
+from .tables import read_text_file
 
 #: A file of bare numbers of this many lines holds nine profiles of fifteen points, as the thesis's program reads them.
 _BARE = 9, 15

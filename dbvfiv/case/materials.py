@@ -13,12 +13,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, StrictStr, ValidationInfo, field_validator, model_validator
 
-from .described import Described
-from .existing_file import existing_file
-from .extent import Extent
+from .damping import Relaxing
 from .quantity import Angle, Density, Length, Modulus, Number, Percent, Quantity
-from .relaxing import Relaxing
-from .section import BrokenRule, Section, key
+from .section import BrokenRule, Described, Section, key
+from .tables import existing_file
+from .wall import Extent
 
 RUBBERS = ("CR", "SBR", "EPDM")
 BUILT_IN = (*RUBBERS, "fibre")

@@ -12,9 +12,9 @@ from typing import Any
 
 from pydantic import ValidationInfo
 
-from .described import Described
 from .quantity import Quantity
-from .text_file import read_text_file
+from .section import Described
+from .tables import read_text_file
 
 _PRESSURE, _VOLUME, _MASS = Quantity("Pa", "kPa", head=True), Quantity("m^3/s", "L/s"), Quantity("kg/s", "kg/s")
 _LENGTH, _AREA = Quantity("m", "mm"), Quantity("m^2", "cm^2")

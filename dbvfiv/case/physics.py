@@ -1,4 +1,4 @@
-"""Shell theory, fluid, load and supports."""
+"""Shell theory, fluids inside and outside, weight, load and supports."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, StrictBool, ValidationInfo, field_validator, model_validator
 
-from .described import Described
 from .parameters import PARAMETERS
-from .quantity import GRAVITY, Density, FaceStiffness, Number, Pressure, Quantity, Stiffness
-from .section import BrokenRule, Section, key
+from .quantity import GRAVITY, Density, FaceStiffness, Length, Number, Pressure, Quantity, Stiffness
+from .section import BrokenRule, Described, Section, key
 
 #: Viscosities by name, Pa s, at 20 degC: water at 0.1 MPa (IAPWS R12-08), dry air at 0.1 MPa (Lemmon & Jacobsen 2004).
 VISCOSITIES = {"none": 0.0, "water": 1.0016e-3, "air": 1.813e-5}
@@ -207,3 +206,133 @@ class Supports(Section):
     lip_stop_columns: Literal["inner-half", "all"] = key(
         "inner-half", "Columns of duckbill nodes with a stop: those next to the centre, or all."
     )
+
+
+#: Along the valve's axis, on which z runs from the lips to the flange: component of gravity over its size.
+_ALONG = {"none": 0.0, "-z": -1.0, "+z": 1.0}
+_ACROSS = ("x", "+x", "-x", "y", "+y", "-y")
+
+
+def _direction(given: Any) -> Any:
+    if isinstance(given, str) and given.strip() in _ACROSS:
+        raise ValueError(
+            "which is across the axis, and the part that is computed is symmetric about x = 0 and y = 0, or one of "
+            "them, so it carries weight along its axis alone"
+        )
+    if not isinstance(given, str) or given.strip() not in _ALONG:
+        raise ValueError("which is no direction that is known here")
+    return given.strip()
+
+
+Direction = Annotated[str, BeforeValidator(_direction), Described("choice", 'one of "none", "-z", "+z"')]
+
+
+class Gravity(Section):
+    """Weight of the wall, and the pressure of the fluid's levels along a valve that stands upright."""
+
+    direction: Direction = key(
+        "none",
+        "Where gravity points: none leaves it out, as for a valve that lies; -z to the lips, a valve that discharges "
+        "downwards; +z to the flange, one that discharges upwards. The wall then weighs what it does in the fluids on "
+        "its sides, and pressures rise with depth, inside by fluid.density, outside by that of outside.fluid. "
+        "drive.pressure is then over that of the surroundings at the level of the lips; at the far end of a line it is "
+        "referred to the level of the flange, and downstream.pressure to that of the lips.",
+    )
+
+    @property
+    def is_there(self) -> bool:
+        """True where gravity has a direction, so that wall and fluid have weight."""
+        return self.direction != "none"
+
+    @property
+    def along(self) -> float:
+        """Component of gravity along z, m/s2."""
+        return GRAVITY * _ALONG[self.direction]
+
+
+#: Words in place of a density.
+WORDS = ("none", "same")
+#: Least diameter of the pipe over that of the flange's outer face.
+CLEARANCE = 1.02
+_DENSITY = PARAMETERS["density"]
+
+
+def _fluid(given: Any) -> Any:
+    if isinstance(given, str) and given.strip() in WORDS:
+        return given.strip()
+    if isinstance(given, str) and not any(c.isdigit() for c in given):
+        raise ValueError("which is no word that is known here")
+    value = _DENSITY.quantity.parse(given)
+    if not _DENSITY.low < value <= _DENSITY.high:
+        raise ValueError("which is out of range")
+    return value
+
+
+OutsideFluid = Annotated[
+    float | str,
+    BeforeValidator(_fluid),
+    Described("choice or density", f'"none", "same" or a density greater than 0 and at most {_DENSITY.high:g} kg/m^3'),
+]
+
+
+class Outside(Section):
+    """Still fluid around the wall; its pressure in motion is that of potential flow on the deformed outer face."""
+
+    fluid: OutsideFluid = key(
+        "none",
+        "Fluid outside the wall, which moves with it as added mass: none, the same as inside (it follows "
+        "fluid.density, in sweeps, onsets and maps over it too), or one of a fixed density.",
+    )
+    pipe_diameter: Length | None = key(
+        None,
+        "Inner diameter of a rigid round pipe around the valve, on its axis, open to the fluid on both sides some way "
+        "off; where not given the fluid is unbounded, and the line in front goes on as a rigid tube of the flange's "
+        "outer face.",
+        gt=0,
+        le=100,
+    )
+
+    lips: Literal["closed", "open"] = key(
+        "closed",
+        "What the fluid outside finds between the lips: a rigid lid (closed), or an opening that it may pass, at the "
+        "outlet pressure of the flow (open).",
+    )
+
+    @property
+    def is_there(self) -> bool:
+        """True where fluid surrounds the valve."""
+        return self.fluid != "none"
+
+    def density(self, inside: float) -> float:
+        """Density outside for one inside, kg/m3; zero where there is none."""
+        return 0.0 if self.fluid == "none" else inside if self.fluid == "same" else float(self.fluid)
+
+    @property
+    def fixed_density(self) -> float:
+        """Density that does not follow the one inside, kg/m3; zero where there is none."""
+        return 0.0 if isinstance(self.fluid, str) else float(self.fluid)
+
+    @property
+    def words(self) -> str:
+        """Description of the surrounding fluid, in words that follow a sentence's subject; empty without any."""
+        if not self.is_there:
+            return ""
+        fluid = "the same fluid" if self.fluid == "same" else f"fluid of {self.fixed_density:g} kg/m3"
+        place = "unbounded" if self.pipe_diameter is None else f"in a pipe of {1e3 * self.pipe_diameter:g} mm"
+        lips = ", lips open to it" if self.lips == "open" else ""
+        return f"with {fluid} outside, {place}{lips}"
+
+    def check_pipe(self, outer: float) -> None:
+        """Refuse a pipe that the valve does not go into; `outer` is the largest diameter of its outer face, m.
+
+        Raises
+        ------
+        BrokenRule
+        """
+        if self.is_there and self.pipe_diameter is not None and self.pipe_diameter < CLEARANCE * outer:
+            raise BrokenRule(
+                "outside.pipe_diameter",
+                f"{1e3 * self.pipe_diameter:g} mm around a valve of {1e3 * outer:.4g} mm",
+                f"it must be at least {CLEARANCE:g} times that, {1e3 * CLEARANCE * outer:.4g} mm, for the fluid "
+                "between them to be resolved",
+            )

@@ -1,4 +1,4 @@
-"""The wall: pieces of given thickness along the axis, and patches on them."""
+"""The wall: pieces of given thickness along the axis, and patches of limited extent on them."""
 
 from __future__ import annotations
 
@@ -6,9 +6,79 @@ from typing import Self
 
 from pydantic import model_validator
 
-from .extent import Extent
-from .quantity import Length
+from .quantity import Length, Number
 from .section import BrokenRule, Section, key
+
+
+class Extent(Section):
+    """A part of the wall; all of it where nothing is given."""
+
+    begin: Length | None = key(
+        None, "Axial position at which it begins, from the lip; the lip where not given.", ge=0, le=100
+    )
+    end: Length | None = key(
+        None, "Axial position at which it ends; the inlet end of the valve where not given.", gt=0, le=100
+    )
+    around_from: Number | None = key(
+        None,
+        "Share of the section's length, from the centre (0) to the side edge (1), at which it begins; 0 where not "
+        "given.",
+        ge=0,
+        lt=1,
+    )
+    around_to: Number | None = key(
+        None, "Share of the section's length at which it ends; 1 where not given.", gt=0, le=1
+    )
+
+    @model_validator(mode="after")
+    def _has_an_inside(self) -> Self:
+        if self.begin is not None and self.end is not None and self.end <= self.begin:
+            raise BrokenRule("end", f"{self.end:g} m", f"it must lie behind begin = {self.begin:g} m")
+        if self.around_from is not None and self.around_to is not None and self.around_to <= self.around_from:
+            raise BrokenRule(
+                "around_to", f"{self.around_to:g}", f"it must be greater than around_from = {self.around_from:g}"
+            )
+        return self
+
+    @property
+    def is_limited(self) -> bool:
+        """True where the region leaves out any part of the wall."""
+        return any(x is not None for x in (self.begin, self.end, self.around_from, self.around_to))
+
+    @property
+    def axial_edges(self) -> tuple[float, ...]:
+        """Axial positions at which it begins and ends, m."""
+        return tuple(z for z in (self.begin, self.end) if z is not None)
+
+    @property
+    def section_edges(self) -> tuple[float, ...]:
+        """Shares of the section at which it begins and ends."""
+        return tuple(s for s in (self.around_from, self.around_to) if s is not None)
+
+    def covers(self, z: float, s: float) -> bool:
+        """True where the point at axial position z, m, and share s of the section's length lies in the region."""
+        along = (self.begin or 0.0) <= z and (self.end is None or z < self.end)
+        end = 2.0 if self.around_to in (None, 1.0) else self.around_to
+        around = (self.around_from or 0.0) <= s < end
+        return along and around
+
+    def check_inside(self, length: float) -> None:
+        """Refuse a part that lies beyond the end of a valve of this length, m.
+
+        Raises
+        ------
+        BrokenRule
+        """
+        for name in ("begin", "end"):
+            place = getattr(self, name)
+            if place is not None and (place > length * (1 + 1e-9) or (name == "begin" and place >= length)):
+                raise BrokenRule(name, f"{place:g} m", f"the valve ends at {length:g} m")
+
+    def enlarged(self, factor: float) -> Self:
+        """Copy with all lengths multiplied by a factor."""
+        return self.model_copy(
+            update={name: factor * getattr(self, name) for name in ("begin", "end") if getattr(self, name) is not None}
+        )
 
 
 class WallStep(Section):

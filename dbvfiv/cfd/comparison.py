@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .fields import FlowFields
 from .flow_case import FlowCase
+from .foam import FlowFields
 
 #: Loss of the jet over its velocity head by driving pressure, kPa (Th. Fig. 7-9).
 PUBLISHED_LOSS = {18.0: 0.86, 29.0: 0.83, 36.0: 0.79}
@@ -69,17 +69,6 @@ class FlowComparison:
         count = len(self.stations)
         total = np.bincount(cells.station, weight * self._pressure, count)
         return total / np.bincount(cells.station, weight, count) - self.back
-
-    @cached_property
-    def mean_velocity(self) -> np.ndarray:
-        """(s,) mean axial velocity of the passage, m/s; behind the lip of the jet, weighted by momentum."""
-        cells, w = self.case.cells, -self.fields.velocity[:, 2]
-        count, v = len(self.stations), cells.volumes
-        first = np.bincount(cells.station, v * w * (cells.part < 2), count)
-        passage = first / np.bincount(cells.station, v * (cells.part < 2), count)
-        jet = np.bincount(cells.station, v * np.maximum(w, 0.0) ** 2, count)
-        jet /= np.bincount(cells.station, v * np.maximum(w, 0.0), count)
-        return np.where(np.arange(count) < self.case.domain.lip, jet, passage)
 
     def _wall(self, block: str, ring: int, patch: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pressures (k,), area vectors (k, 3) out of the fluid and places (k, 3) of the faces of a wall, section by

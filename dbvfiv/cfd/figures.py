@@ -7,8 +7,18 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..drawing.axes import HALO, colour_bar, headline
-from ..drawing.style import ACCENT, COMPUTED, MAGNITUDE, PUBLISHED, REST, kilopascals, new_figure
+from ..drawing.style import (
+    ACCENT,
+    COMPUTED,
+    HALO,
+    MAGNITUDE,
+    PUBLISHED,
+    REST,
+    colour_bar,
+    headline,
+    kilopascals,
+    new_figure,
+)
 from .comparison import FlowComparison
 
 #: Of the pipe that is drawn, in lengths of the valve: before the flange and behind the lip.

@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import CaseError
-from ..exchange.faces import WallFaces
+from ..exchange.bodies import WallFaces
 from ..record.mesh import MeshData
-from .domain import ROOM, Domain
-from .foam_files import Stream, case_files
-from .foam_mesh import write_mesh
-from .hexahedra import FlowMesh
+from .domain import ROOM, Domain, FlowMesh
+from .foam import Stream, case_files, write_mesh
 
 if TYPE_CHECKING:
     from ..model.state import SteadyState

@@ -1,4 +1,4 @@
-"""``dbvfiv case``: check a case file, explain its keys, write a new one."""
+"""``dbvfiv case`` and ``doctor``: a case file checked, explained or written anew; the machine."""
 
 from __future__ import annotations
 
@@ -8,13 +8,10 @@ from typing import Annotated
 import typer
 
 from ..errors import CaseError
-from ._later import action
-from ._options import AsJson, Override
-
-ORDER = 10
+from .terminal import AsJson, Override, print_json
 
 
-def command(
+def case(
     target: Annotated[
         str | None, typer.Argument(metavar="[FILE|KEY]", help="Case file; with --explain a key or a section.")
     ] = None,
@@ -43,14 +40,93 @@ def command(
 
     dbvfiv case my.toml --key-points my.csv  write its shape as key points, to edit
     """
+    from ..case.write import case_toml
+    from ..studies.case import load_case
+
     if explain + new + (key_points is not None) > 1:
         raise CaseError("Only one of --explain, --new and --key-points can be given at a time.")
-    act = action("case")
     if explain:
-        act.explain_keys(target, as_json)
+        _explain_keys(target, as_json)
     elif new:
-        act.write_new(target, overrides, as_json)
+        _write_new(target, overrides, as_json)
     elif key_points is not None:
-        act.write_key_points(target, key_points, points, profiles, overrides, as_json)
+        _write_key_points(load_case(target, overrides or ()).valve, key_points, points, profiles, as_json)
+    elif as_json:
+        print_json(load_case(target, overrides or ()).to_dict())
     else:
-        act.check(target, overrides, as_json)
+        print(case_toml(load_case(target, overrides or ()), comments=False), end="")
+
+
+def _explain_keys(key: str | None, as_json: bool) -> None:
+    """Explain a key, a section or everything."""
+    from ..case.describe import explain, explanation_text
+    from ..case.section import Section
+    from ..studies.case import Case
+
+    def plain(default):
+        if isinstance(default, tuple):
+            return [plain(each) for each in default]
+        return default.model_dump(mode="json") if isinstance(default, Section) else default
+
+    found = explain(Case, key)
+    if as_json:
+        names = ("key", "type", "unit", "default", "required", "allowed", "description")
+        rows = [{name: getattr(info, name) for name in names} | {"default": plain(info.default)} for info in found]
+        print_json({"keys": rows})
+    else:
+        print(explanation_text(found))
+
+
+def _write_new(target: str | None, overrides: list[str] | None, as_json: bool) -> None:
+    """Write a commented starter."""
+    from ..case.write import case_toml
+    from ..studies.case import load_case
+
+    if target is None:
+        raise CaseError("--new needs the name of the file to write, such as my.toml.")
+    _write(target, case_toml(load_case(None, overrides or ()), comments=True))
+    if as_json:
+        print_json({"written": target})
+    else:
+        print(f"Wrote {target}; check it with `dbvfiv case {target}`.")
+
+
+def _write_key_points(valve, file: Path, points: int, profiles: int, as_json: bool) -> None:
+    """Write the shape of a case as key points."""
+    from ..geometry import key_point_table
+
+    _write(str(file), key_point_table(valve, points, profiles))
+    instead = ("lip_half_width", "lip_rise", "lip_radius", "cuff_radius", "flange_radius", "saddle")
+    smooth = ', key_point_skin = "smooth"' if valve.saddle == "smooth" else ""
+    if as_json:
+        print_json({"written": str(file)})
+    else:
+        print(
+            f'Wrote {file}; edit it and give key_points = "{file.name}"{smooth} in [valve] in place of '
+            f"{', '.join(instead)}."
+        )
+
+
+def _write(target: str, text: str) -> None:
+    """Write a new file."""
+    try:
+        with Path(target).open("x") as file:
+            file.write(text)
+    except FileExistsError:
+        raise CaseError(f"{target!r} exists already and is not overwritten; choose another name.") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "its name is not valid"
+        raise CaseError(f"{target!r} cannot be written ({reason}).") from None
+
+
+def doctor(as_json: AsJson = False) -> None:
+    """Say what was found on this machine, what is missing, and the command that mends it."""
+    from ..doctor import examine
+
+    report = examine()
+    if as_json:
+        print_json(report.to_dict())
+    else:
+        print("\n".join(report.lines()))
+    if not report.healthy:
+        raise typer.Exit(1)

@@ -15,10 +15,8 @@ from matplotlib.patches import Patch
 from ..case.model import Case
 from ..model import ValveModel
 from ..record.mesh import MeshData
-from .axes import HALO, colour_bar, headline
-from .faces import ValveSkin, faces
-from .style import COMPUTED, MAGNITUDE, REST, new_figure
-from .views import draw_skin, unrolled
+from .style import COMPUTED, HALO, MAGNITUDE, REST, colour_bar, headline, new_figure
+from .views import ValveSkin, draw_skin, faces, unrolled
 
 _COLOURS = matplotlib.colormaps[MAGNITUDE]
 #: Of rubbers and of plies in the picture of the layers.

@@ -1,19 +1,25 @@
-"""Style of figures: fonts, colours, sizes; drawn without a display."""
+"""Style of figures: fonts, colours, sizes, axes; figures by name, drawn without a display and written as files."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..case.model import Case
 from ..case.parameters import PARAMETERS
+from ..errors import CaseError
 
 #: Colours of things that recur.
 COMPUTED, PUBLISHED, REST, ACCENT = "#1f4e79", "#c0392b", "#8c8c8c", "#d98200"
@@ -118,3 +124,93 @@ def some_of(states: list, count: int = 8) -> list:
     if len(states) <= count:
         return list(states)
     return [states[i] for i in np.unique(np.linspace(0, len(states) - 1, count).round().astype(int))]
+
+
+#: Decades of a logarithmic axis below which 2 and 5 of each decade are written too.
+_SHORT, _SHORTEST = 2.6, 0.7
+
+#: White about a text that may lie on a line.
+HALO = (withStroke(linewidth=3.0, foreground="white"),)
+
+
+def headline(figure: Figure, text: str) -> None:
+    """The title of a figure of several panels, at the left as those of single panels are."""
+    figure.suptitle(text, x=0.01, ha="left")
+
+
+def log_axis(axis: Axis, low: float, high: float) -> None:
+    """Make an axis from `low` to `high` logarithmic, with numbers at its ticks however short it is."""
+    getattr(axis.axes, f"set_{axis.axis_name}scale")("log")
+    decades = np.log10(high / low) if 0 < low < high else 1.0
+    digits = np.arange(1.0, 10.0) if decades < _SHORTEST else (1.0, 2.0, 5.0) if decades < _SHORT else (1.0,)
+    axis.set_major_locator(LogLocator(subs=digits, numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def colour_bar(figure: Figure, drawn: Any, axes: Any, label: str, **options: Any) -> Colorbar:
+    """A colour bar with its label, without a frame."""
+    bar = figure.colorbar(drawn, ax=axes, **{"pad": 0.02, "aspect": 28} | options)
+    bar.set_label(label)
+    bar.outline.set_visible(False)
+    return bar
+
+
+def limits(values: Sequence[float], log: bool = False) -> tuple[float, float]:
+    """Ends of an axis that holds these values, with room about a single one."""
+    low, high = float(min(values)), float(max(values))
+    if high > low:
+        return low, high
+    return (0.5 * low, 2.0 * low) if log else (low - 0.5 * (abs(low) or 1.0), low + 0.5 * (abs(low) or 1.0))
+
+
+FORMATS = ("png", "svg")
+
+
+def draw_figures(drawers: Mapping[str, Callable[[], Figure]], only: Sequence[str], whose: str) -> dict[str, Figure]:
+    """Figures by name.
+
+    Parameters
+    ----------
+    drawers : mapping of names to callables
+    only : sequence of str
+        Names of those wanted; all without it.
+    whose : str
+        For messages, "steady result of 'dbv12'".
+
+    Raises
+    ------
+    CaseError
+        For a name that there is no figure of, or nothing to draw.
+    """
+    if not drawers:
+        raise CaseError(f"The {whose} holds nothing that could be drawn.")
+    for name in only:
+        if name not in drawers:
+            raise CaseError(f"There is no figure {name!r} of this result; it has {', '.join(drawers)}.")
+    with style():
+        return {name: drawer() for name, drawer in drawers.items() if not only or name in only}
+
+
+def write_figures(figures: Mapping[str, Figure], folder: str | Path = ".", format: str = "png") -> list[Path]:
+    """Write figures into files NAME.FORMAT of a folder and return their names.
+
+    Raises
+    ------
+    CaseError
+        For an unknown format or a folder that cannot be written.
+    """
+    if format not in FORMATS:
+        raise CaseError(f"Figures are written as {' or '.join(FORMATS)}, not as {format!r}.")
+    folder = Path(folder)
+    written = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, figure in figures.items():
+            path = folder / f"{name}.{format}"
+            with style():
+                figure.savefig(path, metadata={"Date": None} if format == "svg" else None)
+            written.append(path)
+    except OSError as error:
+        raise CaseError(f"The folder {str(folder)!r} cannot be written ({error.strerror or error}).") from error
+    return written

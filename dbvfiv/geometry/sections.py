@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from ..case.key_points import KeyProfile, is_whole
-from ..case.lip import LipSizes
+from ..case.valve import LipSizes
 
 #: Places at which the arc length of a key-point curve is kept, and Gauss points between them.
 _FINE = 401

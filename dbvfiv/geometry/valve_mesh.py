@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case.extent import Extent
 from ..case.mesh import Mesh
 from ..case.part import QUARTER, Part, part_of
 from ..case.valve import Valve
+from ..case.wall import Extent
 from ..errors import CaseError
 from .divisions import column_division, grading, inverse_grading, row_division
 from .surface import surface_of

@@ -4,7 +4,6 @@ Each law is a strain energy in five Green-Lagrange strains with S33 = 0 (see `la
 stresses and tangents follow by differentiation, in float64.
 """
 
-from dbvfiv.materials.checks import MaterialError
 from dbvfiv.materials.damping import (
     MaterialDamping,
     ShippedLoss,
@@ -14,20 +13,17 @@ from dbvfiv.materials.damping import (
     shipped_loss_names,
 )
 from dbvfiv.materials.damping_report import DampingReport, describe_damping, outside_band
-from dbvfiv.materials.fit import RubberFit, fit_mooney_rivlin, fit_rubber, uniaxial_stress
-from dbvfiv.materials.halpin_tsai import fibre_ply, halpin_tsai, ply_from_constituents
+from dbvfiv.materials.fit import RubberFit, fit_mooney_rivlin, fit_rubber, form_of, uniaxial_stress
 from dbvfiv.materials.isotropic import IsotropicElastic
-from dbvfiv.materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, PARAMETER_COUNT, Law, energy_of
-from dbvfiv.materials.library import law_from_card, law_from_case
+from dbvfiv.materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, PARAMETER_COUNT, Law, MaterialError, energy_of
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
 from dbvfiv.materials.orthotropic import OrthotropicPly
-from dbvfiv.materials.prony import Prony
-from dbvfiv.materials.prony_fit import PronyFit, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
-from dbvfiv.materials.rubber_forms import form_of
-from dbvfiv.materials.rubbers import published_rubber, rubber, rubber_names, strain_levels
+from dbvfiv.materials.ply_fit import fibre_ply, halpin_tsai, ply_from_constituents
+from dbvfiv.materials.prony import Prony, PronyFit, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
+from dbvfiv.materials.rubber_tests import TensionTest, read_tension_test
+from dbvfiv.materials.rubbers import law_from_card, law_from_case, published_rubber, rubber, rubber_names, strain_levels
 from dbvfiv.materials.softening import SofteningRubber
 from dbvfiv.materials.stability import StableRange, stability_margin, stable_range
-from dbvfiv.materials.tension_test import TensionTest, read_tension_test
 from dbvfiv.materials.yeoh import Yeoh
 
 __all__ = [

@@ -1,4 +1,14 @@
-"""Constants of rubbers from tests in tension, planar and equibiaxial tension, one or several at once.
+"""Constants of rubbers from tests in tension, planar and equibiaxial tension, one or several of them.
+
+The residual has several minima (Ogden, Saccomandi & Sgura 2004, Comput. Mech. 34, 484), so the search starts from the
+best of many sets of exponents; without an active constraint its answer is improved over all unknowns at once.
+
+In tension, planar tension and equibiaxial tension with the stretch l the thinnest direction is free, and the nominal
+stress of each pulled direction is P = (dW/d(ln l1) - dW/d(ln l3))/l with l3 = l^-1/2, l^-1 and l^-2. With
+W = sum C_ij (I1 - 3)^i (I2 - 3)^j that is linear in the C_ij; with Ogden's W = sum mu_p/alpha_p (l1^alpha_p +
+l2^alpha_p + l3^alpha_p - 3) it is linear in the mu_p, not in the alpha_p (Treloar 1975, The physics of rubber
+elasticity; Yeoh 1993, Rubber Chem. Technol. 66, 754; Ogden 1972, Proc. R. Soc. A 326, 565). The softening rubber (see
+`softening`) is linear in mu_inf, mu_0, c and c_3, not in x_0.
 
 The nominal stress is linear in the constants of neo-Hookean, Mooney-Rivlin and Yeoh forms, so the fit is a linear
 least-squares problem; Ogden's exponents are searched for about it (see `ogden_fit`), and x_0 of the softening rubber,
@@ -13,22 +23,276 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import least_squares, minimize_scalar
 
-from dbvfiv.materials import ogden_fit
-from dbvfiv.materials.checks import MaterialError
-from dbvfiv.materials.constrained import LEAST_MARGIN, stable_constants, states_within
-from dbvfiv.materials.hill import least_modulus
-from dbvfiv.materials.law import Law
+from dbvfiv.materials.hill import hill_moduli, invariants, knee_slopes, least_modulus, moduli_of, ogden_moduli
+from dbvfiv.materials.law import Law, MaterialError
+from dbvfiv.materials.least_squares import LEAST_MARGIN, nonnegative, stable_constants, states_within
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
-from dbvfiv.materials.nonnegative import nonnegative
-from dbvfiv.materials.rubber_forms import Form, equivalent_strain, first_invariant, form_of, invariant_columns
-from dbvfiv.materials.softening import SofteningRubber
+from dbvfiv.materials.rubber_tests import TensionTest
+from dbvfiv.materials.softening import LEAST_SHARE, SofteningRubber
 from dbvfiv.materials.stability import StableRange, stable_range_of
-from dbvfiv.materials.tension_test import TensionTest
 from dbvfiv.materials.yeoh import Yeoh
+
+_STARTS = (-8.0, -4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
+_TRIED = {"none": 8, "non-negative": 8, "stable": 2}
+_LARGEST = 30.0
+_TIGHT = 1e-15
+_FAR = 1e6
+
+
+def search(problem) -> tuple[np.ndarray, bool | None]:
+    """Exponents of least residual, descending, and whether the constraint changed them.
+
+    Parameters
+    ----------
+    problem
+        Of `fit.fit_rubber`: tests, weights, constraint, `matrix` and `solve` at given exponents.
+    """
+    free = _polished(problem, _best(problem, constrained=False))
+    constants, unconstrained = problem.solve(free)
+    if np.array_equal(constants, unconstrained):
+        return _ordered(free), False
+    return _ordered(_best(problem, constrained=True)), True
+
+
+def _ordered(exponents: np.ndarray) -> np.ndarray:
+    return np.sort(exponents)[::-1]
+
+
+def _best(problem, constrained: bool) -> np.ndarray:
+    """The best of searches from several sets of exponents."""
+
+    def residual(exponents):
+        constants = problem.solve(exponents, constrained)[0]
+        return (problem.matrix(exponents) @ constants - problem.target) / np.linalg.norm(problem.target)
+
+    quick = [(float(np.sum(residual_of_free(problem, s) ** 2)), s) for s in combinations(_STARTS, problem.form.terms)]
+    starts = [np.array(start) for _, start in sorted(quick)[: _TRIED[problem.constraint if constrained else "none"]]]
+    # an exponent of zero is no term: each keeps its sign
+    found = []
+    for start in starts:
+        bounds = np.where(start > 0, 0.05, -_LARGEST), np.where(start > 0, _LARGEST, -0.05)
+        tight = {} if constrained else {"xtol": 1e-12, "ftol": 1e-12, "gtol": 1e-12}
+        found.append(least_squares(residual, start, bounds=bounds, max_nfev=200 if not constrained else 40, **tight))
+    return min(found, key=lambda answer: answer.cost).x
+
+
+def residual_of_free(problem, exponents) -> np.ndarray:
+    """Weighted residuals (n,) of the unconstrained constants at given exponents."""
+    return problem.matrix(exponents) @ problem.solve(exponents, constrained=False)[0] - problem.target
+
+
+def _polished(problem, exponents: np.ndarray) -> np.ndarray:
+    """Exponents after a search over all unknowns with the exact derivatives."""
+    size = np.linalg.norm(problem.target)
+    constants = problem.solve(exponents, constrained=False)[0]
+    scale = np.maximum(np.abs(constants), 1e-300)
+    count = len(exponents)
+
+    def residual(x):
+        if np.abs(x[count:]).max() > 2 * _LARGEST:  # terms that cancel each other: the search before has the answer
+            return np.full(len(problem.target), _FAR)
+        return (problem.matrix(x[count:]) @ (x[:count] * scale) - problem.target) / size
+
+    def derivative(x):
+        return np.hstack([problem.matrix(x[count:]) * scale, problem.slopes(x[count:], x[:count] * scale)]) / size
+
+    start = np.concatenate([constants / scale, exponents])
+    answer = least_squares(residual, start, derivative, method="lm", xtol=_TIGHT, ftol=_TIGHT, gtol=_TIGHT)
+    return answer.x[count:] if answer.cost <= np.sum(residual(start) ** 2) / 2 else exponents
+
+
+#: Logarithm of l3 over that of the stretch, with the sign turned.
+THINNING = {"uniaxial": 0.5, "planar": 1.0, "biaxial": 2.0}
+
+
+@dataclass(frozen=True)
+class Form:
+    """One form of the energy.
+
+    Attributes
+    ----------
+    name : str
+        "neo-hookean", "softening", "mooney-rivlin", "yeoh" or "ogden".
+    terms : int
+    powers : tuple of (int, int)
+        Powers of I1 - 3 and I2 - 3 of each constant; empty where W is not linear in all constants.
+    """
+
+    name: str
+    terms: int
+    powers: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the constants that W is linear in, as the case file writes them."""
+        if self.softens:
+            return "mu_inf", "mu_0", "c", "c_3"
+        if not self.powers:
+            return tuple(f"mu{p + 1}" for p in range(self.terms))
+        return tuple(f"c{i}{j}" for i, j in self.powers)
+
+    @property
+    def exponent_names(self) -> tuple[str, ...]:
+        """Names of the constants that W is not linear in: Ogden's exponents, x_0 of the softening rubber."""
+        if self.softens:
+            return ("x_0",)
+        return () if self.powers else tuple(f"alpha{p + 1}" for p in range(self.terms))
+
+    @property
+    def softens(self) -> bool:
+        """True for the form of the softening rubber, whose constants make it stable in every state."""
+        return self.name == "softening"
+
+    @property
+    def mixing(self) -> np.ndarray:
+        """Constants (terms, terms) per unit of each unknown of a fit; unknowns at least 0 keep the softening rubber
+        stable.
+        """
+        mixing = np.eye(self.terms)
+        if self.softens:
+            mixing[0, 1] = LEAST_SHARE
+        return mixing
+
+    @property
+    def title(self) -> str:
+        """Title of the form for tables and figures."""
+        return self.name if len(TERMS[self.name]) == 1 else f"{self.name} {self.terms}"
+
+    def columns(self, mode: str, strain, exponents=()) -> np.ndarray:
+        """Nominal stress per unit of each constant, (n, terms), at engineering strains (n,)."""
+        if self.softens:
+            return softening_columns(mode, strain, exponents[0])
+        return invariant_columns(mode, strain, self.powers) if self.powers else ogden_columns(mode, strain, exponents)
+
+    def slopes(self, mode: str, strain, exponents, constants) -> np.ndarray:
+        """Derivatives of the nominal stress by the exponents, (n, len(exponents)), at constants (terms,)."""
+        if self.softens:
+            return softening_slopes(mode, strain, exponents[0]) * constants[1]
+        return ogden_slopes(mode, strain, exponents) * constants
+
+    def moduli(self, log_stretches, exponents=()) -> np.ndarray:
+        """Hill moduli per unit of each constant, (..., terms, 5, 5)."""
+        if self.softens:
+            knee = moduli_of(log_stretches, knee_slopes(invariants(log_stretches)[0], exponents[0]))
+            linear, square, cube = np.moveaxis(hill_moduli(log_stretches, ((1, 0), (2, 0), (3, 0))), -3, 0)
+            return np.stack([0.5 * linear, knee, 0.25 * square, cube / 6.0], axis=-3)
+        return hill_moduli(log_stretches, self.powers) if self.powers else ogden_moduli(log_stretches, exponents)
+
+
+_POWERS = {
+    "neo-hookean": ((1, 0),),
+    "softening": (),
+    "mooney-rivlin": ((1, 0), (0, 1), (1, 1)),
+    "yeoh": ((1, 0), (2, 0), (3, 0)),
+    "ogden": (),
+}
+#: Numbers of terms of each form, the usual one first.
+TERMS = {"neo-hookean": (1,), "softening": (4,), "mooney-rivlin": (2, 3), "yeoh": (3, 2), "ogden": (2, 1, 3)}
+
+
+def form_of(name: str, terms: int | None = None) -> Form:
+    """A form by its name; with the usual number of terms if none is given.
+
+    Raises
+    ------
+    MaterialError
+        For a form or a number of terms that there is not.
+    """
+    if name not in TERMS:
+        raise MaterialError(f"The law to be fitted must be one of {', '.join(TERMS)}, but {name!r} was given.")
+    if terms is None:
+        terms = TERMS[name][0]
+    if isinstance(terms, bool) or terms not in TERMS[name]:
+        possible = " or ".join(str(t) for t in sorted(TERMS[name]))
+        title = "-".join(word.capitalize() for word in name.split("-"))
+        raise MaterialError(f"A {title} fit has {possible} terms, but {terms!r} was given.")
+    return Form(name, terms, _POWERS[name][:terms])
+
+
+def all_forms() -> tuple[Form, ...]:
+    """Every form with every number of terms that is worth comparing."""
+    several = (("mooney-rivlin", 2), ("mooney-rivlin", 3), ("yeoh", 3), ("ogden", 2), ("ogden", 3))
+    return tuple(form_of(*pair) for pair in (("neo-hookean", 1), ("softening", 4), *several))
+
+
+def _invariants_of(mode: str, strain) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Nominal stress per unit of dW/dI1 and of dW/dI2, I1 - 3 and I2 - 3, each (n,).
+
+    Written in the strain s = l - 1, so that small strains lose no digits.
+    """
+    s = np.asarray(strain, dtype=float)
+    l = 1.0 + s
+    if mode == "uniaxial":
+        first = 2.0 * s * (l**2 + l + 1.0) / l**2
+        second = first / l
+        i1, i2 = s**2 * (l + 2.0) / l, s**2 * (2.0 * l + 1.0) / l**2
+    elif mode == "planar":
+        first = second = 2.0 * s * (l + 1.0) * (l**2 + 1.0) / l**3
+        i1 = i2 = (s * (l + 1.0) / l) ** 2
+    else:
+        first = 2.0 * s * (l + 1.0) * (l**4 + l**2 + 1.0) / l**5
+        second = first * l**2
+        square = (s * (l + 1.0)) ** 2
+        i1, i2 = square * (2.0 * l**2 + 1.0) / l**4, square * (l**2 + 2.0) / l**2
+    return first, second, i1, i2
+
+
+def first_invariant(mode: str, strain) -> np.ndarray:
+    """I1 - 3 of a kind of test at engineering strains (n,)."""
+    return _invariants_of(mode, strain)[2]
+
+
+def softening_columns(mode: str, strain, knee: float) -> np.ndarray:
+    """Nominal stress per unit of mu_inf, mu_0, c and c_3, (n, 4), at x_0."""
+    first, _, i1, _ = _invariants_of(mode, strain)
+    return 0.5 * first[:, None] * np.stack([np.ones_like(i1), 1.0 / np.sqrt(1.0 + i1 / knee), i1, i1**2], axis=-1)
+
+
+def softening_slopes(mode: str, strain, knee: float) -> np.ndarray:
+    """Derivative of the second of `softening_columns` by x_0, (n, 1)."""
+    first, _, i1, _ = _invariants_of(mode, strain)
+    return (0.25 * first * i1 / knee**2 * (1.0 + i1 / knee) ** -1.5)[:, None]
+
+
+def invariant_columns(mode: str, strain, powers) -> np.ndarray:
+    """Nominal stress per unit of each C_ij, dimensionless, (n, len(powers))."""
+    first, second, i1, i2 = _invariants_of(mode, strain)
+    columns = []
+    for i, j in powers:
+        column = np.zeros_like(first)
+        if i:
+            column = column + i * i1 ** (i - 1) * i2**j * first
+        if j:
+            column = column + j * i1**i * i2 ** (j - 1) * second
+        columns.append(column)
+    return np.stack(columns, axis=-1)
+
+
+def ogden_columns(mode: str, strain, exponents) -> np.ndarray:
+    """Nominal stress per unit of each mu_p, (l^alpha - l3^alpha)/l, dimensionless, (n, len(exponents))."""
+    log, k = np.log1p(np.asarray(strain, dtype=float))[..., None], THINNING[mode]
+    alpha = np.asarray(exponents, dtype=float)
+    return 2.0 * np.exp((0.5 * alpha * (1.0 - k) - 1.0) * log) * np.sinh(0.5 * alpha * (1.0 + k) * log)
+
+
+def ogden_slopes(mode: str, strain, exponents) -> np.ndarray:
+    """Derivatives of `ogden_columns` by their exponents, (n, len(exponents))."""
+    log, k = np.log1p(np.asarray(strain, dtype=float))[..., None], THINNING[mode]
+    alpha = np.asarray(exponents, dtype=float)
+    return log * (np.exp((alpha - 1.0) * log) + k * np.exp((-k * alpha - 1.0) * log))
+
+
+def equivalent_strain(mode: str, strain) -> np.ndarray:
+    """Logarithmic strain of the tension that is as far from rest, sqrt(2/3) |ln U|."""
+    k = THINNING[mode]
+    across = k - 1.0  # of ln l2 over ln l, the sum being zero
+    return np.sqrt(2.0 / 3.0 * (1.0 + k**2 + across**2)) * np.abs(np.log1p(np.asarray(strain, dtype=float)))
+
 
 CONSTRAINTS = ("none", "non-negative", "stable")
 ERRORS = ("absolute", "relative")
@@ -210,7 +474,7 @@ def fit_rubber(
     elif form.softens:
         exponents, active = _search_knee(problem), None
     else:
-        exponents, active = ogden_fit.search(problem)
+        exponents, active = search(problem)
     constants, free = problem.solve(exponents)
     jacobian = problem.matrix(exponents)
     if not form.powers:

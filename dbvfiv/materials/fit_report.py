@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dbvfiv.materials.checks import MaterialError
-from dbvfiv.materials.fit import TAKEN, RubberFit, fit_rubber
-from dbvfiv.materials.loading_cycles import CycleReport, describe_cycles, loading_tests
-from dbvfiv.materials.rubber_forms import all_forms, form_of
-from dbvfiv.materials.tension_test import Curve, TensionTest
+from dbvfiv.materials.fit import TAKEN, RubberFit, all_forms, fit_rubber, form_of
+from dbvfiv.materials.law import MaterialError
+from dbvfiv.materials.rubber_tests import Curve, CycleReport, TensionTest, describe_cycles, loading_tests
 
 #: Condition number above which constants say little of states that were not tested.
 ILL_CONDITIONED = 100.0

@@ -13,9 +13,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from dbvfiv.materials.checks import MaterialError, require_finite, require_positive
-from dbvfiv.materials.incompressible import mooney_rivlin_energy
-from dbvfiv.materials.law import MOONEY_RIVLIN, padded
+from dbvfiv.materials.law import (
+    MOONEY_RIVLIN,
+    MaterialError,
+    mooney_rivlin_energy,
+    padded,
+    require_finite,
+    require_positive,
+)
 
 
 @dataclass(frozen=True)

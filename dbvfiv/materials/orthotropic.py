@@ -14,8 +14,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from dbvfiv.materials.checks import MaterialError, require_finite, require_positive
-from dbvfiv.materials.law import LINEAR_ELASTIC, linear_elastic_energy, padded
+from dbvfiv.materials.law import (
+    LINEAR_ELASTIC,
+    MaterialError,
+    linear_elastic_energy,
+    padded,
+    require_finite,
+    require_positive,
+)
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dbvfiv.materials.checks import MaterialError, require_finite, require_positive
-from dbvfiv.materials.incompressible import rubber_energy
-from dbvfiv.materials.law import MOONEY_RIVLIN, padded
+from dbvfiv.materials.law import MOONEY_RIVLIN, MaterialError, padded, require_finite, require_positive, rubber_energy
 
 #: Least mu_inf over mu_0 with which the law is stable at all strains for any x_0 (0.0048 serves). Without it the power
 #: law loses Hill's condition in equibiaxial tension, by 0.3 % of its stiffness at rest, where x_0 < 0.02.

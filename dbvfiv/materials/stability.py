@@ -33,7 +33,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from dbvfiv.materials.checks import MaterialError
 from dbvfiv.materials.hill import (
     Slopes,
     assembled,
@@ -43,8 +42,7 @@ from dbvfiv.materials.hill import (
     moduli_of,
     rubber_slopes,
 )
-from dbvfiv.materials.incompressible import plane_stress_invariants
-from dbvfiv.materials.law import MOONEY_RIVLIN, Law
+from dbvfiv.materials.law import MOONEY_RIVLIN, Law, MaterialError, plane_stress_invariants
 
 LARGEST_LOG_STRAIN = float(np.log(10.0))
 _EDGE_SAMPLES = 801

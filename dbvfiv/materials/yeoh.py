@@ -12,9 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dbvfiv.materials.checks import require_finite, require_positive
-from dbvfiv.materials.incompressible import rubber_energy
-from dbvfiv.materials.law import MOONEY_RIVLIN, padded
+from dbvfiv.materials.law import MOONEY_RIVLIN, padded, require_finite, require_positive, rubber_energy
 
 
 @dataclass(frozen=True)

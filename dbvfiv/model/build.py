@@ -14,8 +14,8 @@ from ..flow.terms.pump import Pump
 from ..geometry import ValveMesh, valve_mesh
 from ..geometry.divisions import grading
 from ..materials.damping import relaxation_from_case
-from ..materials.library import law_from_case
 from ..materials.orthotropic import OrthotropicPly
+from ..materials.rubbers import law_from_case
 from ..shell import Layer, Section, Shell, ShellMesh, Weight
 from ..shell.zones import Zones
 from .supports import free_unknowns

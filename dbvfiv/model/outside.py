@@ -76,10 +76,6 @@ class AddedMass:
     def rank(self) -> int:
         return self.columns.shape[1]
 
-    def left_out(self, density: float) -> float:
-        """Frequency of the first motion left out, of a wall without mass in a fluid of a density (kg/m3), Hz."""
-        return float(1.0 / (2.0 * np.pi * np.sqrt(density * self.slowness[-1])))
-
     def projected(self, basis: np.ndarray) -> AddedMass:
         """On the span of columns (n, k)."""
         return AddedMass(basis.T @ self.columns, self.slowness)

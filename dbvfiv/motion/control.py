@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case.drive_table import read_drive_table
+from ..case.tables import read_drive_table
 from ..case.model import Case
 from .scheme import Scheme, scheme
 from .state import MotionState

@@ -1,17 +1,188 @@
-"""Opening result files, and the names that they may take; whatever is wrong with one is told in a sentence."""
+"""Opening, naming and locking of result files: one writer, signals deferred until a write is complete."""
 
 from __future__ import annotations
 
+import errno
+import fcntl
+import os
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import sleep
+from types import FrameType, TracebackType
 
 import h5py
 
 from ..errors import CaseError
-from .layout import LAYOUT
-from .lock import check_free, is_being_written
+from .table import LAYOUT
+
+_HELD = (signal.SIGINT, signal.SIGTERM)
+
+
+class Shield:
+    """Context that defers Ctrl-C (SIGINT) and SIGTERM until it is left; not to be nested or shared.
+
+    Python handles signals in its main thread alone, so in other threads the context does nothing. Nor does it for
+    signals that this process ignores or that end it without a Python handler.
+    """
+
+    def __init__(self):
+        self._before: dict[int, object] = {}
+        self._heard: list[tuple[int, FrameType | None]] = []
+
+    def __enter__(self) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number in _HELD:
+            before = signal.getsignal(number)
+            if callable(before):
+                self._before[number] = before
+                signal.signal(number, self._hear)
+
+    def _hear(self, number: int, frame: FrameType | None) -> None:
+        self._heard.append((number, frame))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        before, self._before = self._before, {}
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        heard, self._heard = self._heard, []
+        for number, frame in heard[:1]:
+            before[number](number, frame)
+
+
+#: Readers that ask whether a file is being written hold it for an instant: so often a writer tries, s apart.
+_LOCK_TRIES, _LOCK_PAUSE = 5, 0.02
+#: What a file system says that knows no files without a name.
+_NO_NAMELESS = (errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL, errno.ENOENT)
+
+
+class WriterLock:
+    """The right to write a result of some name, held by this process until it is released or the process ends.
+
+    An empty file takes the name where there was none. The lock sits on the file that has the name, so it moves to the
+    new file when that takes the old one's place (`move`).
+
+    Parameters
+    ----------
+    path : path
+
+    Raises
+    ------
+    CaseError
+        If another process holds it, or the folder cannot be written.
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+        self._descriptor = self._taken()
+
+    def _taken(self) -> int:
+        while True:
+            try:
+                descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+            except OSError as error:
+                raise _unwritable(self.path, error) from None
+            try:
+                _lock(descriptor, self.path)
+                if os.path.samestat(os.stat(self.path), os.fstat(descriptor)):
+                    return descriptor
+            except FileNotFoundError:  # replaced or removed meanwhile
+                pass
+            except BaseException:
+                os.close(descriptor)
+                raise
+            os.close(descriptor)
+
+    def move(self, new: Path) -> None:
+        """Let a finished file take the name, and hold it instead."""
+        descriptor = os.open(new, os.O_RDWR)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        os.replace(new, self.path)
+        os.close(self._descriptor)
+        self._descriptor = descriptor
+
+    def release(self) -> None:
+        """Let others write; an empty file that only held the name goes."""
+        if self._descriptor < 0:
+            return
+        try:
+            if os.fstat(self._descriptor).st_size == 0 and self.path.exists():
+                self.path.unlink()
+        finally:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+
+def check_free(path: Path) -> None:
+    """Make sure that a result may be written under a name, and leave everything as it is.
+
+    Raises
+    ------
+    CaseError
+        If another process writes it, or the file or its folder cannot be written.
+    """
+    try:
+        if path.exists():
+            descriptor = os.open(path, os.O_RDWR)
+            try:
+                _lock(descriptor, path)
+            finally:
+                os.close(descriptor)
+        _check_folder(path.absolute().parent)
+    except OSError as error:
+        raise _unwritable(path, error) from None
+
+
+def _check_folder(folder: Path) -> None:
+    """Try a file without a name in a folder, or in the nearest that there is: nothing can stay behind of it."""
+    while not folder.exists():
+        folder = folder.parent
+    if not folder.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, f"{str(folder)!r} is not a folder")
+    try:
+        os.close(os.open(folder, os.O_TMPFILE | os.O_RDWR, 0o600))
+    except OSError as error:
+        if error.errno not in _NO_NAMELESS:
+            raise
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES)) from None
+
+
+def _lock(descriptor: int, path: Path) -> None:
+    for left in reversed(range(_LOCK_TRIES)):
+        try:
+            return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if not left:
+                raise CaseError(
+                    f"{str(path)!r} is being written by another process; wait for it or choose another name."
+                ) from None
+            sleep(_LOCK_PAUSE)
+
+
+def _unwritable(path: Path, error: OSError) -> CaseError:
+    return CaseError(f"The result file {str(path)!r} cannot be written ({error.strerror}).")
+
+
+def is_being_written(path: Path) -> bool:
+    """True where a process holds the right to write a file."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
 
 #: A file that is being written is tried this often, s apart.
 _TRIES, _PAUSE = 40, 0.02

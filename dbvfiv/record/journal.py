@@ -26,9 +26,8 @@ import h5py
 import numpy as np
 
 from ..errors import CaseError, SolveError
-from .files import refuse_foreign
+from .files import WriterLock, refuse_foreign
 from .header import Header, write_header
-from .lock import WriterLock
 from .mesh import MeshData, write_mesh
 from .table import MARK, TableSpec
 

@@ -17,11 +17,10 @@ import numpy as np
 
 from ..case.model import Case
 from ..observer import Observer
-from .files import reading
+from .files import Shield, reading
 from .header import Header, read_header
 from .journal import Journal, read_log
 from .mesh import MeshData, read_mesh
-from .shield import Shield
 from .table import TableSpec, pack_documents, read_column, read_rows
 
 
@@ -340,3 +339,31 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return tuple(value.tolist()) if value.shape == (3,) else value
     return value.item() if isinstance(value, np.generic) else value
+
+
+class RecordPart(Record):
+    """A record without the last rows of some of its tables; its notes are all there.
+
+    Parameters
+    ----------
+    whole : Record
+    rows : mapping of str to int
+        How many rows of a table are left; all of those that are not named.
+    """
+
+    def __init__(self, whole: Record, rows: Mapping[str, int]):
+        self.whole, self._left = whole, dict(rows)
+        self.header, self.mesh, self.path = whole.header, whole.mesh, whole.path
+
+    def rows(self, table: str) -> int:
+        return min(self._left.get(table, self.whole.rows(table)), self.whole.rows(table))
+
+    def column(self, table: str, name: str) -> np.ndarray:
+        return self.whole.column(table, name)[: self.rows(table)]
+
+    def value(self, table: str, name: str, row: int) -> Any:
+        return self.whole.value(table, name, range(self.rows(table))[row])
+
+    @property
+    def log(self) -> list[dict[str, Any]]:
+        return self.whole.log

@@ -10,10 +10,9 @@ from ..case.model import Case
 from ..model import ValveModel
 from ..model.state import SteadyState
 from ..shell.recovery import layer_fields
-from .layout import TEXT, Column, Shown
 from .mesh import MeshData
 from .record import Record, plain
-from .table import TableSpec
+from .table import TEXT, Column, Shown, TableSpec
 
 #: What a user reads off a state; the names are the keys of the JSON output.
 SUMMARY = (

@@ -9,8 +9,8 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from ..case.parameters import PARAMETERS
-from ..drawing.faces import ValveSkin
 from ..drawing.style import COMPUTED, PUBLISHED
+from ..drawing.views import ValveSkin
 
 if TYPE_CHECKING:
     from ..studies.map.result import MapResult

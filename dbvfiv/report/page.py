@@ -17,11 +17,7 @@ from ..studies.stability.place import describe_fixed
 from . import live
 from .content import Part
 from .gather import Gathered
-from .parts import PARTS
-from .parts.closure import shutting
-from .parts.cycle import cycles
-from .parts.hydraulics import opening
-from .parts.vibration import onsets, stability
+from .parts import PARTS, cycles, onsets, opening, shutting, stability
 
 
 def write_page(found: Gathered, path: Path) -> Path:

@@ -43,7 +43,7 @@ def _deformation(constants, e):
 
 @numba.njit(fastmath=FAST, inline="always")
 def first_invariant(e):
-    """I1 - 3 of strains e (5,) without cancellation; see `dbvfiv.materials.incompressible`."""
+    """I1 - 3 of strains e (5,) without cancellation; see `dbvfiv.materials.law`."""
     trace = 2 * (e[0] + e[1])
     det = 4 * e[0] * e[1] - e[2] * e[2]
     plane = 4 * (e[0] * e[0] + e[0] * e[1] + e[1] * e[1]) + e[2] * e[2]

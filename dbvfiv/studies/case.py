@@ -14,9 +14,9 @@ from typing import Any, Self
 
 from pydantic import create_model, model_validator
 
+from ..case.describe import page
 from ..case.load import key_path, read_case_file
 from ..case.model import Case as PhysicsCase
-from ..case.reference import page
 from ..case.section import BrokenRule, Section, key
 from ..case.write import case_toml
 from . import KINDS

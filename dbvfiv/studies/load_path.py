@@ -8,9 +8,9 @@ import numpy as np
 
 from ..model.load_steps import LoadSteps
 from ..model.state import SteadyState
-from ..record.layout import Column
 from ..record.mesh import MeshData
 from ..record.record import Record
+from ..record.table import Column
 
 WAY_ON = (
     Column("path/slope", "m/Pa, rad/Pa", "Derivative of the free unknowns by the pressure"),

@@ -8,14 +8,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-from ..drawing.files import draw_figures, write_figures
+from ..drawing.style import draw_figures, write_figures
 from ..model import ValveModel
-from ..record.fields import export_result
 from ..record.header import Header
-from ..record.mesh import MeshData
+from ..record.mesh import MeshData, WholeValve
 from ..record.record import Record, copy_record
-from ..record.vtkhdf import Step
-from ..record.whole_valve import WholeValve
+from ..record.vtkhdf import Step, export_result
 from .case import Case
 from .session import Session
 from .study import find_study
@@ -167,5 +165,5 @@ class StudyResult:
         return ()
 
     def export(self, path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any) -> Path:
-        """Write a VTKHDF file for ParaView; see `dbvfiv.record.fields`."""
+        """Write a VTKHDF file for ParaView; see `dbvfiv.record.vtkhdf`."""
         return export_result(self, path, quarter, deformed, **choices)

@@ -17,8 +17,7 @@ from ..observer import Observer
 from ..record.files import check_writable, kind_of
 from ..record.header import Header
 from ..record.mesh import MeshData
-from ..record.part import RecordPart
-from ..record.record import GrowingRecord, Record, StoredRecord
+from ..record.record import GrowingRecord, Record, RecordPart, StoredRecord
 from . import KINDS
 from .case import Case
 from .study import Study, find_study, nothing_to_resume

@@ -1,17 +1,34 @@
 """The thesis, figure by figure: what this model gives beside what was published.
 
 `entry` says what one figure or table is, `workshop` runs what several of them share and keeps it in files; the entries
-stand by subject in `materials`, `strip`, `openings`, `shutting`, `histories` and `flutter`.
+stand by subject in `materials`, `strip`, `openings`, `histories` and `flutter`.
 """
 
-from . import flutter, histories, materials, openings, shutting, strip
-from .entry import Entry, Number
-from .workshop import Workshop
+from collections.abc import Sequence
 
-_SUBJECTS = (materials, strip, openings, shutting, histories, flutter)
+from ..errors import CaseError
+from . import flutter, histories, materials, openings, strip
+from .entry import Entry, Number, Workshop
+
+_SUBJECTS = (materials, strip, openings, histories, flutter)
 #: All entries, in the order of the thesis.
 ENTRIES: tuple[Entry, ...] = tuple(
     sorted((entry for subject in _SUBJECTS for entry in subject.ENTRIES), key=lambda entry: entry.place)
 )
 
-__all__ = ["ENTRIES", "Entry", "Number", "Workshop"]
+__all__ = ["ENTRIES", "Entry", "Number", "Workshop", "choose_entries"]
+
+
+def choose_entries(names: Sequence[str]) -> list[Entry]:
+    """Entries by their names, all without names.
+
+    Raises
+    ------
+    CaseError
+        For a name that there is no entry of.
+    """
+    known = {entry.name: entry for entry in ENTRIES}
+    for name in names:
+        if name not in known:
+            raise CaseError(f"There is no entry {name!r}; there are {', '.join(known)}.")
+    return [known[name] for name in dict.fromkeys(names)] if names else list(ENTRIES)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from ..report.content import picture, pictures_of
 from ..studies.transient import comparison
-from .entry import Entry, Number, Outcome
-from .workshop import Workshop
+from .entry import Entry, Number, Outcome, Workshop
 
 _LIGHT = {"damping.alpha": 0, "damping.beta": 0.003}
 #: A push of about the size of the cycle, so that it settles soon.

@@ -7,8 +7,7 @@ from typing import Any
 
 from ..report.content import picture
 from ..studies.transient import comparison
-from .entry import Entry, Number, Outcome
-from .workshop import Workshop
+from .entry import Entry, Number, Outcome, Workshop
 
 _ALPHA_3 = {"damping.alpha": 3, "damping.beta": 0.003}
 

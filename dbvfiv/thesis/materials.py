@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..drawing.style import branch_looks, new_figure
+from ..materials.damping_report import rayleigh_constants
 from ..materials.fit import uniaxial_stress
-from ..materials.halpin_tsai import ply_from_constituents
-from ..materials.rayleigh import rayleigh_constants
+from ..materials.ply_fit import ply_from_constituents
 from ..materials.rubbers import published_rubber, strain_levels
 from ..report.content import picture
-from .entry import Entry, Number, Outcome
-from .workshop import Workshop
+from .entry import Entry, Number, Outcome, Workshop
 
 _RUBBERS = ("SBR", "CR", "EPDM")
 #: C10, C01, C11 of Table 3-3, three constants, MPa, by rubber and strain level.

@@ -10,8 +10,7 @@ from ..errors import SolveError
 from ..materials import fibre_ply, published_rubber
 from ..report.content import picture
 from ..shell import Layer, Section, Shell, ShellMesh
-from .entry import Entry, Number, Outcome
-from .workshop import Workshop
+from .entry import Entry, Number, Outcome, Workshop
 
 #: m: the strip's length and width, and half the span between the supports, symmetric about the load.
 LENGTH, WIDTH, HALF_SPAN = 0.16, 0.05, 0.05

@@ -3,9 +3,7 @@
 The package is independent of valves.
 """
 
-from .judge import judge
-from .options import JudgeOptions
+from .judge import NAMES, JudgeOptions, Verdict, judge
 from .series import Series, in_steps, spectrum
-from .verdict import NAMES, Verdict
 
 __all__ = ["NAMES", "JudgeOptions", "Series", "Verdict", "in_steps", "judge", "spectrum"]

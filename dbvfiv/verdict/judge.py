@@ -5,18 +5,266 @@ Sampling at the period, beats, slow growth and noise do not mislead it.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
-from .cycles import Cycles, extremes, harmonics
-from .level import within_noise, without_cycles
-from .options import JudgeOptions
-from .period import find_period, refine
-from .sampling import longest_part
-from .series import Series, check_samples, swings, undersampled
-from .trend import comes_and_goes, remaining, settled, trend_of
-from .verdict import Verdict
+from .cycles import Cycles, comes_and_goes, extremes, find_period, harmonics, refine, remaining, settled, trend_of
+from .series import Series, check_samples, longest_part, swings, undersampled
+
+
+@dataclass(frozen=True)
+class JudgeOptions:
+    """Options of a verdict.
+
+    Attributes
+    ----------
+    steady : float
+        Largest change, over the last fifth and still to come, of a steady signal relative to its size.
+    residual : float
+        Largest residual of a steady state, where a residual is known.
+    cycles : int
+        Cycles that a limit cycle must have kept.
+    periodic : float
+        Largest periodicity error of a limit cycle without noise.
+    noisy : float
+        Largest periodicity error of a limit cycle with noise on it.
+    drift : float
+        Largest relative change of the amplitude over the cycles looked at, and still to come.
+    band : float
+        Relative band within which amplitudes count as equal.
+    noise : float
+        Largest root mean square of noise, relative to the level it lies on, within which a signal counts as steady.
+    """
+
+    steady: float = 1e-4
+    residual: float = 1e-3
+    cycles: int = 10
+    periodic: float = 0.02
+    noisy: float = 0.4
+    drift: float = 2e-3
+    band: float = 0.02
+    noise: float = 0.02
+
+
+NAMES = ("steady", "decaying", "limit cycle", "growing", "closed", "irregular", "undecided")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Final behaviour of a time series.
+
+    Attributes
+    ----------
+    name : str
+        One of `NAMES`.
+    decided : bool
+        True where a longer series would not change the verdict.
+    reason : str
+        One sentence.
+    mean : float
+        Over whole cycles where there are cycles, over the end of the series otherwise.
+    amplitude : float
+        Half the distance between the extremes of the last cycles, or of the end of the series.
+    period : float
+        s; not a number without cycles.
+    cycles : int
+        Cycles that the verdict rests on.
+    periodicity_error : float
+        Root mean square of x(t + T) - x(t) over that of two unrelated signals of the same variance: 0 periodic, 1
+        unrelated.
+    periodicity_trend : float
+        Factor of the periodicity error from one cycle to the next; below 1 while a cycle is being approached.
+    amplitude_trend : float
+        Relative change of the amplitude from one cycle to the next.
+    harmonics : (k, 2) array
+        Amplitude and phase, rad, of the first multiples of the frequency: sum a_k cos(2 pi k t / T + phase), t from the
+        start of the series.
+    rms : float
+        Root mean square about the mean, of the same part of the series.
+    smallest, largest : float
+        Extremes of the whole series.
+    noise : float
+        Root mean square of white noise about a constant level, where the end of the series is such noise; not a number
+        otherwise.
+    judged : tuple of float, s
+        Beginning and end of the part that the verdict is about: the whole series, or its longest part between gaps.
+    notes : tuple of str
+        Sentences on the samples: gaps, uneven steps.
+    """
+
+    name: str
+    decided: bool
+    reason: str
+    mean: float = np.nan
+    amplitude: float = np.nan
+    period: float = np.nan
+    cycles: int = 0
+    periodicity_error: float = np.nan
+    periodicity_trend: float = np.nan
+    amplitude_trend: float = np.nan
+    harmonics: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    rms: float = np.nan
+    smallest: float = np.nan
+    largest: float = np.nan
+    noise: float = np.nan
+    judged: tuple[float, float] = (np.nan, np.nan)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def frequency(self) -> float:
+        """Hz; not a number without cycles."""
+        return 1.0 / self.period if self.period > 0 else np.nan
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON; what is not a number is None."""
+        numbers = {
+            "mean": self.mean,
+            "amplitude": self.amplitude,
+            "frequency": self.frequency,
+            "period": self.period,
+            "periodicity_error": self.periodicity_error,
+            "periodicity_trend": self.periodicity_trend,
+            "amplitude_trend": self.amplitude_trend,
+            "rms": self.rms,
+            "smallest": self.smallest,
+            "largest": self.largest,
+            "noise": self.noise,
+        }
+        return {
+            "verdict": self.name,
+            "decided": bool(self.decided),
+            "reason": self.reason,
+            **{name: float(value) if np.isfinite(value) else None for name, value in numbers.items()},
+            "cycles_observed": self.cycles,
+            "judged": [float(t) if np.isfinite(t) else None for t in self.judged],
+            "notes": list(self.notes),
+            "harmonics": [{"amplitude": float(a), "phase": float(p)} for a, p in self.harmonics],
+        }
+
+
+_SHARE, _FEWEST_OF_NOISE = 0.2, 64
+_BANDS = 16
+#: Smallest share of the band up to half the sampling rate that noise fills.
+_FILLED = 0.3
+#: Margin of a line over the largest of so many values of a noise's spectrum, which is the logarithm of their number in
+#: the mean; beyond it lies noise once in a thousand records.
+_LINE = 7.0
+#: Standard errors by which the level may move.
+_LEVEL = 4.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise about a level.
+
+    Attributes
+    ----------
+    level : float
+    rms : float
+        Root mean square about the level.
+    """
+
+    level: float
+    rms: float
+
+
+def noise_at_end(series: Series) -> Noise | None:
+    """Level and noise of the last fifth of a series; None if that is anything but noise about a constant level.
+
+    Noise has no memory: its spectrum (Hann window) fills at least a third of what the sampling shows, holds no line,
+    and its level and its strength stay within what chance explains.
+    """
+    part = series.last(max(_SHARE * series.duration, (_FEWEST_OF_NOISE - 1) * series.step))
+    values, count = part.values, len(part.values)
+    level = float(values.mean())
+    rms = float(values.std())
+    if count < _FEWEST_OF_NOISE // 2 or rms == 0.0:
+        return None
+    power = np.abs(np.fft.rfft((values - level) * np.hanning(count + 2)[1:-1])[2:]) ** 2
+    bands = np.array_split(power, min(_BANDS, max(2, len(power) // _BANDS)))
+    means = np.array([band.mean() for band in bands])
+    if not means.min() > 0:
+        return None
+    filled = means.sum() ** 2 / (len(means) * (means**2).sum())
+    line = max(band.max() / band.mean() for band in bands)
+    thirds = np.array_split(values, 3)
+    moved = np.ptp([third.mean() for third in thirds])
+    chance = rms * np.sqrt(2.0 / (filled * count / 3.0))
+    halves = [half.std() for half in np.array_split(values, 2)]
+    even = max(halves) <= 1.5 * min(halves)
+    if filled < _FILLED or line > np.log(len(power)) + _LINE or moved > _LEVEL * chance or not even:
+        return None
+    return Noise(level, rms)
+
+
+def without_cycles(series: Series, options: JudgeOptions, size: float, residual: float | None, at_end: dict) -> Verdict:
+    """Verdict on a signal without cycles, from its size and from mean, amplitude and rms of its end."""
+    tail = series.last(0.2 * series.duration).values
+    thirds = [part.mean() for part in np.array_split(tail, 3)]
+    first, second = thirds[1] - thirds[0], thirds[2] - thirds[1]
+    to_come = abs(second) / (1.0 - min(abs(second / first), 0.99)) if first and abs(second) > 1e-13 * size else 0.0
+    if 2.0 * at_end["amplitude"] <= options.steady * size and to_come <= options.steady * size:
+        if residual is not None and not residual <= options.residual:
+            return Verdict(
+                "undecided",
+                False,
+                (
+                    f"The signal stands still but its system does not (residual "
+                    f"{residual:.2g}): it may be sampled at its own period."
+                ),
+                **at_end,
+            )
+        return Verdict(
+            "steady", True, f"It changes by less than {options.steady:g} of its size, and little is to come.", **at_end
+        )
+    ranges = np.array([np.ptp(part) for part in np.array_split(series.values, 8)])
+    levels = np.array([part.mean() for part in np.array_split(series.values, 8)])
+    late = ranges[-4:]
+    falling, rising = np.all(np.diff(late) < 0), np.all(np.diff(late) > 0)
+    if falling and late[-1] < 0.6 * late[0]:
+        return Verdict(
+            "decaying", bool(late[-1] < 0.1 * ranges.max()), "Its changes become smaller and smaller.", **at_end
+        )
+    if rising and late[-1] > 1.5 * late[0] and ranges[-1] == ranges.max():
+        return Verdict(
+            "growing", bool(late[-1] > 10 * max(late[0], 1e-300)), "Its changes become larger and larger.", **at_end
+        )
+    steps = np.diff(levels[-5:])
+    if np.all(steps > 0) or np.all(steps < 0):
+        if np.ptp(levels[-5:]) > 2.0 * np.median([_scatter(part) for part in np.array_split(series.values, 8)[-4:]]):
+            shrinking = abs(steps[-1]) < 0.5 * abs(steps[0])
+            return Verdict(
+                "decaying" if shrinking else "growing",
+                False,
+                "It drifts one way" + (", slower and slower." if shrinking else "."),
+                **at_end,
+            )
+    if swings(series) < options.cycles:
+        return Verdict("undecided", False, "It moves, and too few swings have been seen to tell how.", **at_end)
+    return Verdict("irregular", True, "It moves without a period.", **at_end)
+
+
+def _scatter(part: np.ndarray) -> float:
+    t = np.arange(len(part))
+    return float(np.ptp(part - np.polyval(np.polyfit(t, part, 1), t)))
+
+
+def within_noise(series: Series, options: JudgeOptions, residual: float | None, at_end: dict) -> Verdict | None:
+    """Verdict on a signal that ends in a constant level with noise on it; None if it does not."""
+    noise = noise_at_end(series)
+    if noise is None or (residual is not None and not residual <= options.residual):
+        return None
+    facts = at_end | {"mean": noise.level, "rms": noise.rms, "noise": noise.rms}
+    share = noise.rms / abs(noise.level) if noise.level else np.inf
+    if noise.rms <= options.noise * abs(noise.level):
+        words = f"It is constant within noise of {noise.rms:.3g} (root mean square, {100 * share:.2g} % of its level)."
+        return Verdict("steady", True, words, **facts)
+    level = f"{100 * share:.3g} % of its level" if share < 10 else f"its level is {noise.level:.2g}"
+    words = f"It is noise of {noise.rms:.3g} (root mean square, {level}) without a period: too much to call it steady."
+    return Verdict("irregular", True, words, **facts)
+
 
 #: Samples without which nothing is said.
 _FEWEST = 16

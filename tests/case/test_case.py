@@ -11,8 +11,7 @@ import pytest
 
 from dbvfiv.case import Case as PhysicsCase
 from dbvfiv.case import CaseError, make_case, parse_axis
-from dbvfiv.case.describe import walk
-from dbvfiv.case.reference import explain, page
+from dbvfiv.case.describe import explain, page, walk
 from dbvfiv.case.write import case_toml
 from dbvfiv.studies import KINDS
 from dbvfiv.studies.case import THESIS, Case, load_case, thesis_case

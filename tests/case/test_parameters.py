@@ -5,9 +5,9 @@ import pickle
 import pytest
 
 from dbvfiv.case import CaseError
+from dbvfiv.case.axis import parse_stability_axis
 from dbvfiv.case.describe import allowed_words, walk
 from dbvfiv.case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, SYSTEM_NAMES, Mu, listed
-from dbvfiv.case.stability_axis import parse_stability_axis
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.session import KEYWORDS
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from dbvfiv.cfd.domain import PATCHES
 from dbvfiv.cfd.flow_case import FlowCase
-from dbvfiv.cfd.foam_mesh import faces_of
-from dbvfiv.cfd.hexahedra import PATCHES
+from dbvfiv.cfd.foam import faces_of
 from dbvfiv.errors import CaseError
 from dbvfiv.exchange.bodies import shape_of
-from dbvfiv.exchange.stl import triangulated
+from dbvfiv.exchange.files import triangulated
 
 
 def flow_case(state, pipe=0.33, fineness=0.35):

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from dbvfiv.cfd import run as running
+from dbvfiv.cfd import foam
 from dbvfiv.cfd.comparison import FlowComparison
-from dbvfiv.cfd.fields import FlowFields, read_fields
 from dbvfiv.cfd.figures import draw
 from dbvfiv.cfd.flow_case import FlowCase
-from dbvfiv.drawing.files import draw_figures
+from dbvfiv.cfd.foam import FlowFields, read_fields
+from dbvfiv.drawing.style import draw_figures
 from dbvfiv.errors import CaseError, SolveError
 
 
@@ -134,7 +134,7 @@ def test_figures_are_drawn(state):
 def test_without_openfoam_the_case_stays_and_a_sentence_says_so(
     command_line, coarse_run, tmp_path, monkeypatch, one_sentence
 ):
-    monkeypatch.setattr(running.shutil, "which", lambda name: None)
+    monkeypatch.setattr(foam.shutil, "which", lambda name: None)
     folder = tmp_path / "flow"
     done = command_line("cfd", coarse_run.path, "--fineness", 0.3, "--pipe", "330 mm", "-o", folder)
     assert done.status == 1 and one_sentence(done.err) and "apt-get install openfoam" in done.err
@@ -142,11 +142,12 @@ def test_without_openfoam_the_case_stays_and_a_sentence_says_so(
     done = command_line("cfd", coarse_run.path, "--pipe", "wide", "-o", tmp_path / "b")
     assert done.status == 2 and one_sentence(done.err)
     done = command_line("cfd", coarse_run.path, "--fineness", 0.3, "--no-run", "--json", "-o", tmp_path / "c")
+    assert done.status == 0, done.err
     assert json.loads(done.out)["cells"] > 5000
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not running.has_openfoam(), reason="OpenFOAM is not installed")
+@pytest.mark.skipif(not foam.has_openfoam(), reason="OpenFOAM is not installed")
 def test_from_a_state_to_its_flow(command_line, coarse_run, tmp_path):
     """End to end on 6 000 cells: within a tenth of what finer meshes say (docs/three-dimensions.md)."""
     folder = tmp_path / "flow"

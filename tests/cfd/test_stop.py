@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from dbvfiv.cfd.run import run_openfoam
+from dbvfiv.cfd.foam import run_openfoam
 from dbvfiv.observer import Observer
 
 

@@ -8,8 +8,8 @@ import types
 import pytest
 import typer
 
-from dbvfiv.cli import _run
-from dbvfiv.cli._output import print_json
+from dbvfiv.cli import main, run
+from dbvfiv.cli.terminal import print_json
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import Case, load_case
 
@@ -23,7 +23,7 @@ def test_help_lists_every_command(command_line):
 
 def test_every_command_has_help_and_loads_nothing_heavy():
     code = (
-        "import sys; from dbvfiv.cli._run import build; app = build();"
+        "import sys; from dbvfiv.cli.main import build; app = build();"
         "print([c.callback.__module__ for c in app.registered_commands if not c.callback.__doc__]);"
         "heavy = 'jax numpy scipy petsc4py numba pint matplotlib h5py plotly pyvista'.split();"
         "print([m for m in heavy if m in sys.modules])"
@@ -66,7 +66,7 @@ def test_failures_become_exit_statuses(monkeypatch, command_line, one_sentence, 
         app.command("work")(command)
         return app
 
-    monkeypatch.setattr(_run, "build", build)
+    monkeypatch.setattr(main, "build", build)
     outcome = command_line("work")
     assert outcome.status == status
     assert outcome.out == ""
@@ -165,9 +165,9 @@ def test_json_of_arrays_and_of_what_is_not_finite(capsys):
 def test_a_result_that_cannot_be_written_is_refused_before_the_work(tmp_path, capsys):
     notes = tmp_path / "notes.md"
     notes.write_text("not a result")
-    assert _run.run(["sweep", "--over", "density=1:1000:9", "-o", str(notes)]) == 2
+    assert run(["sweep", "--over", "density=1:1000:9", "-o", str(notes)]) == 2
     said = capsys.readouterr()
     assert "notes.md" in said.err and "not overwritten" in said.err and said.out == ""
-    assert _run.run(["modes", "-o", str(notes / "a.h5")]) == 2
+    assert run(["modes", "-o", str(notes / "a.h5")]) == 2
     assert "a.h5" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["notes.md"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.drawing.damping import damping_figure
+from dbvfiv.drawing.materials import damping_figure
 from dbvfiv.studies.case import thesis_case
 from tests.small_valves import THESIS_SET
 

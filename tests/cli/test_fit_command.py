@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.materials import published_rubber, rubber, uniaxial_stress
-from dbvfiv.materials.library import law_from_card
+from dbvfiv.materials.rubbers import law_from_card
 from dbvfiv.studies.case import load_case
 
 TRELOAR = str(Path(__file__).parents[1] / "materials" / "treloar.csv")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.materials import fibre_ply, ply_from_constituents
-from dbvfiv.materials.library import law_from_card
 from dbvfiv.materials.ply_fit import StripTest
+from dbvfiv.materials.rubbers import law_from_card
 from dbvfiv.studies.case import load_case
 
 

@@ -9,11 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbvfiv.errors import CaseError
-from dbvfiv.exchange.bodies import SHAPES, shape_of
-from dbvfiv.exchange.faces import WallFaces
-from dbvfiv.exchange.passage import trim_section
-from dbvfiv.exchange.step import open_gmsh, write_step
-from dbvfiv.exchange.stl import triangulated
+from dbvfiv.exchange.bodies import SHAPES, WallFaces, shape_of, trim_section
+from dbvfiv.exchange.files import open_gmsh, triangulated, write_step
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dbvfiv.case import CaseError
-from dbvfiv.case.lip import LipSizes
+from dbvfiv.case.valve import LipSizes
 from dbvfiv.geometry import lip_section, surface_of, valve_mesh
 from dbvfiv.studies.case import Case
 

@@ -11,11 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbvfiv.case import CaseError
+from dbvfiv.case.damping import SHIPPED_LOSSES
 from dbvfiv.case.parameters import Mu
-from dbvfiv.case.relaxing import SHIPPED_LOSSES
 from dbvfiv.materials import MaterialError, damping_of, relaxation_from_case, shipped_loss, shipped_loss_names
-from dbvfiv.materials.damping_report import describe_damping, outside_band, read_frequencies
-from dbvfiv.materials.rayleigh import rayleigh_constants, rayleigh_ratio
+from dbvfiv.materials.damping_report import (
+    describe_damping,
+    outside_band,
+    rayleigh_constants,
+    rayleigh_ratio,
+    read_frequencies,
+)
 from dbvfiv.model.build import build_section
 from dbvfiv.studies.case import Case, thesis_case
 

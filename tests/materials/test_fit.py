@@ -15,7 +15,7 @@ from dbvfiv.materials import (
     stable_range,
     uniaxial_stress,
 )
-from dbvfiv.materials.rubber_forms import form_of, invariant_columns
+from dbvfiv.materials.fit import form_of, invariant_columns
 
 
 def _test_of(law, largest, count=30, noise=0.0, seed=0):

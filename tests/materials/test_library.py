@@ -19,7 +19,7 @@ from dbvfiv.materials import (
     rubber,
     uniaxial_stress,
 )
-from dbvfiv.materials.library import CARD_KINDS
+from dbvfiv.materials.rubbers import CARD_KINDS
 from dbvfiv.studies.case import thesis_case
 
 

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from dbvfiv.materials import MaterialError, TensionTest, form_of
 from dbvfiv.materials.fit_report import describe_fits
-from dbvfiv.materials.loading_cycles import describe_cycles, hysteresis_loss, loading_tests, read_tests
-from dbvfiv.materials.tension_test import Curve
+from dbvfiv.materials.rubber_tests import Curve, describe_cycles, hysteresis_loss, loading_tests, read_tests
 
 NEO = form_of("neo-hookean")
 

@@ -20,12 +20,11 @@ from dbvfiv.materials import (
     rubber_names,
     strain_levels,
 )
-from dbvfiv.materials.constrained import LEAST_MARGIN
+from dbvfiv.materials.fit import THINNING, ogden_columns, ogden_slopes
 from dbvfiv.materials.fit_report import describe_fits
-from dbvfiv.materials.loading_cycles import loading_tests, read_tests
-from dbvfiv.materials.rubber_forms import MODES, THINNING, ogden_columns, ogden_slopes
+from dbvfiv.materials.least_squares import LEAST_MARGIN
+from dbvfiv.materials.rubber_tests import MODES, loading_tests, read_curves, read_tests
 from dbvfiv.materials.stability import hill_margin
-from dbvfiv.materials.tension_test import read_curves
 
 TRELOAR = Path(__file__).parent / "treloar.csv"
 REACH = {"uniaxial": 4.0, "planar": 3.0, "biaxial": 2.0}

@@ -8,15 +8,13 @@ import scipy.sparse as sp
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.part import HALF, QUARTER
-from dbvfiv.exchange.bodies import shape_of
-from dbvfiv.exchange.faces import WallFaces
-from dbvfiv.exchange.stl import triangulated
+from dbvfiv.exchange.bodies import WallFaces, shape_of
+from dbvfiv.exchange.files import triangulated
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.residual import ValveResidual
 from dbvfiv.model.symmetry import HALF_SYMMETRIES, SYMMETRIES
 from dbvfiv.motion.start import steady_positions
-from dbvfiv.record.mesh import MeshData
-from dbvfiv.record.whole_valve import WholeValve
+from dbvfiv.record.mesh import MeshData, WholeValve
 from eigen.search import leading_modes
 from tests.model.test_coupled_tangent import difference, direction_of
 from tests.model.test_residual_forms import difference as mixed_difference

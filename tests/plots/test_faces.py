@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dbvfiv.drawing.faces import ValveSkin, faces, nodal_thickness, offset_line
+from dbvfiv.drawing.views import ValveSkin, faces, nodal_thickness, offset_line
 from dbvfiv.drawing.waves import wave_content
 from dbvfiv.studies.modes.shapes import drawn_amplitude
 

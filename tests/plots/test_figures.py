@@ -6,9 +6,8 @@ import pytest
 
 import dbvfiv
 from dbvfiv.drawing import style
-from dbvfiv.drawing.axes import log_axis
-from dbvfiv.drawing.faces import faces
-from dbvfiv.drawing.views import COLOURS, unrolled
+from dbvfiv.drawing.style import log_axis
+from dbvfiv.drawing.views import COLOURS, faces, unrolled
 from dbvfiv.errors import CaseError
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.steady import published

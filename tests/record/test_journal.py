@@ -13,9 +13,8 @@ import pytest
 from dbvfiv.errors import CaseError
 from dbvfiv.record.header import Header
 from dbvfiv.record.journal import DiskFull, Journal
-from dbvfiv.record.layout import TEXT, Column
 from dbvfiv.record.record import GrowingRecord, StoredRecord
-from dbvfiv.record.table import TableSpec
+from dbvfiv.record.table import TEXT, Column, TableSpec
 from dbvfiv.studies.case import Case, thesis_case
 
 ROOT = Path(__file__).parent.parent.parent

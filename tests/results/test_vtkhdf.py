@@ -5,7 +5,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.record.whole_valve import WholeValve
+from dbvfiv.record.mesh import WholeValve
 from dbvfiv.studies.steady.result import SteadyResult
 
 vtk = pytest.importorskip("vtk")

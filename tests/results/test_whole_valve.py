@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from dbvfiv.record.fields import motion
-from dbvfiv.record.whole_valve import WholeValve
+from dbvfiv.record.mesh import WholeValve
+from dbvfiv.record.vtkhdf import motion
 
 
 def _normals(points, quads):

@@ -10,7 +10,7 @@ import pytest
 import dbvfiv
 from dbvfiv.cfd.flow_case import FlowCase
 from dbvfiv.errors import CaseError
-from dbvfiv.record.whole_valve import WholeValve
+from dbvfiv.record.mesh import WholeValve
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.measured.sections import WallSections, distances
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.measured import AREA, DISCHARGE, SHAPE, TAPS, read_measured
-from dbvfiv.drawing.faces import faces
+from dbvfiv.drawing.views import faces
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure import comparison as closure
 from dbvfiv.studies.measured.kept import kept_tables

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 import dbvfiv
-from dbvfiv.drawing.faces import faces
+from dbvfiv.drawing.views import faces
 from dbvfiv.errors import CaseError
 from dbvfiv.studies.modes.shapes import drawn_amplitude
 

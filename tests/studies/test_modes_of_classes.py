@@ -9,11 +9,11 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case.parameters import Mu
-from dbvfiv.drawing.faces import ValveSkin
+from dbvfiv.drawing.views import ValveSkin
 from dbvfiv.errors import CaseError
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.symmetry import SYMMETRIES
-from dbvfiv.record.whole_valve import WholeValve
+from dbvfiv.record.mesh import WholeValve
 from dbvfiv.studies.modes.shapes import ModeSurface
 from tests.small_valves import find_open_state, make_valve
 

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbvfiv.case.axis import parse_axis
+from dbvfiv.case.axis import parse_axis, parse_stability_axis
 from dbvfiv.case.parameters import Mu
-from dbvfiv.case.stability_axis import parse_stability_axis
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath

@@ -8,8 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from dbvfiv.model import ValveModel
-from dbvfiv.record.mesh import MeshData
-from dbvfiv.record.whole_valve import WholeValve
+from dbvfiv.record.mesh import MeshData, WholeValve
 from dbvfiv.shell import Section, Shell, ShellMesh
 from dbvfiv.shell.pressure import pressure_stiffness
 

@@ -10,8 +10,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.record.files import check_writable
-from dbvfiv.record.lock import WriterLock
+from dbvfiv.record.files import WriterLock, check_writable
 from dbvfiv.studies.session import Session
 from tests.child import start
 from tests.small_valves import THESIS_SET

@@ -13,7 +13,7 @@ import typer
 
 import dbvfiv
 from dbvfiv import cli
-from dbvfiv.cli._run import build
+from dbvfiv.cli.main import build
 from tests.pages import ROOT, command_lines
 
 TUTORIALS = ROOT / "docs/tutorials"

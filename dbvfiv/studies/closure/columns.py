@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from ...record.layout import TEXT, Column, Shown
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.states import LAYERS, layer_shapes, state_table
-from ...record.table import TableSpec
+from ...record.table import TEXT, Column, Shown, TableSpec
 from ..load_path import WAY_ON, way_on_shapes
 
 #: Tables: of the walk along back pressures, of the flow before it is turned back, of the turn in time.

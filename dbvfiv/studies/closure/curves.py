@@ -8,9 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing.axes import HALO, headline, limits, log_axis
-from ...drawing.faces import faces
-from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, kilopascals, new_figure, pressure_colours, some_of
+from ...drawing.style import (
+    ACCENT,
+    COMPUTED,
+    HALO,
+    PUBLISHED,
+    REST,
+    headline,
+    kilopascals,
+    limits,
+    log_axis,
+    new_figure,
+    pressure_colours,
+    some_of,
+)
+from ...drawing.views import faces
 from ..measured.figures import draw_curve
 from .figures import supports_of
 

@@ -11,10 +11,18 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
 
-from ...drawing.axes import colour_bar, headline
-from ...drawing.faces import ValveSkin, faces
-from ...drawing.style import COMPUTED, MAGNITUDE, PUBLISHED, REST, kilopascals, new_figure, some_of
-from ...drawing.views import COLOURS, draw_skin, unrolled
+from ...drawing.style import (
+    COMPUTED,
+    MAGNITUDE,
+    PUBLISHED,
+    REST,
+    colour_bar,
+    headline,
+    kilopascals,
+    new_figure,
+    some_of,
+)
+from ...drawing.views import COLOURS, ValveSkin, draw_skin, faces, unrolled
 
 if TYPE_CHECKING:
     from .pressed_state import PressedState

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing import layers
+from ...drawing import views
 from ...model.symmetry import equilibria_of
 from ...record.header import Header
-from ...record.layout import Column
+from ...record.mesh import WholeValve
 from ...record.record import Record, plain
-from ...record.table import printed_head, printed_row
+from ...record.table import Column, printed_head, printed_row
 from ...record.vtkhdf import Step
-from ...record.whole_valve import WholeValve
 from ..measured.figures import draw_shapes
 from ..result import StudyResult
 from ..session import Session
@@ -264,7 +263,7 @@ class ClosureResult(StudyResult):
         yield from figures.draw(self)
         yield from curves.draw(self)
         yield from draw_shapes(self.measured.shapes)
-        yield from layers.draw(self, pressure)
+        yield from views.draw_layers(self, pressure)
         if self.compared is not None and self.compared.states:
             for name, draw in self.compared.drawers(pressure):
                 yield f"{name}-{self.compared.supports}", draw

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ...record.fields import layer_field_names, motion
-from ...record.vtkhdf import Step
-from ...record.whole_valve import WholeValve
+from ...record.mesh import WholeValve
+from ...record.vtkhdf import Step, layer_field_names, motion
 
 if TYPE_CHECKING:
     from .pressed_state import PressedState

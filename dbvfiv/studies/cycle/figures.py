@@ -9,18 +9,20 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
-from ...drawing.axes import HALO, colour_bar, headline
-from ...drawing.layers import layer_panels
 from ...drawing.style import (
     ACCENT,
     COMPUTED,
+    HALO,
     REST,
     UNSTABLE,
+    colour_bar,
+    headline,
     new_figure,
     parameter_label,
     phase_looks,
     pressure_colours,
 )
+from ...drawing.views import layer_panels
 from ..stability.place import describe_fixed
 
 if TYPE_CHECKING:

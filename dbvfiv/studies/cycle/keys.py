@@ -7,12 +7,11 @@ from typing import Literal
 
 from pydantic import StrictInt, ValidationInfo, field_validator, model_validator
 
-from ...case.axis import Axis
-from ...case.existing_file import existing_file
+from ...case.axis import Axis, StabilityRange, parse_stability_axis
 from ...case.parameters import listed
 from ...case.quantity import Length, Number
 from ...case.section import BrokenRule, Section, key
-from ...case.stability_axis import StabilityRange, parse_stability_axis
+from ...case.tables import existing_file
 
 
 class Keys(Section):

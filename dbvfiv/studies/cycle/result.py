@@ -12,10 +12,9 @@ from matplotlib.figure import Figure
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError
 from ...model.system import ValveSystem
-from ...record.fields import motion
+from ...record.mesh import WholeValve
 from ...record.table import printed_head, printed_row
-from ...record.vtkhdf import Step
-from ...record.whole_valve import WholeValve
+from ...record.vtkhdf import Step, motion
 from ..orbits.orbit import Orbit
 from ..result import StudyResult
 from ..stability.place import describe_fixed, fixed_conditions, rebuilder

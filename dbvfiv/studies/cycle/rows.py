@@ -12,10 +12,9 @@ from continuation.harmonics import Harmonics
 from continuation.hill import Exponents
 from continuation.periodic import PeriodicMotion
 
-from ...record.layout import Column, Shown
 from ...record.mesh import MeshData
 from ...record.record import Record
-from ...record.table import TableSpec
+from ...record.table import Column, Shown, TableSpec
 from ..orbits.orbit import Orbit
 
 CYCLES, SERIES, SPECIAL, ENDED, VERDICT = "cycles", "series", "special", "ended", "verdict"

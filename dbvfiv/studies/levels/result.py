@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...model.strain_level import AgreedLevels
-from ...record.layout import TEXT, Column, Shown
 from ...record.mesh import MeshData
-from ...record.table import TableSpec, printed_head, printed_row
+from ...record.table import TEXT, Column, Shown, TableSpec, printed_head, printed_row
 from ..result import StudyResult
 
 LAYERS = "levels"

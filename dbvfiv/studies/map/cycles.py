@@ -10,9 +10,8 @@ from continuation.cycle_points import CyclePoint, SpecialCycle
 
 from ...case.parameters import PARAMETERS
 from ...errors import SolveError
-from ...record.layout import Column
 from ...record.record import GrowingRecord, Record
-from ...record.table import TableSpec
+from ...record.table import Column, TableSpec
 from ..case import Case
 from ..orbits.follower import Follower
 from ..orbits.onset import onset_at

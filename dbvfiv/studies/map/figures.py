@@ -12,8 +12,18 @@ from matplotlib.figure import Figure
 from scipy.ndimage import distance_transform_edt, label
 
 from ...case.parameters import PARAMETERS
-from ...drawing.axes import HALO, colour_bar, headline, limits, log_axis
-from ...drawing.style import MAGNITUDE, MOTION, SIGNED, new_figure, parameter_label
+from ...drawing.style import (
+    HALO,
+    MAGNITUDE,
+    MOTION,
+    SIGNED,
+    colour_bar,
+    headline,
+    limits,
+    log_axis,
+    new_figure,
+    parameter_label,
+)
 from ..stability.place import describe_fixed
 from ..stability.verdict import NOT_VALID, OUTCOMES
 

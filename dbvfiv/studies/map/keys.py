@@ -6,9 +6,8 @@ from typing import Literal
 
 from pydantic import StrictBool, StrictInt, model_validator
 
-from ...case.axis import Axis
+from ...case.axis import Axis, StabilityRange, parse_stability_axis
 from ...case.section import BrokenRule, Section, key
-from ...case.stability_axis import StabilityRange, parse_stability_axis
 
 
 class Keys(Section):

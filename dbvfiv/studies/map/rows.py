@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from ...observer import Observer
-from ...record.layout import Column
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
-from ...record.table import TableSpec
+from ...record.table import Column, TableSpec
 from ..case import Case
 from ..stability.verdict import FLUTTERS, OUTCOMES, STABLE, UNDECIDED
 from ..study import nothing_to_resume

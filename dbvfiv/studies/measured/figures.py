@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...drawing.faces import closed_section
 from ...drawing.style import COMPUTED, kilopascals, new_figure, pressure_colours, some_of
+from ...drawing.views import closed_section
 from .curves import MeasuredCurve
 from .sections import MeasuredSection, MeasuredShapes
 

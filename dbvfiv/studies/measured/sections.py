@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...case.part import QUARTER, Part
-from ...drawing.faces import closed_section, faces
 from ...drawing.style import kilopascals
+from ...drawing.views import closed_section, faces
 from ...record.mesh import MeshData
 from .curves import lacking, plain_rows, state_at
 

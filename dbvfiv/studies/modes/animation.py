@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.animation import PillowWriter
 
-from ...drawing.axes import headline
-from ...drawing.style import new_figure, style
+from ...drawing.style import headline, new_figure, style
 from ...errors import CaseError
 from .plane import conditions, mode_title
 from .shapes import ModeSurface

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing.faces import faces
 from ...drawing.style import COMPUTED, REST, new_figure, phase_looks
-from ...drawing.views import mark_pieces
+from ...drawing.views import faces, mark_pieces
 from ...drawing.waves import wave_content
 from ...model.symmetry import symmetry_named
 from .plane import conditions, mode_title

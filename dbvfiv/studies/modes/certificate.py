@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...record.layout import Column
+from ...record.table import Column
 from .run import FoundModes
 
 _ATTRIBUTES = (

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...model.symmetry import EQUILIBRIA, symmetry_named
-from ...record.layout import Column
+from ...record.table import Column
 from ..state import State
 from .run import FoundModes
 

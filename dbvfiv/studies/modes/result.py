@@ -11,11 +11,10 @@ from matplotlib.figure import Figure
 
 from ...errors import CaseError
 from ...model.symmetry import EQUILIBRIA, asks_for_equilibria, symmetry_named
-from ...record.mesh import MeshData
+from ...record.mesh import MeshData, WholeValve
 from ...record.states import state_table
 from ...record.table import TableSpec
 from ...record.vtkhdf import Step
-from ...record.whole_valve import WholeValve
 from ..result import StudyResult
 from ..session import describe_surroundings
 from ..stability.laws import compare_states

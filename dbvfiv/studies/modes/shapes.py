@@ -11,10 +11,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from ...drawing.axes import colour_bar, headline
-from ...drawing.faces import ValveSkin, faces
-from ...drawing.style import UNSTABLE, new_figure
-from ...drawing.views import COLOURS, frame, shaded
+from ...drawing.style import UNSTABLE, colour_bar, headline, new_figure
+from ...drawing.views import COLOURS, ValveSkin, faces, frame, shaded
 from ...model.symmetry import symmetry_named
 from .plane import conditions, mode_title
 

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model.symmetry import symmetry_named
-from ...record.fields import motion
-from ...record.vtkhdf import Step
-from ...record.whole_valve import WholeValve
+from ...record.mesh import WholeValve
+from ...record.vtkhdf import Step, motion
 from .mode import ModeShape
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing.axes import log_axis
-from ...drawing.style import COMPUTED, STABLE, UNSTABLE, new_figure
+from ...drawing.style import COMPUTED, STABLE, UNSTABLE, log_axis, new_figure
 from ...model.symmetry import symmetry_named
 from .plane import conditions
 

@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
-from ...drawing.axes import HALO, limits, log_axis
-from ...drawing.style import ACCENT, COMPUTED, PUBLISHED, REST, new_figure, parameter_label
+from ...drawing.style import ACCENT, COMPUTED, HALO, PUBLISHED, REST, limits, log_axis, new_figure, parameter_label
 from ..stability.place import describe_fixed
 from .intervals import Interval
 

@@ -6,11 +6,10 @@ from typing import Literal
 
 from pydantic import StrictBool
 
-from ...case.axis import Axis
+from ...case.axis import Axis, StabilityRange, parse_stability_axis
 from ...case.parameters import listed
 from ...case.quantity import Number
 from ...case.section import Section, key
-from ...case.stability_axis import StabilityRange, parse_stability_axis
 
 
 class Keys(Section):

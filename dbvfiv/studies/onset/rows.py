@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from ...observer import Observer
-from ...record.layout import Column
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
-from ...record.table import TableSpec
+from ...record.table import Column, TableSpec
 from ..case import Case
 from ..stability.crossings import WATCHED
 from ..stability.verdict import Verdict

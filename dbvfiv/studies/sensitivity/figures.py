@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing.axes import headline
-from ...drawing.style import STABLE, UNSTABLE, new_figure
+from ...drawing.style import STABLE, UNSTABLE, headline, new_figure
 from ..stability.place import describe_fixed
 
 if TYPE_CHECKING:

@@ -10,10 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
-from ...record.layout import TEXT, Column
 from ...record.mesh import MeshData
 from ...record.states import state_table
-from ...record.table import TableSpec
+from ...record.table import TEXT, Column, TableSpec
 from ..result import StudyResult
 from ..session import describe_surroundings
 from ..stability.place import describe_fixed

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...record.layout import Column, Shown
-from ...record.table import printed_head, printed_row
+from ...record.table import Column, Shown, printed_head, printed_row
 from ..case import Case
 from ..state import State
 

@@ -9,13 +9,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from ...drawing import deformed, layers
-from ...record.fields import layer_field_names, motion
-from ...record.mesh import MeshData
+from ...drawing import views
+from ...record.mesh import MeshData, WholeValve
 from ...record.states import shown_summary, state_table
 from ...record.table import TableSpec, printed_head, printed_row
-from ...record.vtkhdf import Step
-from ...record.whole_valve import WholeValve
+from ...record.vtkhdf import Step, layer_field_names, motion
 from ..load_path import WAY_ON, way_on_shapes
 from ..measured.figures import draw_shapes
 from ..result import StudyResult
@@ -103,8 +101,8 @@ class SteadyResult(StudyResult):
         yield from shapes.draw(self)
         yield from passage.draw(self)
         yield from draw_shapes(self.measured.shapes)
-        yield from deformed.draw(self, pressure)
-        yield from layers.draw(self, pressure)
+        yield from views.draw_deformed(self, pressure)
+        yield from views.draw_layers(self, pressure)
 
     def steps(self, valve: WholeValve) -> Sequence[Step]:
         """States in the order of their pressures, as ParaView wants its times."""

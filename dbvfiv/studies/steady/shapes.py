@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from ...drawing.faces import closed_section, faces
 from ...drawing.style import REST, kilopascals, new_figure, pressure_colours, pressure_heading, pressure_name, some_of
-from ...drawing.views import mark_pieces
+from ...drawing.views import closed_section, faces, mark_pieces
 from .discharge import ordered
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ...case.parameters import PARAMETERS
-from ...drawing.axes import HALO, limits, log_axis
-from ...drawing.style import DANGER, UNSTABLE, branch_looks, driven, new_figure
+from ...drawing.style import DANGER, HALO, UNSTABLE, branch_looks, driven, limits, log_axis, new_figure
 
 if TYPE_CHECKING:
     from .result import Branch, Crossing, SweepResult

@@ -13,8 +13,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
-from ...drawing.axes import HALO, colour_bar, limits, log_axis
-from ...drawing.style import DANGER, MAGNITUDE, UNSTABLE, new_figure
+from ...drawing.style import DANGER, HALO, MAGNITUDE, UNSTABLE, colour_bar, limits, log_axis, new_figure
 from .curves import surroundings_of
 
 if TYPE_CHECKING:

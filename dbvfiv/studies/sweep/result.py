@@ -13,10 +13,9 @@ from matplotlib.figure import Figure
 from ...case.axis import Axis
 from ...case.parameters import PARAMETERS
 from ...model.symmetry import chosen_symmetries
-from ...record.layout import Column
 from ...record.mesh import MeshData
 from ...record.states import SUMMARY
-from ...record.table import TableSpec
+from ...record.table import Column, TableSpec
 from ..result import StudyResult
 from ..session import describe_surroundings
 from ..stability.verdict import Verdict

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
 
-from ...drawing.faces import nodal_thickness, offset_line
 from ...drawing.style import ACCENT, COMPUTED, REST, new_figure, style
+from ...drawing.views import nodal_thickness, offset_line
 from ...errors import CaseError
 
 if TYPE_CHECKING:

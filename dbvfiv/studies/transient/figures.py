@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...drawing.axes import colour_bar, headline
-from ...drawing.style import ACCENT, COMPUTED, MAGNITUDE, REST, driven, new_figure, phase_looks
+from ...drawing.style import ACCENT, COMPUTED, MAGNITUDE, REST, colour_bar, driven, headline, new_figure, phase_looks
 from ...verdict import Series, in_steps, spectrum
 
 if TYPE_CHECKING:

@@ -7,10 +7,9 @@ from typing import Literal
 
 from pydantic import StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
 
-from ...case.drive_table import read_drive_table
-from ...case.existing_file import existing_file
 from ...case.quantity import Length, Number, Time
 from ...case.section import BrokenRule, Section, key
+from ...case.tables import existing_file, read_drive_table
 
 Verdict = Literal["steady", "decaying", "limit cycle", "growing", "closed", "irregular"]
 

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from ...errors import CaseError
 from ...motion.control import RunOptions
+from ...record.mesh import WholeValve
 from ...record.record import Record
 from ...record.vtkhdf import Step
-from ...record.whole_valve import WholeValve
 from ..result import StudyResult
 from ..stability.verdict import Verdict
 from . import figures

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...flow.gas_stepping import packed_size
-from ...record.layout import Column
 from ...record.mesh import MeshData
-from ...record.table import TableSpec
+from ...record.table import Column, TableSpec
 
 HISTORY, STATES, RESTART = "history", "states", "restart"
 

@@ -18,8 +18,7 @@ from dbvfiv.motion.control import RunOptions
 from dbvfiv.record.header import Header
 from dbvfiv.record.journal import Journal
 from dbvfiv.record.mesh import MeshData
-from dbvfiv.record.part import RecordPart
-from dbvfiv.record.record import GrowingRecord, StoredRecord
+from dbvfiv.record.record import GrowingRecord, RecordPart, StoredRecord
 from dbvfiv.studies.case import THESIS, Case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient import keeping

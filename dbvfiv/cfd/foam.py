@@ -1,0 +1,449 @@
+"""OpenFOAM: files of a case (steady, incompressible, k-omega SST, Menter 1994), its mesh, its process, its results."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyvista
+
+from ..errors import SolveError
+from ..observer import Observer
+from .domain import PATCHES, FlowMesh
+
+#: Turbulence of the stream that comes in: fluctuations over the mean velocity, eddies over the diameter.
+INTENSITY, EDDIES = 0.03, 0.07
+_C_MU = 0.09
+
+
+@dataclass(frozen=True)
+class Stream:
+    """The flow that is asked for.
+
+    Attributes
+    ----------
+    volume_flow : float, m3/s
+        Of the whole valve.
+    bore : float, m
+        Diameter of the pipe that it comes from.
+    density : float, kg/m3
+    viscosity : float, m2/s
+    free : bool
+        Whether the jet goes into a room instead of a pipe.
+    iterations : int
+        At most.
+    """
+
+    volume_flow: float
+    bore: float
+    density: float
+    viscosity: float
+    free: bool = False
+    iterations: int = 400
+
+    @property
+    def velocity(self) -> float:
+        """Mean velocity of the stream that comes in, m/s."""
+        return self.volume_flow / (0.25 * math.pi * self.bore**2)
+
+    @property
+    def turbulence(self) -> tuple[float, float]:
+        """k, m2/s2, and omega, 1/s, of it."""
+        k = 1.5 * (INTENSITY * self.velocity) ** 2
+        return k, math.sqrt(k) / (_C_MU**0.25 * EDDIES * self.bore)
+
+
+def case_files(stream: Stream) -> dict[str, str]:
+    """All files but the mesh, by their places in the case."""
+    files = {f"0/{name}": text for name, text in _fields(stream).items()}
+    files["constant/transportProperties"] = _foam(
+        "transportProperties", f"transportModel Newtonian;\nnu {stream.viscosity:.8g};\n"
+    )
+    files["constant/turbulenceProperties"] = _foam(
+        "turbulenceProperties", "simulationType RAS;\nRAS { RASModel kOmegaSST; turbulence on; printCoeffs off; }\n"
+    )
+    files["system/controlDict"] = _foam("controlDict", _CONTROL % stream.iterations)
+    files["system/fvSchemes"] = _foam("fvSchemes", _SCHEMES)
+    files["system/fvSolution"] = _foam("fvSolution", _SOLUTION)
+    files["Allrun"] = _RUN
+    return files
+
+
+def _fields(stream: Stream) -> dict[str, str]:
+    """Boundary and initial values of p, U, k, omega and nut."""
+    k, omega = stream.turbulence
+    wall = "type noSlip;" if not stream.free else "type slip;"
+    start = f"uniform (0 0 {-stream.velocity:.8g})"
+    quarter = stream.volume_flow / 4.0
+    return {
+        "p": _field(
+            "p", "volScalarField", "0 2 -2 0 0 0 0", "uniform 0", _OPEN, "type fixedValue; value uniform 0;", _OPEN
+        ),
+        "U": _field(
+            "U",
+            "volVectorField",
+            "0 1 -1 0 0 0 0",
+            start,
+            f"type flowRateInletVelocity; volumetricFlowRate {quarter:.10g}; value {start};",
+            "type inletOutlet; inletValue uniform (0 0 0); value uniform (0 0 0);",
+            "type noSlip;",
+            wall,
+        ),
+        "k": _field(
+            "k", "volScalarField", "0 2 -2 0 0 0 0", f"uniform {k:.8g}", *_turbulent(k, "kqRWallFunction", stream)
+        ),
+        "omega": _field(
+            "omega",
+            "volScalarField",
+            "0 0 -1 0 0 0 0",
+            f"uniform {omega:.8g}",
+            *_turbulent(omega, "omegaWallFunction", stream),
+        ),
+        "nut": _field(
+            "nut",
+            "volScalarField",
+            "0 2 -1 0 0 0 0",
+            "uniform 0",
+            "type calculated; value uniform 0;",
+            "type calculated; value uniform 0;",
+            "type nutUSpaldingWallFunction; value uniform 0;",
+            "type calculated; value uniform 0;" if stream.free else None,
+        ),
+    }
+
+
+_OPEN = "type zeroGradient;"
+
+
+def _turbulent(value: float, wall: str, stream: Stream) -> tuple[str, str, str, str | None]:
+    """Conditions of a quantity of the turbulence: inlet, outlet, walls, and the far side of a room."""
+    fixed = f"value uniform {value:.8g};"
+    return (
+        f"type fixedValue; {fixed}",
+        f"type inletOutlet; inletValue uniform {value:.8g}; {fixed}",
+        f"type {wall}; {fixed}",
+        _OPEN if stream.free else None,
+    )
+
+
+def _field(name, kind, dimensions, start, inlet, outlet, wall, far=None) -> str:
+    lines = [
+        f"dimensions [{dimensions}];",
+        f"internalField {start};",
+        "boundaryField",
+        "{",
+        f"    inlet {{ {inlet} }}",
+        f"    outlet {{ {outlet} }}",
+        "    centre { type symmetryPlane; }",
+        "    side { type symmetryPlane; }",
+        f'    "inner|outer|lip|flange|upstream" {{ {wall} }}',
+        f"    downstream {{ {far or wall} }}",
+        "}",
+    ]
+    return _foam(name, "\n".join(lines) + "\n", kind)
+
+
+def _foam(name: str, body: str, kind: str = "dictionary") -> str:
+    return f"FoamFile {{ version 2.0; format ascii; class {kind}; object {name}; }}\n\n{body}"
+
+
+_CONTROL = """application simpleFoam;
+startFrom latestTime;
+startTime 0;
+stopAt endTime;
+endTime %d;
+deltaT 1;
+writeControl timeStep;
+writeInterval 100;
+purgeWrite 1;
+writeFormat ascii;
+writePrecision 8;
+timePrecision 8;
+runTimeModifiable true;
+functions
+{
+    inletPressure
+    {
+        type surfaceFieldValue;
+        libs (fieldFunctionObjects);
+        writeFields false;
+        log false;
+        regionType patch;
+        name inlet;
+        operation areaAverage;
+        fields (p);
+    }
+}
+"""
+
+_SCHEMES = """ddtSchemes { default steadyState; }
+gradSchemes { default cellLimited Gauss linear 1; grad(p) Gauss linear; }
+divSchemes
+{
+    default none;
+    div(phi,U) bounded Gauss linearUpwind limited;
+    div(phi,k) bounded Gauss limitedLinear 1;
+    div(phi,omega) bounded Gauss limitedLinear 1;
+    div((nuEff*dev2(T(grad(U))))) Gauss linear;
+}
+laplacianSchemes { default Gauss linear limited corrected 0.33; }
+interpolationSchemes { default linear; }
+snGradSchemes { default limited corrected 0.33; }
+wallDist { method meshWave; }
+"""
+
+_SOLUTION = """solvers
+{
+    p
+    {
+        solver PCG;
+        preconditioner DIC;
+        tolerance 1e-9;
+        relTol 0.05;
+        maxIter 400;
+    }
+    "(U|k|omega)"
+    {
+        solver PBiCGStab;
+        preconditioner DILU;
+        tolerance 1e-10;
+        relTol 0.1;
+    }
+}
+SIMPLE
+{
+    nNonOrthogonalCorrectors 0;
+    consistent yes;
+    residualControl { p 2e-5; U 1e-5; "(k|omega)" 1e-5; }
+}
+relaxationFactors { equations { U 0.85; k 0.7; omega 0.7; } }
+"""
+
+_RUN = """#!/bin/sh
+# Checks the mesh and runs to a steady state.
+cd "${0%/*}" || exit 1
+[ -d "$WM_PROJECT_DIR" ] || [ ! -d /usr/share/openfoam ] || export WM_PROJECT_DIR=/usr/share/openfoam # Debian's
+checkMesh > log.checkMesh 2>&1
+exec simpleFoam > log.simpleFoam 2>&1
+"""
+
+
+#: Faces of a hexahedron, their normals pointing out of it.
+_FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
+
+
+def write_mesh(mesh: FlowMesh, case: str | Path) -> None:
+    """Write ``constant/polyMesh`` of a case; cells keep their numbers.
+
+    Raises
+    ------
+    ValueError
+        If faces without a second cell are not those of the patches.
+    """
+    faces, owner, neighbour, patches = faces_of(mesh)
+    folder = Path(case) / "constant" / "polyMesh"
+    folder.mkdir(parents=True, exist_ok=True)
+    note = f"nPoints:{len(mesh.points)} nCells:{len(mesh.cells)} nFaces:{len(faces)} nInternalFaces:{len(neighbour)}"
+    _write(folder, "points", "vectorField", _rows(mesh.points, "(%.15g %.15g %.15g)"))
+    _write(folder, "faces", "faceList", _rows(faces, "4(%d %d %d %d)"))
+    _write(folder, "owner", "labelList", _rows(owner[:, None], "%d"), note)
+    _write(folder, "neighbour", "labelList", _rows(neighbour[:, None], "%d"), note)
+    entries = "\n".join(
+        f"{name} {{ type {PATCHES[name]}; nFaces {count}; startFace {start}; }}" for name, start, count in patches
+    )
+    _write(folder, "boundary", "polyBoundaryMesh", f"{len(patches)}\n(\n{entries}\n)\n")
+
+
+def faces_of(mesh: FlowMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[str, int, int]]]:
+    """Faces of a mesh in OpenFOAM's order.
+
+    Returns
+    -------
+    faces : (nf, 4) int array
+        Normals point out of the owner; inner faces first, by owner and neighbour, then patch by patch.
+    owner : (nf,) int array
+    neighbour : (inner faces,) int array
+    patches : list of (name, first face, number of faces)
+    """
+    every = mesh.cells[:, _FACES].reshape(-1, 4)
+    cell = np.repeat(np.arange(len(mesh.cells)), len(_FACES))
+    keys = np.sort(every, axis=1)
+    order = np.lexsort((cell, *keys.T))  # both sides of a face follow each other, the lower cell first
+    sorted_keys = keys[order]
+    same = np.all(sorted_keys[1:] == sorted_keys[:-1], axis=1)
+    first = np.flatnonzero(same)
+    inner, other = order[first], order[first + 1]
+    rank = np.lexsort((cell[other], cell[inner]))
+    inner, other = inner[rank], other[rank]
+    alone = np.ones(len(order), bool)
+    alone[first] = alone[first + 1] = False
+    outer = order[alone]
+    place = {tuple(key): number for number, key in zip(outer, keys[outer].tolist())}
+    chosen, patches, begin = [], [], len(inner)
+    for name, quads in mesh.patches.items():
+        found = [place.pop(tuple(key), -1) for key in np.sort(quads, axis=1).tolist()]
+        if -1 in found:
+            raise ValueError(f"The patch {name} has faces inside the fluid.")
+        chosen.append(np.sort(found))
+        patches.append((name, begin, len(found)))
+        begin += len(found)
+    if place:
+        raise ValueError(f"{len(place)} faces at the edge of the fluid belong to no patch.")
+    kept = np.concatenate([inner, *chosen])
+    return every[kept], cell[kept], cell[other], patches
+
+
+def _rows(values: np.ndarray, form: str) -> str:
+    body = "\n".join([form] * len(values)) % tuple(values.ravel().tolist())
+    return f"{len(values)}\n(\n{body}\n)\n"
+
+
+def _write(folder: Path, name: str, kind: str, body: str, note: str = "") -> None:
+    note = f' note "{note}";' if note else ""
+    head = f'FoamFile {{ version 2.0; format ascii; class {kind}; location "constant/polyMesh";{note} object {name}; }}'
+    (folder / name).write_text(f"{head}\n\n{body}")
+
+
+#: Where Debian's package keeps what the programs read.
+_DEBIAN = Path("/usr/share/openfoam")
+_STEP = re.compile(r"^Time = (\d+)", re.MULTILINE)
+
+
+def has_openfoam() -> bool:
+    """True where simpleFoam is on the path."""
+    return shutil.which("simpleFoam") is not None
+
+
+def run_openfoam(folder: str | Path, iterations: int, observer: Observer | None = None) -> None:
+    """Run the case in a folder, from where it stopped if it did, to its end.
+
+    Raises
+    ------
+    SolveError
+        If there is no OpenFOAM, or it fails.
+    """
+    if not has_openfoam():
+        raise SolveError(
+            f"The case is in {str(folder)!r}, but there is no simpleFoam on the path to run it: 'apt-get install "
+            "openfoam' brings it, or run Allrun where it is."
+        )
+    observer, folder = observer or Observer(), Path(folder).resolve()
+    environment = dict(os.environ)
+    if "WM_PROJECT_DIR" not in environment and _DEBIAN.exists():
+        environment["WM_PROJECT_DIR"] = str(_DEBIAN)
+    observer.begin("simpleFoam", iterations)
+    process = subprocess.Popen(["./Allrun"], cwd=folder, env=environment, start_new_session=True)
+    interrupted, shown = True, 0
+    try:
+        while process.poll() is None:
+            time.sleep(0.5)
+            for _ in range(shown, done := _steps(folder)):
+                observer.item(None)
+            shown = max(shown, done)
+        interrupted = False
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGTERM)  # the script and what it runs
+            process.wait()
+        observer.end(interrupted)
+    if process.returncode:
+        raise SolveError(f"OpenFOAM failed on the case in {str(folder)!r}: {_reason(folder)}; see its log files.")
+
+
+def _steps(folder: Path) -> int:
+    """Iterations that the solver's log tells of."""
+    try:
+        with open(folder / "log.simpleFoam", "rb") as log:
+            log.seek(max(0, (folder / "log.simpleFoam").stat().st_size - 4000))
+            found = _STEP.findall(log.read().decode(errors="ignore"))
+    except OSError:
+        return 0
+    return int(found[-1]) if found else 0
+
+
+def _reason(folder: Path) -> str:
+    """The line of a log that tells most."""
+    for name in ("log.simpleFoam", "log.checkMesh"):
+        path = folder / name
+        lines = path.read_text(errors="ignore").splitlines() if path.exists() else []
+        for number, line in enumerate(lines):
+            if "FATAL" in line:
+                return " ".join(" ".join(lines[number : number + 3]).split())[:200].rstrip(".")
+            if "Floating point exception" in line or "sigFpe" in line:
+                return "the iteration grew without bound"
+    return "it gives no reason"
+
+
+#: Last share of the iterations over which the inlet pressure is watched.
+WATCHED = 0.2
+
+
+@dataclass(frozen=True)
+class FlowFields:
+    """Fields of the last iteration that was written.
+
+    Attributes
+    ----------
+    pressure : (nc,) array, m2/s2
+        Over the density.
+    velocity : (nc, 3) array, m/s
+    iterations : int
+    history : (n, 2) array
+        Iteration and pressure over density at the inlet.
+    """
+
+    pressure: np.ndarray
+    velocity: np.ndarray
+    iterations: int
+    history: np.ndarray
+
+    @property
+    def unrest(self) -> float:
+        """Span of the inlet pressure over the last fifth of the iterations, relative."""
+        last = self.history[int((1.0 - WATCHED) * len(self.history)) :, 1]
+        return float(np.ptp(last) / abs(last[-1])) if len(last) > 1 else np.inf
+
+
+def read_fields(folder: str | Path, cells: int) -> FlowFields:
+    """Read what a run left in a folder.
+
+    Parameters
+    ----------
+    cells : int
+        How many there are in the mesh.
+
+    Raises
+    ------
+    SolveError
+        If it left nothing, or fields of another mesh.
+    """
+    folder = Path(folder)
+    times = sorted((int(p.name) for p in folder.iterdir() if p.name.isdigit() and int(p.name) > 0), reverse=True)
+    if not times:
+        raise SolveError(f"No flow was computed in {str(folder)!r} yet.")
+    (folder / "case.foam").touch()
+    reader = pyvista.POpenFOAMReader(str(folder / "case.foam"))
+    reader.case_type = "reconstructed"
+    reader.cell_to_point_creation = False
+    reader.set_active_time_value(float(times[0]))
+    data = reader.read()["internalMesh"].cell_data
+    pressure, velocity = (np.array(data[name], float) for name in ("p", "U"))
+    if len(pressure) != cells:
+        raise SolveError(f"The flow in {str(folder)!r} has {len(pressure)} cells and the mesh of this state {cells}.")
+    return FlowFields(pressure, velocity, times[0], _history(folder))
+
+
+def _history(folder: Path) -> np.ndarray:
+    """Inlet pressure over the iterations of all runs in the folder, later ones in place of earlier ones."""
+    found: dict[int, float] = {}
+    for path in sorted(folder.glob("postProcessing/inletPressure/*/*.dat"), key=lambda p: int(p.parent.name)):
+        found |= {int(row[0]): row[1] for row in np.loadtxt(path, ndmin=2)}
+    return np.array(sorted(found.items())).reshape(-1, 2)

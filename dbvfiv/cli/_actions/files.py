@@ -1,7 +1,0 @@
-"""Names of files that commands are given."""
-
-from __future__ import annotations
-
-from ...record.files import check_writable
-
-__all__ = ["check_writable"]

@@ -1,0 +1,393 @@
+"""``dbvfiv info``, ``plot``, ``compare``, ``export`` and ``cfd``: results of earlier commands."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from enum import StrEnum
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import CaseError
+from .terminal import (
+    AsJson,
+    Override,
+    PlotFolder,
+    Progress,
+    ResultFile,
+    print_answer,
+    print_json,
+    print_written,
+    save_figures,
+)
+
+if TYPE_CHECKING:
+    from ..studies.state import State
+
+#: Kinds of results that can be compared.
+_COMPARED = ("transient", "steady", "closure")
+
+
+def info(
+    file: ResultFile,
+    as_json: AsJson = False,
+    case: Annotated[bool, typer.Option("--case", help="Print the case it was computed from, as a case file.")] = False,
+) -> None:
+    """Summarise a result file: what was run, with which versions, and its numbers. Also while the run goes on."""
+    from ..case.write import case_toml
+    from ..studies.session import load_result
+
+    result = load_result(file)
+    header, mesh = result.header, result.mesh
+    if as_json:
+        names = ("kind", "name", "created", "program", "command", "layout", "versions")
+        facts = {name: getattr(header, name) for name in names}
+        facts["complete"] = result.complete
+        around, along = mesh.shape
+        facts["mesh"] = {"around": around, "along": along, "layers": list(mesh.layer_names)}
+        facts["case"] = header.case.to_dict() if case else None
+        print_json(facts | result.summary())
+    elif case:
+        print(case_toml(header.case, comments=False), end="")
+    else:
+        print("\n".join(_describe(result)))
+
+
+def _describe(result: Any) -> list[str]:
+    header, (around, along) = result.header, result.mesh.shape
+    drive, fluid = header.case.drive, header.case.fluid
+    finished = "complete" if result.complete else "not complete: interrupted or still running"
+    flow = f"{fluid.density:g} kg/m3, {fluid.continuity}"
+    facts = (
+        ("result", f"{header.kind} of {header.name}, {finished}"),
+        ("written", f"{header.created} by {header.program}"),
+        ("command", header.command),
+        ("versions", ", ".join(f"{name} {version}" for name, version in header.versions.items() if name != "dbvfiv")),
+        ("mesh", f"{around} around x {along} along, {len(result.mesh.nodes)} nodes"),
+        ("layers", ", ".join(result.mesh.layer_titles()) + " (inside to outside)"),
+        ("load", flow if drive.kind == "flow" else f"uniform pressure {drive.side}, no flow"),
+    )
+    settled = [result.record.settled] if result.record.settled else []
+    lines = [f"{name:<10}{value}" for name, value in facts] + ["", *result.lines(), *settled]
+    notes = [("Warning", text) for text in result.warnings] + [("Failure", text) for text in result.failures]
+    return lines + [""] * bool(notes) + [f"{kind}: {text}" for kind, text in notes]
+
+
+class FigureFormat(StrEnum):
+    """Kinds of figure files."""
+
+    png = "png"
+    svg = "svg"
+
+
+def plot(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="RESULT.h5|CASE.toml", help="Result file of an earlier command, or a case file."),
+    ],
+    folder: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the figures.")] = Path("."),
+    format: Annotated[FigureFormat, typer.Option("--format", help="File format.")] = FigureFormat.png,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="NAME", help="Draw this figure; may be repeated.")
+    ] = None,
+    pressure: Annotated[
+        str | None,
+        typer.Option(
+            "--pressure",
+            "-p",
+            metavar="P",
+            help="Draw 3D view and layer stresses for the state nearest to this pressure.",
+        ),
+    ] = None,
+    mode: Annotated[
+        int | None, typer.Option("--mode", metavar="N", help="Draw centre line and shape of this mode only.")
+    ] = None,
+    animate: Annotated[
+        list[int] | None,
+        typer.Option(
+            "--animate",
+            metavar="N",
+            help="Also write a GIF: of one cycle of mode N, or of the last N cycles of a transient; may be repeated.",
+        ),
+    ] = None,
+    overrides: Override = None,
+    as_json: AsJson = False,
+) -> None:
+    """Draw the figures of a result file; those of one state show the highest pressure unless --pressure is given.
+
+    Of a case file: the valve with its measures, wall and layers, before anything is solved.
+    """
+    from ..api import load
+    from ..case.axis import read_pressures
+    from ..studies.session import load_result
+
+    only, films = only or (), animate or ()
+    if file.suffix.lower() == ".toml":
+        for name, value in {"--pressure": pressure, "--mode": mode, "--animate": films or None}.items():
+            if value is not None:
+                raise CaseError(f"{name} goes with a result file; the picture of {str(file)!r} is that of its valve.")
+        print_written(load(file, list(overrides or ())).plot(folder, format.value, only=only), as_json)
+        return
+    if overrides:
+        raise CaseError(f"--set goes with a case file; {str(file)!r} is a result, whose case stays as it was.")
+    choices: dict[str, object] = {}
+    if pressure is not None:
+        choices["pressure"] = read_pressures([pressure], "--pressure")[0]
+    if mode is not None:
+        choices["mode"] = mode
+    result = load_result(file)
+    makers = [_film(result, file, folder, number) for number in films]  # misuse shows before anything is drawn
+    written = result.plot(folder, format.value, only=only, **choices)
+    print_written([*written, *(make() for make in makers)], as_json)
+
+
+def _film(result, file: Path, folder: Path, number: int) -> Callable[[], Path]:
+    """Function that writes the animation that ``--animate`` asks of a result."""
+    from ..studies.transient.animation import cycles_to_animate
+
+    if result.kind == "modes":
+        result.mode(number)
+        return lambda: result.animate(folder / f"mode-{number}.gif", number)
+    if result.kind == "transient":
+        result.require_steps()
+        duration = cycles_to_animate(result, number)
+        frames = min(48 * number, 240)
+        name = f"last-{number}-cycles.gif" if number > 1 else "last-cycle.gif" if result.cycle else "run.gif"
+        return lambda: result.animate(folder / name, frames=frames, duration=duration)
+    raise CaseError(
+        f"The {result.kind} result {str(file)!r} does not move; --animate takes results of modes and transient."
+    )
+
+
+def compare(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN.h5 RUN.h5 ...", help="Result files of transient runs, of steady or of closure ones."
+        ),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.png", help="Figure to write.")] = Path(
+        "comparison.png"
+    ),
+    as_json: AsJson = False,
+) -> None:
+    """Compare transient runs: their histories in one figure, their verdicts in one table; or steady runs: their head
+    and discharge in one figure, the flows at the pressures of the first and what they differ by in one table; or
+    closure runs: seal, force, displacement, passage and stiffness over the back pressure. Measured data that they name
+    are in the figure, and what each is off by is told. Runs are named by the case keys that tell them apart.
+    """
+    from ..studies.session import load_result
+
+    results = [load_result(file) for file in files]
+    kind = results[0].kind
+    for file, result in zip(files, results):
+        if result.kind not in _COMPARED:
+            raise CaseError(
+                f"{str(file)!r} holds a result of kind {result.kind!r}; {', '.join(_COMPARED[:-1])} "
+                f"and {_COMPARED[-1]} runs can be compared."
+            )
+        if result.kind != kind:
+            raise CaseError(
+                f"{str(file)!r} holds a result of kind {result.kind!r} and {str(files[0])!r} one of kind "
+                f"{kind!r}; runs of one kind can be compared."
+            )
+    study = import_module(f"..studies.{kind}.comparison", __package__)
+    if kind == "transient":
+        for result in results:
+            result.require_steps()
+        labels, extra = study.labels(results), {}
+        lines = _transient_table(labels, results)
+    else:
+        found = study.compare(results)
+        labels, extra = found.labels, {"comparison": found.summary(), "remark": found.remark}
+        lines = found.lines()
+    path = study.save_comparison(results, output)
+    if as_json:
+        runs = [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, labels, results)]
+        print_json({"runs": runs, **extra, "figure": str(path)})
+        return
+    print("\n".join([*lines, f"Wrote {path}."]))
+
+
+def _transient_table(labels: list[str], results: list[Any]) -> list[str]:
+    width = max(len(name) for name in labels) + 2
+    lines = [f"{'':<{width}}{'last kg/s':>11}{'lip mm':>9}{'amplitude mm':>14}{'Hz':>8}  verdict"]
+    for name, result in zip(labels, results):
+        lip, h = result.verdict["lip_displacement"], result.history
+        frequency = "-" if lip["frequency"] is None else f"{lip['frequency']:.3f}"
+        lines.append(
+            f"{name:<{width}}{h['mass_flow'][-1]:>11.5g}{1e3 * h['lip_displacement'][-1]:>9.4g}"
+            f"{1e3 * lip['amplitude']:>14.4g}{frequency:>8}  {result.verdict['verdict']}"
+        )
+    return lines
+
+
+class Format(StrEnum):
+    """Kinds of files."""
+
+    vtkhdf = "vtkhdf"
+    stl = "stl"
+    step = "step"
+
+
+class Shape(StrEnum):
+    """Surfaces and bodies of a state."""
+
+    inner = "inner"
+    middle = "middle"
+    outer = "outer"
+    wall = "wall"
+    fluid = "fluid"
+
+
+def export(
+    file: ResultFile,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE|DIR",
+            help="File ending in .vtkhdf, or a folder; beside the result without it. A folder for STL and STEP.",
+        ),
+    ] = None,
+    quarter: Annotated[
+        bool, typer.Option("--quarter", help="Only the part that was computed, not the whole valve.")
+    ] = False,
+    deformed: Annotated[
+        bool, typer.Option("--deformed", help="Move the points; without it use 'Warp By Vector' along displacement.")
+    ] = False,
+    mode: Annotated[
+        int | None,
+        typer.Option("--mode", metavar="N", help="Of modes: one cycle of mode N, its phases as time steps in s."),
+    ] = None,
+    format: Annotated[
+        Format, typer.Option("--format", help="Fields for ParaView; or one state as triangles (m), or for CAD (mm).")
+    ] = Format.vtkhdf,
+    shape: Annotated[
+        list[Shape] | None,
+        typer.Option("--shape", help="Of STL and STEP: this surface or closed body; may be repeated; all without it."),
+    ] = None,
+    pressure: Annotated[
+        str | None,
+        typer.Option(
+            "--state", "-p", metavar="P", help="Of STL and STEP: the state nearest to this pressure; else the highest."
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a result as VTKHDF for ParaView: displacement, rotation, director; thickness, pressure, von Mises stress
+    and stretch of each layer. Or one steady state as STL or STEP: inner face, mid-surface and outer face of the wall,
+    the wall and the fluid inside as closed bodies.
+
+    The states are the time steps of the file; the "time" that ParaView shows is the inlet pressure in Pa. Of modes it
+    is the number of the mode: mode_real, mode_imag and mode_amplitude come with the displacement of the steady state;
+    --mode N writes one cycle of that mode instead.
+    """
+    from ..studies.session import load_result
+
+    if format is not Format.vtkhdf:
+        folder = file.parent if output is None else output
+        state = _choose_state(file, pressure)
+        print_written(state.export_shapes(folder, format.value, shape or (), quarter), as_json)
+        return
+    result = load_result(file)
+    choices = {} if mode is None else {"mode": mode}
+    beside = file.with_suffix(".vtkhdf") if mode is None else file.with_name(f"{file.stem}-mode{mode}.vtkhdf")
+    print_written(result.export(output if output is not None else beside, quarter, deformed, **choices), as_json)
+
+
+def _choose_state(file: Path, pressure: str | None) -> State:
+    """The steady state of a file nearest to a pressure ("36 kPa", "36kPa"), that of the highest without one."""
+    from ..case.axis import read_pressures
+    from ..studies.session import load_result
+
+    result = load_result(file)
+    if result.kind != "steady":
+        raise CaseError(
+            f"{str(file)!r} holds a result of kind {result.kind!r}; one of `dbvfiv steady` is needed, which has states."
+        )
+    if not result.states:
+        raise CaseError(f"{str(file)!r} holds no state.")
+    if pressure is None:
+        return max(result.states, key=lambda state: state.pressure)
+    return result.nearest(read_pressures([pressure], "--state")[0])
+
+
+def cfd(
+    file: ResultFile,
+    folder: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder of the OpenFOAM case: new, or one to go on with."),
+    ],
+    pressure: Annotated[
+        str | None,
+        typer.Option("--state", "-p", metavar="P", help="The state nearest to this pressure; else the highest."),
+    ] = None,
+    pipe: Annotated[
+        str | None,
+        typer.Option(
+            "--pipe",
+            metavar="D|free",
+            help="Inner diameter of the pipe that the valve stands in, such as '330 mm', or free; else as in the case.",
+        ),
+    ] = None,
+    fineness: Annotated[
+        float,
+        typer.Option(
+            "--fineness", min=0.3, max=3.0, help="Cells in each direction: 0.5 for 26 thousand, 1 for 207 thousand."
+        ),
+    ] = 0.5,
+    iterations: Annotated[int, typer.Option("--iterations", min=1, help="At most this many, over all runs.")] = 400,
+    run: Annotated[bool, typer.Option("--run/--no-run", help="Run OpenFOAM, or only write its case.")] = True,
+    plots: PlotFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Viscous flow through the shape of a steady state, with its flow: a mesh of hexahedra of a quarter, 5 diameters of
+    pipe before it and 12 behind, an OpenFOAM case (simpleFoam, k-omega SST), its run where OpenFOAM is installed, and
+    pressures, recovery and force on the wall beside the one-dimensional law.
+
+    dbvfiv cfd my.h5 --state "36 kPa" --pipe "330 mm" -o flow36 --plots figures
+    """
+    from ..cfd.comparison import FlowComparison
+    from ..cfd.figures import draw
+    from ..cfd.flow_case import WATER_VISCOSITY, FlowCase
+    from ..cfd.foam import read_fields, run_openfoam
+
+    state = _choose_state(file, pressure)
+    result = state.results
+    if not state.volume_flow > 0:
+        raise CaseError(f"Nothing flows in the state at {state.pressure:g} Pa of {str(file)!r}.")
+    width = result.case.downstream.pipe_diameter if pipe is None else _read_diameter(pipe)
+    density = state.mass_flow / state.volume_flow
+    viscosity = result.case.fluid.dynamic_viscosity / density or WATER_VISCOSITY
+    case = FlowCase(result.header.name, result.mesh, state, density, width, fineness, iterations, viscosity)
+    case.write(folder)
+    if not run:
+        written = {"written": str(folder), "cells": len(case.cells.cells)}
+        print_json(written) if as_json else print(f"Wrote {folder}: {written['cells']} cells; run Allrun in it.")
+        return
+    run_openfoam(folder, iterations, Progress(quiet=as_json))
+    found = FlowComparison(case, read_fields(folder, len(case.cells.cells)))
+    (folder / "comparison.json").write_text(json.dumps(found.document(), indent=1) + "\n")
+    figures = save_figures(dict(draw(found)), plots)
+    print_answer(found.document(), found.lines, as_json, (figures, plots), folder)
+
+
+def _read_diameter(text: str) -> float | None:
+    """Diameter of a pipe, m; None for a free jet."""
+    from ..case.pipes import Downstream
+    from ..case.quantity import number_or_text
+
+    if text.strip().lower() == "free":
+        return None
+    try:
+        return Downstream(pipe_diameter=number_or_text(text)).pipe_diameter
+    except ValueError:
+        raise CaseError(
+            f"--pipe is given as {text!r}; it must be a length greater than 0 and at most 100 m, such as '330 mm', or "
+            "free."
+        ) from None

@@ -1,0 +1,152 @@
+"""Commands of the studies, each with its own options and what all share; an interrupted run continued."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated, Any, get_type_hints
+
+import typer
+
+from ..errors import CaseError, SolveError
+from ..studies import KINDS
+from .terminal import AsJson, CaseFile, Output, Override, PlotFolder, Progress, ResultFile, print_answer
+
+#: Arguments that the command of a study may take from those that all share.
+_SHARED = ("case", "plots")
+
+
+def study_commands() -> list[tuple[str, Callable[..., None]]]:
+    """Names and commands of all studies, in the order of their help."""
+    modules = [(kind, import_module(f"..studies.{kind}.command", __package__)) for kind in KINDS]
+    modules.sort(key=lambda found: (getattr(found[1], "ORDER", 100), found[0]))
+    return [(kind, _make_command(kind, module)) for kind, module in modules]
+
+
+def _make_command(kind: str, module: ModuleType) -> Callable[..., None]:
+    """A command with the options of a study between the case file and what all studies share."""
+    hints = get_type_hints(module.command, include_extras=True)
+    asked = inspect.signature(module.command).parameters
+    own = [p for name, p in asked.items() if name not in _SHARED]
+
+    def command(
+        case_file: Path | None, output: Path | None, plots: Path | None, overrides, as_json: bool, **given: Any
+    ) -> None:
+        from ..studies.case import load_case
+
+        case = load_case(case_file, overrides or ())
+        shared = {"case": case, "plots": plots}
+        request = module.command(**{name: shared[name] for name in _SHARED if name in asked}, **given)
+        perform(kind, case, request, case_file.stem if case_file else "dbv12", output, plots, as_json)
+
+    shared_last = (("output", Output, None), ("plots", PlotFolder, None), ("overrides", Override, None))
+    parameters = [
+        _parameter("case_file", CaseFile, None),
+        *(p.replace(annotation=hints[p.name], kind=p.KEYWORD_ONLY) for p in own),
+        *(_parameter(*one) for one in shared_last),
+        _parameter("as_json", AsJson, False),
+    ]
+    command.__signature__ = inspect.Signature(parameters)
+    command.__annotations__ = {p.name: p.annotation for p in parameters}
+    command.__doc__ = module.command.__doc__
+    return command
+
+
+def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def perform(kind: str, case, request, name: str, output: Path | None, plots: Path | None, as_json: bool) -> None:
+    """Run a study on a case with what its command asks for (a `Request`), and report it."""
+    from ..studies.session import Session
+    from ..studies.study import find_study
+
+    changes = {key: value for key, value in request.changes.items() if value is not None}
+    choices = {key: value for key, value in request.choices.items() if value is not None}
+    session = Session(case, name).replace(changes)
+    session.mesh  # a case that gives no model fails before a table begins
+    live = None if as_json else find_study(kind).live
+    progress = Progress(quiet=as_json, row=live and live(session.case))
+    result = session.perform(kind, output, progress, **choices)
+    _report(result, output, plots, as_json, further=request.further, printed=live is not None)
+
+
+def resume(
+    file: ResultFile,
+    duration: Annotated[
+        str | None, typer.Option("--duration", metavar="T", help="New end of the run, 2.0 (s) or '500 ms'.")
+    ] = None,
+    plots: PlotFolder = None,
+    animate: Annotated[
+        Path | None, typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", "-w", metavar="N", min=1, help="Of a map: processes that share the columns."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Continue a run that was interrupted or killed in its file, or a finished transient run with a later --duration.
+
+    The numbers are those of a run that was never interrupted: a transient run goes on from its last restart point, a
+    map solves the columns that are missing in it, an onset run the values, steady and closure runs the pressures.
+    """
+    from ..case.quantity import Quantity, number_or_text
+    from ..record.files import kind_of
+    from ..resuming import resume
+
+    kind = kind_of(file)
+    if animate is not None and kind != "transient":
+        raise CaseError(f"--animate belongs to transient runs; {str(file)!r} is of kind {kind!r}.")
+    end = None
+    if duration is not None:
+        try:
+            end = Quantity("s", "s").parse(number_or_text(duration))
+        except ValueError as error:
+            raise CaseError(f"--duration is given as {duration!r}, {error}.") from None
+    result = resume(file, duration=end, workers=workers, observer=Progress(quiet=as_json))
+    films = animate is not None and result.drawable
+    _report(result, file, plots, as_json, further=(lambda run: [run.animate(animate)]) if films else None)
+
+
+def _report(
+    result: Any,
+    output: Path | None,
+    plots: Path | None,
+    as_json: bool,
+    further: Callable[[Any], list[Path]] | None = None,
+    printed: bool = False,
+) -> None:
+    """Print a result, draw it, and leave with the exit status it deserves.
+
+    Parameters
+    ----------
+    result : StudyResult
+    further : callable, optional
+        Writes further files.
+    printed : bool
+        True where its table was printed row by row already.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If the run was interrupted.
+    SolveError
+        If something was not reached.
+    """
+    figures = result.plot(plots) if plots is not None and result.drawable else []
+    figures += further(result) if further else []
+
+    def lines() -> list[str]:
+        return [*(result.remarks() if printed else result.lines()), *filter(None, [result.record.settled])]
+
+    document = result.summary() | {"output": str(output) if output else None} if as_json else {}
+    print_answer(document, lines, as_json, (figures, plots), output)
+    if result.interrupted:
+        raise KeyboardInterrupt
+    shortfall = result.shortfall()
+    if shortfall is not None:
+        raise SolveError(f"{shortfall}.")  # why was said when it happened

@@ -1,0 +1,174 @@
+"""Arguments that commands share, and how they print: JSON, lines for people, progress."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import CaseError
+from ..observer import Observer
+
+
+def _writable(path: Path | None) -> Path | None:
+    """Refuse a name that cannot be written before anything is computed."""
+    from ..record.files import check_writable
+
+    if path is not None:
+        check_writable(path)
+    return path
+
+
+def _folder(path: Path | None) -> Path | None:
+    """Refuse a name for figures that is taken by a file before anything is computed."""
+    if path is not None and path.exists() and not path.is_dir():
+        raise CaseError(f"--plots {str(path)!r} is a file and not a folder.")
+    return path
+
+
+CaseFile = Annotated[Path | None, typer.Argument(metavar="[CASE]", help="Case file; the 12-inch valve without one.")]
+ResultFile = Annotated[Path, typer.Argument(metavar="RESULT.h5", help="Result file of an earlier command.")]
+Override = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help='Change a key of the case: --set drive.pressure="18 kPa".'),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")]
+Output = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="RESULT.h5", help="Keep everything in this HDF5 file.", callback=_writable),
+]
+PlotFolder = Annotated[
+    Path | None, typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.", callback=_folder)
+]
+
+
+def print_json(document: Any) -> None:
+    """Print one JSON document; arrays become lists, numbers that are not finite become null."""
+    json.dump(_plain(document), sys.stdout, indent=1, allow_nan=False)
+    sys.stdout.write("\n")
+
+
+def print_answer(
+    document: Mapping[str, Any],
+    lines: Callable[[], Sequence[str]],
+    as_json: bool,
+    drawn: tuple[Sequence[Path], Path | None] = ((), None),
+    output: Path | None = None,
+) -> None:
+    """Print a JSON document with the names of its figures, or lines for people.
+
+    Parameters
+    ----------
+    document : mapping
+    lines : callable
+        Makes the lines.
+    as_json : bool
+    drawn : figures and the folder that they are in
+    output : path, optional
+        Where the numbers were written.
+    """
+    figures, folder = drawn
+    if as_json:
+        print_json({**document, "figures": [str(figure) for figure in figures]})
+        return
+    shown = lines()
+    if shown:
+        print("\n".join(shown))
+    if output:
+        print(f"Kept in {output}.")
+    if figures:
+        print(f"{len(figures)} figure{'s' * (len(figures) > 1)} in {folder}.")
+
+
+def print_written(written: Path | Sequence[Path], as_json: bool) -> None:
+    """Print the names of the files that a command has written."""
+    paths = [written] if isinstance(written, Path) else written
+    if as_json:
+        names = [str(path) for path in paths]
+        print_json({"written": names[0] if isinstance(written, Path) else names})
+    else:
+        print("\n".join(f"Wrote {path}." for path in paths))
+
+
+def save_figures(drawers: Mapping[str, Callable[[], Any]], folder: Path | None) -> list[Path]:
+    """Draw figures into a folder, none without one."""
+    from ..drawing.style import draw_figures, write_figures
+
+    return [] if folder is None else write_figures(draw_figures(drawers, (), "result"), folder)
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "tolist"):  # numpy and JAX arrays and scalars
+        value = value.tolist()
+    if isinstance(value, complex):
+        return {"re": _plain(value.real), "im": _plain(value.imag)}
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if is_dataclass(value):
+        return _plain(asdict(value))
+    if hasattr(value, "to_dict"):
+        return _plain(value.to_dict())
+    return str(value)
+
+
+class Progress(Observer):
+    """A bar on standard error where that is a terminal; warnings on standard error in any case.
+
+    Parameters
+    ----------
+    quiet : bool
+        Never show a bar.
+    row : callable, optional
+        Makes a line for standard output from each item.
+    """
+
+    def __init__(self, quiet: bool = False, row: Callable[[Any], str] | None = None):
+        self._show = not quiet and sys.stderr.isatty()
+        self._row = row
+        self._bar = None
+        self._warned: set[str] = set()
+
+    def begin(self, study: str, total: int | None) -> None:
+        if self._show:
+            from tqdm import tqdm
+
+            self._bar = tqdm(total=total, desc=study, file=sys.stderr, leave=False, dynamic_ncols=True, mininterval=0.2)
+
+    def progress(self, text: str) -> None:
+        if self._bar is not None:
+            self._bar.set_postfix_str(text)
+
+    def item(self, result: object) -> None:
+        if self._row is not None:
+            self._print(self._row(result), sys.stdout)
+        if self._bar is not None:
+            self._bar.update()
+
+    def warn(self, sentence: str) -> None:
+        if sentence not in self._warned:
+            self._warned.add(sentence)
+            self._print(f"Warning: {sentence}", sys.stderr)
+
+    def end(self, interrupted: bool) -> None:
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None
+
+    def _print(self, text: str, file: Any) -> None:
+        if self._bar is not None:
+            self._bar.clear()
+        print(text, file=file, flush=True)
+        if self._bar is not None:
+            self._bar.refresh()

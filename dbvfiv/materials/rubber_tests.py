@@ -1,0 +1,438 @@
+"""Tests of rubbers in uniaxial, planar and biaxial tension, read from CSV files, and the cycles in them.
+
+The first line that is neither empty nor a comment (#) names the columns, each with its unit in
+brackets: ``engineering_strain [%], nominal_stress [MPa]``. Other columns are ignored; the order does not matter. A
+strain column may be replaced by ``stretch [-]``. Without a column ``cycle`` all rows are taken for loading data of one
+cycle; which one is the user's choice (the thesis takes the fifth loading curve, Th. 3.2.1).
+
+A rubber that was stretched before is softer up to the strain it has seen (Mullins 1969, Rubber Chem. Technol. 42, 339);
+after a few cycles to the same strain the curve repeats. A valve works on that stabilised curve: the thesis fits the
+fifth loading (Th. 3.2.1). What the cycles leave as permanent set is taken off: strains count from the length at which
+the cycle carries no stress, stresses from the area there.
+
+The loss factor of a loop is that of the linear material with the same loop area A, strain amplitude e0 and stress
+between the ends of strain: tan delta = A / (pi E' e0^2), E' = (stress at the largest strain less that at the least)
+/ (2 e0).
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dbvfiv.materials.law import MaterialError
+
+STRAIN_UNITS = {"-": 1.0, "1": 1.0, "mm/mm": 1.0, "m/m": 1.0, "%": 0.01, "percent": 0.01}
+STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm^2": 1e6, "N/mm2": 1e6, "psi": 6894.757293168361}
+_COLUMNS = {"engineering_strain": STRAIN_UNITS, "stretch": {"-": 1.0, "1": 1.0}, "nominal_stress": STRESS_UNITS}
+_WORDS = {
+    "uniaxial": ("uniaxial", "tension", "uniaxial tension"),
+    "planar": ("planar", "planar tension", "pure shear"),
+    "biaxial": ("biaxial", "equibiaxial", "biaxial tension", "equibiaxial tension"),
+}
+_HEADER = re.compile(r"\s*([A-Za-z_ ]+?)\s*[\[(]\s*([^\])]+?)\s*[\])]\s*")
+
+#: Kinds of tests, in the order in which they are listed.
+MODES = ("uniaxial", "planar", "biaxial")
+
+
+@dataclass(frozen=True)
+class TensionTest:
+    """A loading curve.
+
+    Attributes
+    ----------
+    strain : numpy.ndarray, shape (n,)
+        Engineering strain, a fraction; greater than -1.
+    stress : numpy.ndarray, shape (n,)
+        Nominal (engineering) stress, Pa.
+    mode : str
+        "uniaxial", "planar" (pure shear: the width is held) or "biaxial" (both directions pulled alike).
+    """
+
+    strain: np.ndarray
+    stress: np.ndarray
+    mode: str = "uniaxial"
+
+    def __post_init__(self) -> None:
+        if self.mode not in MODES:
+            raise MaterialError(f"A test is one of {', '.join(MODES)}, but {self.mode!r} was given.")
+        strain, stress = (np.array(v, dtype=float) for v in (self.strain, self.stress))
+        if strain.ndim != 1 or strain.shape != stress.shape:
+            raise MaterialError(
+                "A tension test needs as many strains as stresses in two flat lists, but their shapes are "
+                f"{strain.shape} and {stress.shape}."
+            )
+        if not (np.all(np.isfinite(strain)) and np.all(np.isfinite(stress))):
+            raise MaterialError("A tension test must hold finite numbers only.")
+        if np.any(strain <= -1.0):
+            raise MaterialError(
+                f"Engineering strain must be greater than -1, but the tension test holds {strain.min():g}."
+            )
+        strain.setflags(write=False)
+        stress.setflags(write=False)
+        object.__setattr__(self, "strain", strain)
+        object.__setattr__(self, "stress", stress)
+
+
+def read_tension_test(path: str | Path) -> TensionTest:
+    """Read a uniaxial tension test; see `read_curves`.
+
+    Raises
+    ------
+    MaterialError
+        Also if the table holds other tests, or several cycles.
+    """
+    curves = read_curves(path)
+    if len(curves) > 1 or curves[0].test.mode != "uniaxial":
+        raise MaterialError(
+            f"Tension test {path}: it must hold one uniaxial test, but it holds {_describe_curves(curves)}."
+        )
+    return curves[0].test
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The rows of one test, and of one cycle of it where the table tells cycles apart.
+
+    Attributes
+    ----------
+    test : TensionTest
+        In the order of the file; a cycle has its way back too.
+    cycle : int or None
+    """
+
+    test: TensionTest
+    cycle: int | None = None
+
+
+def _describe_curves(curves: list[Curve]) -> str:
+    """Description of a table's test curves: deformation modes and load cycles."""
+    return ", ".join(c.test.mode + ("" if c.cycle is None else f" (cycle {c.cycle})") for c in curves)
+
+
+def read_curves(path: str | Path, mode: str | None = None) -> list[Curve]:
+    """Read tests of a rubber.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV with a header naming ``engineering_strain`` (or ``stretch``) and ``nominal_stress``
+        with units; separated by commas, semicolons or tabs. A column ``test`` may say which test each row belongs to
+        (uniaxial, planar or biaxial), a column ``cycle`` which cycle (a whole number).
+    mode : str, optional
+        What the file holds if it has no column ``test``; uniaxial if not given.
+
+    Returns
+    -------
+    list of Curve
+        In SI units; tests in the order of `MODES`, cycles ascending.
+
+    Raises
+    ------
+    MaterialError
+        If the file cannot be read, a column or unit is missing or unknown, or a cell is no
+        number; the message names file, line and column.
+    """
+    path = Path(path)
+    rows = _rows(path)
+    line, header = rows[0]
+    columns = _columns(path, line, header)
+    words = {t.strip().lower(): i for i, t in enumerate(header) if t.strip().lower() in ("test", "cycle", "cycle [-]")}
+    if mode is not None and "test" in words:
+        raise MaterialError(f"Tension test {path}: it has a column test, so it cannot be given as {mode} as a whole.")
+    kept: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    for line, row in rows[1:]:
+        place = f"Tension test {path}, line {line}"
+        values = {name: _number(place, name, _cell(row, index)) * unit for name, (index, unit) in columns.items()}
+        which = _mode(place, _cell(row, words["test"])) if "test" in words else mode or "uniaxial"
+        cycle = next((_cycle(place, _cell(row, words[w])) for w in words if w != "test"), 0)
+        strain = values["engineering_strain"] if "engineering_strain" in values else values["stretch"] - 1.0
+        kept.setdefault((MODES.index(which), cycle), []).append((strain, values["nominal_stress"]))
+    if not kept:
+        raise MaterialError(f"Tension test {path}: there is no row of numbers below the header.")
+    numbered = any(w != "test" for w in words)
+    try:
+        return [
+            Curve(TensionTest(*np.array(kept[key]).T, MODES[key[0]]), key[1] if numbered else None)
+            for key in sorted(kept)
+        ]
+    except MaterialError as error:
+        raise MaterialError(f"Tension test {path}: {error}") from None
+
+
+def read_numbers(path: str | Path, others: dict[str, dict[str, float]]) -> dict[str, np.ndarray]:
+    """Strain, stress and further columns of a table that holds one test, in SI units.
+
+    Parameters
+    ----------
+    path : str or Path
+    others : dict
+        Names of columns that may stand beside them, and factors of their units.
+
+    Raises
+    ------
+    MaterialError
+        See `read_curves`.
+    """
+    path = Path(path)
+    rows = _rows(path)
+    columns = _columns(path, *rows[0], _COLUMNS | others)
+    found: dict[str, list[float]] = {name: [] for name in columns}
+    for line, row in rows[1:]:
+        for name, (index, unit) in columns.items():
+            found[name].append(_number(f"Tension test {path}, line {line}", name, _cell(row, index)) * unit)
+    if not found["nominal_stress"]:
+        raise MaterialError(f"Tension test {path}: there is no row of numbers below the header.")
+    values = {name: np.array(numbers) for name, numbers in found.items()}
+    if "stretch" in values:
+        values["engineering_strain"] = values.pop("stretch") - 1.0
+    return values
+
+
+def _cell(row: list[str], index: int) -> str:
+    return row[index].strip() if index < len(row) else ""
+
+
+def _number(place: str, name: str, cell: str) -> float:
+    try:
+        number = float(cell)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise MaterialError(f"{place}: column {name} must hold a finite number, but {cell!r} was found.")
+    return number
+
+
+def _mode(place: str, cell: str) -> str:
+    word = " ".join(cell.lower().replace("-", " ").replace("_", " ").split())
+    found = next((mode for mode, words in _WORDS.items() if word in words), None)
+    if found is None:
+        raise MaterialError(f"{place}: column test must hold one of {', '.join(MODES)}, but {cell!r} was found.")
+    return found
+
+
+def _cycle(place: str, cell: str) -> int:
+    try:
+        number = float(cell)
+    except ValueError:
+        number = math.nan
+    if not (number >= 1 and number == int(number)):
+        raise MaterialError(f"{place}: column cycle must hold a whole number from 1, but {cell!r} was found.")
+    return int(number)
+
+
+def _rows(path: Path) -> list[tuple[int, list[str]]]:
+    """Line number and cells of every line that is neither empty nor a comment."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise MaterialError(f"Tension test {path} is not a text file in UTF-8.") from None
+    except (OSError, ValueError) as error:
+        raise MaterialError(
+            f"Tension test {path} cannot be read: {getattr(error, 'strerror', None) or error}."
+        ) from None
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise MaterialError(f"Tension test {path} is empty.")
+    delimiter = max(",;\t", key=lines[0][1].count)
+    return [(number, next(csv.reader([line], delimiter=delimiter))) for number, line in lines]
+
+
+def _columns(
+    path: Path, line: int, header: list[str], known: dict[str, dict[str, float]] = _COLUMNS
+) -> dict[str, tuple[int, float]]:
+    """Index and unit factor of each known column."""
+    found: dict[str, tuple[int, float]] = {}
+    for index, title in enumerate(header):
+        match = _HEADER.fullmatch(title)
+        name = re.sub(r"\s+", "_", (match[1] if match else title).strip().lower())
+        if name not in known:
+            continue
+        units = known[name]
+        if not match or match[2] not in units:
+            given = f"unit {match[2]!r} is not known" if match else "no unit is given"
+            raise MaterialError(
+                f"Tension test {path}, line {line}: for column {name} {given}; write {name} [UNIT] with one "
+                f"of {', '.join(units)}."
+            )
+        if name in found:
+            raise MaterialError(f"Tension test {path}, line {line}: column {name} appears twice.")
+        found[name] = (index, units[match[2]])
+    if "nominal_stress" not in found or not {"engineering_strain", "stretch"} & set(found):
+        raise MaterialError(
+            f"Tension test {path}, line {line}: the header must name engineering_strain [%] (or stretch [-]) and "
+            f"nominal_stress [MPa], but it reads {', '.join(t.strip() for t in header)!r}."
+        )
+    if {"engineering_strain", "stretch"} <= set(found):
+        raise MaterialError(f"Tension test {path}, line {line}: give either engineering_strain or stretch, not both.")
+    return found
+
+
+CYCLES = ("first", "last")
+#: Share of the range of strain that a way back must cover for a loop.
+_CLOSED = 0.9
+_FEWEST = 3
+#: Work over stiffness and amplitude squared that is rounding alone.
+_NOISE = 1e-9
+
+
+@dataclass(frozen=True)
+class CycleReport:
+    """One cycle of a test.
+
+    Attributes
+    ----------
+    mode : str
+    cycle : int
+    peak_strain : float
+        Largest engineering strain.
+    peak_stress : float
+        Nominal stress there, Pa.
+    set_strain : float
+        Strain at which its loading begins to carry stress; 0 where it does so from the first row.
+    lost : float
+        Work lost in the loop over the volume, J/m3; NaN without a way back.
+    loss_factor : float
+        tan delta; NaN without a way back.
+    """
+
+    mode: str
+    cycle: int
+    peak_strain: float
+    peak_stress: float
+    set_strain: float
+    lost: float
+    loss_factor: float
+
+
+def read_tests(path: str | Path, planar: str | Path | None = None, biaxial: str | Path | None = None) -> list[Curve]:
+    """Tests of one rubber from one file or several; see `tension_test.read_curves`.
+
+    Raises
+    ------
+    MaterialError
+        Also if two files hold the same kind of test.
+    """
+    curves = read_curves(path)
+    for name, mode in ((planar, "planar"), (biaxial, "biaxial")):
+        if name is not None:
+            if any(curve.test.mode == mode for curve in curves):
+                raise MaterialError(
+                    f"Tension test {path} holds a {mode} test already, so {name} cannot be a second one."
+                )
+            curves += read_curves(name, mode)
+    return curves
+
+
+def loading_tests(curves: list[Curve], cycle: str = "last") -> tuple[TensionTest, ...]:
+    """The loading branch of one cycle of each test; curves without cycles as they are.
+
+    Parameters
+    ----------
+    curves : list of Curve
+        Of `tension_test.read_curves`.
+    cycle : {"first", "last"}
+
+    Raises
+    ------
+    MaterialError
+        For another word, or a loading branch without rows.
+    """
+    if cycle not in CYCLES:
+        raise MaterialError(f"The cycle must be one of {', '.join(CYCLES)}, but {cycle!r} was given.")
+    tests = []
+    for mode in MODES:
+        found = sorted((c for c in curves if c.test.mode == mode), key=lambda c: c.cycle or 0)
+        if found:
+            tests.append(_loading(found[0 if cycle == "first" else -1]))
+    return tuple(tests)
+
+
+def describe_cycles(curves: list[Curve]) -> list[CycleReport]:
+    """Every cycle that a table tells apart."""
+    return [_described(curve) for curve in curves if curve.cycle is not None]
+
+
+def hysteresis_loss(strain, stress) -> tuple[float, float]:
+    """Work lost in a loop over the volume, J/m3, and its loss factor.
+
+    Parameters
+    ----------
+    strain, stress : array_like, shape (n,)
+        Engineering strain and nominal stress in the order of time; the loop is closed by a straight line.
+
+    Raises
+    ------
+    MaterialError
+        For a loop without range, without stiffness, or run through the wrong way about.
+    """
+    strain, stress = np.asarray(strain, float), np.asarray(stress, float)
+    middle = strain - strain.mean()
+    lost = float(0.5 * np.sum((stress + np.roll(stress, -1)) * (np.roll(middle, -1) - middle)))
+    amplitude = 0.5 * float(np.ptp(strain))
+    if amplitude <= 0.0:
+        raise MaterialError("A loop needs strains that differ.")
+    top, bottom = (float(stress[strain == end].mean()) for end in (strain.max(), strain.min()))
+    stiffness = (top - bottom) / (2.0 * amplitude)
+    if stiffness <= 0.0:
+        raise MaterialError("The stress of a loop must be greater at its largest strain than at its least one.")
+    if lost < -_NOISE * stiffness * amplitude**2:
+        raise MaterialError("The loop gives energy away: its way back lies above its loading; are the rows in order?")
+    lost = max(lost, 0.0)
+    return lost, lost / (np.pi * stiffness * amplitude**2)
+
+
+def _loading(curve: Curve) -> TensionTest:
+    """Up to the largest strain, counted from the permanent set."""
+    if curve.cycle is None:
+        return curve.test
+    last = int(np.argmax(curve.test.strain))
+    strain, stress = curve.test.strain[: last + 1], curve.test.stress[: last + 1]
+    residual, kept = _set_of(strain, stress)
+    if np.count_nonzero(kept) < _FEWEST:
+        raise MaterialError(
+            f"Cycle {curve.cycle} of the {curve.test.mode} test has {np.count_nonzero(kept)} rows of loading under "
+            f"stress; at least {_FEWEST} are needed."
+        )
+    return TensionTest((1 + strain[kept]) / (1 + residual) - 1, stress[kept] * (1 + residual), curve.test.mode)
+
+
+def _set_of(strain: np.ndarray, stress: np.ndarray) -> tuple[float, np.ndarray]:
+    """Strain at which a loading branch begins to carry stress, and which of its rows lie beyond."""
+    slack = np.flatnonzero(stress <= 0.0)
+    if not slack.size:
+        return 0.0, np.ones(stress.size, bool)
+    i = int(slack[-1])
+    beyond = np.arange(stress.size) > i
+    if i + 1 == stress.size:
+        return float(strain[i]), beyond
+    if stress[i] < 0.0 or i + 2 >= stress.size:
+        share = -stress[i] / (stress[i + 1] - stress[i])
+        return float(strain[i] + share * (strain[i + 1] - strain[i])), beyond
+    # slack: the first rows that carry stress say where it begins
+    slope = (stress[i + 2] - stress[i + 1]) / (strain[i + 2] - strain[i + 1] or np.inf)
+    begins = strain[i + 1] - stress[i + 1] / slope if slope > 0.0 else strain[i]
+    return float(np.clip(begins, strain[i], strain[i + 1])), beyond
+
+
+def _described(curve: Curve) -> CycleReport:
+    strain, stress = curve.test.strain, curve.test.stress
+    top = int(np.argmax(strain))
+    back = strain[top] - strain[top:].min()
+    closed = strain.size - top > _FEWEST and back >= _CLOSED * np.ptp(strain) > 0.0
+    try:
+        lost, factor = hysteresis_loss(strain, stress) if closed else (float("nan"), float("nan"))
+    except MaterialError as error:
+        raise MaterialError(f"Cycle {curve.cycle} of the {curve.test.mode} test: {error}") from None
+    residual = _set_of(strain[: top + 1], stress[: top + 1])[0]
+    return CycleReport(curve.test.mode, curve.cycle, float(strain[top]), float(stress[top]), residual, lost, factor)
