@@ -20,8 +20,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case.model import Case
-from ..contact import ContactLaw, ContactState, PlaneContact, class_stiffness, nodal_thickness, tributary_area
-from ..contact.second import contact_form
+from ..contact import (
+    ContactLaw,
+    ContactState,
+    PlaneContact,
+    class_stiffness,
+    contact_form,
+    nodal_thickness,
+    tributary_area,
+)
 from ..geometry import ValveMesh
 from ..shell import Shell
 
@@ -85,7 +92,7 @@ class FaceContact:
 
     def stiffness_of_class(self, q: np.ndarray, shell: Shell, apart: bool) -> sp.csr_matrix:
         """Tangent (k, k) in a class of motion with its shell: faces that move against each other resist, those that
-        move together turn their force (see `together_blocks`).
+        move together turn their force (see `dbvfiv.contact.plane`).
         """
         return class_stiffness(self.plane, self.nodal(q), self._none, shell, apart)
 

@@ -10,7 +10,7 @@ from continuation import ContinuationOptions, MatrixLinearisation, SystemBase, c
 from continuation import NewtonOptions as ContinuationNewton
 from continuation.branch import Branch
 
-from ...contact.second import contact_form
+from ...contact import contact_form
 from ...model.pressed_shell import PressedShell
 from ...observer import Observer
 from .stiffness import stiffness_spectrum
