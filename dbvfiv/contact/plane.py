@@ -1,4 +1,4 @@
-"""Frictionless one-sided contact of points on a shell's face with a plane: law, forces, tangents and higher derivatives.
+"""Frictionless contact of points on a shell's face with a plane: law, forces, tangents and higher derivatives.
 
 The point that touches lies at a depth below the mid-surface along the current director, x - depth * d, so a contact
 force acts on the displacement across the plane and on both rotations of the node. A depth of zero makes the mid-surface

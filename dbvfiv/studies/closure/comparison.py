@@ -16,7 +16,6 @@ from ...errors import CaseError
 from .. import comparing
 from ..measured import table
 from ..measured.figures import MEASURED, draw_section_of_runs, some_sections
-from .along import value_at
 from .result import ClosureResult
 
 #: Keys that do not change what a run finds.
@@ -110,7 +109,7 @@ def compare(results: Sequence[ClosureResult]) -> Comparison:
         if not result.states:
             raise CaseError(f"{str(result.path or result.header.name)!r} holds no states to compare.")
     pressure = np.array(sorted({state.pressure for state in results[0].states}))
-    values = {name: np.array([value_at(result, pressure, name) for result in results]) for name in COLUMNS}
+    values = {name: np.array([result.along(pressure, name) for result in results]) for name in COLUMNS}
     return Comparison(
         comparing.labels(results, _QUIET),
         pressure,

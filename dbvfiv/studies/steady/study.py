@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 
 from ...errors import SolveError
 from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_warnings
-from ...model.state import SteadyState
 from ...record.record import GrowingRecord
 from ...record.states import read_states, shown_summary, state_row
-from ...record.table import printed_head, printed_row
-from ..case import Case
 from ..load_path import go_on, way_on
 from ..measured.kept import keep_measured
 from ..session import Session
-from ..study import Study
+from ..study import Study, print_rows
 from .cracking import NOTE, find_cracking
 from .measured import KINDS
 from .result import STATES, SteadyResult, tables_of
@@ -57,17 +53,4 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
             record.note(NOTE, **find_cracking(model, states, case.steady.cracking_area).summary())
 
 
-def print_live(case: Case) -> Callable[[SteadyState], str]:
-    """Lines of the table as states are found."""
-    columns = shown_summary(case)
-    head = [*printed_head(columns)]
-
-    def write(state: SteadyState) -> str:
-        lines = [*head, printed_row(columns, state)]
-        head.clear()
-        return "\n".join(lines)
-
-    return write
-
-
-STUDY = Study("steady", tables_of, run_steady, SteadyResult, live=print_live)
+STUDY = Study("steady", tables_of, run_steady, SteadyResult, live=lambda case: print_rows(shown_summary(case)))
