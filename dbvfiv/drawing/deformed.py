@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -16,18 +16,14 @@ from .faces import ValveSkin
 from .style import driven, new_figure
 from .views import COLOURS, frame, shaded
 
-if TYPE_CHECKING:
-    from ..studies.state import State
-    from ..studies.steady.result import SteadyResult
 
-
-def draw(result: SteadyResult, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: Any, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
     state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
     yield "deformed", lambda: deformed(state)
 
 
-def deformed(state: State) -> Figure:
+def deformed(state: Any) -> Figure:
     """Whole valve with the thickness of its wall, true to scale, coloured by displacement (compare Fig. 7-11 of the
     thesis).
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,18 +12,14 @@ from .axes import colour_bar, headline
 from .style import MAGNITUDE, PUBLISHED, kilopascals, new_figure
 from .views import unrolled
 
-if TYPE_CHECKING:
-    from ..studies.state import State
-    from ..studies.steady.result import SteadyResult
 
-
-def draw(result: SteadyResult, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: Any, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
     state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
     yield "layer-stress", lambda: layer_stress(state)
 
 
-def layer_stress(state: State) -> Figure:
+def layer_stress(state: Any) -> Figure:
     """Von Mises stress of each layer over the part that is computed, unrolled: arc length from the centre against the
     axis (compare Fig. 7-12 of the thesis).
     """

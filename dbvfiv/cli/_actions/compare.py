@@ -9,6 +9,7 @@ from typing import Any
 
 from ...errors import CaseError
 from ...studies.closure import comparison as closure
+from ...studies.comparing import save_figure
 from ...studies.session import load_result
 from ...studies.steady import comparison as steady
 from ...studies.transient import comparison as transient
@@ -48,7 +49,7 @@ def _compare_states(
     kind: ModuleType, files: Sequence[Path], results: Sequence[Any], output: Path, as_json: bool
 ) -> None:
     found = kind.compare(results)
-    path = kind.save_comparison(results, output)
+    path = save_figure(lambda: kind.draw(results), output)
     if as_json:
         runs = [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, found.labels, results)]
         print_json({"runs": runs, "comparison": found.summary(), "remark": found.remark, "figure": str(path)})
@@ -60,7 +61,7 @@ def _compare_states(
 def _compare_transient(files: Sequence[Path], results: Sequence[Any], output: Path, as_json: bool) -> None:
     for result in results:
         result.require_steps()
-    path = transient.save_comparison(results, output)
+    path = save_figure(lambda: transient.compare(results), output)
     names = transient.labels(results)
     if as_json:
         print_json(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -150,14 +149,3 @@ def draw(results: Sequence[ClosureResult]) -> Figure:
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=2 if len(results) > 3 else 1)
     panels[0].set_title("Back pressure (crosses: measured)", loc="left", fontweight="bold")
     return figure
-
-
-def save_comparison(results: Sequence[ClosureResult], path: Path) -> Path:
-    """Draw a comparison into a file.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written.
-    """
-    return comparing.save_figure(lambda: draw(results), path)

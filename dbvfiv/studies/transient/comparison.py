@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import matplotlib
@@ -90,14 +89,3 @@ def _last_cycles(result: TransientResult, count: int = 2) -> tuple[slice, np.nda
     begin = t[at] - x[at] * (t[at + 1] - t[at]) / (x[at + 1] - x[at])
     end = int(np.searchsorted(t, begin + count * period, side="right")) + 1
     return slice(at, end), 1e3 * (t[at:end] - begin)
-
-
-def save_comparison(results: Sequence[TransientResult], path: Path) -> Path:
-    """Draw a comparison into a file.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written.
-    """
-    return comparing.save_figure(lambda: compare(results), path)
