@@ -9,7 +9,7 @@ from ...api import load
 from ...case.pressures import read_pressures
 from ...errors import CaseError
 from ...studies.session import load_result
-from ...studies.transient.animation import cycles_to_animate
+from ...studies.transient.figures import cycles_to_animate
 from .._output import print_json
 
 
