@@ -75,11 +75,6 @@ class StiffnessSpectrum:
         vector = self.vectors[:, int(np.argmin(np.abs(self.values - self.lowest)))].real
         return vector / vector[np.argmax(np.abs(vector))]
 
-    @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues among these."""
-        return int(np.count_nonzero(self.values.real < 0))
-
 
 def stiffness_spectrum(
     pressed: PressedShell, q: np.ndarray, pressure: float, count: int = 4, tolerance: float = 1e-8

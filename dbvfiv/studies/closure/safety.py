@@ -151,9 +151,14 @@ class ClassBuckling:
         """Lowest pressure, Pa, at which the wall buckles in this class."""
         return min((found["pressure"] for found in self.buckling), default=None)
 
+    @property
+    def softest(self) -> int:
+        """Number of the state with the lowest eigenvalue."""
+        return min(range(len(self.lowest)), key=self.lowest.__getitem__)
+
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
-        softest = min(range(len(self.lowest)), key=self.lowest.__getitem__)
+        softest = self.softest
         return {
             "symmetry": self.symmetry,
             "motion": symmetry_named(self.symmetry).words,
@@ -169,11 +174,10 @@ class ClassBuckling:
         motion = f"class {self.symmetry} ({symmetry_named(self.symmetry).words})"
         if self.buckling:
             return f"Buckling in {motion} at {self.critical_pressure / 1e3:.6g} kPa."
-        softest = min(range(len(self.lowest)), key=self.lowest.__getitem__)
-        share = self.lowest[softest] / self.lowest[0]
+        share = self.lowest[self.softest] / self.lowest[0]
         return (
             f"No buckling in {motion} up to {max(self.pressures) / 1e3:.4g} kPa; the stiffness is least at "
-            f"{self.pressures[softest] / 1e3:.4g} kPa, {share:.0%} of that at the start."
+            f"{self.pressures[self.softest] / 1e3:.4g} kPa, {share:.0%} of that at the start."
         )
 
 

@@ -170,6 +170,10 @@ class ClosureModel:
     held: np.ndarray
 
     @property
+    def size(self) -> int:
+        return self.pressed.size
+
+    @property
     def shell(self) -> Shell:
         return self.pressed.shell
 
