@@ -16,9 +16,8 @@ from dbvfiv.record.header import Header
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.record import GrowingRecord
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.transient.keeping import row_bytes
-from dbvfiv.studies.transient.run import Runner
-from dbvfiv.studies.transient.tables import RESTART, tables_of
+from dbvfiv.studies.transient.keeping import RESTART, row_bytes, tables_of
+from dbvfiv.studies.transient.study import Runner
 
 from .registry import Row, benchmark
 

@@ -249,7 +249,7 @@ class Valve:
         pressure : number (Pa), text with a unit, or several of them, optional
             Those of the case by default.
         in_time : bool
-            Also turn the drive from flow to back pressure in time; see `dbvfiv.studies.closure.closing`.
+            Also turn the drive from flow to back pressure in time; see `dbvfiv.studies.closure.reversal`.
         compare : bool
             Do the same with the other kind of supports; see `ClosureResult.compared`.
         output : path, optional

@@ -146,7 +146,7 @@ def plot(
 
 def _film(result, file: Path, folder: Path, number: int) -> Callable[[], Path]:
     """Function that writes the animation that ``--animate`` asks of a result."""
-    from ..studies.transient.animation import cycles_to_animate
+    from ..studies.transient.figures import cycles_to_animate
 
     if result.kind == "modes":
         result.mode(number)
@@ -179,6 +179,7 @@ def compare(
     closure runs: seal, force, displacement, passage and stiffness over the back pressure. Measured data that they name
     are in the figure, and what each is off by is told. Runs are named by the case keys that tell them apart.
     """
+    from ..studies.comparing import save_figure
     from ..studies.session import load_result
 
     results = [load_result(file) for file in files]
@@ -204,7 +205,8 @@ def compare(
         found = study.compare(results)
         labels, extra = found.labels, {"comparison": found.summary(), "remark": found.remark}
         lines = found.lines()
-    path = study.save_comparison(results, output)
+    draw = study.compare if kind == "transient" else study.draw
+    path = save_figure(lambda: draw(results), output)
     if as_json:
         runs = [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, labels, results)]
         print_json({"runs": runs, **extra, "figure": str(path)})

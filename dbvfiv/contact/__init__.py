@@ -1,10 +1,15 @@
 """A shell pressed by a uniform follower load against a rigid, frictionless plane."""
 
-from .inner_face import nodal_thickness, tributary_area
-from .law import ContactLaw
-from .plane import ContactState, PlaneContact
+from .plane import (
+    ContactLaw,
+    ContactState,
+    PlaneContact,
+    class_stiffness,
+    contact_form,
+    nodal_thickness,
+    tributary_area,
+)
 from .step import ContactStep, Rebound
-from .together import class_stiffness, together_blocks
 
 __all__ = [
     "ContactLaw",
@@ -13,7 +18,7 @@ __all__ = [
     "PlaneContact",
     "Rebound",
     "class_stiffness",
+    "contact_form",
     "nodal_thickness",
-    "together_blocks",
     "tributary_area",
 ]

@@ -1,8 +1,19 @@
-"""Frictionless one-sided contact of points on a shell's face with a plane.
+"""Frictionless contact of points on a shell's face with a plane: law, forces, tangents and higher derivatives.
 
 The point that touches lies at a depth below the mid-surface along the current director, x - depth * d, so a contact
 force acts on the displacement across the plane and on both rotations of the node. A depth of zero makes the mid-surface
 itself touch.
+
+The plane stands for a mirror image of the wall. In a motion that is antisymmetric about it, opposite points keep their
+distance across it to first order, slide along it by twice their own motion, and tilt together. With u the displacement
+of a node along the plane, d the change of its director along the plane, which for a thin wall is minus the slope of
+both faces, and b its distance from the face, the gap normal to the common face opens by
+
+    -b d.d + 2 d.u      (second order, of both sides)
+
+of which -F is the energy of a pair that is pressed by a force F; half of it belongs to each side. It leaves a rigid
+rotation of the pressed pair free of forces. The faces are taken as flat and in the plane where they touch, and slide
+without friction.
 """
 
 from __future__ import annotations
@@ -10,11 +21,74 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import scipy.sparse as sp
 
 from ..shell import Shell
-from .law import ContactLaw
+from ..shell.reference import SHAPE
+from ..shell.rotation import director
+
+
+def nodal_thickness(shell: Shell) -> np.ndarray:
+    """Mean thickness (nn,) of the elements that meet at each node, m."""
+    mesh = shell.mesh
+    total, count = np.zeros(mesh.node_count), np.zeros(mesh.node_count)
+    np.add.at(total, mesh.quads, np.broadcast_to(mesh.thickness[:, None], mesh.quads.shape))
+    np.add.at(count, mesh.quads, 1.0)
+    return total / count
+
+
+def tributary_area(shell: Shell) -> np.ndarray:
+    """Integrals (nn,) of the shape functions over the mid-surface at rest, m2; they sum to its area."""
+    mesh = shell.mesh
+    out = np.zeros(mesh.node_count)
+    np.add.at(out, mesh.quads, shell.geometry.area @ SHAPE)
+    return out
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """t = penalty * ramp(multiplier / penalty - gap): the augmented Lagrangian of g >= 0, t >= 0, t g = 0 (Alart &
+    Curnier 1991).
+
+    Attributes
+    ----------
+    penalty : float, Pa/m
+        The contact pressure follows the penetration with this slope; updates of the multipliers remove what penetration
+        is left.
+    rounding : float, m
+        Half width over which the kink of the ramp is rounded by a parabola, so that the tangent is continuous; 0 keeps
+        the kink.
+    """
+
+    penalty: float
+    rounding: float = 0.0
+
+    def __post_init__(self):
+        if not self.penalty > 0:
+            raise ValueError(f"The contact penalty must be positive, not {self.penalty:g} Pa/m.")
+        if not self.rounding >= 0:
+            raise ValueError(f"The rounding of the contact law cannot be negative, as {self.rounding:g} m is.")
+
+    def respond(self, gap: np.ndarray, multiplier: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Potential (J/m2), contact pressure (Pa) and stiffness (Pa/m), each (k,), at gaps (k,) and multipliers (k,).
+
+        Pressure and stiffness are the first and second derivatives of the potential with respect to the penetration.
+        """
+        x = multiplier / self.penalty - gap
+        w = self.rounding
+        if w == 0.0:
+            positive = x > 0
+            ramp, slope = np.where(positive, x, 0.0), positive.astype(float)
+            area = 0.5 * ramp**2
+        else:
+            inside, beyond = np.abs(x) < w, x >= w
+            ramp = np.where(beyond, x, np.where(inside, (x + w) ** 2 / (4 * w), 0.0))
+            slope = np.where(beyond, 1.0, np.where(inside, (x + w) / (2 * w), 0.0))
+            area = np.where(beyond, 0.5 * x**2 + w**2 / 6, np.where(inside, (x + w) ** 3 / (12 * w), 0.0))
+        return self.penalty * area, self.penalty * ramp, self.penalty * slope
 
 
 @dataclass(frozen=True)
@@ -191,3 +265,104 @@ class PlaneContact:
 def _add(force: np.ndarray, unknowns: np.ndarray, values: np.ndarray) -> None:
     keep = unknowns >= 0
     force[unknowns[keep]] += values[keep]  # every unknown belongs to one contact node only
+
+
+def _blocks_together(contact: PlaneContact, nodal, directors, first, multiplier) -> tuple[np.ndarray, list[int]]:
+    """Tangent (k, 4, 4) of each contact node and the columns (4) of its nodal unknowns that it belongs to.
+
+    Parameters
+    ----------
+    nodal, directors, first : (nn, c), (nn, 3), (nn, 2, 3) arrays
+        Nodal unknowns, directors and their derivatives.
+    multiplier : (k,) array, Pa
+    """
+    along = [axis for axis in range(3) if axis != contact.axis]
+    force = contact.state(nodal, directors, multiplier).force
+    turn = first[contact.nodes][:, :, along].transpose(0, 2, 1)  # director along the plane by the rotations
+    block = np.zeros((contact.count, 4, 4))
+    block[:, 2:, 2:] = (force * contact.depth)[:, None, None] * (turn.transpose(0, 2, 1) @ turn)
+    block[:, :2, 2:] = -force[:, None, None] * turn
+    block[:, 2:, :2] = block[:, :2, 2:].transpose(0, 2, 1)
+    return block, [*along, 3, 4]
+
+
+def class_stiffness(
+    contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, shell: Shell, apart: bool
+) -> sp.csr_matrix:
+    """Tangent (n, n) of a contact in a class of motion.
+
+    Parameters
+    ----------
+    contact : PlaneContact
+    nodal : (nn, c) array
+        Nodal unknowns of the state.
+    multiplier : (k,) array, Pa
+    shell : Shell
+        With the n unknowns of the class.
+    apart : bool
+        Whether the two walls move against each other, so that contact resists; where they move together it only turns.
+    """
+    directors, first, second = contact.shell.directors(nodal)
+    if apart:
+        block = contact.tangent_blocks(nodal, directors, first, second, multiplier)
+        columns = [contact.axis, 3, 4]
+    else:
+        block, columns = _blocks_together(contact, nodal, directors, first, multiplier)
+    unknowns, width = shell.dofs.index[contact.nodes][:, columns], len(columns)
+    rows = np.repeat(unknowns[:, :, None], width, axis=2)
+    across = np.repeat(unknowns[:, None, :], width, axis=1)
+    keep = (rows >= 0) & (across >= 0) & (block != 0)
+    return sp.csr_matrix((block[keep], (rows[keep], across[keep])), shape=(shell.size, shell.size))
+
+
+def contact_form(
+    contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, *directions: np.ndarray
+) -> np.ndarray:
+    """Derivative (nn, c) of the contact force at nodal unknowns (nn, c) along any number of directions (nn, c).
+
+    The law is made of pieces; at their joints the derivatives are those of one side.
+    """
+    n, axis, mesh = contact.nodes, contact.axis, contact.shell.mesh
+    columns = [axis, 3, 4]
+    data = (
+        mesh.nodes[n, axis] + contact.lift,
+        contact.depth,
+        contact.area,
+        multiplier,
+        mesh.directors[n],
+        mesh.frames[n],
+    )
+    law = (contact.law.penalty, contact.law.rounding)
+    along = tuple(field[n][:, columns] for field in directions)
+    out = np.zeros_like(nodal)
+    out[n[:, None], columns] = np.asarray(_form(axis, law, nodal[n][:, columns], along, data))
+    return out
+
+
+def _potential(axis, law, v, data):
+    """Potential of one node from its displacement across the plane and its rotations (3,)."""
+    place, depth, area, multiplier, reference, frame = data
+    penalty, width = law
+    gap = place + v[0] - depth * director(v[1:], reference, frame)[axis]
+    x = multiplier / penalty - gap
+    if width == 0.0:
+        return area * penalty * 0.5 * jnp.where(x > 0, x, 0.0) ** 2
+    rounded = (x + width) ** 3 / (12 * width)
+    return area * penalty * jnp.where(x >= width, 0.5 * x**2 + width**2 / 6, jnp.where(x > -width, rounded, 0.0))
+
+
+def _form(axis, law, v, along, data):
+    def one(v, along, data):
+        found = jax.grad(lambda w: _potential(axis, law, w, data))
+        for direction in along:
+            found = _derivative(found, direction)
+        return found(v)
+
+    return jax.vmap(one)(v, along, data)
+
+
+def _derivative(function, direction):
+    return lambda w: jax.jvp(function, (w,), (direction,))[1]
+
+
+_form = jax.jit(_form, static_argnums=(0, 1))

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .law import ContactLaw
-from .plane import PlaneContact
+from .plane import ContactLaw, PlaneContact
 
 #: Speed of parting, m/s, above which faces lose energy: that of walls that creep apart is below it.
 CREEP = 1e-3

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -18,11 +18,6 @@ from ..case.part import QUARTER, Part
 from ..record.mesh import MeshData, WholeValve
 from ..record.vtkhdf import motion
 from .style import MAGNITUDE, MOTION, PUBLISHED, colour_bar, driven, headline, kilopascals, new_figure
-
-if TYPE_CHECKING:
-    from ..studies.result import StudyResult as Result
-    from ..studies.state import State
-    from ..studies.steady.result import SteadyResult
 
 
 def nodal_thickness(mesh: MeshData) -> np.ndarray:
@@ -171,7 +166,7 @@ def frame(axes, points: np.ndarray) -> None:
         axis.pane.set_edgecolor("0.8")
 
 
-def mark_pieces(result: Result, *panels) -> None:
+def mark_pieces(result: Any, *panels) -> None:
     """Thin lines where duckbill, saddle, cuff, flare and flange meet."""
     valve = result.case.valve
     if valve.key_points is not None:
@@ -193,13 +188,13 @@ def unrolled(mesh: MeshData) -> tuple[np.ndarray, np.ndarray]:
     return arc - arc[:, middle : middle + 1], points[:, :, 2]
 
 
-def draw_deformed(result: SteadyResult, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw_deformed(result: Any, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
     state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
     yield "deformed", lambda: deformed(state)
 
 
-def deformed(state: State) -> Figure:
+def deformed(state: Any) -> Figure:
     """Whole valve with the thickness of its wall, true to scale, coloured by displacement (compare Fig. 7-11 of the
     thesis).
     """
@@ -225,13 +220,13 @@ def deformed(state: State) -> Figure:
     return figure
 
 
-def draw_layers(result: SteadyResult, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw_layers(result: Any, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
     state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
     yield "layer-stress", lambda: layer_stress(state)
 
 
-def layer_stress(state: State) -> Figure:
+def layer_stress(state: Any) -> Figure:
     """Von Mises stress of each layer over the part that is computed, unrolled: arc length from the centre against the
     axis (compare Fig. 7-12 of the thesis).
     """

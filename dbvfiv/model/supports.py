@@ -31,7 +31,7 @@ from ..contact import (
     nodal_thickness,
     tributary_area,
 )
-from ..contact.second import contact_form
+from ..contact.plane import contact_form
 from ..geometry import ValveMesh
 from ..shell import Shell
 

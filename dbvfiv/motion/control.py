@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case.tables import read_drive_table
 from ..case.model import Case
+from ..case.tables import read_drive_table
 from .scheme import Scheme, scheme
 from .state import MotionState
 from .stepper import StepFailure, StepOptions, Stepper, StepResult

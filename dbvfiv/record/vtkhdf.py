@@ -11,17 +11,13 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
 
 from ..errors import CaseError
 from .mesh import MeshData, WholeValve
-
-if TYPE_CHECKING:
-    from .result import Result
-
 
 _VTK_QUAD = 9
 
@@ -120,9 +116,7 @@ def _write_steps(root: h5py.Group, values: list[float], moving: list[int]) -> No
 _UNITS = {"displacement": "m", "rotation": "rad", "thickness": "m", "pressure": "Pa", "velocity": "m/s"}
 
 
-def export_result(
-    result: Result, path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any
-) -> Path:
+def export_result(result: Any, path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any) -> Path:
     """Write a result as one VTKHDF file with a step for each state.
 
     Parameters

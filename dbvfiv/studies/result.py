@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -167,3 +168,17 @@ class StudyResult:
     def export(self, path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any) -> Path:
         """Write a VTKHDF file for ParaView; see `dbvfiv.record.vtkhdf`."""
         return export_result(self, path, quarter, deformed, **choices)
+
+
+@dataclass(frozen=True)
+class StateSteps(Sequence):
+    """Steps for ParaView, made one at a time from states."""
+
+    states: Sequence[Any]
+    step: Callable[[Any], Step]
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def __getitem__(self, number: int) -> Step:
+        return self.step(self.states[number])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import CaseError
 from ..record.mesh import MeshData
 from ..record.record import Record
-from ..record.table import TableSpec
+from ..record.table import Column, TableSpec, printed_head, printed_row
 from . import KINDS
 from .case import Case
 
@@ -49,6 +49,22 @@ class Study:
     resumable: bool = True
     rows_to_keep: Callable[[Record, Case], Mapping[str, int]] | None = None
     live: Callable[[Case], Callable[[Any], str]] | None = None
+
+
+def print_rows(columns: Iterable[Column]) -> Callable[[Any], str]:
+    """Writer of the lines of a table as its rows are found; a text is a title of those that follow."""
+    columns = tuple(columns)
+    head = [*printed_head(columns)]
+
+    def write(item: Any) -> str:
+        if isinstance(item, str):
+            head[:] = printed_head(columns)
+            return item
+        lines = [*head, printed_row(columns, item)]
+        head.clear()
+        return "\n".join(lines)
+
+    return write
 
 
 def nothing_to_resume(kind: str, path: str | Path | None) -> CaseError:

@@ -10,8 +10,8 @@ import numpy as np
 from ..drawing.views import deformed, layer_stress
 from ..report.content import Picture, picture, pictures_of
 from ..studies.case import Case
-from ..studies.steady import comparison, discharge, passage, shapes
-from ..studies.steady.published import HEAD_DISCHARGE
+from ..studies.steady import comparison, figures
+from ..studies.steady.figures import HEAD_DISCHARGE
 from ..studies.steady.result import SteadyResult
 from .entry import Entry, Number, Outcome, Workshop, spread
 
@@ -114,7 +114,7 @@ def areas(workshop: Workshop) -> Outcome:
     told = (
         "The thesis's model lies within 6.6 and 16.1 % of the areas measured on its two valves; it prints no numbers."
     )
-    return Outcome((told,), numbers, (picture("thesis-7-5", "", lambda: discharge.area_discharge(result)),))
+    return Outcome((told,), numbers, (picture("thesis-7-5", "", lambda: figures.area_discharge(result)),))
 
 
 def velocities(workshop: Workshop) -> Outcome:
@@ -124,7 +124,7 @@ def velocities(workshop: Workshop) -> Outcome:
         Number(f"jet velocity at {p / 1e3:g} kPa", result.nearest(p).outlet_velocity, None, "m/s") for p in PRESSURES
     )
     told = "An ideal jet: the velocity follows from the pressure and the velocity head at the flange alone."
-    return Outcome((told,), numbers, (picture("thesis-7-7", "", lambda: discharge.jet_velocity(result)),))
+    return Outcome((told,), numbers, (picture("thesis-7-7", "", lambda: figures.jet_velocity(result)),))
 
 
 def along_the_valve(workshop: Workshop) -> Outcome:
@@ -140,14 +140,14 @@ def along_the_valve(workshop: Workshop) -> Outcome:
         "differ from it by "
         f"{spread(numbers)} and are said to depend on experiment. They lie above what its own flows give, too."
     )
-    return Outcome((told,), numbers, (picture("thesis-7-9", "", lambda: passage.passage(result)),))
+    return Outcome((told,), numbers, (picture("thesis-7-9", "", lambda: figures.passage(result)),))
 
 
 def lips(workshop: Workshop) -> Outcome:
     """Fig. 7-10: the shape of the exit."""
     result = workshop.steady(PRESSURES)
     told = "Printed as a picture only."
-    return Outcome((told,), _openings(result), (picture("thesis-7-10", "", lambda: shapes.lip_shapes(result)),))
+    return Outcome((told,), _openings(result), (picture("thesis-7-10", "", lambda: figures.lip_shapes(result)),))
 
 
 def largest_displacement(workshop: Workshop) -> Outcome:

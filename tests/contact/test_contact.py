@@ -7,8 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.contact import ContactLaw, PlaneContact, nodal_thickness, tributary_area
-from dbvfiv.contact.second import contact_form
+from dbvfiv.contact import ContactLaw, PlaneContact, contact_form, nodal_thickness, tributary_area
 from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.shell import Shell, ShellMesh
 from tests.shell.structures import grid, mixed_section

@@ -8,7 +8,7 @@ import pytest
 from dbvfiv.contact import ContactLaw, PlaneContact, tributary_area
 from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.shell import Shell, ShellMesh
-from dbvfiv.studies.closure.classes import ClassStiffness
+from dbvfiv.studies.closure.buckling import class_matrices
 from tests.shell.structures import grid, isotropic_section
 
 WALL, SIDE, PRESSURE = 0.01, 0.2, 2e3
@@ -29,7 +29,7 @@ def pressed():
     assert np.abs(model.residual(q, PRESSURE)).max() < 1e-9 * PRESSURE * SIDE**2
     assert model.contact_state(q).total == pytest.approx(PRESSURE * SIDE**2, rel=1e-9)
     free = np.ones((mesh.node_count, 5), bool)
-    return mesh, ClassStiffness(model, free, closing=False).matrices(q, PRESSURE)[0]
+    return mesh, class_matrices(model, free, False, q, PRESSURE)[0]
 
 
 def rotation(mesh, axis: int, turn: float = 1.0) -> np.ndarray:

@@ -9,7 +9,7 @@ import dbvfiv
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.outside import OutsideCorrection
-from dbvfiv.studies.transient.run import Runner
+from dbvfiv.studies.transient.study import Runner
 from tests.small_valves import make_valve
 from tests.studies.transient.runs import Stop, transient
 from tests.verification.test_transient_modes import three_routes

@@ -13,7 +13,7 @@ from dbvfiv.case.measured import DISCHARGE, read_measured
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.steady.comparison import draw
-from dbvfiv.studies.steady.measured import against
+from dbvfiv.studies.steady.result import against
 from tests.small_valves import make_valve
 
 SMALL = {"mesh.around": 6, "mesh.along": 8}

@@ -25,7 +25,7 @@ from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import UNDECIDED, Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk
 from dbvfiv.studies.sweep.run import SweepOptions, run_sweep
-from dbvfiv.studies.transient.run import Runner
+from dbvfiv.studies.transient.study import Runner
 from tests.verification.test_transient_modes import ringing
 
 #: Case files.

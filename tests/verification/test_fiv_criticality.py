@@ -13,7 +13,7 @@ from dbvfiv.model import ValveModel
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.onset.normal_form import normal_form
 from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
-from dbvfiv.studies.transient.run import run_transient
+from dbvfiv.studies.transient.study import run_transient
 
 #: Relative distance from the onset density.
 ASIDE = 0.02

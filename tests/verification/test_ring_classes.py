@@ -6,15 +6,12 @@ about one of them. Motions of the whole ring are held by one more support each, 
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 
 from dbvfiv.model.load_steps import LoadSteps
 from dbvfiv.model.symmetry import SYMMETRIES
-from dbvfiv.studies.closure.buckling import BucklingWatch
-from dbvfiv.studies.closure.classes import ClassStiffness
+from dbvfiv.studies.closure.buckling import BucklingWatch, class_matrices, spectrum_of
 from tests.verification.test_closure_buckling import EI, RADIUS, _options, _ring
 
 
@@ -34,8 +31,10 @@ def _free(model, signs, elements) -> np.ndarray:
 
 def _critical(name: str, elements: int) -> float:
     model, signs = _ring(elements), SYMMETRIES[name].signs
-    of_class = ClassStiffness(model, _free(model, signs, elements), closing=True)
-    watch = BucklingWatch(model, _options(), 3, spectrum=partial(of_class.spectrum, 3))
+    free = _free(model, signs, elements)
+    watch = BucklingWatch(
+        model, _options(), lambda q, p: spectrum_of(*class_matrices(model, free, True, q, p), pressure=p, count=3)
+    )
     steps = LoadSteps(model, _options(), accepted=watch.see)
     for p in np.array([0.5, 2.5, 3.4, 6.0, 7.5, 8.8]) * EI / RADIUS**3:
         steps.reach(p)

@@ -12,7 +12,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.transient.run import run_transient
+from dbvfiv.studies.transient.study import run_transient
 
 STUDY = Path(__file__).parents[2] / "cases" / "studies" / "sudden_pressure.py"
 

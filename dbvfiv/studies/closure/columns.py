@@ -12,6 +12,8 @@ from ..load_path import WAY_ON, way_on_shapes
 STATES, PATH, BUCKLING, OPENED, REVERSAL = "states", "path", "buckling", "opened", "reversal"
 #: Prefix of the tables of a walk with the other supports, for comparison.
 COMPARED = "compared_"
+#: Notes on classes of motion besides that of the path: lowest eigenvalues of one equilibrium, and a state that buckles.
+LOWEST, BUCKLED_CLASS = "class stiffness", "class buckling"
 #: Most stiffness eigenvalues that are followed; the largest value of closure.eigenvalues.
 MOST_EIGENVALUES = 100
 

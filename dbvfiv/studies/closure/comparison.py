@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -16,7 +15,6 @@ from ...errors import CaseError
 from .. import comparing
 from ..measured import table
 from ..measured.figures import MEASURED, draw_section_of_runs, some_sections
-from .along import value_at
 from .result import ClosureResult
 
 #: Keys that do not change what a run finds.
@@ -110,7 +108,7 @@ def compare(results: Sequence[ClosureResult]) -> Comparison:
         if not result.states:
             raise CaseError(f"{str(result.path or result.header.name)!r} holds no states to compare.")
     pressure = np.array(sorted({state.pressure for state in results[0].states}))
-    values = {name: np.array([value_at(result, pressure, name) for result in results]) for name in COLUMNS}
+    values = {name: np.array([result.along(pressure, name) for result in results]) for name in COLUMNS}
     return Comparison(
         comparing.labels(results, _QUIET),
         pressure,
@@ -151,14 +149,3 @@ def draw(results: Sequence[ClosureResult]) -> Figure:
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=2 if len(results) > 3 else 1)
     panels[0].set_title("Back pressure (crosses: measured)", loc="left", fontweight="bold")
     return figure
-
-
-def save_comparison(results: Sequence[ClosureResult], path: Path) -> Path:
-    """Draw a comparison into a file.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written.
-    """
-    return comparing.save_figure(lambda: draw(results), path)

@@ -1,9 +1,9 @@
-"""Back-pressure states: what their file holds and what can be read off them."""
+"""Back-pressure states: what can be read off their record."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
@@ -11,20 +11,24 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...case.measured import AREA, SHAPE
 from ...drawing import views
 from ...model.symmetry import equilibria_of
 from ...record.header import Header
 from ...record.mesh import WholeValve
 from ...record.record import Record, plain
+from ...record.states import LAYERS
 from ...record.table import Column, printed_head, printed_row
-from ...record.vtkhdf import Step
+from ...record.vtkhdf import Step, layer_field_names, motion
+from ...shell.recovery import LayerFields
+from ..measured.curves import MeasuredCurve, MeasuredParts
 from ..measured.figures import draw_shapes
-from ..result import StudyResult
+from ..measured.kept import joined, kept_tables
+from ..measured.sections import MeasuredShapes, WallSections
+from ..result import StateSteps, StudyResult
 from ..session import Session
 from ..state import State, states_of
-from . import curves, figures
-from .class_result import ClassBuckling, first_buckling, read_classes
-from .closing import ClosingResult, ClosingSample, Turn
+from . import figures
 from .columns import (
     BUCKLED,
     BUCKLING,
@@ -39,12 +43,70 @@ from .columns import (
     SUMMARY,
     valid_rows,
 )
-from .measured import MeasuredClosure, measured_closure
-from .model import ClosureModel, closure_model
-from .pressed_state import PressedState
-from .printed import verdict
-from .safety import SafetyFactor, find_safety
-from .steps import ClosureSteps
+from .reversal import Turn
+from .safety import ClassBuckling, Closing, SafetyFactor, find_safety, first_buckling, read_classes, sentences
+from .valve import ClosureModel, Passage, closure_model, layer_maxima
+
+
+class PressedState(SimpleNamespace):
+    """A state under back pressure: the columns `SUMMARY` and `FIELDS` of its row, and what can be asked about it.
+
+    Attributes
+    ----------
+    results : ClosureResult
+    index : int
+        Its row in the table of states.
+    """
+
+    __eq__, __hash__ = object.__eq__, object.__hash__
+
+    def __repr__(self) -> str:
+        shut = "shut" if self.closed else "not shut"
+        return f"<PressedState at {self.pressure / 1e3:.6g} kPa: {shut}, {self.contact_force:.4g} N between the walls>"
+
+    @cached_property
+    def layers(self) -> LayerFields:
+        """Strains and stresses of the layers."""
+        record, table = self.results.record, self.results.table(STATES)
+        found = {c.name.split("/")[1]: record.value(table, c.name, self.index) for c in LAYERS}
+        return LayerFields(record.mesh.layer_names, **found)
+
+    @property
+    def passage(self) -> Passage:
+        """Passage of the part that is computed."""
+        results = self.results
+        reference = results.reference_opening / results.mesh.part.copies
+        return Passage(results.mesh.z, self.opening, reference, results.case.closure.shut_fraction)
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON."""
+        values = {c.name: getattr(self, c.name) for c in SUMMARY}
+        extremes = zip(self.results.mesh.layer_titles(), *layer_maxima(self.layers))
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()} | {
+            "sealed_intervals": [list(pair) for pair in self.passage.shut_intervals],
+            "stiffness_eigenvalues": self.stiffness_eigenvalues.tolist(),
+            "layers": [
+                {"layer": title, "largest_strain": float(e), "largest_stress": float(s)} for title, e, s in extremes
+            ],
+        }
+
+
+@dataclass(frozen=True)
+class MeasuredClosure(MeasuredParts):
+    """Measurements under back pressure; None for a quantity that was not measured.
+
+    Attributes
+    ----------
+    passage : MeasuredCurve or None
+        Narrowest passage left, m2, over the back pressure.
+    shapes : MeasuredShapes or None
+        Sections of the wall.
+    """
+
+    passage: MeasuredCurve | None = None
+    shapes: MeasuredShapes | None = None
+
+    keys = {"passage": "measured_area", "shapes": "measured_sections"}
 
 
 class ClosureResult(StudyResult):
@@ -66,7 +128,7 @@ class ClosureResult(StudyResult):
     walk, buckling : tuples of objects with the columns of `columns.POINT` and `columns.BUCKLED`
     opened : tuple of State
         Of an open start, steady states of the flow as its pressure falls.
-    closing : ClosingResult or None
+    closing : Closing or None
         History of the valve while its drive turned round, where that was asked for.
     compared : ClosureResult or None
         The same with the other supports, where that was asked for.
@@ -145,15 +207,15 @@ class ClosureResult(StudyResult):
         return states_of(self, OPENED)
 
     @cached_property
-    def closing(self) -> ClosingResult | None:
+    def closing(self) -> Closing | None:
         turning = self.record.notes("turning")
         if self._prefix or not turning:
             return None
         over = {"halvings": 0, "failure": ""} | next(iter(self.record.notes("turned")), {})
         columns = {c.name: self.record.column(REVERSAL, c.name) for c in SAMPLE}
         rows = valid_rows(self.record, REVERSAL)
-        samples = tuple(ClosingSample(**{name: plain(values[i]) for name, values in columns.items()}) for i in rows)
-        return ClosingResult(samples, Turn.of(self.case), turning[0]["shut_below"], over["halvings"], over["failure"])
+        samples = tuple(SimpleNamespace(**{name: plain(values[i]) for name, values in columns.items()}) for i in rows)
+        return Closing(samples, Turn.of(self.case), turning[0]["shut_below"], over["halvings"], over["failure"])
 
     @cached_property
     def compared(self) -> ClosureResult | None:
@@ -188,10 +250,36 @@ class ClosureResult(StudyResult):
         shut = [point.pressure for point in self.walk if point.sealed_length > 0]
         return min(shut) if shut else None
 
+    def along(self, pressure: np.ndarray, name: str) -> np.ndarray:
+        """A column of `columns.POINT` at back pressures (k,), Pa: of states where they are, between the load steps by a
+        straight line, from the first to the last one before arclength takes over; NaN beyond.
+        """
+        known: dict[float, float] = {}
+        for point in self.walk:
+            if point.arclength or point.pressure <= max(known, default=0.0):
+                break
+            known[point.pressure] = getattr(point, name)
+        # of a state that was asked for the contact is renewed until it holds; load steps do with less
+        own = {"lowest_eigenvalue": "lowest_stiffness_eigenvalue"}.get(name, name)
+        known |= {state.pressure: getattr(state, own) for state in self.states if not state.beyond_limit}
+        if not known:
+            return np.full(len(pressure), np.nan)
+        places, values = np.array(sorted(known.items())).T
+        return np.interp(pressure, places, values, left=np.nan, right=np.nan)
+
     @cached_property
     def measured(self) -> MeasuredClosure:
         """Measured data beside the states."""
-        return measured_closure(self)
+        tables = kept_tables(self.record)
+        areas = joined(tables, AREA, "pressure", "area")
+        points = joined(tables, SHAPE, "pressure", "z", "face", "x", "y")
+        passage = None
+        if areas is not None:
+            pressure, area = np.array(areas)
+            computed = self.along(pressure, "least_opening")
+            passage = MeasuredCurve("passage left", "area", pressure, area, computed, ("mm2", 1e6))
+        shapes = points and MeasuredShapes.of(points, WallSections(self.mesh, self.states))
+        return MeasuredClosure(passage, shapes)
 
     @cached_property
     def safety(self) -> SafetyFactor | None:
@@ -233,16 +321,16 @@ class ClosureResult(StudyResult):
     # ----
 
     def lines(self) -> list[str]:
-        lines = [*printed_head(SUMMARY), *(printed_row(SUMMARY, state) for state in self._all_states), *verdict(self)]
+        lines = [*printed_head(SUMMARY), *(printed_row(SUMMARY, state) for state in self._all_states), *sentences(self)]
         if self.compared is None:
             return lines
         return [f"Supports: {self.supports}", *lines, f"Supports: {self.compared.supports}", *self.compared.lines()]
 
     def remarks(self) -> list[str]:
         if self.compared is None:
-            return verdict(self)
+            return sentences(self)
         parts = (self, self.compared)
-        return [line for part in parts for line in (f"Supports: {part.supports}", *verdict(part))]
+        return [line for part in parts for line in (f"Supports: {part.supports}", *sentences(part))]
 
     def shortfall(self) -> str | None:
         if not self.failures:
@@ -261,14 +349,25 @@ class ClosureResult(StudyResult):
         if not self.states:
             return
         yield from figures.draw(self)
-        yield from curves.draw(self)
         yield from draw_shapes(self.measured.shapes)
         yield from views.draw_layers(self, pressure)
         if self.compared is not None and self.compared.states:
             for name, draw in self.compared.drawers(pressure):
                 yield f"{name}-{self.compared.supports}", draw
-            yield "supports-compared", lambda: curves.supports_compared(self, self.compared)
+            yield "supports-compared", lambda: figures.supports_compared(self, self.compared)
 
     def steps(self, valve: WholeValve) -> Sequence[Step]:
         """States in the order of their pressures, as ParaView wants its times."""
-        return ClosureSteps(sorted(self.states, key=lambda state: state.pressure), valve)
+        return StateSteps(sorted(self.states, key=lambda state: state.pressure), lambda state: _step(state, valve))
+
+
+def _step(state: PressedState, valve: WholeValve) -> Step:
+    """Fields of a state; "time" is the back pressure in Pa."""
+    mesh = state.results.mesh
+    quantities = {"von_mises": state.layers.von_mises, "largest_stretch": state.layers.stretch[:, :, 1]}
+    cells = {"thickness": mesh.thickness}
+    for quantity, values in quantities.items():
+        cells |= dict(zip(layer_field_names(mesh, quantity), values.T))
+    points = motion(mesh, valve, state.nodal)
+    points |= {"contact_pressure": state.contact_pressure[valve.node], "gap": state.gap[valve.node]}
+    return Step(state.pressure, points, {name: valve.cells(values) for name, values in cells.items()})

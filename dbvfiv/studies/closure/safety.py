@@ -1,18 +1,25 @@
-"""Safety factor of a valve under back pressure: margin to its first limit."""
+"""Verdicts on a valve under back pressure: safety factor, buckling by symmetry class, the turn of the drive, and the
+sentences on them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from .model import HELD_LIPS
-from .remarks import CROSSED
+from ...model.symmetry import EQUILIBRIA, symmetry_named
+from ...record.record import Record
+from ..result import StudyResult
+from .columns import BUCKLED_CLASS, LOWEST
+from .reversal import Turn
+from .valve import HELD_LIPS
 
-if TYPE_CHECKING:
-    from .result import ClosureResult
-
+#: Overlap of the inner faces over the penetration that is left, from which on the faces count as crossed.
+CROSSED = 10.0
 BUCKLING, SEAL, CROSSING, END = "buckling", "loss of seal", "faces crossing", "end of the path"
 MEANING = (
     "Back pressure at the first limit met as it rises (buckling within the symmetry of the model, loss of seal, inner "
@@ -73,7 +80,7 @@ class SafetyFactor:
         )
 
 
-def find_safety(result: ClosureResult) -> SafetyFactor | None:
+def find_safety(result: StudyResult) -> SafetyFactor | None:
     """The factor that a result shows; None if no equilibrium was found."""
     rising = _rising(result)
     if not rising:
@@ -96,7 +103,7 @@ def find_safety(result: ClosureResult) -> SafetyFactor | None:
     return SafetyFactor(pressure / rated, False, limit, pressure, rated, followed, held)
 
 
-def _rising(result: ClosureResult) -> list[Any]:
+def _rising(result: StudyResult) -> list[Any]:
     """Points of the path as the pressure rises, up to where arclength takes over."""
     rising: list[Any] = []
     for point in result.walk:
@@ -119,3 +126,201 @@ def _last_before(rising: list[Any], reached: np.ndarray) -> list[float]:
         return []
     first = int(np.argmax(reached))
     return [rising[first - 1].pressure if first else 0.0]
+
+
+@dataclass(frozen=True)
+class ClassBuckling:
+    """Buckling of the wall in one symmetry class.
+
+    Attributes
+    ----------
+    symmetry : str
+    pressures, lowest : tuples of float, Pa, 1/s2
+        Lowest stiffness eigenvalue along the path.
+    buckling : tuple of dict
+        kind, pressure, eigenvalue of the states that buckle, by pressure.
+    """
+
+    symmetry: str
+    pressures: tuple[float, ...]
+    lowest: tuple[float, ...]
+    buckling: tuple[dict[str, Any], ...]
+
+    @property
+    def critical_pressure(self) -> float | None:
+        """Lowest pressure, Pa, at which the wall buckles in this class."""
+        return min((found["pressure"] for found in self.buckling), default=None)
+
+    @property
+    def softest(self) -> int:
+        """Number of the state with the lowest eigenvalue."""
+        return min(range(len(self.lowest)), key=self.lowest.__getitem__)
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        softest = self.softest
+        return {
+            "symmetry": self.symmetry,
+            "motion": symmetry_named(self.symmetry).words,
+            "buckling": list(self.buckling),
+            "critical_pressure": self.critical_pressure,
+            "softest": {"pressure": self.pressures[softest], "lowest_stiffness_eigenvalue": self.lowest[softest]},
+            "path": {"pressure": list(self.pressures), "lowest_eigenvalue": list(self.lowest)},
+        }
+
+    @property
+    def sentence(self) -> str:
+        """Sentence on buckling in the class, or on its least stiffness."""
+        motion = f"class {self.symmetry} ({symmetry_named(self.symmetry).words})"
+        if self.buckling:
+            return f"Buckling in {motion} at {self.critical_pressure / 1e3:.6g} kPa."
+        share = self.lowest[self.softest] / self.lowest[0]
+        return (
+            f"No buckling in {motion} up to {max(self.pressures) / 1e3:.4g} kPa; the stiffness is least at "
+            f"{self.pressures[self.softest] / 1e3:.4g} kPa, {share:.0%} of that at the start."
+        )
+
+
+def read_classes(record: Record, table: str) -> tuple[ClassBuckling, ...]:
+    """Classes of the walk whose points are kept in a table; none where they were not asked for."""
+    seen = {note["pressure"]: note["lowest"] for note in record.notes(LOWEST) if note["table"] == table}
+    keys = ("kind", "pressure", "eigenvalue")
+    buckled = {
+        (note["symmetry"], round(note["pressure"], 3)): {key: note[key] for key in keys}
+        for note in record.notes(BUCKLED_CLASS)
+        if note["table"] == table
+    }
+    found = []
+    for name in next(iter(seen.values()), ()):
+        pressures = sorted(seen)
+        lowest = tuple(seen[p][name] for p in pressures)
+        own = sorted((b for (symmetry, _), b in buckled.items() if symmetry == name), key=lambda b: b["pressure"])
+        found.append(ClassBuckling(name, tuple(pressures), lowest, tuple(own)))
+    return tuple(found)
+
+
+def first_buckling(
+    critical: float | None, classes: tuple[ClassBuckling, ...], own: str = EQUILIBRIA
+) -> dict[str, Any] | None:
+    """Lowest pressure at which the wall buckles in any class, Pa, and the class; `critical` is that of the path, whose
+    class is `own`.
+    """
+    found = [(c.critical_pressure, c.symmetry) for c in classes if c.critical_pressure is not None]
+    found += [] if critical is None else [(critical, own)]
+    pressure, name = min(found, default=(None, None))
+    return None if pressure is None else {"pressure": pressure, "symmetry": name}
+
+
+@dataclass(frozen=True)
+class Closing:
+    """History of a valve whose drive turns round.
+
+    Attributes
+    ----------
+    samples : sequence of objects with the columns of `columns.SAMPLE`
+    turn : Turn
+    shut_below : float, m2
+        Passage that counts as shut.
+    halvings : int
+        Steps that had to be halved.
+    failure : str
+        Why the run ended early; empty if it did not.
+    """
+
+    samples: Sequence[SimpleNamespace]
+    turn: Turn
+    shut_below: float
+    halvings: int = 0
+    failure: str = ""
+
+    @property
+    def first_shut(self) -> float | None:
+        """Time from the start of the turn to the first shut instant, s; None if there is none."""
+        shut = [s.time for s in self.samples if s.least_opening <= self.shut_below]
+        return shut[0] - self.turn.start if shut else None
+
+    @property
+    def closing_time(self) -> float | None:
+        """Time from the start of the turn to the first instant from which on it is shut to the end of the run, s; None
+        if it ends open.
+        """
+        since = None
+        for sample in reversed(self.samples):
+            if sample.least_opening > self.shut_below:
+                break
+            since = sample.time
+        return None if since is None else max(0.0, since - self.turn.start)
+
+    def summary(self) -> dict:
+        """Plain SI numbers for JSON."""
+        first, closing = self.first_shut, self.closing_time
+        samples = self.samples
+        return {
+            "open_pressure": self.turn.pressure,
+            "reversal_time": self.turn.duration,
+            "duration": samples[-1].time if samples else 0.0,
+            "first_shut": first,
+            "closing_time": closing,
+            "closing_time_after_sign_change": None if closing is None else closing - 0.5 * self.turn.duration,
+            "stays_shut": closing is not None and not self.failure,
+            "lowest_pressure": min((s.lowest_pressure for s in samples), default=None),
+            "highest_pressure": max((s.highest_pressure for s in samples), default=None),
+            "largest_backflow": max(0.0, -min((s.mass_flow for s in samples), default=0.0)),
+            "largest_penetration": max((s.penetration for s in samples), default=0.0),
+            "steps": max(0, len(samples) - 1),
+            "halvings": self.halvings,
+            "failure": self.failure,
+        }
+
+
+def sentences(result: StudyResult) -> list[str]:
+    """Sentences on the balances, on buckling, on the safety against it and on the turn of the drive."""
+    safety = result.safety
+    return [
+        *_balances(result),
+        *_buckling(result),
+        *(part.sentence for part in result.classes),
+        *([] if safety is None else [safety.sentence]),
+        *([] if result.closing is None else _closing(result.closing)),
+        *result.measured.sentences(),
+    ]
+
+
+def _balances(result: StudyResult) -> list[str]:
+    if not result.states:
+        return []
+    force, energy = (
+        max(getattr(state, name) for state in result.states) for name in ("force_balance", "energy_balance")
+    )
+    return [f"Forces balance to {force:.1g} of their sizes, work and energies to {energy:.1g} of the work."]
+
+
+def _buckling(result: StudyResult) -> list[str]:
+    if result.buckling:
+        return [f"Buckling ({b.kind}) at {b.pressure / 1e3:.6g} kPa." for b in result.buckling[:3]]
+    followed = [point for point in result.walk if np.isfinite(point.lowest_eigenvalue)]
+    if not followed:
+        return []
+    softest = min(followed, key=lambda point: point.lowest_eigenvalue)
+    return [
+        f"No buckling within the symmetry of the model up to "
+        f"{max(p.pressure for p in followed) / 1e3:.4g} kPa; the stiffness is least at "
+        f"{softest.pressure / 1e3:.4g} kPa, "
+        f"{softest.lowest_eigenvalue / followed[0].lowest_eigenvalue:.0%} of that at the start."
+    ]
+
+
+def _closing(closing: Closing) -> list[str]:
+    told = closing.summary()
+    turn = (
+        f"Drive turned from {told['open_pressure'] / 1e3:g} to {-told['open_pressure'] / 1e3:g} kPa "
+        f"in {told['reversal_time']:g} s:"
+    )
+    if told["closing_time"] is None:
+        return [f"{turn} open at the end, {told['duration']:.4g} s."]
+    return [
+        f"{turn} shut for good {told['closing_time']:.4g} s after it began to turn "
+        f"({told['closing_time_after_sign_change']:.4g} s after it changed "
+        f"sign), fluid pressure between {told['lowest_pressure'] / 1e3:.4g} and "
+        f"{told['highest_pressure'] / 1e3:.4g} kPa."
+    ]

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
+from ...case.measured import AREA, SHAPE
 from ...errors import SolveError
 from ...record.record import GrowingRecord
-from ...record.table import printed_head, printed_row
 from ..case import Case
 from ..measured.kept import keep_measured
 from ..session import Session
-from ..study import Study
-from .closing import closing_valve, run_closing, shut_below
+from ..study import Study, print_rows
 from .columns import COMPARED, REVERSAL, SUMMARY, tables_of, void_rows
-from .measured import KINDS
-from .model import CONTACT, HELD_LIPS, closure_model
-from .opened import turn_back
 from .result import ClosureResult
-from .state import ClosureState
+from .reversal import closing_valve, run_closing, turn_back
+from .valve import CONTACT, HELD_LIPS, closure_model
 from .walk import ClosureWalk
 
 
@@ -31,7 +26,7 @@ def run(session: Session, record: GrowingRecord, in_time: bool = False, compare:
     else:
         record.note("asked", in_time=in_time, compare=compare)
     case, pressures = session.case, session.case.closure.pressures
-    keep_measured(record, "closure.measured", case.closure.measured, KINDS, case.fluid.density)
+    keep_measured(record, "closure.measured", case.closure.measured, (AREA, SHAPE), case.fluid.density)
     record.begin("closure", len(pressures) * (2 if compare else 1))
     if case.gravity.is_there:
         record.warn("Gravity has no part in back pressure: wall and fluid weigh nothing in these states.")
@@ -58,31 +53,16 @@ def _turn_in_time(case: Case, record: GrowingRecord) -> None:
     if not record.notes("turned"):
         void_rows(record, REVERSAL, 0)
         model = closing_valve(case)
-        record.note("turning", shut_below=shut_below(model))
+        record.note("turning", shut_below=model.shut_below)
+        halvings, failure = 0, ""
         try:
-            found = run_closing(model, record, lambda sample: record.append(REVERSAL, vars(sample)))
+            halvings, failure = run_closing(model, lambda sample: record.append(REVERSAL, sample), record)
         except SolveError as error:
-            record.note("turned", halvings=0, failure=str(error))
-        else:
-            record.note("turned", halvings=found.halvings, failure=found.failure)
+            failure = str(error)
+        record.note("turned", halvings=halvings, failure=failure)
     failure = record.notes("turned")[-1]["failure"]
     if failure:
         record.fail(f"The turn of the drive in time was not followed to its end: {failure}")
 
 
-def print_live(_case: Case) -> Callable[[ClosureState | str], str]:
-    """Lines of the table as states are found; a text is a title of those that follow."""
-    head = [*printed_head(SUMMARY)]
-
-    def write(item: ClosureState | str) -> str:
-        if isinstance(item, str):
-            head[:] = printed_head(SUMMARY)
-            return item
-        lines = [*head, printed_row(SUMMARY, item)]
-        head.clear()
-        return "\n".join(lines)
-
-    return write
-
-
-STUDY = Study("closure", tables_of, run, ClosureResult, live=print_live)
+STUDY = Study("closure", tables_of, run, ClosureResult, live=lambda case: print_rows(SUMMARY))

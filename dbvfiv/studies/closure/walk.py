@@ -1,31 +1,61 @@
-"""The walk over the back pressures of a case, kept in a record while it goes on and taken up again from there."""
+"""The walk over the back pressures of a case: load steps, multiplier updates, the watch for buckling in every symmetry
+class, arclength past limit points; kept in a record while it goes on and taken up again from there.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
+from copy import copy
+from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from continuation import NotConverged
+
 from ...errors import SolveError
 from ...model.equilibria import model_warnings, state_warnings
-from ...model.symmetry import symmetry_named
+from ...model.load_steps import LoadStepOptions, LoadSteps
+from ...model.newton import NewtonOptions, NewtonResult
+from ...model.symmetry import ALL, symmetries_of, symmetry_named
 from ...record.record import GrowingRecord
-from ...record.states import LAYERS
-from ...shell.recovery import layer_fields
-from .buckling import Buckling
-from .class_result import BUCKLED_CLASS, LOWEST
-from .columns import BUCKLED, BUCKLING, FIELDS, MOST_EIGENVALUES, PATH, POINT, STATES, SUMMARY, valid_rows, void_rows
-from .model import ClosureModel
-from .opening import opening
-from .path import ClosureOptions, ClosurePath
-from .path_point import PathPoint, PathRestart
-from .remarks import FoundPlace, overlap_warnings, start_warnings
-from .state import ClosureState
+from .buckling import (
+    Buckling,
+    BucklingWatch,
+    StiffnessSpectrum,
+    class_matrices,
+    follow_past_limits,
+    spectrum_of,
+    stiffness_spectrum,
+)
+from .columns import (
+    BUCKLED,
+    BUCKLED_CLASS,
+    BUCKLING,
+    LOWEST,
+    MOST_EIGENVALUES,
+    PATH,
+    RESTART,
+    STATES,
+    valid_rows,
+    void_rows,
+)
+from .energy import EnergyLedger
+from .safety import CROSSED
+from .valve import CONTACT, ClosureModel
+
+#: Farthest that an equilibrium may lie from its prediction, over the mean wall thickness.
+LARGEST_JUMP = 0.15
+#: Renewals of the multipliers before giving up.
+MOST_UPDATES = 40
+#: Smallest load step over the target pressure, and largest load step over the first from rest, where the lips meet.
+MIN_STEP, FIRST_SHARE = 1e-5, 20
 
 
 class ClosureWalk:
-    """The walk of one model.
+    """The walk of one model; rows of its record are appended as soon as they are found.
 
     Parameters
     ----------
@@ -33,26 +63,48 @@ class ClosureWalk:
     record : GrowingRecord
     prefix : str
         Of the tables that the walk is kept in.
+
+    Attributes
+    ----------
+    steps : LoadSteps
+    watches : dict of BucklingWatch
+        Of the class of the path, the first, and of others that are watched, by their names.
     """
 
     def __init__(self, model: ClosureModel, record: GrowingRecord, prefix: str = ""):
         self.model, self.record, self.compared = model, record, bool(prefix)
         self.states, self.points, self.buckling = (prefix + table for table in (STATES, PATH, BUCKLING))
-        self.path = ClosurePath(model, ClosureOptions.of(model.case), record, self._follow)
-        self._kept = {self.points: 0, self.buckling: 0}  # of what this walk has found
-        self._classes_kept, self._class_buckling_kept = 0, {}
-        self._limit_kept = False
+        closure, steady, pressed = model.case.closure, model.case.steady, model.pressed
+        jump = LARGEST_JUMP * float(np.mean(model.mesh.thickness))
+        newton = NewtonOptions(steady.tolerance, steady.max_iterations)
+        options = LoadStepOptions(newton, MIN_STEP, closure.max_step / FIRST_SHARE, closure.max_step, jump)
+        self.steps = LoadSteps(pressed, options, observer=record, accepted=self._accept)
+        self.watches = {name: BucklingWatch(pressed, options, watch) for name, watch in self._spectra().items()}
+        self.own = next(iter(self.watches.values()))
+        self.energy = EnergyLedger(pressed, closure.balance_tolerance)
+        self.energy.begin(self.steps.q, 0.0)
+        self.beyond_limit = self._limit_met = False
+        self._kept = dict.fromkeys(self.watches, 0)  # buckling states in the record
+
+    def _spectra(self) -> dict[str, Any]:
+        model, closure = self.model, self.model.case.closure
+        (own, _), *others = symmetries_of(model.mesh.part).items()
+        spectra = {own: lambda q, pressure: stiffness_spectrum(model.pressed, q, pressure, closure.eigenvalues)}
+        for name, symmetry in others if closure.symmetry == ALL and model.supports == CONTACT else ():
+            free = symmetry.free_unknowns(model.mesh)
+            matrices = partial(class_matrices, model.pressed, free, symmetry.moves_lips_apart)
+            spectra[name] = lambda q, p, matrices=matrices: spectrum_of(*matrices(q, p), p, closure.eigenvalues)
+        return spectra
 
     def go(self, pressures: Sequence[float]) -> None:
         """Equilibria at back pressures, Pa, each reached from the one before; those that the record holds are not found
         again. One that is not reached ends the list, for those after it lie beyond it.
         """
         record = self.record
-        self._say([*model_warnings(self.model), *start_warnings(self.model)])
+        self._warn([*model_warnings(self.model), *self.model.start_warnings()])
         if not record.notes(self.states):
-            copies = self.model.mesh.part.copies
-            reference = copies * opening(self.model, self.model.pressed.rest()).reference
-            record.note(self.states, supports=self.model.supports, reference_opening=reference)
+            setting = {"supports": self.model.supports, "reference_opening": self.model.reference_opening}
+            record.note(self.states, **setting)
         try:
             over = [note for note in record.notes("walked") if note["table"] == self.states]
             failure = over[-1]["failure"] if over else self._walk(pressures)
@@ -61,80 +113,198 @@ class ClosureWalk:
             if failure is not None:
                 record.fail(self._named(failure))
         finally:
-            found = self._found()
-            self._say(
-                [*state_warnings(self.model, found), *self._buckling_warnings(), *overlap_warnings(self.model, found)]
-            )
+            self._warn_of_states()
 
     def _walk(self, pressures: Sequence[float]) -> str | None:
         """Go over the list, and say why it was not gone to its end."""
-        done = self._resume()
-        for pressure in pressures[done:]:
-            try:
-                state = self.path.go_to(pressure)
-            except SolveError as error:
-                self._follow(self.path)
-                return str(error)
-            self._reached(state)
+        try:
+            for pressure in pressures[self._resume() :]:
+                self._go_to(pressure)
+        except SolveError as error:
+            return str(error)
         return None
+
+    # -- equilibria
+    # ----
+
+    def _go_to(self, target: float) -> None:
+        """Find and keep the equilibrium at a back pressure, Pa, with the penetration asked for.
+
+        Raises
+        ------
+        SolveError
+        """
+        steps, iterations, count = self.steps, 0, 0
+        try:
+            way = steps.reach(target)
+            last, iterations, count = way.result, way.iterations, way.steps
+        except SolveError as error:
+            if not self.model.case.closure.arclength:
+                self._keep_before_limit(steps.pressure, steps.q)
+                raise
+            self._go_past_limit(target, error)
+            last = steps.settle()
+        updates = 0
+        while (depth := self.model.pressed.contact_state(steps.q).penetration) > self.model.case.closure.penetration:
+            if updates == MOST_UPDATES:
+                raise SolveError(
+                    f"At {target:.6g} Pa {updates} renewals of the contact multipliers left a penetration of "
+                    f"{depth:.2g} m; a larger closure.contact_depth may help."
+                )
+            self.model.pressed.renew_multipliers(steps.q)
+            last = steps.settle()
+            self.energy.add(steps.q, target, steps.slope)
+            iterations, updates = iterations + last.iterations, updates + 1
+        self.energy.settle()
+        spectrum = self._watch(target, steps.q)
+        found = {"iterations": iterations, "load_steps": count, "multiplier_updates": updates}
+        self._keep_state(self.model, steps.q, target, spectrum, last, found, self._restart())
+
+    def _accept(self, pressure: float, q: np.ndarray) -> None:
+        """Keep an equilibrium between two back pressures."""
+        self.energy.add(q, pressure, self.steps.slope)
+        self._watch(pressure, q, point=True)
+
+    def _watch(self, pressure: float, q: np.ndarray, point: bool = False) -> StiffnessSpectrum:
+        """Look for buckling at the next equilibrium in every class; keep it as a point of the path if it is one."""
+        spectrum = self.own.see(pressure, q)
+        if point:
+            self._keep_point(pressure, q, float(spectrum.values.real[0]))
+        others = {name: watch.see(pressure, q).lowest for name, watch in list(self.watches.items())[1:]}
+        if others:
+            self.record.note(LOWEST, table=self.points, pressure=float(pressure), lowest=others)
+        self._keep_buckling()
+        if self.own.before is not None:
+            self._keep_before_limit(*self.own.before)
+        return spectrum
+
+    def _go_past_limit(self, target: float, error: SolveError) -> None:
+        """Arclength from the last equilibrium to the target pressure."""
+        steps, pressed = self.steps, self.model.pressed
+        start, q = steps.pressure, steps.q
+        self.record.progress(f"arclength from {start:.6g} Pa")
+        try:
+            path = follow_past_limits(pressed, q, start, target, steps.options.newton.tolerance, self.record)
+        except NotConverged as reason:
+            self._keep_before_limit(start, q)
+            raise SolveError(f"{error} Arclength did not get under way either: {reason}") from reason
+        for pressure, place in path.points[1:]:
+            self._keep_point(pressure, place, np.nan, arclength=True)
+            self.energy.add(place, pressure, refine=False)
+        self.own.found.extend(path.limits)
+        self._keep_buckling()
+        if path.limits or not path.reached:
+            self._keep_before_limit(start, q)
+        self.beyond_limit = self.beyond_limit or bool(path.limits)
+        for watch in self.watches.values():
+            watch.forget()
+        steps.pressure, steps.q = path.points[-1]
+        steps.slope = None
+        if not path.reached:
+            raise SolveError(
+                f"{error} Arclength ended at {steps.pressure:.6g} Pa after {len(path.points)} points ({path.reason})."
+            )
+
+    def _keep_before_limit(self, pressure: float, q: np.ndarray) -> None:
+        """Describe and keep the last equilibrium before the first limit."""
+        if self._limit_met or pressure <= 0:
+            return
+        self._limit_met = True
+        try:
+            model, q, last, updates = self._settle_apart(pressure, q)
+            spectrum = stiffness_spectrum(model.pressed, q, pressure, self.model.case.closure.eigenvalues)
+            found = {"iterations": last.iterations, "load_steps": 0, "multiplier_updates": updates}
+            self._keep_state(model, q, pressure, spectrum, last, found, None)
+        except SolveError as error:
+            self.record.warn(f"The last state before a limit, at {pressure:.6g} Pa, was not described: {error}")
+
+    def _settle_apart(self, pressure: float, q: np.ndarray) -> tuple[ClosureModel, np.ndarray, NewtonResult, int]:
+        """Equilibrium with the penetration asked for, on a model of its own: the walk is left as it is."""
+        model = replace(self.model, pressed=copy(self.model.pressed))
+        pressed, steps, updates = model.pressed, LoadSteps(model.pressed, self.steps.options, pressure, q), 0
+        last = steps.settle()
+        found = pressed.multiplier, steps.q
+        allowed = model.case.closure.penetration
+        try:
+            while pressed.contact_state(steps.q).penetration > allowed and updates < MOST_UPDATES:
+                pressed.renew_multipliers(steps.q)
+                last, updates = steps.settle(), updates + 1
+        except SolveError:  # the limit lies nearer than what renewed multipliers change
+            pressed.multiplier, steps.q = found
+            last, updates = steps.settle(), 0
+        return model, steps.q, last, updates
 
     # -- the record
     # ----
 
-    def _follow(self, path: ClosurePath) -> None:
-        """Keep what is new on the path."""
-        self._follow_classes(path)
-        for table, found, row_of in (
-            (self.points, path.points, self._point_row),
-            (self.buckling, path.buckling, self._buckling_row),
-        ):
-            for item in found[self._kept[table] :]:
-                self.record.append(table, row_of(item))
-            self._kept[table] = len(found)
-        if path.before_limit is not None and not self._limit_kept:
-            self._limit_kept = True
-            self.record.append(self.states, self._state_row(path.before_limit) | self._no_restart())
-            self.record.item(path.before_limit)
+    def _keep_point(self, pressure: float, q: np.ndarray, lowest: float, arclength: bool = False) -> None:
+        row = {"pressure": float(pressure), "lowest_eigenvalue": lowest, "arclength": arclength}
+        self.record.append(self.points, row | self.model.measure(q))
 
-    def _follow_classes(self, path: ClosurePath) -> None:
-        """Keep what is new of the classes of motion that the path does not have."""
-        for pressure, lowest in path.classes.lowest[self._classes_kept :]:
-            self.record.note(LOWEST, table=self.points, pressure=pressure, lowest=lowest)
-        self._classes_kept = len(path.classes.lowest)
-        for name, watch in path.classes.watches.items():
-            for found in watch.found[self._class_buckling_kept.get(name, 0) :]:
-                self.record.note(
-                    BUCKLED_CLASS,
-                    table=self.points,
-                    symmetry=name,
-                    kind=found.kind,
-                    pressure=found.pressure,
-                    eigenvalue=found.eigenvalue,
-                )
-                self._say(
-                    [f"The wall buckles at {found.pressure:.6g} Pa in class {name}: {symmetry_named(name).words}."]
-                )
-            self._class_buckling_kept[name] = len(watch.found)
+    def _keep_buckling(self) -> None:
+        """Keep what is new of the buckling states of all classes."""
+        nodal = self.model.pressed.nodal
+        for name, watch in self.watches.items():
+            for b in watch.found[self._kept[name] :]:
+                row = {"kind": b.kind, "pressure": b.pressure, "eigenvalue": b.eigenvalue}
+                if watch is self.own:
+                    self.record.append(self.buckling, row | {"nodal": nodal(b.q), "shape": nodal(b.shape)})
+                else:
+                    self.record.note(BUCKLED_CLASS, table=self.points, symmetry=name, **row)
+                    words = symmetry_named(name).words
+                    self._warn([f"The wall buckles at {b.pressure:.6g} Pa in class {name}: {words}."])
+            self._kept[name] = len(watch.found)
 
-    def _reached(self, state: ClosureState) -> None:
-        """Keep a state with what it takes to go on from it; what led to it is kept already."""
-        at = self.path.restart(state.lowest_stiffness_eigenvalue)
-        multiplier = np.zeros(len(state.nodal))
-        multiplier[self.model.pressed.contact.nodes] = at.multiplier
-        restart = {
-            "way/step": at.step,
-            "way/slope": self.model.pressed.nodal(at.slope),
-            "way/multiplier": multiplier,
-            "way/energy": at.energy,
-            "way/path": self.record.rows(self.points),
-            "way/buckling": self.record.rows(self.buckling),
+    def _keep_state(
+        self,
+        model: ClosureModel,
+        q: np.ndarray,
+        pressure: float,
+        spectrum: StiffnessSpectrum,
+        last: NewtonResult,
+        found: dict[str, int],
+        restart: dict[str, Any] | None,
+    ) -> None:
+        """Keep a state; one without `restart` data is the last before a limit."""
+        values = np.full(MOST_EIGENVALUES, np.nan)
+        values[: len(spectrum.values)] = spectrum.values.real
+        row = model.describe(q, pressure) | found
+        row |= {
+            "lowest_stiffness_eigenvalue": spectrum.lowest,
+            "lowest_symmetric_eigenvalue": float(spectrum.symmetric_values[0]),
+            "asymmetry": spectrum.asymmetry,
+            "stable": bool(spectrum.lowest > 0),
+            "stiffness_eigenvalues": values,
+            "beyond_limit": restart is not None and self.beyond_limit,
+            "energy_balance": self.energy.error,
+            "converged": True,
+            "residual": last.residual,
+            "rounding": last.rounding,
+            "reason": last.reason,
+            "before_limit": restart is None,
         }
-        self.record.append(self.states, self._state_row(state) | restart)
-        self.record.item(state)
+        shapes = self.record.tables[self.states].shapes
+        none = {c.name: np.full(shapes.get(c.name, ()), np.nan) for c in RESTART}
+        counts = {"way/path": self.record.rows(self.points), "way/buckling": self.record.rows(self.buckling)}
+        self.record.append(self.states, row | none | (restart or {}) | counts)
+        self.record.item(SimpleNamespace(**row))
+
+    def _restart(self) -> dict[str, Any]:
+        """What it takes to go on from the present state."""
+        pressed, steps = self.model.pressed, self.steps
+        multiplier = np.zeros(pressed.mesh.node_count)
+        multiplier[pressed.contact.nodes] = pressed.multiplier
+        slope = pressed.nodal(steps.slope)
+        return {
+            "way/step": steps.step,
+            "way/slope": slope,
+            "way/multiplier": multiplier,
+            "way/energy": self.energy.totals,
+        }
 
     def _resume(self) -> int:
         """Stand at the last state that was asked for, if there is one, and say how many there are."""
-        record = self.record
+        record, steps = self.record, self.steps
         rows = [row for row in valid_rows(record, self.states) if not self._value("before_limit", row)]
         last = rows[-1] if rows else None
         void_rows(record, self.states, 0 if last is None else last + 1)
@@ -142,67 +312,30 @@ class ClosureWalk:
         void_rows(record, self.buckling, 0 if last is None else int(self._value("way/buckling", last)))
         if last is None:
             return 0
-        restrict = self.model.shell.dofs.restrict
-        buckling = tuple(self._read_buckling())
-        self._kept[self.buckling] = len(buckling)
-        self.path.resume(
-            PathRestart(
-                float(self._value("pressure", last)),
-                restrict(self._value("nodal", last)),
-                restrict(self._value("way/slope", last)),
-                self._value("way/multiplier", last)[self.model.pressed.contact.nodes],
-                float(self._value("way/step", last)),
-                bool(self._value("beyond_limit", last)),
-                float(self._value("lowest_stiffness_eigenvalue", last)),
-                tuple(self._value("way/energy", last)),
-                buckling,
-            )
-        )
+        pressed, restrict = self.model.pressed, self.model.shell.dofs.restrict
+        steps.pressure, steps.step = float(self._value("pressure", last)), float(self._value("way/step", last))
+        steps.q, steps.slope = restrict(self._value("nodal", last)), restrict(self._value("way/slope", last))
+        pressed.multiplier = self._value("way/multiplier", last)[pressed.contact.nodes]
+        self.energy.begin(steps.q, steps.pressure, steps.slope)
+        self.energy.totals = tuple(self._value("way/energy", last))
+        self.beyond_limit = bool(self._value("beyond_limit", last))
+        for row in valid_rows(record, self.buckling):
+            b = {c.name: record.value(self.buckling, c.name, row) for c in BUCKLED}
+            q, shape = restrict(b["nodal"]), restrict(b["shape"])
+            self.own.found.append(Buckling(str(b["kind"]), float(b["pressure"]), q, shape, float(b["eigenvalue"])))
+        self._kept[next(iter(self.watches))] = len(self.own.found)
+        self._limit_met = bool(self.own.found)
+        for watch in self.watches.values():
+            watch.see(steps.pressure, steps.q)
         return len(rows)
-
-    def _read_buckling(self) -> Iterator[Buckling]:
-        restrict = self.model.shell.dofs.restrict
-        for row in valid_rows(self.record, self.buckling):
-            found = {c.name: self.record.value(self.buckling, c.name, row) for c in BUCKLED}
-            q, shape = restrict(found["nodal"]), restrict(found["shape"])
-            yield Buckling(str(found["kind"]), float(found["pressure"]), q, shape, float(found["eigenvalue"]))
 
     def _value(self, column: str, row: int) -> Any:
         return self.record.value(self.states, column, row)
 
-    # -- rows
-    # ----
-
-    def _state_row(self, state: ClosureState) -> dict[str, Any]:
-        row = {c.name: getattr(state, c.name) for c in (*SUMMARY, *FIELDS)}
-        values = np.full(MOST_EIGENVALUES, np.nan)
-        values[: len(state.stiffness_eigenvalues)] = state.stiffness_eigenvalues
-        layers = layer_fields(self.model.shell, self.model.shell.dofs.restrict(state.nodal))
-        return row | {"stiffness_eigenvalues": values} | {c.name: getattr(layers, c.name.split("/")[1]) for c in LAYERS}
-
-    def _no_restart(self) -> dict[str, Any]:
-        nodes = len(self.model.mesh.nodes)
-        counts = {"way/path": self.record.rows(self.points), "way/buckling": self.record.rows(self.buckling)}
-        return counts | {
-            "way/step": np.nan,
-            "way/slope": np.full(self.model.shell.dofs.free.shape, np.nan),
-            "way/multiplier": np.full(nodes, np.nan),
-            "way/energy": np.full(6, np.nan),
-        }
-
-    @staticmethod
-    def _point_row(point: PathPoint) -> dict[str, Any]:
-        return {c.name: getattr(point, c.name) for c in POINT}
-
-    def _buckling_row(self, found: Buckling) -> dict[str, Any]:
-        nodal = self.model.pressed.nodal
-        own = {name: getattr(found, name) for name in ("pressure", "kind", "eigenvalue")}
-        return own | {"nodal": nodal(found.q), "shape": nodal(found.shape)}
-
     # -- what is worth knowing
     # ----
 
-    def _say(self, sentences: Iterable[str]) -> None:
+    def _warn(self, sentences: Iterable[str]) -> None:
         for sentence in sentences:
             if not self.compared:
                 self.record.warn(sentence)
@@ -212,17 +345,26 @@ class ClosureWalk:
     def _named(self, sentence: str) -> str:
         return f"With the supports {self.model.supports}: {sentence}" if self.compared else sentence
 
-    def _found(self) -> list[FoundPlace]:
+    def _warn_of_states(self) -> None:
+        """Warnings about the states that were found: material, buckling, faces that overlap."""
         restrict = self.model.shell.dofs.restrict
-        return [
-            FoundPlace(
-                *(float(self._value(name, row)) for name in ("pressure", "overlap")),
-                restrict(self._value("nodal", row)),
+        found = [
+            SimpleNamespace(
+                pressure=float(self._value("pressure", row)),
+                overlap=float(self._value("overlap", row)),
+                q=restrict(self._value("nodal", row)),
             )
             for row in valid_rows(self.record, self.states)
         ]
-
-    def _buckling_warnings(self) -> Iterator[str]:
+        self._warn(state_warnings(self.model, found))
         for row in valid_rows(self.record, self.buckling)[:1]:
             pressure, kind = (self.record.value(self.buckling, name, row) for name in ("pressure", "kind"))
-            yield f"The wall buckles at {pressure:.6g} Pa ({kind}); states at higher pressures lie beyond it."
+            self._warn([f"The wall buckles at {pressure:.6g} Pa ({kind}); states at higher pressures lie beyond it."])
+        worst = max(found, key=lambda state: state.overlap, default=None)
+        if worst is not None and worst.overlap > CROSSED * self.model.case.closure.penetration:
+            self._warn(
+                [
+                    f"The inner faces overlap by up to {worst.overlap * 1e3:.2g} mm at {worst.pressure:.6g} Pa, "
+                    "because these supports stop the mid-surface and not the faces."
+                ]
+            )

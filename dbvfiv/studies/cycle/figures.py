@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -23,10 +23,8 @@ from ...drawing.style import (
     pressure_colours,
 )
 from ...drawing.views import layer_panels
+from ..result import StudyResult
 from ..stability.place import describe_fixed
-
-if TYPE_CHECKING:
-    from .result import CycleResult, Point
 
 #: Cycles shown in the phase plane and in spectra.
 SHOWN = 7
@@ -34,7 +32,7 @@ SHOWN = 7
 INSTANTS = 12
 
 
-def draw(result: CycleResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a branch, each with its name."""
     yield "branch", lambda: branch(result)
     yield "envelope", lambda: envelope(result)
@@ -45,15 +43,15 @@ def draw(result: CycleResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "stress-range", lambda: stress_range(result)
 
 
-def _title(result: CycleResult) -> str:
+def _title(result: StudyResult) -> str:
     return f"{result.header.name}, {describe_fixed(result.case, result.parameter)}"
 
 
-def _values(result: CycleResult) -> np.ndarray:
+def _values(result: StudyResult) -> np.ndarray:
     return np.array([point.value for point in result.points]) / PARAMETERS[result.parameter].scale
 
 
-def branch(result: CycleResult) -> Figure:
+def branch(result: StudyResult) -> Figure:
     """Amplitude and frequency over the parameter, unstable cycles dashed, special points marked."""
     figure = new_figure(7.2, 6.0)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
@@ -81,7 +79,7 @@ def branch(result: CycleResult) -> Figure:
     return figure
 
 
-def _with_stability(axes, result: CycleResult, x: np.ndarray, y: np.ndarray, first: int = 0) -> None:
+def _with_stability(axes, result: StudyResult, x: np.ndarray, y: np.ndarray, first: int = 0) -> None:
     """Curves through cycles: full where both ends of a piece are stable or unknown."""
     states = [point.stable for point in result.points]
     states = [states[0]] * first + states
@@ -95,7 +93,7 @@ def _with_stability(axes, result: CycleResult, x: np.ndarray, y: np.ndarray, fir
     axes.plot(x[first:], y[first:], ".", color=COMPUTED, ms=6)
 
 
-def _mark_special(result: CycleResult, axes) -> None:
+def _mark_special(result: StudyResult, axes) -> None:
     scale = PARAMETERS[result.parameter].scale
     for special in result.special_points:
         x, y = special["value"] / scale, 1e3 * special["amplitude"]
@@ -104,7 +102,7 @@ def _mark_special(result: CycleResult, axes) -> None:
         axes.annotate(f"{special['kind']}\n{x:.4g}", (x, y), xytext=(8, -7), va="top", **look)
 
 
-def envelope(result: CycleResult) -> Figure:
+def envelope(result: StudyResult) -> Figure:
     """Between which displacements the lip swings, and its mean."""
     figure = new_figure(7.0, 4.4)
     axes = figure.subplots()
@@ -126,12 +124,12 @@ def envelope(result: CycleResult) -> Figure:
     return figure
 
 
-def _some(result: CycleResult) -> list[Point]:
+def _some(result: StudyResult) -> list[Any]:
     points = [point for point in result.points if point.asked] or list(result.points)
     return [points[i] for i in np.unique(np.linspace(0, len(points) - 1, SHOWN).round().astype(int))]
 
 
-def phase_plane(result: CycleResult) -> Figure:
+def phase_plane(result: StudyResult) -> Figure:
     """Orbits of some cycles in the plane of displacement and velocity of the lip."""
     figure = new_figure(6.6, 5.2)
     axes = figure.subplots()
@@ -153,7 +151,7 @@ def phase_plane(result: CycleResult) -> Figure:
     return figure
 
 
-def centre_line(result: CycleResult) -> Figure:
+def centre_line(result: StudyResult) -> Figure:
     """The line x = 0 at instants of a period of the last cycle."""
     point = result.nearest()
     figure = new_figure(7.4, 4.4)
@@ -168,7 +166,7 @@ def centre_line(result: CycleResult) -> Figure:
     return figure
 
 
-def wave(result: CycleResult) -> Figure:
+def wave(result: StudyResult) -> Figure:
     """The motion of the line x = 0 about its mean over one period of the last cycle: a wave along the valve."""
     point = result.nearest()
     orbit = point.orbit
@@ -194,7 +192,7 @@ def wave(result: CycleResult) -> Figure:
     return figure
 
 
-def spectrum(result: CycleResult) -> Figure:
+def spectrum(result: StudyResult) -> Figure:
     """Harmonics of the displacement of the lip of some cycles."""
     figure = new_figure(6.8, 4.4)
     axes = figure.subplots()
@@ -212,7 +210,7 @@ def spectrum(result: CycleResult) -> Figure:
     return figure
 
 
-def stress_range(result: CycleResult) -> Figure:
+def stress_range(result: StudyResult) -> Figure:
     """Largest range of a stress over a period of the last cycle, in each layer on the unrolled part."""
     point = result.nearest()
     figure, _ = layer_panels(result.mesh, point.ranges.stress.T / 1e6, "Range of stress, MPa")
@@ -220,6 +218,6 @@ def stress_range(result: CycleResult) -> Figure:
     return figure
 
 
-def _at(result: CycleResult, point: Point) -> str:
+def _at(result: StudyResult, point: Any) -> str:
     row = PARAMETERS[result.parameter]
     return f"{result.header.name}: {row.text(point.value)}, {point.frequency:.4g} Hz"

@@ -1,16 +1,26 @@
-"""Start of a branch of cycles from an onset (Hopf bifurcation) of a scan."""
+"""Start of a branch of cycles: from an onset (Hopf bifurcation) of a scan, or from a motion in a result file."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from continuation.harmonics import Harmonics
+from continuation.periodic import PeriodicMotion
+
 from ...case.parameters import PARAMETERS, Mu
-from ...errors import SolveError
+from ...errors import CaseError, SolveError
+from ...model import ValveModel
+from ...motion.equations import ValveMotion
+from ...motion.scheme import scheme
+from ...motion.state import consistent_state
+from ...motion.stepper import StepFailure, Stepper
 from ...observer import Observer
 from ..case import Case
 from ..orbits.onset import Onset, onset_at
+from ..session import load_result
 from ..stability.correction import OnsetCorrection
 from ..stability.crossings import Crossing, Scan, locate
 from ..stability.place import condition_of, is_surrounding
@@ -100,3 +110,121 @@ def _without(case: Case, scan: Scan) -> str:
         f"{state} there, and a branch of cycles starts where it loses stability. `dbvfiv onset` looks over a wider "
         "range."
     )
+
+
+#: Steps of the period that is run from the last state of a run in time.
+STEPS = 96
+#: Harmonics of its motion.
+HARMONICS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """A motion to start from.
+
+    Attributes
+    ----------
+    value : float
+        Of the parameter.
+    place : Mu
+    motion : PeriodicMotion
+        Near a cycle.
+    """
+
+    value: float
+    place: Mu
+    motion: PeriodicMotion
+
+
+def given_motion(case: Case, walk: StabilityWalk) -> Given:
+    """The motion of `cycle.start_file`: a cycle, or the last period of a run in time that has settled on one.
+
+    Only the value of the parameter is that of the file; all else is that of the case.
+
+    Raises
+    ------
+    CaseError
+        If the file holds no such motion, or one of another mesh or beyond the range.
+    SolveError
+        If the run does not go on.
+    """
+    path, axis = case.cycle.start_file, case.cycle.axis
+    result = load_result(path)
+    if result.kind not in ("transient", "cycle"):
+        raise CaseError(
+            f"{str(path)!r} holds a result of kind {result.kind!r}; a branch starts from a cycle or from a run in "
+            "time.",
+            key="cycle.start_file",
+        )
+    model = walk.built(Mu.of(case)).model
+    if result.mesh.nodes.shape != model.mesh.nodes.shape:
+        raise CaseError(
+            f"The motion of {str(path)!r} belongs to a mesh of {len(result.mesh.nodes)} nodes and this case's has "
+            f"{len(model.mesh.nodes)}.",
+            key="cycle.start_file",
+        )
+    value = Mu.of(result.case)[axis.parameter]
+    point = _cycle_of(case, result) if result.kind == "cycle" else None
+    if point is not None and result.parameter == axis.parameter:
+        value = float(point.value)
+    low, high = axis.values[0], axis.values[-1]
+    if not low <= value <= high:
+        row = PARAMETERS[axis.parameter]
+        raise CaseError(
+            f"The motion of {str(path)!r} is at {row.text(value)}, beyond the range from {row.text(low)} to "
+            f"{row.text(high)}.",
+            key="cycle.start_file",
+        )
+    place = Mu.of(case).at(**{axis.parameter: value})
+    if point is not None:
+        return Given(value, place, point.orbit.motion)
+    return Given(value, place, _last_period(walk.built(place).model, case, place, result))
+
+
+def _cycle_of(case: Case, result):
+    """Cycle `cycle.start_cycle` of a result, counted in the order of its table."""
+    number, points = case.cycle.start_cycle, sorted(result.points, key=lambda point: point.number)
+    if number is None and result.parameter != case.cycle.axis.parameter and points:
+        return result.nearest(Mu.of(case)[result.parameter])
+    number = -1 if number is None else number
+    if not -len(points) <= number < len(points):
+        raise CaseError(
+            f"{str(case.cycle.start_file)!r} holds {len(points)} cycles, so there is no cycle {number}.",
+            key="cycle.start_cycle",
+        )
+    return points[number]
+
+
+def _last_period(model: ValveModel, case: Case, place: Mu, result) -> PeriodicMotion:
+    """One period, in steps, from the last state of a run."""
+    verdict = result.verdict
+    if verdict["verdict"] != "limit cycle" or not verdict["frequency"]:
+        raise CaseError(
+            f"The run in {str(case.cycle.start_file)!r} has not settled on a cycle; its verdict is "
+            f"{verdict['verdict']}.",
+            key="cycle.start_file",
+        )
+    if model.flow.inner != 1:
+        raise CaseError(
+            "A branch of a valve with an elastic line, or a compressed fluid, does not start from a run in time, whose "
+            "states do not hold the waves; start it from an onset, or from a cycle.",
+            key="cycle.start_file",
+        )
+    state, inlet, period = result.states[-1], place.pressure, 1.0 / verdict["frequency"]
+    motion = ValveMotion(model, place)
+    dofs = model.shell.dofs
+    speed = float(state.station_velocity[-1])
+    now = consistent_state(motion, 0.0, dofs.restrict(state.nodal), dofs.restrict(state.nodal_rate), speed, inlet)
+    stepper = Stepper(motion, scheme("generalised-alpha"), lambda _: inlet)
+    samples = []
+    for _ in range(STEPS):
+        samples.append(np.append(now.q, now.speed))
+        try:
+            now = stepper.step(now, period / STEPS).state
+        except StepFailure as failure:
+            raise SolveError(f"The run in {str(case.cycle.start_file)!r} does not go on: {failure}") from failure
+    # what is not periodic yet is spread over the period
+    drift = np.append(now.q, now.speed) - samples[0]
+    rows = np.array(samples) - np.linspace(0.0, 1.0, STEPS, endpoint=False)[:, None] * drift
+    h = Harmonics(min(HARMONICS, case.cycle.max_harmonics))
+    return PeriodicMotion(h, h.real(np.fft.rfft(rows, axis=0)[: h.count + 1] / STEPS), 2 * np.pi / period)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from ...case.parameters import Mu
 from ...errors import CaseError, SolveError
 from ...motion.periodic import check_periodic
 from ...record.record import GrowingRecord
-from ...record.table import printed_head, printed_row
 from ..case import Case
 from ..orbits.follower import Follower
 from ..orbits.onset import MODES
@@ -22,36 +20,25 @@ from ..session import Session
 from ..stability.place import check_scan
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
-from ..study import Study
-from .given import given_motion
-from .result import CycleResult
-from .rows import (
+from ..study import Study, print_rows
+from .result import (
     COLUMNS,
     CYCLES,
     ENDED,
     SERIES,
     SPECIAL,
     VERDICT,
+    CycleResult,
     cycle_row,
     read_points,
     series_rows,
     special_note,
     tables_of,
 )
-from .start import find_onset
+from .start import find_onset, given_motion
 
 #: Distance of the second cycle from one of a file, over the range.
 AWAY = 0.02
-
-
-@dataclass(frozen=True)
-class Row:
-    """A row of the table of cycles as it is printed."""
-
-    numbers: dict
-
-    def __getattr__(self, name):
-        return self.numbers[name]
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -166,19 +153,7 @@ class _Keeper:
                 "Fluid is drawn in during some cycles. Their flow has the law of outward flow, so they are not to be "
                 "relied on; runs in time have a law for either way."
             )
-        record.item(Row(row))
+        record.item(SimpleNamespace(**row))
 
 
-def print_live(case: Case) -> Callable[[Row], str]:
-    """Lines of the table as cycles are found."""
-    head = [*printed_head(COLUMNS)]
-
-    def write(row: Row) -> str:
-        lines = [*head, printed_row(COLUMNS, row)]
-        head.clear()
-        return "\n".join(lines)
-
-    return write
-
-
-STUDY = Study("cycle", tables_of, run, CycleResult, live=print_live)
+STUDY = Study("cycle", tables_of, run, CycleResult, live=lambda case: print_rows(COLUMNS))

@@ -2,14 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 #: How near, of the pressure, a state must be to be that of a measured point.
 _SAME = 1e-9
+
+
+class MeasuredParts:
+    """Measurements beside a result: a dataclass of measured curves, taps and sections, None for what was not measured.
+
+    Attributes
+    ----------
+    keys : dict of str
+        Keys of the JSON document by the names of these attributes.
+    """
+
+    keys: ClassVar[dict[str, str]]
+
+    def __iter__(self) -> Iterator[Any]:
+        return (part for name in self.keys if (part := getattr(self, name)) is not None)
+
+    def sentences(self) -> list[str]:
+        """Sentences that compare each measured quantity with the computed one."""
+        return [part.sentence() for part in self]
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON; empty lists of what was not measured."""
+        parts = {key: getattr(self, name) for name, key in self.keys.items()}
+        return {key: [] if part is None else part.summary() for key, part in parts.items()}
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -18,8 +17,7 @@ from .. import comparing
 from ..measured import table
 from ..measured.figures import MEASURED, draw_curve, draw_section_of_runs, some_sections
 from ..state import State
-from .between import flow_at
-from .result import SteadyResult
+from .result import SteadyResult, flow_at
 
 #: Keys that do not change what a run finds.
 _QUIET = ("steady.pressures", "steady.measured", "steady.cracking_area", "steady.max_iterations", "steady.min_step")
@@ -168,14 +166,3 @@ def _taps(axes: Axes, result: SteadyResult, label: str, colour: Any) -> None:
 
 def _ordered(result: SteadyResult) -> list[State]:
     return sorted(result.states, key=lambda state: state.pressure)
-
-
-def save_comparison(results: Sequence[SteadyResult], path: Path) -> Path:
-    """Draw a comparison into a file.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written.
-    """
-    return comparing.save_figure(lambda: draw(results), path)

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from contextlib import suppress
 
+import numpy as np
+from scipy.optimize import brentq
+
+from ...case.quantity import head_of
 from ...errors import SolveError
+from ...model import ValveModel
 from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_warnings
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
 from ...record.states import read_states, shown_summary, state_row
-from ...record.table import printed_head, printed_row
-from ..case import Case
 from ..load_path import go_on, way_on
 from ..measured.kept import keep_measured
 from ..session import Session
-from ..study import Study
-from .cracking import NOTE, find_cracking
-from .measured import KINDS
-from .result import STATES, SteadyResult, tables_of
+from ..study import Study, print_rows
+from .result import CRACKING, KINDS, STATES, Cracking, SteadyResult, tables_of
 
 
 def run_steady(session: Session, record: GrowingRecord) -> None:
@@ -51,23 +52,51 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
     finally:
         for sentence in state_warnings(model, states):
             record.warn(sentence)
-    if model.flow.has_fluid and states and not record.notes(NOTE):
+    if model.flow.has_fluid and states and not record.notes(CRACKING):
         record.progress("cracking pressure")
         with suppress(SolveError):  # none is given then
-            record.note(NOTE, **find_cracking(model, states, case.steady.cracking_area).summary())
+            record.note(CRACKING, **find_cracking(model, states, case.steady.cracking_area).summary())
 
 
-def print_live(case: Case) -> Callable[[SteadyState], str]:
-    """Lines of the table as states are found."""
-    columns = shown_summary(case)
-    head = [*printed_head(columns)]
-
-    def write(state: SteadyState) -> str:
-        lines = [*head, printed_row(columns, state)]
-        head.clear()
-        return "\n".join(lines)
-
-    return write
+#: Relative accuracy of the cracking pressure.
+_ACCURACY = 1e-5
 
 
-STUDY = Study("steady", tables_of, run_steady, SteadyResult, live=print_live)
+def find_cracking(model: ValveModel, states: Iterable[SteadyState], area_ratio: float) -> Cracking:
+    """Cracking pressure between rest and the states found.
+
+    Parameters
+    ----------
+    model : ValveModel
+        With a flow.
+    states : iterable of SteadyState
+    area_ratio : float
+        Passage at the lips over that at rest.
+
+    Raises
+    ------
+    SolveError
+        If a state on the way is not found.
+    """
+    rest = model.rows.areas(model.nodal(model.rest()))[0]
+    wanted = np.log(area_ratio * rest)
+    open_ = [state for state in states if np.log(max(state.station_area[0], rest)) >= wanted]
+    if not open_:
+        return Cracking(area_ratio, None, None)
+    upper = min(open_, key=lambda state: state.pressure)
+    path = LoadPath(model, SteadyOptions.of(model.case))
+    back = model.flow.back
+
+    def missing(drive: float) -> float:
+        """Logarithm of the passage over the one wanted, at a pressure over that downstream."""
+        if drive == 0.0 and model.weight is None:
+            return -np.log(area_ratio)
+        return float(np.log(max(path.go_to(back + drive).station_area[0], rest * 1e-6)) - wanted)
+
+    if missing(0.0) >= 0.0:  # the weight alone has opened it
+        return Cracking(area_ratio, 0.0, 0.0)
+    drive = brentq(missing, 0.0, upper.pressure - back, xtol=1e-12, rtol=_ACCURACY)
+    return Cracking(area_ratio, float(drive), head_of(float(drive), model.case.fluid.density))
+
+
+STUDY = Study("steady", tables_of, run_steady, SteadyResult, live=lambda case: print_rows(shown_summary(case)))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -12,28 +10,25 @@ from matplotlib.figure import Figure
 
 from ...drawing.style import new_figure
 from .. import comparing
-
-if TYPE_CHECKING:
-    from .result import TransientResult
-
+from ..result import StudyResult
 
 _QUIET = tuple(
     f"transient.{key}" for key in ("save_every", "restart_every", "stop_when", "duration", "start_file", "start_state")
 )
 
 
-def labels(results: Sequence[TransientResult]) -> list[str]:
+def labels(results: Sequence[StudyResult]) -> list[str]:
     """Legend entries that say what tells the runs apart."""
     return comparing.labels(results, _QUIET)
 
 
-def compare(results: Sequence[TransientResult], names: Sequence[str] | None = None) -> Figure:
+def compare(results: Sequence[StudyResult], names: Sequence[str] | None = None) -> Figure:
     """Mass flow and lip opening of several runs over time (compare Figs. 5-3 to 5-10, 7-13 and 7-14 of the thesis);
     where all end in cycles, these in phase.
 
     Parameters
     ----------
-    results : sequence of TransientResult
+    results : sequence of StudyResult
     names : sequence of str, optional
         What the runs are called; by what tells their cases apart without them.
     """
@@ -72,12 +67,12 @@ def compare(results: Sequence[TransientResult], names: Sequence[str] | None = No
     return figure
 
 
-def _swings(result: TransientResult) -> bool:
+def _swings(result: StudyResult) -> bool:
     """True where a run ends in at least three cycles, and not in a transition."""
     return bool(result.cycle) and result.verdict["lip_displacement"]["cycles_observed"] >= 3
 
 
-def _last_cycles(result: TransientResult, count: int = 2) -> tuple[slice, np.ndarray]:
+def _last_cycles(result: StudyResult, count: int = 2) -> tuple[slice, np.ndarray]:
     """Rows of the last cycles, and times, ms, from the instant at which the lip rises through its mean."""
     h = result.history
     t, x = h["time"], h["lip_displacement"] - result.verdict["lip_displacement"]["mean"]
@@ -90,14 +85,3 @@ def _last_cycles(result: TransientResult, count: int = 2) -> tuple[slice, np.nda
     begin = t[at] - x[at] * (t[at + 1] - t[at]) / (x[at + 1] - x[at])
     end = int(np.searchsorted(t, begin + count * period, side="right")) + 1
     return slice(at, end), 1e3 * (t[at:end] - begin)
-
-
-def save_comparison(results: Sequence[TransientResult], path: Path) -> Path:
-    """Draw a comparison into a file.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written.
-    """
-    return comparing.save_figure(lambda: compare(results), path)

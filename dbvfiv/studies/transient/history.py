@@ -1,4 +1,4 @@
-"""Quantities computed at every step: rows of `dbvfiv.studies.transient.tables.HISTORY`."""
+"""Quantities computed at every step: rows of `dbvfiv.studies.transient.keeping.HISTORY`."""
 
 from __future__ import annotations
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from dbvfiv.flow import Channel
 from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.closure.closing import ClosingResult, ClosingSample, Turn, closing_valve, run_closing
-from dbvfiv.studies.closure.closing_motion import ContactValve
+from dbvfiv.studies.closure.reversal import ContactValve, Turn, closing_valve, run_closing
+from dbvfiv.studies.closure.safety import Closing
 from tests.small_valves import FORMER
 
 COARSE = {"mesh.around": 6, "mesh.along": 10, "closure.pressures": ["10 kPa"]}
@@ -84,7 +86,7 @@ def test_contact_of_the_coupled_valve_is_part_of_its_exact_tangent():
     nodal = 2e-4 * generator.standard_normal((len(model.mesh.nodes), 5))
     nodal[:, 1] -= 3e-4
     q = model.shell.dofs.restrict(nodal)
-    assert model.contact_state(q).touching.any()
+    assert model.faces.state(q).touching.any()
     direction = generator.standard_normal(model.size)
     tangent = model.tangent(q, 2e3)
     assert tangent.residual == pytest.approx(model.residual(q, 2e3), abs=1e-9 * np.abs(tangent.residual).max())
@@ -100,13 +102,14 @@ def test_a_history_that_opens_again_is_not_shut_before_it_shuts_for_good():
     ) and turn.zero == pytest.approx(0.3)
 
     def sample(time, passage):
-        return ClosingSample(time, turn(time), 0.0, 0.0, passage, 0.0, 0.0, 0.0, 0.0, 0.0)
+        still = dict.fromkeys(("mass_flow", "lowest_pressure", "highest_pressure", "penetration"), 0.0)
+        return SimpleNamespace(time=time, least_opening=passage, **still)
 
     history = [sample(0.1 * i, passage) for i, passage in enumerate((9, 9, 9, 1, 5, 1, 1, 1))]
-    result = ClosingResult(tuple(history), turn, 2.0)
+    result = Closing(tuple(history), turn, 2.0)
     assert result.first_shut == pytest.approx(0.2) and result.closing_time == pytest.approx(0.4)
     assert result.summary()["stays_shut"] is True
-    assert ClosingResult(tuple(history[:5]), turn, 2.0).closing_time is None
+    assert Closing(tuple(history[:5]), turn, 2.0).closing_time is None
 
 
 def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
@@ -120,7 +123,9 @@ def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
             **FORMER,
         }
     )
-    result = run_closing(closing_valve(case))
+    model, samples = closing_valve(case), []
+    halvings, failure = run_closing(model, lambda sample: samples.append(SimpleNamespace(**sample)))
+    result = Closing(samples, Turn.of(case), model.shut_below, halvings, failure)
     told = result.summary()
     assert not result.failure and told["stays_shut"]
     assert result.samples[0].inlet_pressure == 10e3 and result.samples[-1].inlet_pressure == -10e3

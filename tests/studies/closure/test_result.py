@@ -11,7 +11,7 @@ import pytest
 import dbvfiv
 from dbvfiv.api import load
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.closure.curves import supports_compared
+from dbvfiv.studies.closure.figures import supports_compared
 from dbvfiv.studies.session import Session, load_result
 
 COARSE = {

@@ -4,20 +4,15 @@ depend on how it was found.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from dbvfiv.errors import SolveError
+from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import Case, thesis_case
-from dbvfiv.studies.closure import path as closure_path
+from dbvfiv.studies.closure import walk
 from dbvfiv.studies.closure.energy import EnergyLedger
-from dbvfiv.studies.closure.model import closure_model
-from dbvfiv.studies.closure.opening import Opening, opening
-from dbvfiv.studies.closure.path import ClosureOptions, ClosurePath
-from dbvfiv.studies.closure.remarks import start_warnings
+from dbvfiv.studies.closure.valve import Passage, closure_model
 from dbvfiv.studies.session import Session
 from tests.small_valves import EVEN
 
@@ -40,10 +35,11 @@ def closure(case, pressures=None, observer=None):
     return Session(case).perform("closure", observer=observer)
 
 
-def reach(case, pressure, model=None, **options):
+def reach(case, pressure, **options):
     """State at one back pressure, with the penalty for the largest pressure of the case."""
-    path = ClosurePath(model or closure_model(case), replace(ClosureOptions.of(case), **options))
-    return path.go_to(pressure)
+    depth = options.pop("contact_depth", case.closure.contact_depth) * pressure / max(case.closure.pressures)
+    keys = {f"closure.{key}": value for key, value in (options | {"contact_depth": depth}).items()}
+    return closure(case.replace(keys), [pressure]).states[0]
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +94,7 @@ def test_the_valve_shuts_more_firmly_under_more_pressure(pressed):
     # the displacement, until now called opening: half of the 0.38 mm between the faces at rest
     assert low.lip_displacement == pytest.approx(-(0.00619 - 0.006), abs=2e-6)
     assert 0.0 <= low.lip_opening < 4e-6
-    assert high.least_opening < 0.2 * 4 * opening(pressed.model, pressed.model.pressed.rest()).reference
+    assert high.least_opening < 0.2 * 4 * pressed.model.passage(pressed.model.pressed.rest()).reference
 
 
 def test_the_thesis_supports_hold_the_lips_and_say_so(held):
@@ -126,12 +122,12 @@ def test_nothing_is_said_of_faces_that_do_not_start_beyond_the_plane(case):
     """A wall of half the thickness clears the plane everywhere."""
     thin = closure_model(case.replace({"valve.thickness_factor": 0.5}))
     assert len(thin.nodes_beyond) == 0
-    assert list(start_warnings(thin)) == []
+    assert list(thin.start_warnings()) == []
 
 
 def test_the_answer_does_not_depend_on_the_penalty(case, pressed):
     """Three times softer: the multipliers bring the same forces, but for the wider rounding of the law's kink."""
-    state, reference = reach(case, 7e3, closure_model(case, contact_depth=1e-5)), pressed.states[0]
+    state, reference = reach(case, 7e3, contact_depth=1e-5), pressed.states[0]
     assert state.multiplier_updates > 0
     assert state.contact_force == pytest.approx(reference.contact_force, rel=1e-3)
     assert state.max_displacement == pytest.approx(reference.max_displacement, rel=1e-3)
@@ -185,28 +181,25 @@ def test_an_interrupt_keeps_what_was_found(case):
     assert [state.pressure for state in result.states] == [1e3]
 
 
-def test_a_penetration_out_of_reach_is_an_error(case, monkeypatch):
-    monkeypatch.setattr(closure_path, "MOST_UPDATES", 0)
-    path = ClosurePath(closure_model(case, contact_depth=1e-4), ClosureOptions.of(case))
-    with pytest.raises(SolveError, match="penetration"):
-        path.go_to(14e3)
+def test_a_penetration_out_of_reach_is_a_failure(case, monkeypatch):
+    monkeypatch.setattr(walk, "MOST_UPDATES", 0)
+    found = closure(case.replace({"closure.contact_depth": 1e-4}), [14e3])
+    assert not found.states and "penetration" in found.failures[0]
 
 
 def test_shut_intervals_are_cut_between_rows_where_roots_of_areas_are_linear():
     z = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
-    passage = Opening(z, np.array([0.0, 0.0, 2.0, 0.0, 2.0]), 1.0, np.zeros((5, 2)), np.ones(5))
-    assert np.ravel(passage.shut_intervals(0.5)) == pytest.approx([0.0, 1.5, 2.5, 3.5])
-    assert passage.shut_length(0.5) == pytest.approx(2.5) and passage.lip_seal(0.5) == pytest.approx(1.5)
-    assert passage.narrowest == 0
-    parting = Opening(z, np.maximum(z - 0.5, 0.0) ** 2, 1.0, np.zeros((5, 2)), np.ones(5))
-    assert parting.lip_seal(0.81) == pytest.approx(1.4)
-    assert Opening(z, np.array([2.0, 0.0, 0.0, 2.0, 2.0]), 1.0, np.zeros((5, 2)), np.ones(5)).lip_seal(0.5) == 0.0
+    passage = Passage(z, np.array([0.0, 0.0, 2.0, 0.0, 2.0]), 1.0, 0.5)
+    assert np.ravel(passage.shut_intervals) == pytest.approx([0.0, 1.5, 2.5, 3.5])
+    assert passage.shut_length == pytest.approx(2.5) and passage.lip_seal == pytest.approx(1.5)
+    assert Passage(z, np.maximum(z - 0.5, 0.0) ** 2, 1.0, 0.81).lip_seal == pytest.approx(1.4)
+    assert Passage(z, np.array([2.0, 0.0, 0.0, 2.0, 2.0]), 1.0, 0.5).lip_seal == 0.0
 
 
 def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
     case = thesis_case({"mesh.around": 56, "mesh.along": 16})
     model = closure_model(case)
-    passage = opening(model, model.pressed.rest())
+    passage = model.passage(model.pressed.rest())
     assert passage.reference == pytest.approx(0.00019 * 0.125, rel=0.05)
     # the flange is a circle of the inner radius
     inner = case.valve.flange_radius - 0.008
@@ -230,18 +223,20 @@ def test_energy_balances_to_1e_8_on_request_from_the_first_touch_on(case):
 @pytest.mark.parametrize("share", [1.0, 1.01])
 def test_no_refinement_hides_a_force_that_is_no_derivative_of_the_energy(case, monkeypatch, share):
     model = closure_model(case)
-    path = ClosurePath(model, replace(ClosureOptions.of(case), eigenvalues=2))
-    path.go_to(2e3)
-    path.steps.accepted = None
+    steps = LoadSteps(model.pressed, LoadStepOptions(first_step=50.0))
+    steps.reach(2e3)
+    for _ in range(3):
+        model.pressed.renew_multipliers(steps.q)
+        steps.settle()
     energy = model.pressed.contact.energy
     monkeypatch.setattr(model.pressed.contact, "energy", lambda *state: share * energy(*state))
     ledger = EnergyLedger(model.pressed, 1e-7)
-    ledger.begin(path.steps.q, 2e3)
-    model.pressed.renew_multipliers(path.steps.q)
-    path.steps.settle()
-    ledger.add(path.steps.q, 2e3)
-    path.steps.reach(2.05e3)
-    ledger.add(path.steps.q, path.steps.pressure)
+    ledger.begin(steps.q, 2e3)
+    model.pressed.renew_multipliers(steps.q)
+    steps.settle()
+    ledger.add(steps.q, 2e3)
+    steps.reach(2.05e3)
+    ledger.add(steps.q, steps.pressure)
     ledger.settle()
     assert ledger.renewal > 0.0
     assert ledger.error < 1e-7 if share == 1.0 else ledger.error > 1e-6

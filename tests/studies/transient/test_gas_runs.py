@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.studies.transient.assess import beyond_model
-from dbvfiv.studies.transient.tables import GAS
+from dbvfiv.studies.transient.keeping import GAS
+from dbvfiv.studies.transient.result import beyond_model
 
 from .runs import SHORT, Stop, transient
 

@@ -22,10 +22,8 @@ from dbvfiv.record.record import GrowingRecord, RecordPart, StoredRecord
 from dbvfiv.studies.case import THESIS, Case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient import keeping
-from dbvfiv.studies.transient.keeping import rows_to_keep
-from dbvfiv.studies.transient.progress import Progress
-from dbvfiv.studies.transient.run import Runner, run_transient
-from dbvfiv.studies.transient.tables import HISTORY, RESTART, STATES, tables_of
+from dbvfiv.studies.transient.keeping import HISTORY, RESTART, STATES, Progress, rows_to_keep, tables_of
+from dbvfiv.studies.transient.study import Runner, run_transient
 
 from .runs import SHORT, Stop, transient
 

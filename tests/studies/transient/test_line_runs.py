@@ -9,8 +9,7 @@ import pytest
 import dbvfiv
 from dbvfiv.record.record import StoredRecord
 from dbvfiv.studies.case import Case
-from dbvfiv.studies.transient.keeping import rows_to_keep
-from dbvfiv.studies.transient.tables import HISTORY, LINE, tables_of
+from dbvfiv.studies.transient.keeping import HISTORY, LINE, rows_to_keep, tables_of
 
 from .runs import SHORT, Stop, transient
 

@@ -12,9 +12,8 @@ from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.record.record import StoredRecord
 from dbvfiv.studies.case import Case
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.transient.keeping import rows_to_keep
-from dbvfiv.studies.transient.run import run_transient
-from dbvfiv.studies.transient.tables import HISTORY, MEMORY_COLUMNS, RELAXING, tables_of
+from dbvfiv.studies.transient.keeping import HISTORY, MEMORY_COLUMNS, RELAXING, rows_to_keep, tables_of
+from dbvfiv.studies.transient.study import run_transient
 
 from .runs import SHORT, Stop, transient
 

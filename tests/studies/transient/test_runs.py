@@ -10,8 +10,8 @@ from dbvfiv.motion.control import Drive
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.transient.assess import assess, beyond_model, lip_gap
-from dbvfiv.studies.transient.run import run_transient
+from dbvfiv.studies.transient.result import assess, beyond_model, lip_gap
+from dbvfiv.studies.transient.study import run_transient
 
 from .runs import SHORT, transient
 

@@ -1,0 +1,331 @@
+"""The valve under back pressure: shell, supports and contact of a case, and the passage left between its walls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...contact import ContactLaw, PlaneContact, nodal_thickness, tributary_area
+from ...geometry import ValveMesh
+from ...model.build import build_shell
+from ...model.pressed_shell import PressedShell
+from ...model.state import LipCentre
+from ...model.supports import free_unknowns
+from ...model.symmetry import EQUILIBRIA
+from ...model.valve import loaded_share
+from ...shell import Shell
+from ...shell.recovery import LayerFields, layer_fields
+from ..case import Case
+
+#: Contacting inner faces, or the supports of Th. 3.6.
+CONTACT, HELD_LIPS = "contact", "held-lips"
+#: Half width of the rounded kink of the contact law over the depth that the reference pressure would press in.
+ROUNDING = 0.3
+
+
+@dataclass(frozen=True)
+class Passage:
+    """Passage between the inner faces, of the part that is computed, by mesh row from the lip.
+
+    Attributes
+    ----------
+    z : (rows,) array, m
+    area : (rows,) array, m2
+        Between inner face and closing plane; overlapping faces count as shut.
+    reference : float, m2
+        Area at the lip at rest.
+    shut_fraction : float
+        A section is shut where less than this share of the reference is left.
+    """
+
+    z: np.ndarray
+    area: np.ndarray
+    reference: float
+    shut_fraction: float
+
+    @property
+    def shut_length(self) -> float:
+        """Length along the axis, m, that is shut."""
+        return float(sum(b - a for a, b in self.shut_intervals))
+
+    @property
+    def lip_seal(self) -> float:
+        """Length, m, that is shut from the lip on without a break."""
+        shut = self.shut_intervals
+        return shut[0][1] - self.z[0] if shut and shut[0][0] <= self.z[0] else 0.0
+
+    @property
+    def shut_intervals(self) -> list[tuple[float, float]]:
+        """Intervals of z, m, that are shut.
+
+        Between rows the roots of the areas are taken as linear, because walls that touch part from each other with at
+        least the square of the distance.
+        """
+        excess = np.sqrt(self.area) - np.sqrt(self.shut_fraction * self.reference)
+        cuts: list[tuple[float, float]] = []
+        for a, b, fa, fb in zip(self.z[:-1], self.z[1:], excess[:-1], excess[1:]):
+            if fa > 0 and fb > 0:
+                continue
+            start = a if fa <= 0 else a + (b - a) * fa / (fa - fb)
+            stop = b if fb <= 0 else a + (b - a) * fa / (fa - fb)
+            if cuts and abs(cuts[-1][1] - start) < 1e-12:
+                cuts[-1] = (cuts[-1][0], stop)
+            elif stop > start:
+                cuts.append((start, stop))
+        return [(float(a), float(b)) for a, b in cuts]
+
+
+@dataclass(frozen=True)
+class InnerFace:
+    """Inner face of the wall before the closing plane, and the passage between them.
+
+    Attributes
+    ----------
+    mesh : ValveMesh
+    shell : Shell
+    plane : PlaneContact
+        Contact of this face, for its gaps.
+    shut_fraction : float
+    """
+
+    mesh: ValveMesh
+    shell: Shell
+    plane: PlaneContact
+    shut_fraction: float
+
+    def gaps(self, nodal: np.ndarray) -> np.ndarray:
+        """Gaps (nn,), m, of all nodes for nodal unknowns (nn, c), measured as the contact measures them."""
+        return self._points(nodal)[0]
+
+    def passage(self, nodal: np.ndarray, held: np.ndarray | None = None) -> Passage:
+        """Passage for nodal unknowns (nn, c); `held` (rows,) are rows shut by their supports."""
+        gap, x = self._points(nodal)
+        at_rest, x_rest = self._points(np.zeros_like(nodal))
+        rows = self.mesh.rows
+        area = _area(gap[rows], x[rows])
+        if held is not None:
+            area[held] = 0.0
+        reference = float(_area(at_rest[rows[:1]], x_rest[rows[:1]])[0])
+        return Passage(self.mesh.z, area, reference, self.shut_fraction)
+
+    def _points(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gap (nn,) and x position (nn,) of the inner face at all nodes; the clamped flange is no contact node but has
+        a face all the same.
+        """
+        shell = self.shell
+        depth = 0.5 * nodal_thickness(shell)
+        directors = shell.directors(nodal)[0] if nodal.any() else shell.mesh.directors
+        point = shell.mesh.nodes + nodal[:, :3] - depth[:, None] * directors
+        lift = np.zeros(len(depth))
+        lift[self.plane.nodes] = self.plane.lift
+        return point[:, 1] + lift, point[:, 0]
+
+
+def _area(gap: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Area (rows,) under the gap of rows of points; where the face folds back on itself no width is counted."""
+    height = np.maximum(gap, 0.0)
+    step = np.maximum(np.diff(x, axis=1), 0.0)
+    return np.sum(0.5 * (height[:, 1:] + height[:, :-1]) * step, axis=1)
+
+
+def face_plane(case: Case, shell: Shell, law: ContactLaw) -> PlaneContact:
+    """Contact of the inner face with the closing plane."""
+    depth = 0.5 * nodal_thickness(shell)
+    every = np.arange(shell.mesh.node_count)
+    return PlaneContact(shell, every, depth, tributary_area(shell), law, least_gap=case.valve.initial_gap)
+
+
+def contact_law(case: Case, pressure: float) -> ContactLaw:
+    """Law by which a pressure, Pa, alone would press the faces in to the contact depth of a case."""
+    depth = case.closure.contact_depth
+    return ContactLaw(pressure / depth, ROUNDING * depth)
+
+
+@dataclass(frozen=True)
+class ClosureModel:
+    """The computed part of a valve, pressed from outside.
+
+    Attributes
+    ----------
+    case : Case
+    supports : str
+        "contact": the inner faces touch the closing plane; "held-lips": the duckbill cannot move across the plane and
+        one-sided stops keep the mid-surface of the saddle from crossing it (Th. 3.6).
+    mesh : ValveMesh
+    pressed : PressedShell
+    face : InnerFace
+        For measuring gaps with either supports; with contact its plane is the contact itself.
+    held : (rows,) bool array
+        Rows that are shut by the supports.
+    """
+
+    case: Case
+    supports: str
+    mesh: ValveMesh
+    pressed: PressedShell
+    face: InnerFace
+    held: np.ndarray
+
+    @property
+    def size(self) -> int:
+        return self.pressed.size
+
+    @property
+    def shell(self) -> Shell:
+        return self.pressed.shell
+
+    @property
+    def nodes_beyond(self) -> np.ndarray:
+        """Numbers of the nodes whose inner face starts beyond the closing plane."""
+        return self.face.plane.nodes[self.face.plane.start < 0]
+
+    def passage(self, q: np.ndarray) -> Passage:
+        """Passage of a state (n,)."""
+        return self.face.passage(self.pressed.nodal(q), self.held)
+
+    @property
+    def reference_opening(self) -> float:
+        """Passage between the inner faces of the lip at rest, whole valve, m2."""
+        return self.mesh.part.copies * self.passage(self.pressed.rest()).reference
+
+    def measure(self, q: np.ndarray) -> dict[str, Any]:
+        """Measures of a state (n,) that every point of a path has, by the names of `columns.POINT`."""
+        nodal, passage = self.pressed.nodal(q), self.passage(q)
+        return {
+            "max_displacement": float(np.linalg.norm(nodal[:, :3], axis=1).max()),
+            "contact_force": self.mesh.part.walls * self.pressed.contact_state(q).total,
+            "least_opening": float(self.mesh.part.copies * passage.area.min()),
+            "sealed_length": passage.shut_length,
+            "lip_seal": passage.lip_seal,
+            "contact_front": self._contact_front(nodal),
+            "overlap": self._overlap(nodal),
+        }
+
+    def describe(self, q: np.ndarray, pressure: float) -> dict[str, Any]:
+        """Columns of a state (n,) at a pressure, Pa, that follow from it alone."""
+        pressed, mesh, part = self.pressed, self.mesh, self.mesh.part
+        nodal, contact, passage = pressed.nodal(q), pressed.contact_state(q), self.passage(q)
+        measured, shut = self.measure(q), passage.shut_length
+        contact_pressure, gap = np.zeros(len(nodal)), np.zeros(len(nodal))
+        contact_pressure[pressed.contact.nodes] = contact.pressure
+        gap[mesh.rows] = self.face.gaps(nodal)[mesh.rows]
+        layers, centre = layer_fields(pressed.shell, q), LipCentre(mesh, pressed.shell)
+        strain, stress = layer_maxima(layers)
+        return (
+            measured
+            | {
+                "pressure": float(pressure),
+                "closed": bool(passage.shut_intervals),
+                "joint_seal": shut - measured["lip_seal"],
+                "sealed_area": float(part.walls * pressed.contact.area[contact.touching].sum()),
+                "largest_contact_pressure": float(contact.pressure.max(initial=0.0)),
+                "contact_nodes": int(np.count_nonzero(contact.touching)),
+                "penetration": contact.penetration,
+                "least_opening_position": float(passage.z[np.argmin(passage.area)]),
+                "lip_opening": centre.opening(q),
+                "lip_displacement": centre.displacement(q),
+                "max_displacement_position": mesh.nodes[np.argmax(np.linalg.norm(nodal[:, :3], axis=1))],
+                "largest_strain": float(strain.max()),
+                "largest_strain_layer": layers.names[int(np.argmax(strain))],
+                "largest_stress": float(stress.max()),
+                "largest_stress_layer": layers.names[int(np.argmax(stress))],
+                "force_balance": force_imbalance(pressed, q, pressure),
+                "nodal": nodal,
+                "opening": passage.area,
+                "contact_pressure": contact_pressure,
+                "gap": gap,
+            }
+            | {f"layers/{name}": getattr(layers, name) for name in ("strain", "stress", "von_mises", "stretch")}
+        )
+
+    def _overlap(self, nodal: np.ndarray) -> float:
+        """Deepest overlap of the inner faces, m, for nodal unknowns (nn, c); rows held shut are left out."""
+        plane = self.face.plane
+        movable = np.ones(len(nodal), bool)
+        movable[self.mesh.rows[self.held].ravel()] = False
+        gap = plane.gap(nodal, self.shell.directors(nodal)[0])
+        return float(max(0.0, -gap[movable[plane.nodes]].min(initial=0.0)))
+
+    def _contact_front(self, nodal: np.ndarray) -> float:
+        """Distance from the lip, m, up to which the walls have met along the centre line, to within the initial gap.
+
+        It is linear between rows.
+        """
+        # just less than the gap that lifted rows have at rest
+        gap = np.where(self.held, 0.0, self.face.gaps(nodal)[self.mesh.centre_line])
+        gap = gap - 0.999 * self.case.valve.initial_gap
+        met, z = np.flatnonzero(gap <= 0), self.mesh.z
+        if not len(met):
+            return 0.0
+        last = int(met[-1])
+        if last + 1 == len(gap):
+            return float(z[last])
+        a, b = gap[last], gap[last + 1]
+        return float(z[last] + (z[last + 1] - z[last]) * a / (a - b))
+
+    def start_warnings(self) -> Iterator[str]:
+        """Warnings about where the inner face starts, and about supports that hold it."""
+        plane, beyond = self.face.plane, self.nodes_beyond
+        if len(beyond):
+            z = self.mesh.nodes[plane.nodes[plane.lifted], 2]
+            yield (
+                f"The inner face starts beyond the closing plane at {len(beyond)} node{'s' * (len(beyond) > 1)}, by up "
+                f"to {float(-plane.start.min()) * 1e3:.2g} mm, and nearer to it than the initial gap at {len(z)} "
+                f"(z {z.min():.3f} to {z.max():.3f} m, of {plane.count} nodes): there half the wall is thicker than "
+                "the mid-surface is high, and contact resists further closing by more than the initial gap only."
+            )
+        if self.supports == HELD_LIPS:
+            yield (
+                "The duckbill is held shut by its supports, as in Th. 3.6, so that nothing is found out about "
+                "whether its lips seal."
+            )
+            if self.case.closure.symmetry != EQUILIBRIA:
+                yield (
+                    "closure.symmetry asks for all classes of motion, but lips that are held shut cannot move "
+                    "together, so with these supports only the class of the model is watched for buckling."
+                )
+
+
+def closure_model(case: Case, supports: str | None = None) -> ClosureModel:
+    """Model of a case under back pressure, with the supports "contact" or "held-lips"; as the case says by default."""
+    supports = case.closure.supports if supports is None else supports
+    law = contact_law(case, max(case.closure.pressures))
+    mesh, shell = build_shell(case)
+    duckbill = mesh.z <= case.valve.duckbill_length * (1 + 1e-9)
+    held = np.zeros(len(mesh.z), bool)
+    if supports == HELD_LIPS:
+        held = duckbill
+        free = free_unknowns(mesh)
+        free[mesh.rows[duckbill].ravel(), 1] = False
+        shell = shell.with_free(free)
+    contact = plane = face_plane(case, shell, law)
+    if supports == HELD_LIPS:
+        contact = PlaneContact(shell, np.arange(shell.mesh.node_count), 0.0, tributary_area(shell), law)
+    face = InnerFace(mesh, shell, plane, case.closure.shut_fraction)
+    return ClosureModel(case, supports, mesh, PressedShell(shell, contact, -1.0, loaded_share(mesh, case)), face, held)
+
+
+def layer_maxima(layers: LayerFields) -> tuple[np.ndarray, np.ndarray]:
+    """Largest elongation or shortening and largest von Mises stress, Pa, of each layer, (layers,) each."""
+    strain = np.maximum(layers.stretch[:, :, 1] - 1, 1 - layers.stretch[:, :, 0])
+    return strain.max(axis=0), layers.von_mises.max(axis=0)
+
+
+def force_imbalance(pressed: PressedShell, q: np.ndarray, pressure: float) -> float:
+    """Norm of the sum of pressure, contact and support forces over the sum of their norms.
+
+    The supports give what the internal forces at held displacements ask for, so the check knows nothing of how the
+    state was found.
+    """
+    dofs, nodal = pressed.shell.dofs, pressed.nodal(q)
+    internal = pressed.shell.with_free().force(nodal.ravel()).reshape(nodal.shape)
+    load, contact = pressed.nodal_pressure_force(nodal, pressure), np.zeros_like(nodal)
+    if pressed.contact is not None:
+        contact[pressed.contact.nodes, pressed.contact.axis] = pressed.contact_state(q).force
+    held = np.where(dofs.free, 0.0, internal - load - contact)
+    parts = [force[:, :3].sum(axis=0) for force in (load, contact, held)]
+    total = sum(float(np.linalg.norm(part)) for part in parts)
+    return float(np.linalg.norm(sum(parts))) / total if total > 0 else 0.0

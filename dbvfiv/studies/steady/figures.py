@@ -1,0 +1,307 @@
+"""Figures of steady states: curves over the pressure with published and measured points, shapes, the passage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...case.quantity import head_of
+from ...case.valve import Valve
+from ...drawing.style import (
+    ACCENT,
+    COMPUTED,
+    PUBLISHED,
+    REST,
+    kilopascals,
+    new_figure,
+    parameter_label,
+    pressure_colours,
+    pressure_heading,
+    pressure_name,
+    some_of,
+)
+from ...drawing.views import closed_section, faces, mark_pieces
+from ..case import Case
+from ..measured.figures import MEASURED, draw_curve
+from ..result import StudyResult
+
+
+def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of a steady result, each with its name."""
+    if result.case.drive.kind == "flow":
+        yield "head-discharge", lambda: head_discharge(result)
+        yield "area-discharge", lambda: area_discharge(result)
+        if result.measured.area is not None:
+            yield "area-pressure", lambda: area_pressure(result)
+        yield "jet-velocity", lambda: jet_velocity(result)
+        if result.case.has_line:
+            yield "operating-point", lambda: operating_point(result)
+    yield "deflection", lambda: deflection(result)
+    yield "lip-shapes", lambda: lip_shapes(result)
+    yield "centre-line", lambda: centre_line(result)
+    if result.case.drive.kind == "flow":
+        yield "passage", lambda: passage(result)
+
+
+def ordered(result: StudyResult) -> list[Any]:
+    """States from low to high pressure."""
+    return sorted(result.states, key=lambda state: state.pressure)
+
+
+def head_discharge(result: StudyResult) -> Figure:
+    """Static inlet pressure over mass flow (compare Fig. 7-4 of the thesis)."""
+    states = ordered(result)
+    figure, axes = _axes("Mass flow, kg/s", parameter_label(result.case, "pressure"))
+    axes.plot(
+        [s.mass_flow for s in states], [s.pressure / 1e3 for s in states], "o-", color=COMPUTED, label=_name(result)
+    )
+    if is_published(result.case):
+        data = HEAD_DISCHARGE
+        axes.plot(
+            data.mass_flow,
+            np.array(data.pressure) / 1e3,
+            "D",
+            color=PUBLISHED,
+            label=data.label,
+            mfc="none",
+            mew=1.6,
+            ms=7,
+        )
+    points = result.measured.discharge
+    if points is not None:
+        axes.plot(points.measured, points.pressure / 1e3, color="black", label="measured", **MEASURED)
+    return _finish(figure, axes, "Head and discharge")
+
+
+def operating_point(result: StudyResult) -> Figure:
+    """Total head that the valve takes and that the line leaves it, over the flow; they cross where the valve works.
+
+    The head of the line is that of its far end less losses that go with the square of the flow, for some of the
+    pressures.
+    """
+    states = [state for state in ordered(result) if state.hydraulics is not None]
+    figure, axes = _axes("Flow, L/s", "Total head at the flange, m")
+    flow = np.array([0.0] + [1e3 * s.volume_flow for s in states])
+    rest = head_of(result.case.rest_pressure - result.case.level_pressure, result.case.fluid.density)
+    head = np.array([rest] + [s.hydraulics.total_head for s in states])
+    axes.plot(flow, head, "-", color=COMPUTED, label="valve and what is behind it")
+    chosen = some_of(states, 5)
+    reach = np.linspace(0.0, 1.15 * flow.max(), 60)
+    for state, colour in zip(chosen, pressure_colours([s.pressure for s in chosen])):
+        found = state.hydraulics
+        lost = found.line_loss * (reach / (1e3 * state.volume_flow)) ** 2
+        axes.plot(
+            reach, found.supply_head - lost, "--", color=colour, lw=1.2, label=f"line, {kilopascals(state.pressure)}"
+        )
+        axes.plot(1e3 * state.volume_flow, found.total_head, "o", color=colour)
+    return _finish(figure, axes, "Operating points")
+
+
+def area_discharge(result: StudyResult) -> Figure:
+    """Lip area over mass flow (compare Fig. 7-5 of the thesis)."""
+    states = ordered(result)
+    figure, axes = _axes("Mass flow, kg/s", "Flow area at the lip, cm²")
+    axes.plot(
+        [s.mass_flow for s in states], [s.outlet_area * 1e4 for s in states], "o-", color=COMPUTED, label=_name(result)
+    )
+    both = result.measured.discharged_area
+    if both is not None:
+        axes.plot(both[:, 0], both[:, 1] * 1e4, color="black", label="measured", **MEASURED)
+    return _finish(figure, axes, "Lip area and discharge")
+
+
+def area_pressure(result: StudyResult) -> Figure:
+    """Lip area over the static inlet pressure, with what was measured."""
+    figure, axes = _axes(parameter_label(result.case, "pressure"), "Flow area at the lip, cm²")
+    computed = [(s.pressure, s.outlet_area) for s in ordered(result)]
+    draw_curve(axes, computed, result.measured.area, 1e4, _name(result))
+    return _finish(figure, axes, "Lip area and pressure")
+
+
+def jet_velocity(result: StudyResult) -> Figure:
+    """Jet velocity over pressure (compare Fig. 7-7 of the thesis)."""
+    states = ordered(result)
+    figure, axes = _axes(parameter_label(result.case, "pressure"), "Velocity, m/s")
+    p = np.array([s.pressure for s in states])
+    axes.plot(
+        p / 1e3, [s.outlet_velocity for s in states], "o-", color=COMPUTED, label=f"jet at the lip, {_name(result)}"
+    )
+    axes.plot(p / 1e3, [s.station_velocity[-1] for s in states], "s-", color=ACCENT, ms=4.5, label="inlet")
+    fine = np.linspace(0.0, p.max(), 200)
+    axes.plot(
+        fine / 1e3,
+        np.sqrt(2 * fine / result.case.fluid.density),
+        ":",
+        color="0.35",
+        lw=1.3,
+        label=r"$\sqrt{2\,p/\rho}$, without the velocity at the inlet",
+    )
+    return _finish(figure, axes, "Jet velocity")
+
+
+def deflection(result: StudyResult) -> Figure:
+    """Clear lip opening, between the inner faces, and largest displacement over pressure."""
+    states = ordered(result)
+    figure, axes = _axes(parameter_label(result.case, "pressure"), "Opening, displacement, mm")
+    p = [s.pressure / 1e3 for s in states]
+    axes.plot(
+        p,
+        [s.max_displacement * 1e3 for s in states],
+        "s-",
+        color=ACCENT,
+        ms=4.5,
+        label="largest displacement of the wall",
+    )
+    axes.plot(p, [s.lip_opening * 1e3 for s in states], "o-", color=COMPUTED, label="clear lip opening at its middle")
+    return _finish(figure, axes, "Opening and deflection", from_zero=all(s.lip_opening >= 0 for s in states))
+
+
+def _name(result: StudyResult) -> str:
+    return f"dbvfiv, {result.header.name}"
+
+
+def _axes(x: str, y: str):
+    figure = new_figure()
+    axes = figure.add_subplot()
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    return figure, axes
+
+
+def _finish(figure: Figure, axes, title: str, from_zero: bool = True) -> Figure:
+    axes.set_title(title, loc="left", fontweight="bold")
+    axes.margins(0.06)
+    axes.set_xlim(0, 1.08 * max(0.0, axes.dataLim.x1) or None)
+    if from_zero:
+        axes.set_ylim(0, 1.12 * max(0.0, axes.dataLim.y1) or None)
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.14), ncols=2)
+    return figure
+
+
+_WATER = 1000.0
+
+
+@dataclass(frozen=True)
+class Published:
+    """Points of a published curve of the 12-inch valve.
+
+    Attributes
+    ----------
+    label : str
+    pressure : tuple, Pa
+    mass_flow : tuple, kg/s
+        Whole valve.
+    source : str
+    """
+
+    label: str
+    pressure: tuple[float, ...]
+    mass_flow: tuple[float, ...]
+    source: str
+
+
+#: Mass flows of the coupled model of Th. 4.3.3: handed to the viscous flow model at the pressures of Fig. 4-4.
+HEAD_DISCHARGE = Published(
+    "thesis, coupled model", (18e3, 29e3, 36e3), (47.88, 75.52, 90.82), "Th. 4.3.3, Fig. 4-4 and chapter 7"
+)
+
+
+def is_published(case: Case) -> bool:
+    """True for the 12-inch valve with water flowing through it.
+
+    Layers and materials may differ, shape and wall may not.
+    """
+    same_shape = case.valve.model_copy(update={"saddle": "ruled"}) == Valve()
+    bare = not (case.has_line or case.has_tail or case.rest_pressure)
+    return same_shape and case.drive.kind == "flow" and case.fluid.density == _WATER and bare
+
+
+def lip_shapes(result: StudyResult) -> Figure:
+    """Inner faces of the lips at several pressures, all around, and the outer face at the highest (compare Fig.
+    7-10 of the thesis, which shows the mid-surface).
+    """
+    figure = new_figure(7.2, 4.6)
+    axes = figure.add_subplot()
+    lip, part = result.mesh.rows[0], result.mesh.part
+    axes.plot(
+        *closed_section(faces(result.mesh)[0][lip, :2], part).T * 1e3, color=REST, lw=1.2, ls="--", label="at rest"
+    )
+    states = some_of(ordered(result))
+    for state, colour in zip(states, pressure_colours([s.pressure for s in states])):
+        inner, outer = faces(result.mesh, state.nodal)
+        axes.plot(*closed_section(inner[lip, :2], part).T * 1e3, color=colour, label=kilopascals(state.pressure))
+    axes.plot(*closed_section(outer[lip, :2], part).T * 1e3, color=colour, lw=0.9, label="its outer face")
+    axes.set_aspect("equal")
+    axes.set_xlabel("x, mm")
+    axes.set_ylabel("y, mm")
+    axes.set_title("Lips at the outlet, inner faces", loc="left", fontweight="bold")
+    figure.legend(loc="outside lower center", ncols=5, title=pressure_name(result.case).lower())
+    return figure
+
+
+def centre_line(result: StudyResult) -> Figure:
+    """Inner and outer face in the middle of the lips, y over z, and at the side edges, x over z at y = 0."""
+    figure = new_figure(7.2, 6.2)
+    upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1, 1]})
+    states = some_of(ordered(result))
+    colours = pressure_colours([s.pressure for s in states])
+    moved = [faces(result.mesh, state.nodal) for state in states]
+    rest = faces(result.mesh)
+    part, edges = result.mesh.part, [(lower, result.mesh.rows[:, -1], 0)]
+    if not part.is_quarter:
+        edges.append((lower, result.mesh.rows[:, 0], 0))
+    for axes, line, across in ((upper, result.mesh.centre_line, 1), *edges):
+        for face, width in ((0, 1.6), (1, 0.8)):
+            look = {"color": REST, "lw": 0.75 * width, "ls": "--", "label": None if face else "at rest"}
+            axes.plot(rest[face][line, 2] * 1e3, rest[face][line, across] * 1e3, **look)
+            for state, both, colour in zip(states, moved, colours):
+                place = both[face][line] * 1e3
+                label = None if face else kilopascals(state.pressure)
+                axes.plot(place[:, 2], place[:, across], color=colour, lw=width, label=label)
+        axes.tick_params(labelbottom=True)
+    mark_pieces(result, upper, lower)
+    upper.set_ylabel("y, mm")
+    lower.set_ylabel("x, mm")
+    lower.set_xlabel("Distance from the lip z, mm")
+    upper.set_title(f"Inner (thick) and outer face at {part.middle}", loc="left", fontweight="bold")
+    lower.set_title("Side edge, y = 0", loc="left", fontweight="bold")
+    upper.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title=pressure_heading(result.case))
+    return figure
+
+
+#: What each panel shows of a state, in how many copies of the part that is computed.
+_PANELS = (
+    ("Static pressure, kPa", lambda state, copies: (state.station_pressure + state.outlet_pressure) / 1e3),
+    ("Velocity, m/s", lambda state, copies: state.station_velocity),
+    ("Flow area, cm²", lambda state, copies: copies * state.station_area * 1e4),
+)
+
+
+def passage(result: StudyResult) -> Figure:
+    """Pressure over that of the surroundings, velocity and flow area over the distance from the lip, with pressures
+    that were measured; the fluid flows from right to left.
+    """
+    figure = new_figure(7.2, 7.4)
+    panels = figure.subplots(3, 1, sharex=True)
+    states, taps = some_of(ordered(result)), result.measured.taps
+    z = result.mesh.z * 1e3
+    colours = pressure_colours([*(s.pressure for s in states), *([] if taps is None else taps.pressure)])
+    for axes, (label, value) in zip(panels, _PANELS):
+        for state, colour in zip(states, colours):
+            axes.plot(z, value(state, result.mesh.part.copies), color=colour, label=kilopascals(state.pressure))
+        axes.set_ylabel(label)
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+        axes.set_xlim(0, z[-1])
+        axes.tick_params(labelbottom=True)
+    if taps is not None:
+        look = {"c": colours[len(states) :], "marker": MEASURED["marker"], "label": "measured"}
+        panels[0].scatter(taps.z * 1e3, taps.measured / 1e3, zorder=3, **look)
+    mark_pieces(result, *panels)
+    panels[0].set_title("Along the passage (lip left, inlet right)", loc="left", fontweight="bold")
+    panels[-1].set_xlabel("Distance from the lip z, mm")
+    panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=pressure_heading(result.case))
+    return figure
