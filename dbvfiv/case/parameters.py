@@ -277,7 +277,7 @@ SURROUNDINGS = tuple(row.name for row in _TABLE if row.surrounding)
 #: Names of those for which the model is built anew.
 DESIGN = tuple(row.name for row in _TABLE if row.design)
 #: Names of those of the pipes in front of the valve and behind it.
-PIPES = ("pipe_length", "tail_length", "wave_speed")
+PIPES = tuple(row.name for row in _TABLE if row.key.startswith(("upstream.", "downstream.")))
 #: Density of the fluid outside where it is fixed, kg/m3: part of a parameter point, and no parameter to move.
 OUTSIDE = "outside"
 

@@ -11,7 +11,7 @@ elasticity; Yeoh 1993, Rubber Chem. Technol. 66, 754; Ogden 1972, Proc. R. Soc. 
 `softening`) is linear in mu_inf, mu_0, c and c_3, not in x_0.
 
 The nominal stress is linear in the constants of neo-Hookean, Mooney-Rivlin and Yeoh forms, so the fit is a linear
-least-squares problem; Ogden's exponents are searched for about it (see `ogden_fit`), and x_0 of the softening rubber,
+least-squares problem; Ogden's exponents are searched for about it (see `search`), and x_0 of the softening rubber,
 whose other constants are kept at least 0, which makes it stable in every state. One kind of test alone tells
 constants apart badly: over a small range of strains in tension the columns of C10 and C01 are nearly parallel, and the
 fit returns large constants of opposite sign that describe the test well and other states of strain badly. The
@@ -429,7 +429,7 @@ def fit_rubber(
     ----------
     tests : sequence of TensionTest
     form : Form
-        See `rubber_forms.form_of`.
+        See `form_of`.
     constraint : {"none", "non-negative", "stable"}
         "non-negative": every constant at least 0 (Ogden: every mu_p alpha_p). For neo-Hookean, two-constant
         Mooney-Rivlin, Yeoh and Ogden that suffices for stability at all strains.

@@ -174,7 +174,7 @@ class Law(Protocol):
         Reference density, kg/m3.
     parameters : numpy.ndarray, shape (8,), float64
         Kind 0: ``[Q11, Q22, Q12, Q66, Q55, Q44, 0, 0]`` with Q55 for the 13 and Q44 for the 23
-        shear. Kind 1: ``[c10, c01, c11, c20, c30, m0, x0, 0]``, see `incompressible.rubber_energy`. All in Pa but x0.
+        shear. Kind 1: ``[c10, c01, c11, c20, c30, m0, x0, 0]``, see `rubber_energy`. All in Pa but x0.
     small_strain_shear_modulus : float
         In-plane shear modulus (12) in the reference state, Pa.
     """

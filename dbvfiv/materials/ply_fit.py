@@ -193,7 +193,7 @@ def read_strip_test(path: str | Path, direction: str) -> StripTest:
     Raises
     ------
     MaterialError
-        See `tension_test.read_curves`.
+        See `rubber_tests.read_curves`.
     """
     values = read_numbers(path, {"transverse_strain": STRAIN_UNITS})
     try:

@@ -316,7 +316,7 @@ class CycleReport:
 
 
 def read_tests(path: str | Path, planar: str | Path | None = None, biaxial: str | Path | None = None) -> list[Curve]:
-    """Tests of one rubber from one file or several; see `tension_test.read_curves`.
+    """Tests of one rubber from one file or several; see `read_curves`.
 
     Raises
     ------
@@ -340,7 +340,7 @@ def loading_tests(curves: list[Curve], cycle: str = "last") -> tuple[TensionTest
     Parameters
     ----------
     curves : list of Curve
-        Of `tension_test.read_curves`.
+        Of `read_curves`.
     cycle : {"first", "last"}
 
     Raises

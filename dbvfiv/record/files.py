@@ -21,7 +21,7 @@ from .table import LAYOUT
 _HELD = (signal.SIGINT, signal.SIGTERM)
 
 
-class Shield:
+class DeferredSignals:
     """Context that defers Ctrl-C (SIGINT) and SIGTERM until it is left; not to be nested or shared.
 
     Python handles signals in its main thread alone, so in other threads the context does nothing. Nor does it for

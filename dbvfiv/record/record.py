@@ -17,7 +17,7 @@ import numpy as np
 
 from ..case.model import Case
 from ..observer import Observer
-from .files import Shield, reading
+from .files import DeferredSignals, reading
 from .header import Header, read_header
 from .journal import Journal, read_log
 from .mesh import MeshData, read_mesh
@@ -182,7 +182,7 @@ class GrowingRecord(Record, Observer):
         for c in spec.columns:
             values = np.asarray(columns[c.name], object if c.dtype == "text" else c.dtype)
             blocks[c.name] = values.reshape(len(columns[c.name]), *spec.shape(c))
-        with Shield():
+        with DeferredSignals():
             for name, block in blocks.items():
                 self._rows[table][name].append(block)
             if self._journal is not None:
@@ -191,7 +191,7 @@ class GrowingRecord(Record, Observer):
     def note(self, what: str, **data: Any) -> None:
         """Keep a note: plain data, arrays included, under a kind of its own."""
         text = pack_documents([{"what": what} | data])
-        with Shield():
+        with DeferredSignals():
             self._log.append(json.loads(text))  # as a file gives it back
             if self._journal is not None:
                 self._journal.write_log(text)

@@ -1,6 +1,6 @@
 """The thesis, figure by figure: what this model gives beside what was published.
 
-`entry` says what one figure or table is, `workshop` runs what several of them share and keeps it in files; the entries
+`entry` says what one figure or table is, and runs what several of them share and keeps it in files; the entries
 stand by subject in `materials`, `strip`, `openings`, `histories` and `flutter`.
 """
 
