@@ -5,7 +5,7 @@ import pytest
 
 from dbvfiv.drawing.views import ValveSkin, faces, nodal_thickness, offset_line
 from dbvfiv.drawing.waves import wave_content
-from dbvfiv.studies.modes.shapes import drawn_amplitude
+from dbvfiv.studies.modes.figures import drawn_amplitude
 
 
 def test_the_faces_lie_a_wall_apart_and_a_closed_lip_shows_no_slot(coarse_run):

@@ -10,7 +10,7 @@ from PIL import Image
 import dbvfiv
 from dbvfiv.drawing.views import faces
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.modes.shapes import drawn_amplitude
+from dbvfiv.studies.modes.figures import drawn_amplitude
 
 FLUTTER = {"density": 10, "alpha": 0}
 

@@ -14,7 +14,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.record.mesh import WholeValve
-from dbvfiv.studies.modes.shapes import ModeSurface
+from dbvfiv.studies.modes.figures import ModeSurface
 from tests.small_valves import find_open_state, make_valve
 
 FLUTTER = {"density": 10, "alpha": 0}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -24,11 +23,9 @@ from ...drawing.style import (
     new_figure,
     parameter_label,
 )
+from ..result import StudyResult
 from ..stability.place import describe_fixed
 from ..stability.verdict import NOT_VALID, OUTCOMES
-
-if TYPE_CHECKING:
-    from .result import MapResult
 
 #: Places across a picture at which its regions are looked at.
 _FINE = 120
@@ -36,7 +33,7 @@ _BAR = "Growth rate of the leading mode, 1/s"
 _TITLES = {0.0: "Quasi-steady continuity", 1.0: "Storage: moving walls displace fluid"}
 
 
-def draw(result: MapResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a map, each with its name."""
     if any(not column.failure for column in result.columns):
         yield "stability-map", lambda: stability_map(result)
@@ -45,7 +42,7 @@ def draw(result: MapResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
         yield "cycle-amplitude", lambda: cycle_amplitude(result)
 
 
-def stability_map(result: MapResult) -> Figure:
+def stability_map(result: StudyResult) -> Figure:
     """The headline: where the valve flutters. Cells that no independent count certifies are hatched."""
     growth = np.where(certified_cells(result), result.grid("growth_rate"), np.nan)
     levels = growth_levels(growth)
@@ -62,7 +59,7 @@ def stability_map(result: MapResult) -> Figure:
     return figure
 
 
-def leading_frequency(result: MapResult) -> Figure:
+def leading_frequency(result: StudyResult) -> Figure:
     """Frequency of the leading mode; it changes with a jump where another mode takes the lead."""
     frequency = np.ma.masked_invalid(np.where(certified_cells(result), result.grid("frequency"), np.nan))
     top = float(frequency.max()) if frequency.count() else 1.0
@@ -77,7 +74,7 @@ def leading_frequency(result: MapResult) -> Figure:
     return figure
 
 
-def cycle_amplitude(result: MapResult) -> Figure:
+def cycle_amplitude(result: StudyResult) -> Figure:
     """Amplitude of the limit cycle where there is one; unstable cells without one are hatched, unstable cycles
     dotted.
     """
@@ -101,12 +98,12 @@ def cycle_amplitude(result: MapResult) -> Figure:
     return figure
 
 
-def certified_cells(result: MapResult) -> np.ndarray:
+def certified_cells(result: StudyResult) -> np.ndarray:
     """(laws, rows, columns) whether two counts agree on a cell."""
     return result.grid("certified").astype(bool) & (result.grid("unstable") >= 0)
 
 
-def invalid_cells(result: MapResult) -> np.ndarray:
+def invalid_cells(result: StudyResult) -> np.ndarray:
     """(laws, rows, columns) where the constants of the rubber do not hold."""
     return result.grid("outcome") == OUTCOMES.index(NOT_VALID)
 
@@ -120,7 +117,7 @@ def growth_levels(growth: np.ndarray) -> np.ndarray:
     return np.array([*(-s for s in up[::-1]), 0.0, *up])
 
 
-def _panels(result: MapResult):
+def _panels(result: StudyResult):
     count = len(result.plan.laws)
     figure = new_figure(8.4 if count == 1 else 13.2, 5.4)
     panels = np.atleast_1d(figure.subplots(1, count, sharex=True, sharey=True))
@@ -141,14 +138,14 @@ def _panels(result: MapResult):
     return figure, list(panels)
 
 
-def _headline(figure: Figure, result: MapResult) -> None:
+def _headline(figure: Figure, result: StudyResult) -> None:
     case, mesh = result.case, result.case.mesh
     headline(figure, f"Stability of {result.header.name}")
     words = [describe_fixed(case, *result.moved), f"{mesh.around} × {mesh.along} elements", _vouched(result)]
     figure.supxlabel(" · ".join(w for w in words if w), x=0.01, ha="left", fontsize=8.5, color="0.35")
 
 
-def _vouched(result: MapResult) -> str:
+def _vouched(result: StudyResult) -> str:
     certified, found = result.grid("certified"), result.grid("unstable") >= 0
     text = f"{int(certified.sum())} of {int(found.sum())} cells certified by two counts"
     if not certified_cells(result).all():
@@ -173,7 +170,7 @@ def _shown(axis, values):
     return np.asarray(values) / PARAMETERS[axis.parameter].scale
 
 
-def _cells(axes, result: MapResult, values, colours, norm):
+def _cells(axes, result: StudyResult, values, colours, norm):
     axes.set_facecolor("#d9d9d9")
     x, y = _edges(result.plan.x), _edges(result.plan.y)
     mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(values), cmap=colours, norm=norm, rasterized=True)
@@ -185,7 +182,7 @@ def _cells(axes, result: MapResult, values, colours, norm):
     return mesh
 
 
-def _curves(axes, result: MapResult, law: int) -> None:
+def _curves(axes, result: StudyResult, law: int) -> None:
     """Onset curves in black, dashed where they are interpolated, their frequency written along them."""
     for curve in result.curves:
         if curve.law != law:
@@ -232,7 +229,7 @@ def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:
         )
 
 
-def label_regions(axes, result: MapResult, law: int) -> None:
+def label_regions(axes, result: StudyResult, law: int) -> None:
     """Words, on a ground of their own, in the middle of the largest stable and unstable regions."""
     unstable = result.grid("unstable")[law]
     sure, invalid = certified_cells(result)[law], invalid_cells(result)[law]

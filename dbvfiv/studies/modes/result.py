@@ -20,9 +20,9 @@ from ..session import describe_surroundings
 from ..stability.laws import compare_states
 from ..stability.verdict import Verdict
 from ..state import State, states_of
-from . import centre_line, other_law, plane, shapes, winding
-from .animation import animate_mode
+from . import figures, other_law
 from .certificate import CURVE, Certificate
+from .figures import animate_mode
 from .mode import MODE, ModeShape
 from .steps import cycle_steps, mode_steps
 
@@ -231,10 +231,7 @@ class ModesResult(StudyResult):
         """Eigenvalues, shapes, centre lines and the independent count; of one mode alone if it is named."""
         if self.certificate is None:
             return
-        yield from plane.draw(self)
-        yield from shapes.draw(self, mode)
-        yield from centre_line.draw(self, mode)
-        yield from winding.draw(self)
+        yield from figures.draw(self, mode)
 
     def animate(self, path: str | Path, mode: int = 1, frames: int = 24) -> Path:
         """Write a GIF of one cycle of a mode."""

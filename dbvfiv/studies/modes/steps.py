@@ -6,24 +6,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...model.symmetry import symmetry_named
 from ...record.mesh import WholeValve
 from ...record.vtkhdf import Step, motion
+from ..result import StudyResult
 from .mode import ModeShape
-
-if TYPE_CHECKING:
-    from .result import ModesResult
 
 
 @dataclass(frozen=True)
 class _ModeSteps(Sequence):
     """Modes as steps, made one at a time; "time" is the number of the mode."""
 
-    result: ModesResult
+    result: StudyResult
     valve: WholeValve
 
     def __len__(self) -> int:
@@ -52,7 +49,7 @@ class _CycleSteps(Sequence):
     nothing oscillates.
     """
 
-    result: ModesResult
+    result: StudyResult
     valve: WholeValve
     mode: ModeShape
     phases: int
@@ -74,13 +71,13 @@ class _CycleSteps(Sequence):
         return Step(value, points, {"thickness": self.valve.cells(mesh.thickness)})
 
 
-def mode_steps(result: ModesResult, valve: WholeValve) -> Sequence[Step]:
+def mode_steps(result: StudyResult, valve: WholeValve) -> Sequence[Step]:
     """All modes: the equilibrium as ``displacement``, shapes as ``mode_real``, ``mode_imag`` and ``mode_amplitude``
     (largest 1).
     """
     return _ModeSteps(result, valve)
 
 
-def cycle_steps(result: ModesResult, valve: WholeValve, mode: ModeShape, phases: int = 24) -> Sequence[Step]:
+def cycle_steps(result: StudyResult, valve: WholeValve, mode: ModeShape, phases: int = 24) -> Sequence[Step]:
     """One cycle of a mode about the equilibrium, at an amplitude that shows well; growth or decay is left out."""
     return _CycleSteps(result, valve, mode, phases)

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
 from ...drawing.style import ACCENT, COMPUTED, HALO, PUBLISHED, REST, limits, log_axis, new_figure, parameter_label
+from ..result import StudyResult
 from ..stability.place import describe_fixed
 from .intervals import Interval
-
-if TYPE_CHECKING:
-    from .result import OnsetResult
 
 _UNSTABLE = "#f6ddcf"
 
 
-def draw(result: OnsetResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of an onset result, each with its name."""
     if len(result.values):
         yield "onset", lambda: onset(result)
 
 
-def onset(result: OnsetResult) -> Figure:
+def onset(result: StudyResult) -> Figure:
     """Growth rate and frequency of the leading modes, unstable ranges shaded, uncertain ones hatched, onsets marked."""
     axis = result.case.onset.axis
     scale = PARAMETERS[axis.parameter].scale
@@ -52,7 +49,7 @@ def onset(result: OnsetResult) -> Figure:
     return figure
 
 
-def _shade(result: OnsetResult, scale: float, *panels) -> None:
+def _shade(result: StudyResult, scale: float, *panels) -> None:
     """Unstable ranges in a tint; hatched where nothing is certified, and so nothing claimed."""
     unsure = {"facecolor": "#ececec", "edgecolor": "#9a9a9a", "hatch": "////"}
     _span(result.unstable_intervals, scale, panels, "unstable", facecolor=_UNSTABLE)
@@ -66,7 +63,7 @@ def _span(intervals: list[Interval], scale: float, panels, label: str, **look) -
             axes.axvspan(a / scale, b / scale, lw=0, zorder=0, label=named, **look)
 
 
-def _draw_scan(result: OnsetResult, values: np.ndarray, top, bottom) -> float:
+def _draw_scan(result: StudyResult, values: np.ndarray, top, bottom) -> float:
     """Curves of the scan; the growth rate down to which they are shown."""
     growth, frequency = result.growth_rates, result.frequencies
     low = _floor(growth)
@@ -122,5 +119,5 @@ def _jumps(frequency: np.ndarray) -> np.ndarray:
     return step > 0.25 * np.maximum(frequency, 1.0)
 
 
-def _title(result: OnsetResult) -> str:
+def _title(result: StudyResult) -> str:
     return f"{result.header.name}, {describe_fixed(result.case, result.parameter)}"

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from ...drawing.style import STABLE, UNSTABLE, headline, new_figure
+from ..result import StudyResult
 from ..stability.place import describe_fixed
-
-if TYPE_CHECKING:
-    from .result import SensitivityResult
 
 #: Bars drawn at most, those that move the mode most.
 MOST = 24
 
 
-def draw_bars(result: SensitivityResult) -> Figure:
+def draw_bars(result: StudyResult) -> Figure:
     """Change of growth rate and frequency of the mode for one percent more of each parameter, the largest on top."""
     known = [found for found in result.sensitivities if found.value]
     shown = sorted(known, key=lambda found: abs(found.relative), reverse=True)[:MOST]

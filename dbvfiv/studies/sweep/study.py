@@ -15,8 +15,7 @@ from ..case import Case
 from ..session import Session
 from ..stability.place import is_surrounding, require_parameter
 from ..study import Study
-from .printed import head, point_row
-from .result import BRANCHES, CHECKS, POINTS, STATES, SweepResult, tables_of
+from .result import BRANCHES, CHECKS, POINTS, STATES, SweepResult, head, point_row, tables_of
 from .run import FoundBranches, SweepOptions, SweepPoint, run_sweep
 
 

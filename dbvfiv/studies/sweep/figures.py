@@ -1,32 +1,46 @@
-"""Damping and frequency of tracked modes over the parameter."""
+"""Figures of a sweep: damping and frequency of tracked modes over the parameter, and the root locus."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
+import matplotlib
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ...case.parameters import PARAMETERS
-from ...drawing.style import DANGER, HALO, UNSTABLE, branch_looks, driven, limits, log_axis, new_figure
-
-if TYPE_CHECKING:
-    from .result import Branch, Crossing, SweepResult
+from ...drawing.style import (
+    DANGER,
+    HALO,
+    MAGNITUDE,
+    UNSTABLE,
+    branch_looks,
+    colour_bar,
+    driven,
+    limits,
+    log_axis,
+    new_figure,
+)
+from ..result import StudyResult
 
 #: Confidence below which a match is drawn as doubtful.
 DOUBTFUL = 0.5
 _STABLE_GROUND = "#1f4e790d"
 
 
-def draw(result: SweepResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a sweep, each with its name."""
     if len(result.values) and result.branches:
         yield "sweep", lambda: curves(result)
+        yield "root-locus", lambda: root_locus(result)
 
 
-def curves(result: SweepResult) -> Figure:
+def curves(result: StudyResult) -> Figure:
     """Growth rate, frequency and damping ratio of each branch; crossings of zero growth marked, spans with unstable
     modes shaded.
     """
@@ -67,7 +81,7 @@ def curves(result: SweepResult) -> Figure:
     return figure
 
 
-def _draw_branch(panels, x: np.ndarray, branch: Branch, look: dict) -> None:
+def _draw_branch(panels, x: np.ndarray, branch: Any, look: dict) -> None:
     """A branch in the three panels, doubtful matches crossed."""
     size = np.hypot(branch.growth_rate, branch.angular_frequency)
     second = (branch.angular_frequency < 0).any()  # of a pair that two real modes became: both are seen
@@ -79,7 +93,7 @@ def _draw_branch(panels, x: np.ndarray, branch: Branch, look: dict) -> None:
         axes.plot(x[doubtful], values[doubtful], "x", color="black", ms=8, mew=1.6)
 
 
-def _mark_crossing(axes, crossing: Crossing, result: SweepResult, x: np.ndarray) -> None:
+def _mark_crossing(axes, crossing: Any, result: StudyResult, x: np.ndarray) -> None:
     """A crossing of zero growth and its numbers, beside it where there is room."""
     row = PARAMETERS[result.parameter]
     unit, factor = row.shown_unit, 1.0 / row.scale
@@ -92,7 +106,7 @@ def _mark_crossing(axes, crossing: Crossing, result: SweepResult, x: np.ndarray)
     axes.annotate(f"≈ {at:.3g} {unit}, {swing}", (at, 0.0), (7 * side, 7), **look)
 
 
-def surroundings_of(result: SweepResult) -> str:
+def surroundings_of(result: StudyResult) -> str:
     """Fixed parameters of a sweep, for titles."""
     case = result.case
     parts = []
@@ -113,7 +127,7 @@ def _share(at: float, x: np.ndarray, log: bool) -> float:
     return float((place(at) - place(x[0])) / (place(x[-1]) - place(x[0])))
 
 
-def _shade(axes, result: SweepResult, x: np.ndarray) -> None:
+def _shade(axes, result: StudyResult, x: np.ndarray) -> None:
     """Ground red where a mode is unstable, its edges at the crossings."""
     factor = 1.0 / PARAMETERS[result.parameter].scale
     edges = sorted(
@@ -125,3 +139,64 @@ def _shade(axes, result: SweepResult, x: np.ndarray) -> None:
         inside = result.unstable_count[(x >= low) & (x <= high)]
         unstable = bool(inside.size) and (inside > 0).mean() > 0.5
         axes.axvspan(low, high, color=DANGER if unstable else _STABLE_GROUND, lw=0, zorder=0)
+
+
+def root_locus(result: StudyResult) -> Figure:
+    """Growth rate and frequency of each branch, coloured by the parameter; a ring where it begins, crossings of the
+    axis marked.
+    """
+    row = PARAMETERS[result.parameter]
+    name, unit, factor = row.words, row.shown_unit, 1.0 / row.scale
+    figure = new_figure(7.6, 5.4)
+    axes = figure.add_subplot()
+    x = result.values * factor
+    colours = matplotlib.colors.ListedColormap(matplotlib.colormaps[MAGNITUDE](np.linspace(0.0, 0.9, 256)))
+    ends_of_x = limits(x, result.axis.log)
+    scale = LogNorm(*ends_of_x) if result.axis.log else Normalize(*ends_of_x)
+    ends: dict[tuple[float, ...], list[int]] = {}
+    for branch in result.branches:
+        points = np.column_stack([branch.growth_rate, branch.frequency])
+        there = np.isfinite(points).all(axis=1)
+        if not there.any():
+            continue
+        joined = there[:-1] & there[1:]
+        pieces = np.stack([points[:-1], points[1:]], axis=1)[joined]
+        axes.add_collection(
+            LineCollection(pieces, colors=colours(scale(0.5 * (x[:-1] + x[1:])[joined])), linewidths=1.8)
+        )
+        axes.scatter(*points[there].T, c=x[there], cmap=colours, norm=scale, s=13, zorder=3)
+        first, last = np.flatnonzero(there)[[0, -1]]
+        axes.plot(*points[first], "o", mfc="white", mec=colours(scale(x[first])), mew=1.6, ms=7, zorder=4)
+        ends.setdefault(tuple(points[last].round(6)), []).append(branch.id)
+    for place, ids in ends.items():
+        axes.annotate(", ".join(map(str, ids)), place, (6, 4), textcoords="offset points", fontsize=9.5, color="0.15")
+    _mark_axis(axes, result)
+    axes.margins(0.06)
+    axes.autoscale_view()
+    low, high = axes.get_xlim()
+    high = max(high, 0.08 * (high - low))
+    axes.axvspan(0.0, high, color=DANGER, lw=0, zorder=0)
+    axes.axvline(0.0, color="0.25", lw=1.1, zorder=1)
+    axes.set_xlim(low, high)
+    axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
+    axes.text(0.995, 0.015, "unstable", transform=axes.transAxes, ha="right", va="bottom", color=UNSTABLE, fontsize=9)
+    bar = colour_bar(figure, ScalarMappable(scale, colours), axes, f"{name}, {unit}")
+    if result.axis.log:
+        log_axis(bar.ax.yaxis, x[0], x[-1])
+    axes.set_xlabel("Growth rate, 1/s")
+    axes.set_ylabel("Frequency, Hz")
+    axes.set_title(f"Root locus, {surroundings_of(result)}", loc="left", fontweight="bold")
+    words = "Rings: where a branch begins; numbers: where it ends."
+    if result.crossings():
+        words += " Diamonds: interpolated between the values computed."
+    figure.supxlabel(words, x=0.01, ha="left", fontsize=9)
+    return figure
+
+
+def _mark_axis(axes, result: StudyResult) -> None:
+    row = PARAMETERS[result.parameter]
+    unit, factor = row.shown_unit, 1.0 / row.scale
+    look = {"textcoords": "offset points", "fontsize": 9, "color": UNSTABLE, "path_effects": HALO}
+    for crossing in result.crossings():
+        axes.plot(0.0, crossing.frequency, "D", color=UNSTABLE, ms=6, zorder=5)
+        axes.annotate(f"≈ {factor * crossing.value:.3g} {unit}", (0.0, crossing.frequency), (9, 6), **look)
