@@ -1,26 +1,19 @@
 """Spectra of large sparse quadratic pencils with a low-rank, frequency-dependent coupling."""
 
-from .agreement import Certificate
+from .basis import NotPositiveError, TransferBasis, lowest_frequencies
 from .block_krylov import LargestPairs, NotConvergedError, largest_pairs
-from .certificate import CertifiedSpectrum, certified_spectrum, listed_unstable
-from .column import Column
-from .columns import ColumnSolver
-from .condensation import Workspace
-from .coverage import CLEAR
+from .certificate import Certificate, CertifiedSpectrum, certified_spectrum, listed_unstable
+from .columns import Column, ColumnSolver
+from .count import Count, unstable_count
 from .derivative import PencilDerivative, difference, eigenvalue_derivative
-from .factorization import SingularShiftError
+from .factor import SingularShiftError, Workspace
 from .family import Condition, PencilFamily
-from .mass_basis import NotPositiveError
-from .options import SearchOptions
-from .pencil import CoupledPencil
+from .operator import CoupledPencil, Relaxation
+from .options import CLEAR, SearchOptions
 from .reduction import FamilyReduction
-from .region import Oval, SearchedRegion
-from .relaxation import Relaxation
 from .search import leading_modes
-from .spectrum import Mode, Spectrum
+from .spectrum import Mode, Oval, SearchedRegion, Spectrum
 from .tracking import Branches, TrackOptions, track
-from .transfer import TransferBasis, lowest_frequencies
-from .winding import Count, unstable_count
 
 __all__ = [
     "CLEAR",

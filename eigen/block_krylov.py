@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mass_basis import beside
+from .basis import beside
 
 #: Blocks after which the search is given up.
 MOST_BLOCKS = 60

@@ -1,4 +1,7 @@
-"""Leading modes together with the independent count of the unstable ones."""
+"""Leading modes with the independent count of the unstable ones, and their agreement.
+
+on the real axis far from its shifts.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +10,148 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .agreement import Certificate
-from .condensation import Workspace, condensed_matrix
-from .distant import distant_pairs, joined
-from .factorization import StructureMatrices, SuperluFactorization
+from .basis import TransferBasis
+from .count import Count, Determinant, unstable_count
+from .dense import all_pairs
+from .factor import StructureMatrices, SuperluFactorization, Workspace, condensed_matrix
+from .operator import CoupledPencil, real_apply
 from .options import SearchOptions
-from .pencil import CoupledPencil, real_apply
-from .response import Determinant
+from .pairs import SAME, Found, acceptable, newton, normalised
 from .search import leading_modes
 from .spectrum import Spectrum
-from .transfer import TransferBasis
-from .winding import Count, unstable_count
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Agreement of a spectrum with an independent count, for a mode list and for a cell of a map alike.
+
+    Attributes
+    ----------
+    unstable : int
+        Eigenvalues right of `line` by the spectrum, conjugates counted apart.
+    counted : int
+        The same by the argument principle.
+    certain : bool
+        The count followed its phase everywhere, and what both rest on is accurate enough.
+    line : float
+        Growth rate counted from, 1/s.
+    band : float
+        Hz; frequencies up to it were looked at, infinite for all.
+
+    Examples
+    --------
+    >>> Certificate(2, 2, True).stable, Certificate(0, 2, True).stable, Certificate(0, 0, True).stable
+    (False, None, True)
+    """
+
+    unstable: int
+    counted: int
+    certain: bool
+    line: float = 0.0
+    band: float = np.inf
+
+    @property
+    def agrees(self) -> bool:
+        """Both routes give the same number, and the count is certain."""
+        return self.certain and self.unstable == self.counted
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether all eigenvalues up to the band decay; None without agreement."""
+        return self.unstable == 0 if self.agrees else None
+
+    @property
+    def where(self) -> str:
+        """The region in words, empty for the whole right half-plane."""
+        text = "" if self.line == 0 else f" with a growth rate above {self.line:.4g} 1/s"
+        return text + ("" if np.isinf(self.band) else f" up to {self.band:.4g} Hz")
+
+
+#: Pairs beyond the band that are looked for at most, and real ones.
+MOST = 4
+#: Newton steps at most; what lies beyond the band is known roughly.
+STEPS = 8
+
+
+def distant_pairs(
+    pencil: CoupledPencil,
+    spectrum: Spectrum,
+    basis: TransferBasis | None,
+    line: float,
+    options: SearchOptions,
+) -> Found | None:
+    """Unstable pairs of the full pencil near those that the pencil on a basis has beyond the band of a spectrum, if
+    that was not asked for, and on the real axis, which every band holds; without a basis those of a small pencil.
+
+    Each is brought to the full pencil by Newton steps and has to pass the residual test like any other, however far it
+    moves on the way: a basis may know it roughly. The fastest growing ones are tried.
+
+    Parameters
+    ----------
+    line : float
+        Growth rate above which a pair counts as unstable, 1/s.
+
+    Returns
+    -------
+    Found or None
+        None if left vectors are wanted as well, or none was found.
+    """
+    if spectrum.left_q is not None:
+        return None
+    values, q, u, _, _ = all_pairs(pencil if basis is None else basis.reduced(pencil), left=False)
+    unstable = np.flatnonzero(values.real > line)
+    unstable = unstable[np.argsort(-values.real[unstable])]
+    chosen = list(unstable[values.imag[unstable] == 0][:MOST])
+    if options.max_frequency is None:
+        chosen += list(unstable[values.imag[unstable] > 2 * np.pi * spectrum.band][:MOST])
+    starts = [(values[i], q[:, i] if basis is None else basis.lift(q[:, i]), u[:, i]) for i in chosen]
+    workspace = Workspace()
+    pairs = []
+    for start in starts:
+        pair = newton(pencil, *start, workspace=workspace, tolerance=options.tolerance, steps=STEPS)
+        value, _, _, residual, backward = pair
+        known = [abs(value - x) <= SAME * abs(x) for x in (*spectrum.eigenvalues, *(other[0] for other in pairs))]
+        if value.real > line and acceptable(residual, backward, options.tolerance) and not any(known):
+            pairs.append(pair)
+    if not pairs:
+        return None
+    values, q, u, residual, backward = (np.stack(part, axis=-1) for part in zip(*pairs))
+    return Found(values, *normalised(q, u), residual, backward)
+
+
+def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
+    """The spectrum with further unstable pairs, sorted; as long as was asked for, if not more are unstable."""
+    new = {
+        "eigenvalues": found.values,
+        "q": found.q,
+        "u": found.u,
+        "residual": found.residual,
+        "backward_error": found.backward,
+    }
+    parts = {name: np.concatenate([getattr(spectrum, name), part], axis=-1) for name, part in new.items()}
+    order = np.lexsort((parts["eigenvalues"].imag, -parts["eigenvalues"].real))
+    order = order[: max(spectrum.asked, int(np.sum(parts["eigenvalues"].real > line)))]
+    real = found.values.imag == 0
+    notes = []
+    if real.any():
+        rates = ", ".join(f"{value.real:.4g}" for value in found.values[real])
+        notes.append(
+            f"Motions that grow by {rates} 1/s without oscillating lie far from where modes are searched for; the "
+            f"independent count pointed to them."
+        )
+    if not real.all():
+        frequencies = ", ".join(f"{value.imag / (2 * np.pi):.4g}" for value in found.values[~real])
+        notes.append(
+            f"Unstable modes at {frequencies} Hz lie beyond the band up to {spectrum.band:.4g} Hz in which the list is "
+            f"complete; the independent count pointed to them."
+        )
+    return replace(
+        spectrum,
+        **{name: part[..., order] for name, part in parts.items()},
+        refined=spectrum.refined + found.values.size,
+        notes=(*spectrum.notes, *notes),
+    )
+
 
 #: Largest accepted error of log det of the reduced basis behind a count.
 TRUSTED = 0.1

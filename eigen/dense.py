@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
-from .pencil import CoupledPencil
+from .operator import CoupledPencil
 
 
 def all_pairs(pencil: CoupledPencil, *, left: bool):

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .pencil import FLUID_PARTS, CoupledPencil, FluidParts, real_apply
-from .products import coupling_of_modes
+from .operator import FLUID_PARTS, CoupledPencil, FluidParts, coupling_of_modes, real_apply
 from .spectrum import Mode
 
 

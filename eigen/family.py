@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .coverage import CLEAR
-from .creep import edge_of
-from .options import SearchOptions
-from .pencil import CoupledPencil
-from .relaxation import Relaxation
-from .shifts import LOWEST, SLOPE
-
-if TYPE_CHECKING:
-    from .reduction import FamilyReduction
+from .operator import CoupledPencil, Relaxation, edge_of
+from .options import CLEAR, LOWEST, SLOPE, SearchOptions
 
 
 class Condition(NamedTuple):
@@ -64,7 +57,7 @@ class PencilFamily(ABC):
     """
 
     added: int = 0
-    model: Callable[[], FamilyReduction | None] = staticmethod(lambda: None)
+    model: Callable[[], Any | None] = staticmethod(lambda: None)
     mass: object
     damping: object
     stiffness: object
@@ -116,7 +109,7 @@ class Reach(NamedTuple):
     """Growth rates above `floor` (1/s) and angular frequencies up to `band` (rad/s).
 
     Left of `creep` (1/s), which is minus infinity where nothing relaxes, what oscillates hardly or slowly does not
-    count; see `eigen.creep` and `eigen.shifts`.
+    count; see `eigen.operator` and `eigen.search`.
     """
 
     floor: float

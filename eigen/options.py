@@ -5,6 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+#: Share of a limit point of eigenvalues right of which an eigenvalue is clearly apart from it.
+CLEAR = 0.8
+#: Lowest frequency searched where the stiffness relaxes, over the highest, and decay over angular frequency down to
+#: which such a search goes at most; slower and more strongly damped motions shade off into relaxation.
+LOWEST, SLOPE = 0.05, 0.75
+
 
 @dataclass(frozen=True)
 class SearchOptions:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from .phase import middle
+from .count import middle
 
 #: Pairs of a cell and a place evaluated at once, so that they stay in the processor's cache.
 CHUNK = 128
@@ -295,3 +295,11 @@ def real_roots(problem: RationalCells, low: np.ndarray, top: float) -> tuple[np.
         same = problem.signs(rows, place) == sign
         a, b = np.where(same, place, a), np.where(same, b, place)
     return rows, 0.5 * (a + b)
+
+
+#: Fewest cells of a line.
+LEAST = 8
+#: Largest ratio of the inertia of two cells that are solved, and largest distance of them along the line.
+RATIO, STEP = 1.5, 3
+#: Relative distance within which eigenvalues of two such cells are those of one mode.
+ALIKE = 0.2

@@ -1,4 +1,4 @@
-"""Leading eigenpairs of a pencil: shifts, merging, verification, completeness."""
+"""Search for the leading eigenpairs of a pencil: shifts, merging, verification, completeness."""
 
 from __future__ import annotations
 
@@ -6,20 +6,174 @@ from dataclasses import replace
 
 import numpy as np
 
-from .compact import oscillating_pairs
-from .condensation import Workspace
-from .coverage import CLEAR, apart_from_limit, band_sought, is_covered, leading_band, number_in_band, would_do
-from .creep import apart_from_creep
 from .dense import all_pairs
-from .factorization import SingularShiftError, petsc_is_complex
-from .krylov import near_shift
-from .left import attach_left, biorthogonalise
-from .options import SearchOptions
-from .pairs import Found, empty, merge, polish, refine, upper_half, verified
-from .pencil import CoupledPencil
-from .region import Oval
-from .shifts import SLOPE, lowest_sought, next_shift, plan_shifts
-from .spectrum import Spectrum
+from .factor import SingularShiftError, Workspace, petsc_is_complex
+from .krylov import near_shift, oscillating_pairs
+from .operator import CoupledPencil, apart_from_creep
+from .options import CLEAR, LOWEST, SLOPE, SearchOptions
+from .pairs import Found, attach_left, biorthogonalise, empty, merge, polish, refine, upper_half, verified
+from .spectrum import Oval, Spectrum
+
+DEPTH = 0.4  # growth rate over angular frequency, down to which a band is searched at most
+
+
+def band_sought(options) -> float:
+    """Upper end of the band sought, rad/s."""
+    return np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
+
+
+def number_in_band(found, options) -> int:
+    """Eigenvalues found up to the end of the band."""
+    return int(np.sum(found.values.imag <= band_sought(options)))
+
+
+def would_do(values, oval: Oval, found, aim, options) -> bool:
+    """Whether eigenvalues that have converged in an oval are all that is asked for."""
+    apart = values[apart_from_limit(values, options) & (values.imag >= -1e-11 * np.abs(values))]
+    trial = Found(apart, *(np.zeros(0),) * 4, lowest=found.lowest, slope=found.slope)
+    trial.ovals[oval.shift] = oval
+    return is_covered(trial, aim, options)
+
+
+def apart_from_limit(values, options) -> np.ndarray:
+    """Which eigenvalues do not belong to those that crowd around the limit point."""
+    if options.limit_point is None:
+        return np.ones(values.size, bool)
+    return np.abs(values - options.limit_point) > 0.05 * abs(options.limit_point)
+
+
+def leading_band(found, aim, options) -> tuple[float, float]:
+    """Growth rate of the last of the leading modes, and the band that holds them, rad/s."""
+    values = found.values
+    if options.limit_point is not None:
+        floor = CLEAR * options.limit_point
+        values = values[values.real > floor]
+        growth = np.sort(values.real)[::-1]
+        band = min(band_sought(options), float(values.imag.max(initial=0.0)))
+        return float(growth[aim - 1]) if growth.size >= aim else floor, band
+    if options.max_frequency is not None:
+        band = 2 * np.pi * options.max_frequency
+        values = values[values.imag <= band * (1 + 1e-12)]
+        growth = np.sort(values.real)[::-1]
+        return (growth[min(aim, growth.size) - 1] if growth.size else -np.inf), band
+    if not values.size:
+        return -np.inf, np.inf
+    if not found.everything:
+        covered = _widest_covered(found, aim)
+        if covered is not None:
+            return covered
+    order = np.argsort(-values.real)[:aim]
+    return float(values.real[order].min()), float(values.imag[order].max())
+
+
+def _widest_covered(found, aim) -> tuple[float, float] | None:
+    """The widest band whose leading modes the region covers, with the growth rate of the last."""
+    region = found.region
+    tops = np.unique(found.values.imag)[::-1]
+    for band in tops[:: max(1, tops.size // 60)]:
+        growth = np.sort(found.values.real[found.values.imag <= band])[::-1]
+        if growth.size < aim:
+            return None
+        low, high = region.complete_between(float(band), samples=100)
+        if low <= growth[aim - 1] and high > 0:
+            return float(growth[aim - 1]), float(band)
+    return None
+
+
+def is_covered(found, aim, options) -> bool:
+    """Whether the leading modes asked for are known to be the leading ones."""
+    if found.everything:
+        return True
+    growth, band = leading_band(found, aim, options)
+    if options.limit_point is not None:
+        low, high = found.region.complete_between(band)
+        return low <= growth and high > 0
+    inside = found.values.imag <= band * (1 + 1e-12)
+    low, high = found.region.complete_between(band)
+    if inside.sum() < aim:
+        # a band may hold fewer: enough if it is searched down to strongly damped modes
+        return options.max_frequency is not None and low <= -DEPTH * band and high > 0
+    return low <= growth and high > 0
+
+
+def plan_shifts(pencil, count, options, workspace):
+    """First shift, and whether a limit point of eigenvalues is near enough to matter."""
+    if options.shifts is not None:
+        return options, None
+    if pencil.relaxation is not None:
+        # all from the lowest frequency to the highest lie as high above the real axis of 1 / (lambda - shift)
+        return options, 0.9 * LOWEST**-0.5 * lowest_sought(pencil, count, options, workspace)
+    first = first_shift(pencil, max(count, options.least), options, workspace)
+    if options.limit_point is None:
+        return options, first
+    beside = 1.5 * abs(options.limit_point)
+    if beside < first:
+        return options, beside
+    return replace(options, limit_point=None), first
+
+
+def lowest_sought(pencil, count, options, workspace) -> float:
+    """Angular frequency above which a search where the stiffness relaxes has to be complete, rad/s."""
+    if options.max_frequency is not None:
+        return LOWEST * 2 * np.pi * options.max_frequency
+    return LOWEST * first_shift(pencil, max(count, options.least), options, workspace)
+
+
+def first_shift(pencil, aim, options, workspace) -> float:
+    """A positive real shift of the size of the frequencies sought."""
+    if options.max_frequency is not None:
+        # close to the band its eigenvalues lie well apart; next to a limit point the disc has to stay flat
+        return (0.75 if options.limit_point is None else 1.5) * 2 * np.pi * options.max_frequency
+    stiffness, inertia = np.abs(pencil.K.diagonal()), np.abs(pencil.M.diagonal())
+    typical = np.sqrt(np.median(stiffness + 1e-300) / np.median(inertia + 1e-300))
+    probe = 1e-3 * typical if np.isfinite(typical) and typical > 0 else 1.0
+    lowest = probe
+    for _ in range(3):  # inverse power iteration on the structure with M at the shift
+        try:
+            factor = workspace.factored(pencil, probe)
+        except SingularShiftError:
+            probe *= 1.37
+            continue
+        x = np.random.default_rng(3).standard_normal(pencil.n)
+        for _ in range(6):
+            x = factor.solve(pencil.M @ x).real
+            size = np.linalg.norm(x)
+            if not (np.isfinite(size) and size > 0):
+                return probe
+            x /= size
+        lowest = size**-0.5
+        # with the shift small against the frequency the estimate holds
+        if lowest > 2 * probe or probe < 1e-6 * typical:
+            break
+        probe *= 0.05
+    return max(lowest, probe) * max(3.0, 1.0 * aim)
+
+
+def next_shift(pencil, found, aim, options, workspace) -> complex:
+    """The natural real shift where the band was far off, then complex ones up the band.
+
+    Where nothing converged the spectrum is dense as seen from afar, as heavy fluids make it: go closer.
+    """
+    if pencil.relaxation is not None:
+        return found.shifts[0] * (2.5, 0.4)[len(found.shifts) % 2] ** ((len(found.shifts) + 1) // 2)
+    if not found.values.size and all(isinstance(s, float) for s in found.shifts):
+        closer = min(found.shifts) / 3.0
+        if options.max_frequency is None:
+            return closer
+        return min(closer, first_shift(pencil, aim, replace(options, max_frequency=None), workspace))
+    if options.limit_point is not None:  # a larger disc hugs the line through the limit point
+        return 3.0 * max(abs(s) for s in found.shifts)
+    if options.max_frequency is not None and len(found.shifts) == 1:
+        natural = first_shift(pencil, aim, replace(options, max_frequency=None), workspace)
+        if natural < 0.75 * 2 * np.pi * options.max_frequency:
+            return natural
+    if options.max_frequency is not None:
+        band = 2 * np.pi * options.max_frequency
+    else:
+        band = max(leading_band(found, aim, options)[1], abs(found.shifts[0]))
+    step = len([s for s in found.shifts if isinstance(s, complex)])
+    height = band * (1.0, 0.5, 0.75, 0.25)[step % 4]
+    return complex(0.3 * band, height)
 
 
 def leading_modes(

@@ -10,17 +10,12 @@ structure itself turns it by is followed once for all cells.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
 
-from .oscillators import Oscillators
-from .phase import LARGEST_STEP, LATE, grid, middle, principal, thinned, wide
-from .systems import solved
-
-if TYPE_CHECKING:
-    from .reduced import ReducedFamily
+from .determinant import LARGEST_STEP, LATE, Oscillators, grid, middle, principal, solved, thinned, wide
 
 #: Patterns of motion and force weaker than this are left out.
 PATTERNS = 1e-5
@@ -51,7 +46,7 @@ class Response:
 
     Parameters
     ----------
-    reduced : ReducedFamily
+    reduced : Any
     alpha, beta : float
 
     Attributes
@@ -72,7 +67,7 @@ class Response:
 
     turned, certain = 0.0, True
 
-    def __init__(self, reduced: ReducedFamily, alpha: float, beta: float):
+    def __init__(self, reduced: Any, alpha: float, beta: float):
         k = reduced.size
         damping = alpha * reduced.M + beta * reduced.D
         form = np.zeros((2 * k, 2 * k))
@@ -112,13 +107,13 @@ class RelaxingResponse:
 
     Parameters
     ----------
-    reduced : ReducedFamily
+    reduced : Any
     alpha, beta, loss : float
     """
 
     unstable = 0
 
-    def __init__(self, reduced: ReducedFamily, alpha: float, beta: float, loss: float):
+    def __init__(self, reduced: Any, alpha: float, beta: float, loss: float):
         parts = np.stack([reduced.K, reduced.M, alpha * reduced.M + beta * reduced.D, *reduced.relaxing])
         self._shape, self._flat = reduced.K.shape, parts.reshape(len(parts), -1)
         self._relaxation = reduced.family.relaxation(loss)
@@ -233,7 +228,7 @@ def relative(matrix: np.ndarray, root: np.ndarray) -> np.ndarray:
     return np.linalg.solve(root, half.T)
 
 
-def response(reduced: ReducedFamily, damping: tuple[float, float, float]) -> Response | RelaxingResponse:
+def response(reduced: Any, damping: tuple[float, float, float]) -> Response | RelaxingResponse:
     """The response at one damping; the last ones are kept."""
     known = reduced.responses
     if damping not in known:

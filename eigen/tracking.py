@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from .condensation import Workspace
+from .factor import Workspace
+from .operator import CoupledPencil, coupling_of_modes
 from .options import SearchOptions
-from .pencil import CoupledPencil
-from .products import coupling_of_modes
 from .search import leading_modes
 from .spectrum import Spectrum
 

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from eigen import CoupledPencil, Relaxation
-from eigen.pencil import FLUID_PARTS
+from eigen.operator import FLUID_PARTS
 
 from ..case.parameters import PIPES
 from ..errors import SolveError

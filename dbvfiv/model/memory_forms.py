@@ -16,7 +16,7 @@ import numpy as np
 from continuation.normal_form import Motion
 from continuation.system import expand
 from eigen import CoupledPencil
-from eigen.pencil import real_apply
+from eigen.operator import real_apply
 
 from .dynamics import linearise
 from .residual import ValveResidual

@@ -21,7 +21,7 @@ import numpy as np
 
 from continuation import OutOfDomain, Spectrum, SystemBase
 from eigen import CoupledPencil, SearchOptions, SingularShiftError, Workspace, leading_modes
-from eigen.pencil import real_apply
+from eigen.operator import real_apply
 
 from ..case.parameters import SYSTEM_NAMES
 from ..errors import SolveError

@@ -21,7 +21,7 @@ from continuation import OutOfDomain
 from continuation.harmonics import Rates
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
 from eigen import CoupledPencil, SingularShiftError, Workspace
-from eigen.pencil import FLUID_PARTS
+from eigen.operator import FLUID_PARTS
 
 from ..errors import SolveError
 from ..flow import FlowMotion

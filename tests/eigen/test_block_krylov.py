@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 import eigen.block_krylov
 from eigen import NotConvergedError, NotPositiveError, largest_pairs
-from eigen.full_rows import FullRows
+from eigen.factor import FullRows
 
 
 def problem(n: int, values, seed: int = 0):

@@ -6,10 +6,9 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from eigen import Certificate, ColumnSolver, Condition, CoupledPencil, PencilFamily, SearchOptions, certified_spectrum
-from eigen.cell_counts import count_unstable
-from eigen.column import DIRECT, REDUCED
-from eigen.reduced import POWERS
-from eigen.reduction import FamilyReduction
+from eigen.columns import DIRECT, REDUCED
+from eigen.reduced_counts import count_unstable
+from eigen.reduction import POWERS, FamilyReduction
 
 SIZE = 60
 

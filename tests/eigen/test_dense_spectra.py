@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from eigen import CoupledPencil, SearchOptions, Workspace, leading_modes
 from eigen.krylov import near_shift
 from eigen.pairs import empty
-from eigen.shifts import next_shift
+from eigen.search import next_shift
 
 
 def chain(n=600, stiffness=4e5, damping=1e-5):

@@ -12,13 +12,12 @@ from eigen import (
     PencilFamily,
     Relaxation,
     SearchOptions,
-    chains,
     lowest_frequencies,
     structure_response,
+    viscoelastic,
 )
-from eigen.phase_count import phase_counts
-from eigen.reduced import POWERS, ReducedFamily
-from eigen.reduction import FamilyReduction
+from eigen.reduced_counts import phase_counts
+from eigen.reduction import POWERS, FamilyReduction, ReducedFamily
 
 SIZE, GROUPS, TIMES = 12, 2, 3
 
@@ -170,7 +169,7 @@ def test_cells_of_a_line_are_those_solved_one_by_one(seed, cells):
     family = RelaxingFamily(seed, coupling=0.3)
     reduced = ReducedFamily(family, np.eye(SIZE))
     line = [Condition(x, 0.05, 0.0, float(seed % 2), 0.6) for x in np.geomspace(0.01, 3.0, cells)]
-    assert len(chains.solved_cells(line)) == 21
+    assert len(viscoelastic.solved_cells(line)) == 21
     together = reduced.eigenvalues(line)
     for condition, row in zip(line, together):
         alone, row = (family.reach(condition).leading(r)[:4] for r in (reduced.eigenvalues([condition])[0], row))

@@ -6,9 +6,9 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from eigen import CoupledPencil, Relaxation, SearchOptions, TransferBasis, Workspace, certified_spectrum, leading_modes
-from eigen.creep import apart_from_creep, creep_edge
 from eigen.dense import all_eigenvalues, all_pairs
-from eigen.residual import newton
+from eigen.operator import apart_from_creep, creep_edge
+from eigen.pairs import newton
 from tests.systems.beam import beam
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 from eigen import CoupledPencil, Relaxation, SearchOptions, TransferBasis, certified_spectrum, unstable_count
 from eigen.certificate import response_error
-from eigen.response import Determinant
+from eigen.count import Determinant
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues, random_pencil
 from tests.systems.relaxing import STRENGTHS, TIMES, relaxing_random

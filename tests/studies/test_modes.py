@@ -18,7 +18,7 @@ from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.modes.run import ModesOptions, run_modes
 from eigen import SearchOptions
-from eigen.residual import acceptable
+from eigen.pairs import acceptable
 
 LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
 WATER = Mu(density=1000.0, alpha=5.0, beta=0.003)

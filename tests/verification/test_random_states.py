@@ -11,9 +11,9 @@ import pytest
 
 from dbvfiv.model import select_search
 from eigen import CertifiedSpectrum, SearchOptions, TransferBasis, certified_spectrum, unstable_count
-from eigen.creep import apart_from_creep
 from eigen.dense import all_eigenvalues
-from eigen.residual import acceptable
+from eigen.operator import apart_from_creep
+from eigen.pairs import acceptable
 from tests.small_valves import FORMER
 from tests.verification.random_states import (
     RandomState,

@@ -10,8 +10,8 @@ from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, Workspace, leading_modes
+from eigen.basis import TransferBasis
 from eigen.certificate import certified_spectrum
-from eigen.transfer import TransferBasis
 
 pytestmark = pytest.mark.slow
 LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)

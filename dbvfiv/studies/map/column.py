@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eigen import Column
-from eigen.column import MISSING
+from eigen.columns import MISSING
 
 from ...case.axis import Axis
 from ...case.parameters import Mu

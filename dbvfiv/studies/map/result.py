@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from eigen.column import DIRECT, MISSING
+from eigen.columns import DIRECT, MISSING
 
 from ...model.symmetry import equilibria_of
 from ..result import StudyResult

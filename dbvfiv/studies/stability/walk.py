@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from eigen import Column, ColumnSolver, Workspace
-from eigen.column import DIRECT
+from eigen.columns import DIRECT
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import NotValidError, SolveError

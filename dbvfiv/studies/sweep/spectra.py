@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eigen import Column, CoupledPencil, SearchOptions, Spectrum, Workspace, leading_modes
-from eigen.left import with_left_vectors
+from eigen.pairs import with_left_vectors
 
 from ...case.parameters import Mu
 from ...errors import NotValidError

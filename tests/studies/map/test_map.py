@@ -26,7 +26,7 @@ from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.modes.run import run_modes
 from dbvfiv.studies.session import load_result
 from eigen import SingularShiftError
-from eigen.phase_count import PhaseCounts
+from eigen.reduced_counts import PhaseCounts
 from tests.small_valves import FORMER, THESIS_SET
 
 from .axes import AXES
@@ -273,7 +273,7 @@ def test_without_mpiexec_there_is_one_process(monkeypatch):
 
 def test_cells_that_the_count_does_not_confirm_are_uncertain(case, monkeypatch):
     # a count that sees one pair too many, whatever the model
-    monkeypatch.setattr("eigen.cell_counts.phase_counts", lambda reduced, conditions, hints: _more(conditions))
+    monkeypatch.setattr("eigen.reduced_counts.phase_counts", lambda reduced, conditions, hints: _more(conditions))
     monkeypatch.setattr("eigen.columns.certified_spectrum", _refuse)
     result = run_map(case.replace({"map.x": "pressure=3000:8000:2", "map.refine": 0, "map.checks": 0}))
     assert not result.grid("certified").any()

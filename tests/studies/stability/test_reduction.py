@@ -6,9 +6,8 @@ import pytest
 from dbvfiv.case.parameters import Mu
 from dbvfiv.studies.stability.family import ValveFamily
 from eigen import ColumnSolver, Condition, FamilyReduction
-from eigen.phase_count import phase_counts
-from eigen.reduced import POWERS
-from eigen.static_solver import StaticSolver
+from eigen.reduced_counts import phase_counts
+from eigen.reduction import POWERS, StaticSolver
 
 DENSITIES = np.geomspace(1.0, 1000.0, 13)
 

@@ -1,20 +1,53 @@
-"""Leading eigenvalues of a reduced family whose stiffness relaxes, for many conditions at once."""
+"""Leading eigenvalues of reduced pencils of viscoelastic walls, for many conditions at once."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import chains
-from .creep import OVERDAMPED
-from .family import bordered
-from .rational import SAME, RationalCells, Refined, Surrogate, real_roots, refined, started
+from .family import Condition, bordered
+from .operator import OVERDAMPED
+from .rational import ALIKE, LEAST, RATIO, SAME, STEP, RationalCells, Refined, Surrogate, real_roots, refined, started
 from .structure_response import relative
 
-if TYPE_CHECKING:
-    from .family import Condition
-    from .reduced import ReducedFamily
+
+class Mode(NamedTuple):
+    """An eigenvalue with its right and left vectors, (n,) each."""
+
+    value: complex
+    right: np.ndarray
+    left: np.ndarray
+
+
+def solved_cells(conditions) -> np.ndarray:
+    """Cells to be solved from nothing: all where the conditions follow each other too far apart, or differ in more than
+    the inertia.
+    """
+    every = np.arange(len(conditions))
+    inertia = np.array([c.inertia for c in conditions])
+    if len(conditions) < LEAST or len({(c.law, c.damping) for c in conditions}) > 1 or not (inertia > 0).all():
+        return every
+    widest = np.abs(np.diff(np.log(inertia))).max()
+    step = min(STEP, int(np.log(RATIO) / max(widest, 1e-300)))
+    return every if step < 2 else np.union1d(every[::step], every[-1:])
+
+
+def in_between(first: list[Mode], second: list[Mode], share: float) -> list[Mode]:
+    """Modes to start from, a share of the way from one cell to another: between where one has its like there, and all
+    that have none.
+    """
+    others, out = list(second), []
+    for mode in first:
+        distance = [abs(mode.value - other.value) for other in others]
+        nearest = int(np.argmin(distance)) if distance else -1
+        if distance and distance[nearest] <= ALIKE * abs(mode.value):
+            other = others.pop(nearest)
+            vectors = mode if share < 0.5 else other
+            mode = vectors._replace(value=(1.0 - share) * mode.value + share * other.value)
+        out.append(mode)
+    return out + others
+
 
 #: Eigenvalues of a cell that are taken from the surrogate to the rational pencil.
 TAKEN = 6
@@ -37,10 +70,10 @@ class SmallSpectra:
 
     Parameters
     ----------
-    reduced : ReducedFamily
+    reduced : Any
     """
 
-    def __init__(self, reduced: ReducedFamily):
+    def __init__(self, reduced: Any):
         self.reduced = reduced
         root = np.linalg.cholesky(reduced.M)
         squares, motions = np.linalg.eigh(relative(reduced.K, root))
@@ -109,7 +142,7 @@ class SmallSpectra:
         """Leading eigenvalues of each cell in the upper half-plane; and right and left vectors, where they came along,
         by cell and eigenvalue.
         """
-        solved = chains.solved_cells(conditions)
+        solved = solved_cells(conditions)
         if len(solved) == len(conditions):
             return self._each(conditions)
         rows: list[list[complex]] = [[] for _ in conditions]
@@ -121,13 +154,13 @@ class SmallSpectra:
             vectors.update({(cells[i], value): pair for (i, value), pair in found[1].items()})
 
         enter(solved, self._each([conditions[i] for i in solved]))
-        known = {i: [chains.Mode(v, *vectors[i, v]) for v in rows[i] if (i, v) in vectors] for i in solved}
+        known = {i: [Mode(v, *vectors[i, v]) for v in rows[i] if (i, v) in vectors] for i in solved}
         between = np.setdiff1d(np.arange(len(conditions)), solved)
         next_one = np.searchsorted(solved, between)
         # beside one solved by the exact linear form, which brings no vectors, none can be started
         whole = {i: all((i, v) in vectors for v in rows[i] if v.imag > 0) for i in solved}
         starts = [
-            chains.in_between(known[a], known[b], (i - a) / (b - a)) if whole[a] and whole[b] else []
+            in_between(known[a], known[b], (i - a) / (b - a)) if whole[a] and whole[b] else []
             for i, a, b in zip(between, solved[next_one - 1], solved[next_one])
         ]
         *found, doubtful = self._from([conditions[i] for i in between], starts)

@@ -1,4 +1,4 @@
-"""A quadratic pencil with a low-rank coupling that depends on the eigenvalue."""
+"""Parameter-separable operator: pencils of a structure with a low-rank coupling, and what relaxes of its stiffness."""
 
 from __future__ import annotations
 
@@ -8,7 +8,98 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from .relaxation import Relaxation
+from .options import CLEAR
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxation:
+    r"""Parts of a stiffness that relax, each with strengths of its own over common times.
+
+    .. math:: \sum_g \varphi_g(\lambda) K_g, \qquad
+        \varphi_g(\lambda) = \sum_j g_{gj} \frac{\lambda \tau_j}{1 + \lambda \tau_j}
+
+    comes on top of the slow stiffness K of a pencil. With :math:`z_j = q / (1 + \lambda \tau_j)` it is linear in
+    lambda: :math:`\lambda \tau_j z_j = q - z_j`, force :math:`\sum_j N_j (q - z_j)`, :math:`N_j = \sum_g g_{gj} K_g`.
+
+    Parameters
+    ----------
+    matrices : sequence of real sparse or dense matrices, shape (n, n)
+        K_g.
+    strengths : array, shape (g, j)
+        Not negative, over the slow stiffness.
+    times : array, shape (j,)
+        Relaxation times, s, positive.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, a strength is negative or a time is not positive.
+
+    Examples
+    --------
+    >>> relaxation = Relaxation([np.eye(1)], [[0.2]], [0.01])
+    >>> relaxation.factors(0.0), relaxation.factors(1e9).round(6)
+    (array([0.]), array([0.2]))
+    """
+
+    matrices: tuple[sp.csr_matrix, ...]
+    strengths: np.ndarray
+    times: np.ndarray
+
+    def __post_init__(self):
+        matrices = tuple(sp.csr_matrix(m, dtype=float) for m in self.matrices)
+        strengths = np.array(self.strengths, float, ndmin=2)
+        times = np.array(self.times, float, ndmin=1)
+        if strengths.shape != (len(matrices), times.size):
+            raise ValueError(f"Strengths have shape {strengths.shape}; {(len(matrices), times.size)} is needed.")
+        if not (np.isfinite(strengths).all() and (strengths >= 0).all()):
+            raise ValueError("Strengths of relaxation must be finite and not negative.")
+        if not (np.isfinite(times).all() and (times > 0).all()):
+            raise ValueError("Relaxation times must be finite and positive.")
+        for name, value in (("matrices", matrices), ("strengths", strengths), ("times", times)):
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @property
+    def branches(self) -> int:
+        """Number of relaxation times."""
+        return self.times.size
+
+    def factors(self, s) -> np.ndarray:
+        """phi_g(s), shape (g, ...) for s of shape (...)."""
+        x = np.multiply.outer(self.times, np.asarray(s))
+        return np.tensordot(self.strengths, x / (1.0 + x), 1)
+
+    def slopes(self, s) -> np.ndarray:
+        """Derivatives of the factors by s, shape (g, ...)."""
+        return self.quotients(s, s)
+
+    def quotients(self, a, b) -> np.ndarray:
+        """(phi_g(a) - phi_g(b)) / (a - b), shape (g, ...), of a and b that broadcast; the slope where they meet."""
+        a, b = np.asarray(a), np.asarray(b)
+        times = self.times.reshape((-1,) + (1,) * np.broadcast(a, b).ndim)
+        return np.tensordot(self.strengths, times / ((1.0 + a * times) * (1.0 + b * times)), 1)
+
+    def beside(self, line: float) -> tuple[np.ndarray, Relaxation]:
+        """phi_g(line) and the relaxation in z = s - line: phi_g(s) = phi_g(line) + what relaxes with z.
+
+        Raises
+        ------
+        ValueError
+            If the line does not lie right of all poles -1/tau_j.
+        """
+        below = 1.0 + line * self.times
+        if not (below > 0).all():
+            raise ValueError(
+                f"A growth rate of {line:.6g} 1/s lies left of the creep at {-1 / self.times.max():.6g} 1/s."
+            )
+        return self.factors(line), self.replace(self.strengths / below, self.times / below)
+
+    def replace(self, strengths, times=None) -> Relaxation:
+        """The same matrices with other strengths and, where given, times."""
+        return Relaxation(self.matrices, strengths, self.times if times is None else times)
+
 
 #: Complex columns up to which a sparse product is faster one real column after another.
 FEW = 2
@@ -292,3 +383,55 @@ def stable_fluid(S0: np.ndarray, S1: np.ndarray, line: float = 0.0) -> np.ndarra
     zeros = fluid_zeros(S0, S1) - line
     least = 1e-6 * np.abs(zeros).max(initial=0.0)
     return -np.maximum(np.abs(zeros.real), least) + 1j * zeros.imag
+
+
+def coupling_of_modes(pencil: CoupledPencil, left_values, left_q, left_u, right_values, right_q, right_u) -> np.ndarray:
+    r"""w_i^H [T(l_i) - T(l_j)] / (l_i - l_j) x_j, the product in which modes are orthogonal.
+
+    For a quadratic pencil this is w^H [(l_i + l_j) M' + C'] x with M', C' the coefficients of
+    lambda^2 and lambda of the full pencil; on the diagonal it is w^H T'(l) x. What relaxes adds the
+    divided differences of its factors.
+
+    Returns
+    -------
+    ndarray, shape (k_left, k_right)
+    """
+    p = pencil
+    y = real_apply(p.J, right_q)
+    wg = real_apply(p.G.T.tocsr(), left_q).conj().T  # w^H G
+    wh, Wh = left_q.conj().T, left_u.conj().T
+    inertia = wh @ real_apply(p.M, right_q) - wg @ (p.A2 @ y) + Wh @ (p.R2 @ y)
+    damping = wh @ real_apply(p.C, right_q) - wg @ (p.A1 @ y + p.B1 @ right_u) + Wh @ (p.R1 @ y + p.S1 @ right_u)
+    first, second = np.asarray(left_values)[:, None], np.asarray(right_values)
+    table = (first + second) * inertia + damping
+    if p.relaxation is not None:
+        for quotient, matrix in zip(p.relaxation.quotients(first, second), p.relaxing):
+            table = table + quotient * (wh @ real_apply(matrix, right_q))
+    return table
+
+
+#: Share of the size of an eigenvalue below which its imaginary part is no oscillation: a crowd of creep that rounding
+#: has split, or a motion whose damping ratio exceeds 0.995.
+OVERDAMPED = 0.1
+
+
+def creep_edge(pencil: CoupledPencil) -> float:
+    """Growth rate right of which a real eigenvalue is clearly no creep, 1/s, negative; minus infinity without.
+
+    A stiffness of which all relaxes creeps at the zeros of 1 + phi_g, the slowest of them left of -1/(tau_max (1 + sum
+    of strengths)).
+    """
+    return edge_of(pencil.relaxation)
+
+
+def edge_of(relaxation: Relaxation | None) -> float:
+    """The same of what relaxes."""
+    if relaxation is None:
+        return -np.inf
+    return float(-CLEAR / (relaxation.times.max() * (1.0 + relaxation.strengths.sum(axis=1).max())))
+
+
+def apart_from_creep(pencil: CoupledPencil, values: np.ndarray) -> np.ndarray:
+    """Which eigenvalues oscillate, or lie clearly right of the creep."""
+    values = np.asarray(values)
+    return (np.abs(values.imag) > OVERDAMPED * np.abs(values)) | (values.real > creep_edge(pencil))

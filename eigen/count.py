@@ -1,4 +1,4 @@
-"""Number of eigenvalues right of a line, by the argument principle."""
+"""Number of eigenvalues right of a line, by the argument principle on the determinant of a pencil."""
 
 from __future__ import annotations
 
@@ -7,14 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .pencil import CoupledPencil, fluid_zeros
-from .phase import middle, principal, thinned
-from .response import Determinant
-
-MAX_PHASE = np.pi / 4  # largest accepted phase increment between neighbours
-MAX_LOG = 1.0  # largest accepted increment of log |f|: feels zeros beside the line
-CLOSE = 0.4  # distance of two places beside zeros that relax, over the distance of the zero from the line
-MAX_PREDICTED = 1.5  # largest increment of log f that a neighbour's slope may predict
+from .determinant import CLOSE, MAX_LOG, MAX_PHASE, MAX_PREDICTED, Determinant, middle, principal, thinned
+from .operator import CoupledPencil, fluid_zeros
 
 
 @dataclass(frozen=True)

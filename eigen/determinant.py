@@ -1,4 +1,4 @@
-"""The determinant of a full pencil along a line, relative to a structure known to be stable.
+"""Determinant of a pencil along a line, relative to a structure known to be stable.
 
 det T(s) / det D_ref(s) with D_ref = s^2 M + s C_ref + K_ref, where M, C_ref, K_ref are
 symmetric and positive definite, so that D_ref has no zero on or right of the line (Kelvin,
@@ -11,19 +11,179 @@ eigenvalues counted, the structure's own among them.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
+import scipy.sparse.linalg as spla
 
-from .condensation import condensed_matrix
-from .factorization import SingularShiftError, StructureMatrices, SuperluFactorization, superlu
-from .inertia import is_positive_definite
-from .oscillators import Oscillators
-from .pencil import CoupledPencil, real_apply, stable_fluid
-from .relaxation import Relaxation
-from .systems import solved
+from .factor import SingularShiftError, StructureMatrices, SuperluFactorization, condensed_matrix, superlu
+from .operator import CoupledPencil, Relaxation, real_apply, stable_fluid
+
+#: Largest accepted step of the phase between neighbours, rad.
+LARGEST_STEP = np.pi / 3
+#: Distance of the last phase from its limit that calls for higher frequencies, rad.
+LATE = 0.1
+#: Places between far below and far above the frequencies of a structure that every walk looks at.
+GRID = 17
+
+
+def principal(angle):
+    """Angles brought to -pi..pi."""
+    return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
+
+
+def grid(scale: float, top: float, beside) -> list[float]:
+    """Places to begin with: zero, those spread over the frequencies of a structure, and those given."""
+    return [0.0, *np.geomspace(0.1 * scale, top, GRID), *beside]
+
+
+def middle(a, b) -> np.ndarray:
+    """Where intervals are parted: on the positive axis in proportion where they are wide, else in length."""
+    a, b = np.asarray(a, float), np.asarray(b, float)
+    return np.where((a > 0) & (b > 4 * a), np.sqrt(np.abs(a * b)), 0.5 * (a + b))
+
+
+def wide(omega: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    """Intervals between ascending places over which the phase turns too far and which are not yet too short."""
+    far = np.flatnonzero(np.abs(principal(np.diff(phase))) > LARGEST_STEP)
+    return far[np.diff(omega)[far] > 1e-10 * omega[far + 1]]
+
+
+def thinned(places, widths, apart: float) -> list[float]:
+    """Places that lie apart by a share of their widths: zeros that are all well damped share theirs."""
+    kept: list[float] = []
+    for i in np.argsort(widths):
+        at = bisect_left(kept, places[i])
+        if all(abs(places[i] - w) > apart * widths[i] for w in kept[max(0, at - 1) : at + 1]):
+            kept.insert(at, float(places[i]))
+    return kept
+
+
+def solved(matrices: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Solutions of systems, and logarithms of their determinants, from one factorisation each.
+
+    Parameters
+    ----------
+    matrices : (k, n, n) complex array
+        Overwritten.
+    right : (n, m) array
+        The same for all.
+
+    Returns
+    -------
+    solutions : (k, n, m) complex array
+    logarithms : (k,) complex array
+        Both NaN where a matrix is singular.
+    """
+    right = np.asarray(right, complex)
+    factor, solve = la.get_lapack_funcs(("getrf", "getrs"), (matrices, right))
+    solutions = np.full((len(matrices), *right.shape), complex(np.nan, np.nan))
+    logarithms = np.full(len(matrices), complex(np.nan, np.nan))
+    for i, matrix in enumerate(matrices):
+        # of the transpose, whose columns lie in memory as the rows of the matrix
+        lu, pivots, singular = factor(matrix.T, overwrite_a=True)
+        if singular > 0:
+            continue
+        solutions[i] = solve(lu, pivots, right, trans=1)[0]
+        swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
+        logarithms[i] = np.log(lu.diagonal()).sum() + 1j * np.pi * swaps
+    return solutions, logarithms
+
+
+class SymmetricLU:
+    """SuperLU of a symmetric matrix with pivots from the diagonal only: their signs are its inertia (Sylvester).
+
+    Raises
+    ------
+    SingularShiftError
+        If a pivot is zero, or had to be taken from elsewhere.
+    """
+
+    def __init__(self, matrix: sp.spmatrix):
+        matrix = sp.csc_matrix(matrix)
+        size = np.abs(matrix.diagonal())
+        scale = sp.diags(1.0 / np.sqrt(np.where(size > 0, size, 1.0)))
+        try:
+            lu = spla.splu(
+                (scale @ matrix @ scale).tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise SingularShiftError(f"SuperLU could not factor the matrix ({error}).") from error
+        if not np.array_equal(lu.perm_r, lu.perm_c):
+            raise SingularShiftError("A pivot of the symmetric matrix is zero.")
+        #: Pivots of the matrix scaled to a diagonal of ones.
+        self.pivots = lu.U.diagonal()
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues."""
+        return int(np.sum(self.pivots < 0))
+
+
+def is_positive_definite(matrix: sp.spmatrix) -> bool:
+    """Whether a symmetric sparse matrix is positive definite, by its pivots."""
+    if (matrix.diagonal() <= 0).any():
+        return False
+    try:
+        return bool((SymmetricLU(matrix).pivots > 1e-13).all())
+    except SingularShiftError:
+        return False
+
+
+class Oscillators(NamedTuple):
+    """A symmetric structure that relaxes, one equation s^2 + s c + k + sum phi_g(s) k_g = 0 for each mode.
+
+    The modes are those of the stiffness that nothing has relaxed of; what couples them besides is left out.
+
+    Attributes
+    ----------
+    squares : (k,) array
+        Of their angular frequencies, rad2/s2.
+    damping, slow : (k,) arrays, 1/s, 1/s2
+    relaxing : (g, k) array, 1/s2
+    """
+
+    squares: np.ndarray
+    damping: np.ndarray
+    slow: np.ndarray
+    relaxing: np.ndarray
+
+    @classmethod
+    def of(cls, M, C, K, relaxing, relaxation: Relaxation | None) -> Oscillators:
+        """From symmetric matrices; relaxing (g, n, n), g = 0 where nothing does."""
+        fast = 0.0 if relaxation is None else np.tensordot(relaxation.strengths.sum(axis=1), relaxing, 1)
+        squares, X = la.eigh(K + fast, M)
+        damping, slow = (np.einsum("ik,ij,jk->k", X, part, X, optimize=True) for part in (C, K))
+        relaxing = np.einsum("ik,gij,jk->gk", X, relaxing, X, optimize=True)
+        return cls(squares, damping, slow, np.maximum(relaxing, 0.0))  # but for rounding they are
+
+    def values(self, relaxation: Relaxation | None, places: np.ndarray) -> np.ndarray:
+        """The left sides at places s, (len(places), k)."""
+        s = np.asarray(places, complex)[:, None]
+        elastic = self.slow + s * (s + self.damping)
+        return elastic if relaxation is None else elastic + relaxation.factors(s[:, 0]).T @ self.relaxing
+
+    def zeros(self, relaxation: Relaxation | None, steps: int = 12) -> np.ndarray:
+        """Estimates of the oscillating zeros."""
+        found = 1j * np.sqrt(np.maximum(self.squares, 0.0))
+        for _ in range(steps):
+            stiffness = self.slow + 0j
+            if relaxation is not None:
+                stiffness += (relaxation.factors(found) * self.relaxing).sum(axis=0)
+            found = (
+                -0.5 * self.damping
+                + 1j * np.sqrt(np.maximum((stiffness - 0.25 * self.damping**2).real, 0.0))
+                - 0.5 * (stiffness.imag / np.where(found.imag > 0, found.imag, 1.0))
+            )
+        return found[found.imag > 0]
+
 
 #: Numbers at most in one stack of dense matrices.
 _STACK = 1_000_000
@@ -53,7 +213,7 @@ class Determinant:
     leading_phase : float
         0 or pi.
     fluid : (k,) array
-        Zeros of what the ratio is divided by where the fluid has several unknowns, see `eigen.pencil.stable_fluid`.
+        Zeros of what the ratio is divided by where the fluid has several unknowns, see `eigen.operator.stable_fluid`.
     evaluations : int
 
     Raises
@@ -329,3 +489,9 @@ def _log_determinant(stack) -> np.ndarray:
 def _gap(a, b) -> float:
     size = max(abs(a).max(), abs(b).max()) if a.nnz or b.nnz else 0.0
     return float(abs(a - b).max() / size) if size else 0.0
+
+
+MAX_PHASE = np.pi / 4  # largest accepted phase increment between neighbours
+MAX_LOG = 1.0  # largest accepted increment of log |f|: feels zeros beside the line
+CLOSE = 0.4  # distance of two places beside zeros that relax, over the distance of the zero from the line
+MAX_PREDICTED = 1.5  # largest increment of log f that a neighbour's slope may predict
