@@ -16,10 +16,13 @@ class Keys(Section):
 
     over: Range = key("density=1:1000:40:log", "Parameter and its values: PARAMETER=START:STOP:COUNT[:log].")
     count: StrictInt = key(6, "How many leading modes to follow.", ge=1, le=100)
-    checks: StrictInt = key(
-        3, "Values at which the reduced basis, or the count of unstable modes, is checked.", ge=1, le=50
+    checks: StrictInt = key(3, "Values at which eigenvalues and the count of unstable modes are checked.", ge=1, le=50)
+    tolerance: Number = key(
+        1e-6,
+        "Accepted relative error of eigenvalues of the reduced-order model; beyond it values are solved in full.",
+        gt=0,
+        le=1e-2,
     )
-    tolerance: Number = key(1e-6, "Accepted relative error of the eigenvalues on the reduced basis.", gt=0, le=1e-2)
     least_confidence: Number = key(
         0.6, "A step is halved while the match of a leading mode is less certain than this.", gt=0, lt=1
     )
