@@ -34,8 +34,8 @@ def command(
 ) -> Request:
     """Damping and frequency of the leading modes, followed along a parameter of load, fluid or damping.
 
-    Each mode keeps its number through crossings; "confidence" says how sure each match is. Where the steady state stays,
-    modes are those of a reduced-order model checked with the full matrices. Ctrl-C keeps what is done.
+    Each mode keeps its number through crossings; "confidence" says how sure each match is. Where the steady state
+    stays, modes are those of a reduced-order model checked with the full matrices. Ctrl-C keeps what is done.
 
     dbvfiv sweep cases/dbv12.toml -p "6 kPa" --set damping.alpha=0 --over density=1:1000:40:log -o sweep.h5 --plots
     figures
