@@ -64,7 +64,7 @@ def three_routes(
     walk, place = StabilityWalk(valve.case, model=model), Mu.of(valve.case)
     walk.give(place, q)
     # the reduced-order model is made beside the state itself
-    column = walk.column([place.at(density=share * density) for share in (0.9, 0.95, 1.05, 1.1)])
+    column = walk.column([place.at(beta=share * BETA) for share in (0.9, 0.95, 1.05, 1.1)])
     reduced = column.nearest(condition_of(place), eigenvalue)
     lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
     rings = []
