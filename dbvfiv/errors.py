@@ -1,7 +1,8 @@
 """Kinds of failure a user can meet, each told in one sentence.
 
 ``CaseError`` means the question was wrong (exit status 2), ``SolveError`` that
-the question was fine and no answer was found (exit status 1).
+the question was fine and no answer was found (exit status 1), ``DiskFull`` that
+there is no room for the answer (exit status 1).
 """
 
 from __future__ import annotations
@@ -41,3 +42,10 @@ class SolveError(RuntimeError):
 
 class NotValidError(SolveError):
     """A state that the constants of its rubber do not describe, so that nothing is said of its vibration."""
+
+
+class DiskFull(RuntimeError):
+    """The disk has no room for what a run has found.
+
+    No ``SolveError``: it ends a study, which would go on to the next value after one that was not solved.
+    """

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import __version__
-from ..errors import CaseError, SolveError
+from ..errors import CaseError, DiskFull, SolveError
 from . import case, materials, pages, results, studies, verdict
 
 # Typer brings its own Click in newer versions and uses the separate package in older ones.
@@ -131,7 +131,7 @@ def _outcome(arguments: Sequence[str], ending: Ending) -> int:
         return status if isinstance(status, int) else 0
     except CaseError as error:
         return _report(str(error), 2)
-    except SolveError as error:
+    except (SolveError, DiskFull) as error:
         return _report(str(error), 1)
     except (KeyboardInterrupt, typer.Abort):
         how, status = ("Terminated", 143) if ending.terminated else ("Interrupted", 130)

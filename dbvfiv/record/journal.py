@@ -25,7 +25,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..errors import CaseError, SolveError
+from ..errors import CaseError, DiskFull
 from .files import WriterLock, refuse_foreign
 from .header import Header, write_header
 from .mesh import MeshData, write_mesh
@@ -33,10 +33,6 @@ from .table import MARK, TableSpec
 
 #: Room that is left on a disk besides what is to be written, bytes: for the structure of the file.
 _SPARE = 384 * 1024
-
-
-class DiskFull(SolveError):
-    """The disk has no room for what a run has found."""
 
 
 class Journal:

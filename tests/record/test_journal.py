@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dbvfiv.errors import CaseError
+from dbvfiv.errors import CaseError, DiskFull
 from dbvfiv.record.header import Header
-from dbvfiv.record.journal import DiskFull, Journal
+from dbvfiv.record.journal import Journal
 from dbvfiv.record.record import GrowingRecord, StoredRecord
 from dbvfiv.record.table import TEXT, Column, TableSpec
 from dbvfiv.studies.case import Case, thesis_case
