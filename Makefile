@@ -1,8 +1,9 @@
 # Two commands matter, `make demo` and `make test`; each sets up what is missing first.
 PYTHON = $(shell cat build/setup/python 2>/dev/null)
 JOBS ?= 2
+CORE = tests --ignore=tests/cfd --ignore=tests/exchange
 
-.PHONY: setup test verify verify-3d bench demo demo-full reproduce docs clean
+.PHONY: setup test verify random verify-3d bench demo demo-full reproduce docs clean
 .DEFAULT_GOAL := demo
 
 setup:
@@ -13,10 +14,15 @@ test: export XLA_FLAGS ?= --xla_backend_optimization_level=0
 test: setup
 	@$(PYTHON) -m pytest -n $(JOBS) --dist loadscope -m "not slow"
 
+# all that is slow but the third dimension, with the tables that its tests print
 verify: setup
-	@$(PYTHON) -m pytest -s tests/verification
-	@DBVFIV_FINE=1 $(PYTHON) -m pytest -s -m slow tests/verification/test_shipped_cases.py tests/verification/test_cycles_in_time.py
-	@$(PYTHON) -m pytest -m slow --ignore=tests/verification
+	@$(PYTHON) -m pytest -n $(JOBS) --dist loadscope -rP -m "slow and not random" $(CORE)
+	@DBVFIV_FINE=1 $(PYTHON) -m pytest -n $(JOBS) --dist load -m slow tests/verification/test_shipped_cases.py tests/verification/test_cycles_in_time.py
+	@$(MAKE) random
+
+# one outcome and one count at thousands of random states
+random: setup
+	@$(PYTHON) -m pytest -n $(JOBS) --dist load -m random tests/verification
 
 # flow and wall in three dimensions, end to end; installs Debian's OpenFOAM where there is none
 verify-3d: setup

@@ -53,6 +53,7 @@ def test_counts_of_some_agree():
 
 
 @pytest.mark.slow
+@pytest.mark.random
 def test_counts_of_many_agree():
     missed = look_at(200, 22)
     print("\n".join(missed))

@@ -130,6 +130,7 @@ def test_random_states(number):
 
 
 @pytest.mark.slow
+@pytest.mark.random
 @pytest.mark.parametrize(
     ("around", "along", "number", "seed"), [(8, 14, 5000, 1), (11, 19, 2500, 2), (14, 24, 2200, 3)]
 )
@@ -182,6 +183,7 @@ def test_random_states_that_relax(number):
 
 
 @pytest.mark.slow
+@pytest.mark.random
 @pytest.mark.parametrize(
     ("around", "along", "number", "seed"), [(8, 14, 1400, 11), (11, 19, 350, 12), (14, 24, 250, 13)]
 )
