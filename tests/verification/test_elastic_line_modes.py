@@ -124,10 +124,10 @@ def installations(number: int, seed: int, states: int = 3) -> list[str]:
         for _ in range(states):
             own = Mu.of(model.case)
             if case.damping.relaxes:
-                conditions = replace(own, loss_factor=float(rng.uniform(0.3, 1.5)))
+                conditions = own.at(loss_factor=float(rng.uniform(0.3, 1.5)))
             else:
                 beta = 0.0 if rng.random() < 0.1 else float(10 ** rng.uniform(-5, -2))
-                conditions = replace(own, alpha=float(rng.choice([0.0, 5.0])), beta=beta)
+                conditions = own.at(alpha=float(rng.choice([0.0, 5.0])), beta=beta)
             pencil = linear.pencil(conditions.at(storage=float(rng.choice([0.0, 1.0, rng.random()]))))
             basis = TransferBasis(pencil) if basis is None or case.damping.relaxes else basis
             found = certified(model, conditions, pencil, basis)
