@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, StrictStr
+from pydantic import AfterValidator, StrictStr, ValidationInfo
 
 from ..errors import CaseError
 from .parameters import PARAMETERS, SWEPT, Parameter
@@ -15,6 +16,8 @@ from .quantity import number_or_text
 
 FORM = 'PARAMETER=START:STOP:COUNT, with ":log" behind it for logarithmic steps'
 _LARGEST = 100_000
+#: A head of the fluid in the text of a range.
+_HEAD = re.compile(r"\d\s*(m|ft)\s*(:|$)")
 
 
 @dataclass(frozen=True)
@@ -85,17 +88,28 @@ def _value(row: Parameter, text: str, density: float | None) -> float:
         return row.quantity.parse(text, density)
 
 
-def _readable(text: str) -> str:
-    parse_axis(text)
-    return text
+def _readable(text: str, info: ValidationInfo) -> str:
+    """The text of a range that can be read, heads of the fluid as pressures."""
+    return _in_pascal(text, parse_axis(text, density=_density(info)))
+
+
+def _density(info: ValidationInfo) -> float | None:
+    return (info.context or {}).get("density")
+
+
+def _in_pascal(text: str, axis: Axis) -> str:
+    span = text.partition("=")[2]
+    if axis.parameter != "pressure" or not _HEAD.search(span):
+        return text
+    return f"pressure={axis.values[0]!r} Pa:{axis.values[-1]!r} Pa:{len(axis.values)}{':log' if axis.log else ''}"
 
 
 #: A key that holds the text of a range.
 Range = Annotated[StrictStr, AfterValidator(_readable)]
 
 
-def parse_stability_axis(text: str) -> Axis:
-    """Read ``PARAMETER=START:STOP:COUNT[:log]``, or a parameter alone with its usual range.
+def parse_stability_axis(text: str, density: float | None = None) -> Axis:
+    """Read ``PARAMETER=START:STOP:COUNT[:log]``, or a parameter alone with its usual range; heads as in `parse_axis`.
 
     Raises
     ------
@@ -104,12 +118,11 @@ def parse_stability_axis(text: str) -> Axis:
     """
     if isinstance(text, str) and text.strip() in PARAMETERS:
         text = PARAMETERS[text.strip()].usual_range
-    return parse_axis(text, tuple(PARAMETERS))
+    return parse_axis(text, tuple(PARAMETERS), density)
 
 
-def _readable_range(text: str) -> str:
-    parse_stability_axis(text)
-    return text
+def _readable_range(text: str, info: ValidationInfo) -> str:
+    return _in_pascal(text, parse_stability_axis(text, _density(info)))
 
 
 #: A key that holds the text of such a range.
@@ -118,7 +131,8 @@ StabilityRange = Annotated[StrictStr, AfterValidator(_readable_range)]
 
 _PRESSURE = PARAMETERS["pressure"]
 _ALLOWED = (
-    f"it must be a pressure greater than 0 kPa and at most {_PRESSURE.high / 1e3:g} kPa, such as '36 kPa' or 36e3 (Pa)"
+    f"it must be a pressure greater than 0 kPa and at most {_PRESSURE.high / 1e3:g} kPa, such as '36 kPa', or a head "
+    "of the fluid, such as '2 m'"
 )
 
 

@@ -1,6 +1,6 @@
 """Numbers with units: ``"36 kPa"``, ``"12 mm"``, ``"54 deg"``, ``"10 %"`` become SI floats.
 
-A pressure may also be a head: ``"2 m"`` of the fluid (metres alone: ``"2 mm"`` is a slip), ``"2 mH2O"`` of water. A
+A pressure may also be a head: ``"2 m"`` or ``"6 ft"`` of the fluid (``"2 mm"`` is a slip), ``"2 mH2O"`` of water. A
 bare number is taken as SI. Strings carry a unit of the right dimension; a fraction such as ``"3/28"`` is accepted where
 a plain number is asked for.
 """
@@ -23,6 +23,8 @@ _FRACTION = re.compile(rf"\s*({_NUMBER})\s*/\s*({_NUMBER})\s*")
 
 #: Standard gravity, m/s2, and the density of the water in mH2O, kg/m3.
 GRAVITY, WATER = 9.80665, 1000.0
+#: Units of a head of the fluid.
+_HEADS = ("m", "ft")
 _HEAD_OF_WATER = re.compile(r"(mm|cm|dm|m|in|ft)\s*H2O")
 
 # SI unit -> what such a quantity is called in messages and in the reference
@@ -99,7 +101,7 @@ def _head(text: str, density: float | None) -> float | None:
     match = _QUANTITY.fullmatch(text)
     unit = (match[2] or "").strip() if match else ""
     water = _HEAD_OF_WATER.fullmatch(unit)
-    if unit != "m" and water is None:
+    if unit not in _HEADS and water is None:
         return None
     if water is None and density is None:
         raise ValueError("which is a head, and the density of the fluid is not known here; mH2O or a pressure is")

@@ -133,12 +133,12 @@ def plot(
         return
     if overrides:
         raise CaseError(f"--set goes with a case file; {str(file)!r} is a result, whose case stays as it was.")
+    result = load_result(file)
     choices: dict[str, object] = {}
     if pressure is not None:
-        choices["pressure"] = read_pressures([pressure], "--pressure")[0]
+        choices["pressure"] = read_pressures([pressure], "--pressure", result.case.fluid.density)[0]
     if mode is not None:
         choices["mode"] = mode
-    result = load_result(file)
     makers = [_film(result, file, folder, number) for number in films]  # misuse shows before anything is drawn
     written = result.plot(folder, format.value, only=only, **choices)
     print_written([*written, *(make() for make in makers)], as_json)
@@ -316,7 +316,7 @@ def _choose_state(file: Path, pressure: str | None) -> State:
         raise CaseError(f"{str(file)!r} holds no state.")
     if pressure is None:
         return max(result.states, key=lambda state: state.pressure)
-    return result.nearest(read_pressures([pressure], "--state")[0])
+    return result.nearest(read_pressures([pressure], "--state", result.case.fluid.density)[0])
 
 
 def cfd(

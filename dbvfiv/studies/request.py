@@ -9,9 +9,37 @@ from typing import Annotated, Any
 
 import typer
 
+from ..case.quantity import number_or_text
+from ..errors import CaseError
+
+
+def with_unit(given: str | list[str] | None) -> str | list[str] | None:
+    """Refuse a bare number where a command takes a pressure, or several, or ranges of it.
+
+    Raises
+    ------
+    CaseError
+    """
+    for text in given if isinstance(given, list) else [given or ""]:
+        for part in text.split(":")[:2]:
+            if isinstance(number := number_or_text(part), float) and number != 0:
+                raise CaseError(
+                    f"--pressure is given as {text!r}, without a unit: Pa or m? Give '{part} Pa', '{part} kPa', or "
+                    f"'{part} m' for a head of the fluid."
+                )
+    return given
+
+
 #: What several studies take in place of keys of the case.
 PressureOption = Annotated[
-    str | None, typer.Option("--pressure", "-p", metavar="P", help="Pressure in place of drive.pressure.")
+    str | None,
+    typer.Option(
+        "--pressure",
+        "-p",
+        metavar="P",
+        callback=with_unit,
+        help="Pressure in place of drive.pressure: '18 kPa', or a head of the fluid, '2 m'.",
+    ),
 ]
 DensityOption = Annotated[
     str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")

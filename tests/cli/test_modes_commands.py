@@ -40,7 +40,7 @@ def test_set_and_options_say_the_same(command_line):
         "--set",
         "modes.in_vacuo=true",
     )
-    by_option = ("-p", "6e3", "--density", "10 kg/m^3", "-n", 2, "--in-vacuo")
+    by_option = ("-p", "6e3 Pa", "--density", "10 kg/m^3", "-n", 2, "--in-vacuo")
     one, other = (json.loads(command_line("modes", *COARSE, *given, "--json").out) for given in (by_set, by_option))
     assert one == other and one["state"]["in_vacuo"]
 
@@ -89,7 +89,7 @@ def test_impossible_modes(command_line, one_sentence, arguments):
 
 def test_an_equilibrium_that_is_not_found(command_line, one_sentence):
     outcome = command_line(
-        "modes", *COARSE, "--set", "steady.max_iterations=2", "--set", "steady.min_step=0.3", "-p", "100"
+        "modes", *COARSE, "--set", "steady.max_iterations=2", "--set", "steady.min_step=0.3", "-p", "100 Pa"
     )
     assert outcome.status == 1 and one_sentence(outcome.err.splitlines()[-1]) and "No equilibrium" in outcome.err
 

@@ -32,7 +32,7 @@ KEYS = {
 
 
 def test_json(command_line):
-    outcome = command_line("steady", "cases/dbv12.toml", *COARSE, "--pressure", "6 kPa", "-p", 18e3, "--json")
+    outcome = command_line("steady", "cases/dbv12.toml", *COARSE, "--pressure", "6 kPa", "-p", "18e3 Pa", "--json")
     assert outcome.status == 0
     document = json.loads(outcome.out)
     points = document["points"]
@@ -63,7 +63,7 @@ def test_table_and_file(command_line, tmp_path):
         ("[drive]\npressure = 4e3\n[steady]\npressures = [1e3, 2e3]", [], [1e3, 2e3]),
         ("[steady]\npressures = [1e3, 2e3]", ["--set", "drive.pressure=3 kPa"], [3e3]),
         ("[steady]\npressures = [1e3, 2e3]", ["--set", "drive.pressure=3 kPa", "-p", "5 kPa"], [5e3]),
-        ("", ["-p", "1 kPa:3 kPa:3", "-p", 4000], [1e3, 2e3, 3e3, 4e3]),
+        ("", ["-p", "1 kPa:3 kPa:3", "-p", "4000 Pa"], [1e3, 2e3, 3e3, 4e3]),
         ("[fluid]\ndensity = 800", ["-p", "2 m", "-p", "1 mH2O:2 mH2O:2"], [15690.64, 9806.65, 19613.3]),
         ("[fluid]\ndensity = 800", ["-p", "1 m:2 m:2"], [7845.32, 15690.64]),
         ("", [], [2e3, 6e3, 12e3, 18e3, 24e3, 29e3, 36e3, 50e3]),
@@ -98,7 +98,7 @@ def test_impossible_cases(command_line, one_sentence, overrides):
 
 def test_a_pressure_that_is_not_reached(command_line, one_sentence, tmp_path):
     hard = ("--set", "steady.max_iterations=4", "--set", "steady.min_step=1")
-    outcome = command_line("steady", *COARSE, *hard, "-p", "50", "-p", "50 kPa", "-o", tmp_path / "r.h5", "--json")
+    outcome = command_line("steady", *COARSE, *hard, "-p", "50 Pa", "-p", "50 kPa", "-o", tmp_path / "r.h5", "--json")
     assert outcome.status == 1
     document = json.loads(outcome.out)
     assert [point["pressure"] for point in document["points"]] == [50.0] and len(document["failures"]) == 1
@@ -178,5 +178,20 @@ def test_a_reader_that_leaves(tmp_path):
 
 
 def test_no_bar_without_a_terminal(command_line):
-    outcome = command_line("steady", *COARSE, "-p", "500", "--json")
+    outcome = command_line("steady", *COARSE, "-p", "500 Pa", "--json")
     assert "\r" not in outcome.err and "%|" not in outcome.err
+
+
+@pytest.mark.parametrize("given", ["2", "2e3", "2:50:12", "2 kPa:50:12", "-3"])
+def test_a_pressure_without_a_unit_is_refused(command_line, one_sentence, given):
+    outcome = command_line("steady", *COARSE, "-p", given)
+    assert outcome.status == 2 and "Pa or m?" in outcome.err and one_sentence(outcome.err)
+
+
+def test_heads_are_pressures_of_the_fluid(command_line):
+    options = ("steady", *COARSE, "--set", "fluid.density=1025", "--json")
+    documents = [
+        json.loads(command_line(*options, "-p", given).out) for given in ("0.3048 m", "1 ft", "3063.793593 Pa")
+    ]
+    pressures = [document["points"][0]["pressure"] for document in documents]
+    assert pressures == pytest.approx(3 * [0.3048 * 9.80665 * 1025], rel=1e-9)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ...case.quantity import number_or_text
-from ..request import ClassesOption, Request
+from ..request import ClassesOption, Request, with_unit
 
 ORDER = 35
 
@@ -15,7 +15,13 @@ ORDER = 35
 def command(
     pressures: Annotated[
         list[str] | None,
-        typer.Option("--pressure", "-p", metavar="P", help="Back pressure, 7e3 (Pa) or '7 kPa'; may be repeated."),
+        typer.Option(
+            "--pressure",
+            "-p",
+            metavar="P",
+            callback=with_unit,
+            help="Back pressure, '7 kPa' or '3 m'; may be repeated.",
+        ),
     ] = None,
     compare: Annotated[
         bool,

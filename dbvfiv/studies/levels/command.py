@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ..case import Case
-from ..request import Request
+from ..request import Request, with_unit
 
 ORDER = 25
 
@@ -16,7 +16,9 @@ def command(
     case: Case,
     pressures: Annotated[
         list[str] | None,
-        typer.Option("--pressure", "-p", metavar="P", help="Static inlet pressure; may be repeated."),
+        typer.Option(
+            "--pressure", "-p", metavar="P", callback=with_unit, help="Static inlet pressure; may be repeated."
+        ),
     ] = None,
 ) -> Request:
     """Strain level of each rubber that agrees with what its layer strains (Eq. 7.1), and the flow with it.

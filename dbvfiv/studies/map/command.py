@@ -9,7 +9,7 @@ import typer
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
 from ..case import Case
-from ..request import ClassesOption, Request
+from ..request import ClassesOption, Request, with_unit
 from ..stability.fixed import refuse_moved
 
 ORDER = 30
@@ -27,7 +27,9 @@ def command(
     ] = None,
     pressure: Annotated[
         str | None,
-        typer.Option("--pressure", "-p", metavar="P", help="Static inlet pressure where no axis moves it."),
+        typer.Option(
+            "--pressure", "-p", metavar="P", callback=with_unit, help="Static inlet pressure where no axis moves it."
+        ),
     ] = None,
     density: Annotated[
         str | None, typer.Option("--density", metavar="RHO", help="Fluid density where no axis moves it.")

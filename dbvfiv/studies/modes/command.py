@@ -10,7 +10,7 @@ import typer
 from ...case.quantity import number_or_text
 from ...errors import CaseError
 from ..case import Case
-from ..request import DensityOption, LawOption, Request
+from ..request import DensityOption, LawOption, Request, with_unit
 from ..stability.laws import law_changes
 
 ORDER = 25
@@ -24,6 +24,7 @@ def command(
             "--pressure",
             "-p",
             metavar="P",
+            callback=with_unit,
             help="Static inlet pressure in place of drive.pressure; 0 with --in-vacuo is the valve at rest.",
         ),
     ] = None,

@@ -11,7 +11,7 @@ from ...case.axis import parse_axis
 from ...case.quantity import number_or_text
 from ...errors import CaseError
 from ..case import Case
-from ..request import Request
+from ..request import Request, with_unit
 
 ORDER = 20
 
@@ -21,7 +21,8 @@ Pressures = Annotated[
         "--pressure",
         "-p",
         metavar="P",
-        help="Static inlet pressure, 36e3 (Pa), '36 kPa', '2 m' (head of the fluid), '2 mH2O', or a range "
+        callback=with_unit,
+        help="Static inlet pressure, '36 kPa', '2 m' or '6 ft' (head of the fluid), '2 mH2O', or a range "
         "'2 kPa:50 kPa:12'; may be repeated.",
     ),
 ]
