@@ -13,10 +13,11 @@ import typer
 
 from ..errors import CaseError, SolveError
 from ..studies import KINDS
+from ..studies.request import is_sheet
 from .terminal import AsJson, CaseFile, Output, Override, PlotFolder, Progress, ResultFile, print_answer
 
 #: Arguments that the command of a study may take from those that all share.
-_SHARED = ("case", "plots")
+_SHARED = ("case", "plots", "output")
 
 
 def study_commands() -> list[tuple[str, Callable[..., None]]]:
@@ -38,7 +39,7 @@ def _make_command(kind: str, module: ModuleType) -> Callable[..., None]:
         from ..studies.case import load_case
 
         case = load_case(case_file, overrides or ())
-        shared = {"case": case, "plots": plots}
+        shared = {"case": case, "plots": plots, "output": output}
         request = module.command(**{name: shared[name] for name in _SHARED if name in asked}, **given)
         perform(kind, case, request, case_file.stem if case_file else "dbv12", output, plots, as_json)
 
@@ -64,13 +65,26 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
     from ..studies.session import Session
     from ..studies.study import find_study
 
+    if is_sheet(output) and request.sheet is None:
+        raise CaseError(
+            f"{str(output)!r} names a sheet, which `dbvfiv steady` writes alone; -o of {kind} takes a .h5 file."
+        )
     changes = {key: value for key, value in request.changes.items() if value is not None}
     choices = {key: value for key, value in request.choices.items() if value is not None}
     session = Session(case, name).replace(changes)
     session.mesh  # a case that gives no model fails before a table begins
     live = None if as_json else find_study(kind).live
     progress = Progress(quiet=as_json, row=live and live(session.case))
-    result = session.perform(kind, output, progress, **choices)
+    result = session.perform(kind, output if request.sheet is None else None, progress, **choices)
+    if request.sheet is not None:
+        found = [result]
+        try:
+            for variant in request.variants:
+                if found[-1].interrupted:
+                    break
+                found.append(session.replace(variant).perform(kind, None, progress, **choices))
+        finally:  # what was found is kept
+            request.sheet(found)
     _report(result, output, plots, as_json, further=request.further, printed=live is not None)
 
 

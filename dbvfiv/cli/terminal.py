@@ -14,13 +14,14 @@ import typer
 
 from ..errors import CaseError
 from ..observer import Observer
+from ..studies.request import is_sheet
 
 
 def _writable(path: Path | None) -> Path | None:
     """Refuse a name that cannot be written before anything is computed."""
     from ..record.files import check_writable
 
-    if path is not None:
+    if path is not None and not is_sheet(path):
         check_writable(path)
     return path
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,6 +11,14 @@ import typer
 
 from ..case.quantity import number_or_text
 from ..errors import CaseError
+
+#: Suffixes of sheets, tables that are no result files.
+SHEETS = (".csv", ".xlsx")
+
+
+def is_sheet(path: Path | None) -> bool:
+    """True for the name of a sheet, by its suffix."""
+    return path is not None and path.suffix.lower() in SHEETS
 
 
 def with_unit(given: str | list[str] | None) -> str | list[str] | None:
@@ -74,8 +82,14 @@ class Request:
         What the study takes that is no key of the case; likewise.
     further : callable, optional
         From the result to further files, such as an animation.
+    sheet : callable, optional
+        From results to a table that takes the place of the result file.
+    variants : tuple of dict
+        Changes of the case with which the study is made again, for the same sheet.
     """
 
     changes: dict[str, Any] = field(default_factory=dict)
     choices: dict[str, Any] = field(default_factory=dict)
     further: Callable[[Any], list[Path]] | None = None
+    sheet: Callable[[Sequence[Any]], Path] | None = None
+    variants: tuple[dict[str, Any], ...] = ()

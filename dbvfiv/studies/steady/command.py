@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -11,7 +12,8 @@ from ...case.axis import parse_axis
 from ...case.quantity import number_or_text
 from ...errors import CaseError
 from ..case import Case
-from ..request import Request, with_unit
+from ..request import Request, is_sheet, with_unit
+from .sheet import require_sheet, write_sheet
 
 ORDER = 20
 
@@ -28,7 +30,21 @@ Pressures = Annotated[
 ]
 
 
-def command(case: Case, pressures: Pressures = None) -> Request:
+Sizes = Annotated[
+    list[float] | None,
+    typer.Option(
+        "--scale", metavar="S", min=1e-3, max=1e3, help="Of a sheet: valve.scale of one size; repeated for several."
+    ),
+]
+Units = Annotated[
+    str | None,
+    typer.Option("--units", metavar="U,U", help="Of a sheet: its units, 'ft, gpm, ft/s, in'; else m, L/s, m/s, mm."),
+]
+
+
+def command(
+    case: Case, pressures: Pressures = None, sizes: Sizes = None, units: Units = None, output: Path | None = None
+) -> Request:
     """Equilibria of the coupled valve: flow, lip area, jet velocity, deflections, layer stresses.
 
     The pressures are those of --pressure; else steady.pressures of the case, or its drive.pressure where only that is
@@ -39,11 +55,26 @@ def command(case: Case, pressures: Pressures = None) -> Request:
     `dbvfiv plot`, `export` and `info` read it.
 
     dbvfiv steady cases/dbv12.toml -p "18 kPa" -p "36 kPa" -o dbv12.h5
+
+    A file in .csv or .xlsx takes the catalogue sheet in its place: head, flow, velocities, loss, K, Kv and opening, of
+    one size or several.
+
+    dbvfiv steady cases/dbv12.toml -p "0.2 m:5 m:9:log" --scale 0.5 --scale 1 --units "ft, gpm, in" -o catalogue.csv
     """
-    if not pressures and case.meets_pump("steady"):
-        return Request()
+    changes: dict[str, Any] = {}
+    if pressures or not case.meets_pump("steady"):
+        asked = _read(pressures, case.fluid.density) if pressures else case.steady_pressures()
+        changes = {"steady.pressures": list(asked)}
+    if not is_sheet(output):
+        if sizes or units:
+            raise CaseError("--scale and --units go with a sheet; name one with -o, such as catalogue.csv.")
+        return Request(changes)
+    first, *others = sizes or [None]
+    require_sheet(output, units)
     return Request(
-        {"steady.pressures": list(_read(pressures, case.fluid.density) if pressures else case.steady_pressures())}
+        changes | {"valve.scale": first},
+        sheet=lambda results: write_sheet(output, [state for result in results for state in result.states], units),
+        variants=tuple({"valve.scale": scale} for scale in others),
     )
 
 

@@ -1,0 +1,57 @@
+"""The catalogue sheet against the states it is made of."""
+
+import csv
+
+import pytest
+
+import dbvfiv
+from tests.small_valves import THESIS_SET
+
+OPTIONS = (*THESIS_SET, "--set", "mesh.around=4", "--set", "mesh.along=6")
+CHANGES = [text.removeprefix("--set=") for text in OPTIONS if "=" in text]
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_sheet_of_two_sizes_in_units_of_choice(command_line, tmp_path):
+    path = tmp_path / "catalogue.csv"
+    asked = ("-p", "0.2 m", "-p", "1 m", "--scale", 0.5, "--scale", 1, "--units", "ft, gpm, in")
+    assert command_line("steady", *OPTIONS, *asked, "-o", path).status == 0
+    assert [each.name for each in tmp_path.iterdir()] == ["catalogue.csv"]  # and no HDF5
+    rows = rows_of(path)
+    states = [
+        state
+        for scale in (0.5, 1.0)
+        for state in dbvfiv.load(None, [*CHANGES, f"valve.scale={scale}"]).steady(pressure=["0.2 m", "1 m"]).states
+    ]
+    assert len(rows) == len(states) == 4
+    for row, state in zip(rows, states):
+        assert float(row["static head [ft]"]) == pytest.approx(state.head / 0.3048, rel=1e-5)
+        assert float(row["flow [gpm]"]) == pytest.approx(state.volume_flow * 60 / 3.785411784e-3, rel=1e-5)
+        assert float(row["opening [in]"]) == pytest.approx(state.lip_opening / 0.0254, rel=1e-5)
+        assert float(row["jet velocity [m/s]"]) == pytest.approx(state.outlet_velocity, rel=1e-5)
+        # K = g H_loss / (v^2 / 2), Kv in m3/h at 1 bar of water
+        k = 2 * 9.80665 * 0.3048 * float(row["head loss [ft]"]) / float(row["velocity [m/s]"]) ** 2
+        assert float(row["K"]) == pytest.approx(k, rel=1e-4)
+    assert float(rows[2]["bore [in]"]) == pytest.approx(2 * float(rows[0]["bore [in]"]), rel=1e-5)
+    # lengths twice as large at the same head: four times the flow
+    assert float(rows[2]["flow [gpm]"]) == pytest.approx(4 * float(rows[0]["flow [gpm]"]), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "arguments, part",
+    [
+        (("steady", "-o", "s.csv", "--units", "furlong"), "no unit of a sheet"),
+        (("steady", "-o", "s.csv", "--units", "m, ft"), "second unit"),
+        (("steady", "-o", "no/such/folder/s.csv"), "cannot be written"),
+        (("steady", "--units", "ft"), "go with a sheet"),
+        (("steady", "--scale", "2", "-o", "s.h5"), "go with a sheet"),
+        (("modes", "-o", "s.csv"), "names a sheet"),
+    ],
+)
+def test_what_is_no_sheet(command_line, one_sentence, arguments, part):
+    outcome = command_line(*arguments)
+    assert outcome.status == 2 and part in outcome.err and one_sentence(outcome.err.replace("; ", ", ")), outcome.err
