@@ -15,6 +15,7 @@ def case(
     target: Annotated[
         str | None, typer.Argument(metavar="[FILE|KEY]", help="Case file; with --explain a key or a section.")
     ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Print every key of the case.")] = False,
     explain: Annotated[bool, typer.Option("--explain", help="Explain KEY, or every key.")] = False,
     new: Annotated[bool, typer.Option("--new", help="Write a commented starter to FILE.")] = False,
     key_points: Annotated[
@@ -30,9 +31,11 @@ def case(
     overrides: Override = None,
     as_json: AsJson = False,
 ) -> None:
-    """Check a case file and print it, explain its keys, or write a new one.
+    """Check a case file, print or explain its keys, or write a new one.
 
-    dbvfiv case my.toml                  check it and print every key
+    dbvfiv case my.toml                  check it: its sizes, and what contradicts what
+
+    dbvfiv case my.toml --all            print every key
 
     dbvfiv case --new my.toml            write a commented starter
 
@@ -53,8 +56,62 @@ def case(
         _write_key_points(load_case(target, overrides or ()).valve, key_points, points, profiles, as_json)
     elif as_json:
         print_json(load_case(target, overrides or ()).to_dict())
-    else:
+    elif every:
         print(case_toml(load_case(target, overrides or ()), comments=False), end="")
+    else:
+        _check(load_case(target, overrides or ()), target or "The 12-inch valve")
+
+
+def _check(case, name: str) -> None:
+    """Print the sizes of a case, and whether its keys fit.
+
+    Raises
+    ------
+    CaseError
+        With all that contradicts what.
+    """
+    from ..model.equilibria import model_warnings
+    from ..model.sizes import ValveSizes
+    from ..studies.contradictions import contradictions
+    from ..studies.session import Session
+
+    found = list(contradictions(case))
+    if found:
+        raise CaseError(" ".join(found))
+    model = Session(case).described
+    print(f"{name} fits.")
+    lines = [*ValveSizes.of(model).lines(), *_conditions(case)]
+    print("\n".join(f"  {line}" for line in lines))
+    for sentence in model_warnings(model):
+        print(f"Note: {sentence}")
+    print("`dbvfiv case FILE --all` prints every key.")
+
+
+def _conditions(case) -> list[str]:
+    """Load, fluid and damping in words."""
+    from ..case.quantity import head_of
+
+    fluid, drive, outside = case.fluid, case.drive, case.outside
+    lines = []
+    if drive.kind == "flow":
+        head = head_of(drive.pressure, fluid.density)
+        lines.append(
+            f"driven by {drive.pressure / 1e3:.4g} kPa, a head of {head:.3g} m"
+            if not case.seeks_operating_point
+            else "driven by a pump"
+        )
+        lines.append(
+            f"fluid of {fluid.density:g} kg/m3, continuity {fluid.continuity}, outside the wall: {outside.fluid}"
+        )
+    else:
+        lines.append(f"a uniform pressure of {drive.pressure / 1e3:.4g} kPa, no fluid")
+    level = case.materials.strain_level
+    level = level if isinstance(level, str) else f"{100 * level:g} %"
+    lines.append(f"damping by {case.damping.model}, constants {case.materials.constants}, strain level {level}")
+    rated = case.closure.rated_pressure
+    if rated is not None:
+        lines.append(f"rated back pressure {rated / 1e3:.4g} kPa")
+    return lines
 
 
 def _explain_keys(key: str | None, as_json: bool) -> None:

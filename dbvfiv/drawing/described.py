@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 
 from ..case.model import Case
 from ..model import ValveModel
+from ..model.sizes import ValveSizes
 from ..record.mesh import MeshData
 from .style import COMPUTED, HALO, MAGNITUDE, REST, colour_bar, headline, new_figure
 from .views import ValveSkin, draw_skin, faces, unrolled
@@ -46,16 +47,11 @@ def valve_figure(model: ValveModel) -> Figure:
 
 
 def _title(model: ValveModel) -> str:
-    case, shell = model.case, model.shell
-    density = np.atleast_2d(shell.at_rest.inertia)[:, 0]  # of the wall, by element or everywhere
-    copies = model.mesh.part.copies
-    weight = copies * float(np.sum(shell.geometry.area.sum(axis=1) * shell.mesh.thickness * density))
-    passage = 1e4 * copies * (model.mesh.rest_area - model.mesh.wall_deduction)
-    lip, inlet = passage[0], passage[-1]
+    case, sizes = model.case, ValveSizes.of(model)
     scaled = f", {case.valve.scale:g} times as given" if case.valve.scale != 1.0 else ""
     return (
-        f"Valve as described{scaled}: {1e3 * case.valve.length:.4g} mm long, wall of {weight:.3g} kg\n"
-        f"passage at rest {lip:.3g} cm² at the lips, {inlet:.4g} cm² at the inlet"
+        f"Valve as described{scaled}: {1e3 * case.valve.length:.4g} mm long, wall of {sizes.wall_mass:.3g} kg\n"
+        f"passage at rest {1e4 * sizes.lip_area:.3g} cm² at the lips, {1e4 * sizes.inlet_area:.4g} cm² at the inlet"
     )
 
 

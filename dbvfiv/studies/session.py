@@ -20,6 +20,7 @@ from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, RecordPart, StoredRecord
 from . import KINDS
 from .case import Case
+from .contradictions import require_consistent
 from .study import Study, find_study, nothing_to_resume
 
 #: Keyword arguments of the Python interface and the keys of the case that they stand for.
@@ -186,6 +187,7 @@ class Session:
         SolveError
             If nothing can be found at all.
         """
+        require_consistent(self.case, kind)  # before levels are settled
         if self.case.seeks_levels and kind != "levels":
             return self.settle(observer).perform(kind, output, observer, **choices)
         if self.case.meets_pump(kind):

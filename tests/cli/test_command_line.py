@@ -83,9 +83,9 @@ def test_case_as_json(command_line, tmp_path):
 
 
 def test_case_printed_can_be_used_again(command_line, tmp_path):
-    first = command_line("case", "--set", "drive.pressure=36 kPa")
+    first = command_line("case", "--all", "--set", "drive.pressure=36 kPa")
     (tmp_path / "a.toml").write_text(first.out)
-    assert command_line("case", tmp_path / "a.toml").out == first.out
+    assert command_line("case", tmp_path / "a.toml", "--all").out == first.out
 
 
 def test_a_new_case_is_commented_valid_and_never_overwrites(command_line, one_sentence, tmp_path):

@@ -1,0 +1,67 @@
+"""Sizes of a valve that follow from its case: what an engineer checks beside a drawing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .valve import ValveModel
+
+
+@dataclass(frozen=True)
+class ValveSizes:
+    """Derived sizes.
+
+    Attributes
+    ----------
+    length : float, m
+    bill_width, bill_height : float, m
+        Over the outer faces of the lip, at rest.
+    wall_mass : float, kg
+    lip_area, inlet_area : float, m2
+        Passage at rest.
+    line_volume : float, m3
+        Of the pipes in front; 0 without any.
+    """
+
+    length: float
+    bill_width: float
+    bill_height: float
+    wall_mass: float
+    lip_area: float
+    inlet_area: float
+    line_volume: float
+
+    @classmethod
+    def of(cls, model: ValveModel) -> ValveSizes:
+        case, shell, mesh = model.case, model.shell, model.mesh
+        density = np.atleast_2d(shell.at_rest.inertia)[:, 0]  # of the wall, by element or everywhere
+        mass = float(np.sum(shell.geometry.area.sum(axis=1) * shell.mesh.thickness * density))
+        passage = mesh.part.copies * (mesh.rest_area - mesh.wall_deduction)
+        lip = mesh.nodes[mesh.rows[0]]
+        wall = float(mesh.thickness[0])
+        high, low = lip[:, 1].max(), -lip[:, 1].max() if mesh.part.is_quarter else lip[:, 1].min()
+        line = (
+            sum(0.25 * np.pi * pipe.diameter**2 * pipe.length for pipe in case.upstream.pipes) if case.has_line else 0
+        )
+        return cls(
+            case.valve.length,
+            float(2 * np.abs(lip[:, 0]).max() + wall),
+            float(high - low + wall),
+            mesh.part.copies * mass,
+            float(passage[0]),
+            float(passage[-1]),
+            float(line),
+        )
+
+    def lines(self) -> list[str]:
+        """Sentences with units."""
+        said = [
+            f"{1e3 * self.length:.4g} mm long, bill {1e3 * self.bill_width:.4g} mm wide and "
+            f"{1e3 * self.bill_height:.4g} mm high, wall of {self.wall_mass:.3g} kg",
+            f"passage at rest {1e4 * self.lip_area:.3g} cm2 at the lips, {1e4 * self.inlet_area:.4g} cm2 at the inlet",
+        ]
+        if self.line_volume:
+            said.append(f"pipe in front holds {self.line_volume:.4g} m3 of the fluid")
+        return said

@@ -1,0 +1,76 @@
+"""Careless and contradictory cases: one sentence each, before anything is solved."""
+
+import time
+
+import pytest
+
+from dbvfiv.studies.session import Session
+
+#: What was given, and a word that the sentence must hold.
+CARELESS = [
+    (["drive.pressure=0"], "drive.pressure"),
+    (["downstream.pressure=30 kPa"], "nothing flows"),
+    (["drive.pressure=2 m", "downstream.pressure=2 m"], "nothing flows"),
+    (["outside.fluid=same", "downstream.pressure=5 m"], "nothing flows"),
+    (["drive.pressure=20 kPa", "downstream.pressure=12 kPa", "steady.pressures=[2 kPa, 12 kPa]"], "steady.pressures"),
+    (["closure.rated_pressure=60 kPa"], "closure.pressures"),
+    (["closure.rated_pressure=10 m", "closure.pressures=[1 m, 2 m]"], "closure.pressures"),
+    (
+        [
+            'valve.wall_map=[{to="210 mm", thickness="12 mm"}, {to="210.2 mm", thickness="15 mm"}, '
+            '{to="560 mm", thickness="16 mm"}]'
+        ],
+        "sliver",
+    ),
+    (["drive.pressure=3 furlongs"], "not a pressure"),
+    (["drive.pressure=2 mm"], "not a pressure"),
+    (["fluid.density=1000 kPa"], "not a density"),
+    (["fluid.density=0"], "fluid.density"),
+    (["valve.lip_half_width=0"], "lip_half_width"),
+    (["valve.duckbill_length=-10 mm"], "duckbill_length"),
+    (["valve.lenght=1 m"], "length"),
+    (["downstream.pipe_diameter=100 mm"], "pipe_diameter"),
+    (["outside.fluid=same", "outside.pipe_diameter=200 mm"], "pipe_diameter"),
+    (["layers.0.material=rubber"], "rubber"),
+    (["damping.model=structural"], "damping.model"),
+    (["materials.strain_level=200 %"], "strain_level"),
+    (["materials.CR.hardness=120 Shore A"], "hardness"),
+    (["mesh.around=0"], "mesh.around"),
+    (["upstream.length=-1 m"], "upstream.length"),
+    (["upstream.length=30 m", "upstream.wave_speed=1000 m/s", "fluid.unsteady=false"], "wave_speed"),
+    (["sweep.over=density=10:1:5"], "start is not below"),
+    (["onset.over=pressure=1 kPa:2 kPa"], "not of that form"),
+    (["steady.pressures=[]"], "steady.pressures"),
+]
+
+
+@pytest.mark.parametrize("changes, word", CARELESS, ids=[" ".join(changes)[:50] for changes, _ in CARELESS])
+def test_one_sentence_for_a_careless_case(command_line, one_sentence, changes, word):
+    begin = time.process_time()
+    outcome = command_line("case", *(f"--set={change}" for change in changes))
+    assert outcome.status == 2 and outcome.out == "" and word in outcome.err, outcome
+    assert one_sentence(outcome.err.replace("; ", ", ")), outcome.err
+    assert time.process_time() - begin < 3.0
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("modes", "--set", "downstream.pressure=30 kPa"),
+        ("steady", "-p", "1 m", "--set", "downstream.pressure=2 m"),
+        ("map", "--x", "density=1:100:3:log", "--y", "alpha=1:2:2", "--set", "downstream.pressure=30 kPa"),
+        ("closure", "-p", "5 kPa", "--set", "closure.rated_pressure=10 kPa"),
+    ],
+)
+def test_studies_refuse_contradictions_before_they_solve(command_line, one_sentence, monkeypatch, arguments):
+    monkeypatch.setattr(Session, "settle", lambda *_: pytest.fail("levels were settled"))
+    outcome = command_line(*arguments)
+    assert outcome.status == 2 and one_sentence(outcome.err.replace("; ", ", ")), outcome
+
+
+def test_a_case_that_fits(command_line):
+    outcome = command_line("case", "cases/dbv18.toml")
+    assert outcome.status == 0 and "fits" in outcome.out.splitlines()[0]
+    assert "835 mm long, bill 416 mm wide and 36 mm high" in outcome.out  # 2 x (190 + 18) mm, two lips of 18 mm
+    assert "4.771 m3" in outcome.out  # 30 m of 450 mm
+    assert "a head of 1 m" in outcome.out and len(outcome.out.splitlines()) < 25
