@@ -8,6 +8,7 @@ from .count import Count, unstable_count
 from .derivative import PencilDerivative, difference, eigenvalue_derivative
 from .factor import SingularShiftError, Workspace
 from .family import Condition, PencilFamily
+from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, Relaxation
 from .options import CLEAR, SearchOptions
 from .reduction import FamilyReduction
@@ -26,6 +27,7 @@ __all__ = [
     "Count",
     "CoupledPencil",
     "FamilyReduction",
+    "KrylovPairs",
     "LargestPairs",
     "Mode",
     "NotConvergedError",
@@ -44,6 +46,7 @@ __all__ = [
     "certified_spectrum",
     "difference",
     "eigenvalue_derivative",
+    "krylov_pairs",
     "largest_pairs",
     "leading_modes",
     "listed_unstable",

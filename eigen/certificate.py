@@ -5,15 +5,17 @@ on the real axis far from its shifts.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from .basis import TransferBasis
 from .count import Count, Determinant, unstable_count
 from .dense import all_pairs
-from .factor import StructureMatrices, SuperluFactorization, Workspace, condensed_matrix
+from .factor import StructureMatrices, SuperluFactorization, Workspace
+from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, real_apply
 from .options import SearchOptions
 from .pairs import SAME, Found, acceptable, newton, normalised
@@ -226,12 +228,13 @@ def certified_spectrum(
     exact: bool = False,
     check_points: int = 2,
     whole: bool = True,
+    solver: Callable[..., KrylovPairs] = krylov_pairs,
 ) -> CertifiedSpectrum:
     """Leading modes and an independent count of the unstable ones, with their agreement.
 
     Parameters
     ----------
-    pencil, count, options, workspace
+    pencil, count, options, workspace, solver
         As for `leading_modes`.
     basis : TransferBasis, optional
         For the count of a large pencil; made if missing.
@@ -252,13 +255,13 @@ def certified_spectrum(
     -------
     CertifiedSpectrum
     """
-    workspace = workspace or Workspace()
-    spectrum = leading_modes(pencil, count, options, workspace=workspace)
+    search = partial(leading_modes, pencil, workspace=workspace or Workspace(), solver=solver)
+    spectrum = search(count, options)
     if pencil.n > Determinant.dense_below:
         basis = basis or TransferBasis(pencil)
     else:
         basis = None
-    asked = pencil, options, workspace, exact, check_points
+    asked = pencil, options, search, exact, check_points
     if not whole and options is not None and options.max_frequency is not None and np.isfinite(spectrum.band):
         found, _ = _judged(*asked, spectrum, basis, within=0.999 * spectrum.band)
         if found.agrees:
@@ -283,7 +286,7 @@ def _finer(pencil, basis, found, finer, number) -> TransferBasis:
     return basis.enlarged(*responses(pencil, checked), compression=DISTINCT)
 
 
-def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, finer=0, within=None):
+def _judged(pencil, options, search, exact, check_points, spectrum, basis, finer=0, within=None):
     """A spectrum beside a count, and the basis of the count; both may grow by what the count points to. The count is
     that of all frequencies, or `within` a band, Hz.
     """
@@ -309,7 +312,7 @@ def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, fi
         and np.isinf(spectrum.band)
     ):
         # all that were asked for are unstable: look at the rest of the unstable ones too
-        spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
+        spectrum = search(winding.number + 2, options)
     if (model is not pencil or basis is None) and winding.number > listed_unstable(spectrum, winding):
         distant = distant_pairs(pencil, spectrum, basis, winding.line, options or SearchOptions())
         if distant is not None:
@@ -325,9 +328,7 @@ def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, fi
         none_stable = not len(spectrum) or spectrum.growth_rate[-1] > winding.line
         if winding.number > listed_unstable(spectrum, winding) and none_stable:
             band = SearchOptions() if options is None else options
-            spectrum = leading_modes(
-                pencil, winding.number + 2, replace(band, max_frequency=spectrum.band), workspace=workspace
-            )
+            spectrum = search(winding.number + 2, replace(band, max_frequency=spectrum.band))
     listed = listed_unstable(spectrum, winding)
     error = None
     if model is not pencil:
@@ -349,8 +350,9 @@ def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> 
     worst = 0.0
     for s, factor in _factored(pencil, frequencies):
         exact = real_apply(pencil.J, factor.solve(pencil.G.toarray().astype(complex)))
-        small = [condensed_matrix(*pencil.fluid_at(s), H) for H in (exact, basis.transfer(pencil, s))]
-        if small[0].size:
+        coupling, _ = pencil.fluid.condensed([s])
+        small = [np.eye(pencil.m) - coupling[0] @ H for H in (exact, basis.transfer(pencil, s))]
+        if pencil.m:
             ratio = np.linalg.det(np.linalg.solve(small[0], small[1]))
             worst = max(worst, float(abs(np.log(ratio))) if ratio != 0 else np.inf)
     return worst

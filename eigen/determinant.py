@@ -21,7 +21,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from .factor import SingularShiftError, StructureMatrices, SuperluFactorization, condensed_matrix, superlu
-from .operator import CoupledPencil, Relaxation, real_apply, stable_fluid
+from .operator import CoupledPencil, Relaxation, real_apply
 
 #: Largest accepted step of the phase between neighbours, rad.
 LARGEST_STEP = np.pi / 3
@@ -213,7 +213,7 @@ class Determinant:
     leading_phase : float
         0 or pi.
     fluid : (k,) array
-        Zeros of what the ratio is divided by where the fluid has several unknowns, see `eigen.operator.stable_fluid`.
+        Zeros of what the ratio is divided by where the fluid has several unknowns, see `eigen.operator.FluidMotions`.
     evaluations : int
 
     Raises
@@ -233,8 +233,7 @@ class Determinant:
         if not is_positive_definite(pencil.M):
             raise ValueError("The count needs a positive definite mass matrix.")
         self._prepare_reference()
-        self._scale = None
-        self.fluid = stable_fluid(pencil.S0, pencil.S1, line)
+        self.fluid = pencil.fluid.stable(line)
         self.degree, self.leading_phase = self._at_infinity()
 
     def _prepare_reference(self):
@@ -409,13 +408,10 @@ class Determinant:
         return H, np.array([self._factor.log_determinant() - self._twin_factor.log_determinant()])
 
     def _fluid_log(self, s, H):
-        small = condensed_matrix(*self.pencil.fluid_at(s[:, None, None]), H)
-        if not small.size:
+        if not self.pencil.m + self.pencil.b:
             return np.zeros(s.size)
-        if self._scale is None:  # constant positive factors leave the phase alone
-            size = np.abs(small[0]).max(axis=1)
-            self._scale = np.where(size > 0, size, 1.0)
-        return _log_determinant(small / self._scale[:, None])
+        coupling, total = self.pencil.fluid.condensed(s)
+        return total + _log_determinant(np.eye(self.pencil.m) - coupling @ H)
 
 
 class _StructureModes:

@@ -548,6 +548,43 @@ def _settled(shift, theta, error, edge, band, tolerance):
     return chosen, 0.5 / lowest if np.isfinite(lowest) else 0.0, settled
 
 
-def _apply(matrix, x):
-    """Sparse product that keeps a real matrix real."""
-    return real_apply(matrix, x) if matrix.dtype.kind == "f" else matrix @ x
+def krylov_pairs(
+    shifted: ShiftedPencil,
+    wanted: int,
+    *,
+    tolerance: float = 1e-12,
+    band: float = np.inf,
+    limit_point: float | None = None,
+    transposed: bool = False,
+    enough: Callable[[np.ndarray, float], bool] | None = None,
+) -> KrylovPairs:
+    """Eigenpairs near the shift of a factored pencil: what a search asks of any eigen-solver.
+
+    Parameters
+    ----------
+    shifted : ShiftedPencil
+        The pencil, its shift, and solves with it.
+    wanted : int
+        Number of eigenvalues, conjugates counted apart; those nearest to the shift, and of a viscoelastic wall those
+        that oscillate.
+    tolerance : float
+        Relative.
+    band : float
+        Angular frequency of interest, rad/s.
+    limit_point : float, optional
+        Real limit point of eigenvalues, at which the search may end.
+    transposed : bool
+        Left vectors (conjugated) instead of right ones.
+    enough : callable, optional
+        enough(eigenvalues, reach) is True where no more are needed.
+
+    Returns
+    -------
+    KrylovPairs
+        With `reach` as large as is known to be complete, and `exhausted` where these are all eigenvalues.
+    """
+    if shifted.pencil.relaxation is not None:
+        return oscillating_pairs(shifted, band=band, transposed=transposed, enough=enough)
+    return near_shift(
+        shifted, wanted, tolerance=tolerance, transposed=transposed, limit_point=limit_point, enough=enough
+    )

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
 
 from .options import CLEAR
@@ -103,6 +104,9 @@ class Relaxation:
 
 #: Complex columns up to which a sparse product is faster one real column after another.
 FEW = 2
+
+#: Rates of a fluid that rounding leaves, relative to the largest; share by which a zero that is met is moved.
+ROUNDING, MET = 1e-13, 1e-10
 
 FLUID_PARTS = ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")
 
@@ -255,6 +259,11 @@ class CoupledPencil(FluidParts):
         other._check_fluid()
         return other
 
+    @cached_property
+    def fluid(self) -> FluidMotions:
+        """The fluid by its own motions."""
+        return FluidMotions({name: getattr(self, name) for name in FLUID_PARTS})
+
     def fluid_at(self, s: complex):
         """Values A(s), B(s), R(s), S(s) of the fluid polynomials."""
         return (
@@ -366,23 +375,69 @@ def _real_csr(name: str, value) -> sp.csr_matrix:
     return matrix
 
 
-def fluid_zeros(S0: np.ndarray, S1: np.ndarray) -> np.ndarray:
-    """Finite zeros of det (S0 + s S1): the fluid's own swinging between walls that stand."""
-    values = la.eigvals(-S0, S1)
-    return values[np.isfinite(values)]
+class FluidMotions:
+    """Inner unknowns of a fluid condensed by the motions that it has between walls at rest.
 
+    With S(sigma)^-1 S1 = X diag(k) X^-1 at some real sigma, S(s)^-1 = X diag(1 / d) X^-1 S(sigma)^-1 where
+    d = 1 + (s - sigma) k: a place costs products alone, however many unknowns a long line brings.
 
-def stable_fluid(S0: np.ndarray, S1: np.ndarray, line: float = 0.0) -> np.ndarray:
-    """Zeros of a stable polynomial that turns as det (S0 + s S1) does, relative to a line; none of one unknown.
+    Parameters
+    ----------
+    parts : mapping
+        A0 to S1 of a `CoupledPencil`.
 
-    They are those of the fluid alone, mirrored to the left of the line. What is divided by it varies as little as with
-    a single unknown, however many the fluid has.
+    Attributes
+    ----------
+    zeros : (j,) complex array
+        Finite zeros of det S(s).
     """
-    if S0.shape[0] < 2:
-        return np.zeros(0, complex)
-    zeros = fluid_zeros(S0, S1) - line
-    least = 1e-6 * np.abs(zeros).max(initial=0.0)
-    return -np.maximum(np.abs(zeros.real), least) + 1j * zeros.imag
+
+    def __init__(self, parts: Mapping[str, np.ndarray]):
+        S0, S1 = parts["S0"], parts["S1"]
+        self._A = [parts["A0"], parts["A1"], parts["A2"]]
+        size = np.abs(S0).max(initial=0.0), np.abs(S1).max(initial=0.0)
+        shift = size[0] / size[1] if min(size) > 0 else 1.0
+        # of one unknown either of them may be the zero itself
+        self._shift, (sign, log) = max(
+            ((s, np.linalg.slogdet(S0 + s * S1)) for s in (shift, -shift)), key=lambda x: x[1][1]
+        )
+        if sign == 0:
+            raise ValueError("The inner unknowns of the fluid are not determined by their own equations.")
+        self._log = log + 1j * np.angle(sign)
+        columns = np.hstack([S1, *(parts[f"R{power}"] for power in range(3))])
+        rates, rows = np.split(np.linalg.solve(S0 + self._shift * S1, columns), [len(S0)], axis=1)
+        self._rates, X = np.linalg.eig(rates) if len(S0) else (np.zeros(0), np.zeros((0, 0)))
+        # unknowns without a rate of their own leave rounding
+        self._rates[np.abs(self._rates) <= ROUNDING * np.abs(self._rates).max(initial=0.0)] = 0.0
+        self._B = [parts[name] @ X for name in ("B0", "B1")]
+        rows = np.split(np.linalg.solve(X, rows), 3, axis=1)
+        self._R = {power: rows[power] for power in range(3) if parts[f"R{power}"].any()}
+        self.zeros = self._shift - 1.0 / self._rates[self._rates != 0]
+
+    def stable(self, line: float = 0.0) -> np.ndarray:
+        """Zeros of a stable polynomial that turns as det S(s) does, relative to a line; none of one unknown.
+
+        They are those of the fluid alone, mirrored to the left of the line. What is divided by it varies as little as
+        with a single unknown, however many the fluid has.
+        """
+        if self._rates.size < 2:
+            return np.zeros(0, complex)
+        zeros = self.zeros - line
+        least = 1e-6 * np.abs(zeros).max(initial=0.0)
+        return -np.maximum(np.abs(zeros.real), least) + 1j * zeros.imag
+
+    def condensed(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A - B S^-1 R at places, (p, m, m), and log det S, (p,); a zero of S that is met is moved by rounding."""
+        s = np.asarray(s, complex)[:, None]
+        away = (s - self._shift) * self._rates
+        below = 1.0 + away
+        below = np.where(np.abs(below) > MET * np.abs(away), below, MET * np.abs(away))
+        s = s[..., None]
+        left = (self._B[0] + s * self._B[1]) / below[:, None, :]
+        coupling = self._A[0] + s * (self._A[1] + s * self._A[2])
+        for power, part in self._R.items():
+            coupling -= s**power * (left @ part)
+        return coupling, self._log + np.log(below).sum(axis=1)
 
 
 def coupling_of_modes(pencil: CoupledPencil, left_values, left_q, left_u, right_values, right_q, right_u) -> np.ndarray:

@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse.linalg as spla
 
-from .factor import ShiftedPencil, SingularShiftError, Workspace
-from .krylov import near_shift, oscillating_pairs
+from .factor import SingularShiftError, Workspace
 from .operator import CoupledPencil, coupling_of_modes, real_apply
 from .spectrum import Oval, SearchedRegion, Spectrum
 
@@ -387,23 +386,12 @@ def empty(pencil, left) -> Found:
     return found
 
 
-def attach_left(
-    pencil, shifted: ShiftedPencil, batch, wanted, tolerance, found, limit_point: float | None = None
-) -> None:
+def attach_left(pencil, batch, solve, found) -> None:
     """Left vectors from the same factor, matched by eigenvalue; strays by inverse iteration."""
     k = batch.values.size
     batch.left_q = np.zeros((pencil.n, k), complex)
     batch.left_u = np.zeros((pencil.b, k), complex)
-
-    def enough(values, _reach):
-        return _all_there(batch, values)
-
-    if pencil.relaxation is not None:
-        pairs = oscillating_pairs(shifted, transposed=True, enough=enough)
-    else:
-        pairs = near_shift(
-            shifted, wanted, tolerance=tolerance, transposed=True, limit_point=limit_point, enough=enough
-        )
+    pairs = solve(lambda values, _reach: _all_there(batch, values))
     found.applications += pairs.applications
     free = np.ones(pairs.eigenvalues.size, bool)
     workspace = Workspace()

@@ -21,8 +21,8 @@ import numpy as np
 
 from .count import unstable_count
 from .determinant import LARGEST_STEP, LATE, grid, middle, principal, wide
-from .family import Condition, PencilFamily, bordered
-from .operator import fluid_zeros, stable_fluid
+from .family import Condition, PencilFamily
+from .operator import FluidMotions
 from .reduction import ReducedFamily
 from .structure_response import NEAR, RelaxingResponse, Response, response
 
@@ -87,18 +87,17 @@ class _Walk:
         first = reduced.family.parts(conditions[0].law)
         self.inner = first["S0"].shape[0]
         grows = int(((first["B1"] != 0).any(axis=0) | (first["S1"] != 0).any(axis=0)).sum())
+        kinds = list({id(p): p for p in self._parts}.values())
+        self._kinds = [FluidMotions(p) for p in kinds]
+        self._which = np.array([next(k for k, p in enumerate(kinds) if p is own) for own in self._parts])
         # what the determinants are divided by, in z = s sqrt(inertia)
-        self._fluid = [stable_fluid(parts["S0"], parts["S1"]) for parts in self._parts]
-        self.order = np.array([grows - len(zeros) for zeros in self._fluid])
+        self._fluid = [kind.stable() for kind in self._kinds]
+        self.order = np.array([grows - len(self._fluid[k]) for k in self._which])
         self.omega = [np.zeros(0) for _ in conditions]
         self.phase = [np.zeros(0) for _ in conditions]
         self.points = 0
         self._cut = [False] * len(conditions)
         self._laden = [_turning(reduced.laden_frequencies(c), c) for c in conditions]
-        kinds = list({id(p): p for p in self._parts}.values())
-        self._bordered = [bordered(p) for p in kinds]
-        self._which = np.array([next(k for k, p in enumerate(kinds) if p is own) for own in self._parts])
-        self._same = len(kinds) == 1
 
     def _condensed(self, parts):
         P, Q = self.response.P, self.response.Q
@@ -124,18 +123,13 @@ class _Walk:
 
     def _chunk(self, cells, omega, inverse) -> np.ndarray:
         """Phase of det [h^-1 - A, -B; R, S]."""
-        r, b = inverse.shape[1], self.inner
-        z = 1j * omega * self.root[cells]
-        powers = np.stack([np.ones_like(z), z, z * z], axis=1).view(float).reshape(-1, 3, 2)
-        matrix = np.empty((len(omega), r + b, r + b), complex)
+        z, angle = 1j * omega * self.root[cells], np.empty(len(omega))
         for which in np.unique(self._which[cells]):
-            mine = slice(None) if self._same else self._which[cells] == which
-            flat = self._bordered[which].reshape(3, -1).T
-            matrix[mine] = np.matmul(flat, powers[mine]).view(complex).reshape(-1, r + b, r + b)
-        matrix[:, :r, :r] += inverse
-        angle = np.angle(np.linalg.slogdet(matrix)[0])
-        if b > 1:
-            angle -= np.array([np.angle(at - self._fluid[i]).sum() for i, at in zip(cells, z)])
+            mine = self._which[cells] == which
+            coupling, own = self._kinds[which].condensed(z[mine])
+            angle[mine] = own.imag + np.angle(np.linalg.slogdet(inverse[mine] - coupling)[0])
+            if self.inner > 1:
+                angle[mine] -= np.angle(z[mine, None] - self._fluid[which]).sum(axis=1)
         return angle
 
     def _add(self, cells, omega):
@@ -169,7 +163,7 @@ class _Walk:
         """Where the fluid alone would swing, near which phases turn fast where it has several unknowns."""
         if self.inner < 2:
             return np.zeros(0)
-        zeros = fluid_zeros(self._parts[cell]["S0"], self._parts[cell]["S1"])
+        zeros = self._kinds[self._which[cell]].zeros
         return zeros[zeros.imag > 0] / self.root[cell]
 
     def refine(self, most_points):
