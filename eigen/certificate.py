@@ -13,14 +13,12 @@ import numpy as np
 
 from .basis import TransferBasis
 from .count import Count, Determinant, unstable_count
-from .dense import all_pairs
-from .factor import StructureMatrices, SuperluFactorization, Workspace
+from .factor import ScaledLU, StructureMatrices, Workspace
 from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, real_apply
-from .options import SearchOptions
-from .pairs import SAME, Found, acceptable, newton, normalised
+from .pairs import SAME, Found, acceptable, all_pairs, newton, normalised
 from .search import leading_modes
-from .spectrum import Spectrum
+from .spectrum import SearchOptions, Spectrum
 
 
 @dataclass(frozen=True)
@@ -159,6 +157,8 @@ def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
 TRUSTED = 0.1
 #: Points of a count over all frequencies where one up to the end of a band can stand in for it.
 POINTS_BEYOND = 1000
+#: Frequencies at which a basis is compared with the full pencil.
+CHECKED = 2
 #: Finer bases tried at most where the first one leaves a count open.
 FINER = 3
 #: Size below which directions of exact responses are left out of a finer basis, relative to the largest.
@@ -225,8 +225,6 @@ def certified_spectrum(
     *,
     workspace: Workspace | None = None,
     basis: TransferBasis | None = None,
-    exact: bool = False,
-    check_points: int = 2,
     whole: bool = True,
     solver: Callable[..., KrylovPairs] = krylov_pairs,
 ) -> CertifiedSpectrum:
@@ -238,10 +236,6 @@ def certified_spectrum(
         As for `leading_modes`.
     basis : TransferBasis, optional
         For the count of a large pencil; made if missing.
-    exact : bool
-        Count with the full pencil at every frequency instead of the basis; slow.
-    check_points : int
-        Frequencies at which the basis is compared with the full pencil.
     whole : bool
         Count over all frequencies, also where a band was asked for; without, in that band alone where both routes agree
         there. A lightly damped wall has very many modes to pass beyond it.
@@ -261,48 +255,43 @@ def certified_spectrum(
         basis = basis or TransferBasis(pencil)
     else:
         basis = None
-    asked = pencil, options, search, exact, check_points
+    asked = pencil, options, search
     if not whole and options is not None and options.max_frequency is not None and np.isfinite(spectrum.band):
         found, _ = _judged(*asked, spectrum, basis, within=0.999 * spectrum.band)
         if found.agrees:
             return found
     found, basis = _judged(*asked, spectrum, basis)
     for finer in range(1, FINER + 1):
-        if found.agrees or exact or basis is None:
+        if found.agrees or basis is None:
             break
-        basis = _finer(pencil, basis, found, finer, check_points)
+        basis = _finer(pencil, basis, found, finer)
         if basis.size > Determinant.dense_below:
             break
         found, basis = _judged(*asked, found.spectrum, basis, finer)
     return found
 
 
-def _finer(pencil, basis, found, finer, number) -> TransferBasis:
+def _finer(pencil, basis, found, finer) -> TransferBasis:
     """A basis that answers better than the one that left a count open."""
     spectrum = found.spectrum
     if finer == 1 and len(spectrum):  # a mode that is all but neutral has to be met to a fraction of its growth rate
         return basis.enlarged(*(q for q in (spectrum.q, spectrum.left_q) if q is not None))
-    checked = _checks(spectrum, found.count, number, finer - 1, basis)
+    checked = _checks(spectrum, found.count, finer - 1, basis)
     return basis.enlarged(*responses(pencil, checked), compression=DISTINCT)
 
 
-def _judged(pencil, options, search, exact, check_points, spectrum, basis, finer=0, within=None):
+def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
     """A spectrum beside a count, and the basis of the count; both may grow by what the count points to. The count is
     that of all frequencies, or `within` a band, Hz.
     """
-    model, scale, hints = pencil, None, []
+    model, scale = pencil, None
     if basis is not None:
-        reduced = basis.reduced(pencil)
-        scale = 2 * np.pi * (float(basis.structural_frequencies[0]) or 1.0)
-        if exact:
-            hints = list(Determinant(reduced).reference_zeros())
-        else:
-            model = reduced
+        model, scale = basis.reduced(pencil), 2 * np.pi * (float(basis.structural_frequencies[0]) or 1.0)
 
     def counted(band=None):
         # a structure that loses stability by itself has very many modes beyond a band that hardly decay
         most = POINTS_BEYOND if band is None and np.isfinite(spectrum.band) and model is not pencil else None
-        return unstable_count(model, scale=scale, hints=[*hints, *spectrum.eigenvalues], band=band, max_points=most)
+        return unstable_count(model, scale=scale, hints=spectrum.eigenvalues, band=band, max_points=most)
 
     winding = counted(within)
     if (
@@ -313,7 +302,7 @@ def _judged(pencil, options, search, exact, check_points, spectrum, basis, finer
     ):
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = search(winding.number + 2, options)
-    if (model is not pencil or basis is None) and winding.number > listed_unstable(spectrum, winding):
+    if winding.number > listed_unstable(spectrum, winding):
         distant = distant_pairs(pencil, spectrum, basis, winding.line, options or SearchOptions())
         if distant is not None:
             spectrum = joined(spectrum, distant, winding.line)
@@ -332,7 +321,7 @@ def _judged(pencil, options, search, exact, check_points, spectrum, basis, finer
     listed = listed_unstable(spectrum, winding)
     error = None
     if model is not pencil:
-        error = response_error(pencil, basis, _checks(spectrum, winding, check_points, finer, basis))
+        error = response_error(pencil, basis, _checks(spectrum, winding, finer, basis))
     trusted = winding.certain and (error is None or error < TRUSTED)
     agrees = trusted and winding.number == listed
     statement = _statement(spectrum, winding, listed, agrees, error)
@@ -367,26 +356,24 @@ def responses(pencil: CoupledPencil, frequencies) -> list[np.ndarray]:
     return found
 
 
-def _factored(pencil: CoupledPencil, frequencies) -> Iterator[tuple[complex, SuperluFactorization]]:
+def _factored(pencil: CoupledPencil, frequencies) -> Iterator[tuple[complex, ScaledLU]]:
     """Places i 2 pi f and the factored structure there."""
     structure = StructureMatrices(pencil)
-    factor = SuperluFactorization(structure)
     for f in frequencies:
         s = 2j * np.pi * float(f)
-        factor.refactor(structure.values(s).astype(complex))
-        yield s, factor
+        yield s, ScaledLU(structure.columns(structure.values(s).astype(complex)))
 
 
-def _checks(spectrum, winding, number, finer, basis):
+def _checks(spectrum, winding, finer, basis):
     """Frequencies to compare at: those of the leading modes, where the count is decided; for a finer basis, which is
     made for those, others each time from somewhat below the list to somewhat above it.
     """
     listed = [f for f in spectrum.frequency if 0 < f <= winding.band]
     if not finer:
-        return listed[:number] or list(winding.frequencies[1:2])
+        return listed[:CHECKED] or list(winding.frequencies[1:2])
     listed = listed or list(basis.structural_frequencies[basis.structural_frequencies > 0]) or winding.frequencies[1:2]
     low, high = 0.7 * min(listed), min(1.4 * max(listed), winding.band)
-    places = (np.arange((finer - 1) * number, finer * number) + 1) * GOLDEN % 1.0
+    places = (np.arange((finer - 1) * CHECKED, finer * CHECKED) + 1) * GOLDEN % 1.0
     return list(low * (high / low) ** places)
 
 

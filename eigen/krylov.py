@@ -24,7 +24,7 @@ import numpy as np
 import scipy.linalg as la
 
 from .factor import ShiftedPencil
-from .operator import creep_edge, real_apply
+from .operator import edge_of, real_apply
 
 
 @dataclass(frozen=True)
@@ -504,7 +504,7 @@ def oscillating_pairs(
     order = shifted.pencil.order
     most = min(most, order)
     krylov = _Arnoldi(_Operator(shifted, transposed), most)
-    edge = creep_edge(shifted.pencil)
+    edge = edge_of(shifted.pencil.relaxation)
     alive = True
     while True:
         aim = min(most, FIRST if krylov.steps < FIRST else krylov.steps + EVERY)

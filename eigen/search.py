@@ -7,13 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from .dense import all_pairs
 from .factor import SingularShiftError, Workspace, petsc_is_complex
 from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, apart_from_creep
-from .options import CLEAR, LOWEST, SLOPE, SearchOptions
-from .pairs import Found, attach_left, biorthogonalise, empty, merge, polish, refine, upper_half, verified
-from .spectrum import Oval, Spectrum
+from .pairs import Found, all_pairs, attach_left, biorthogonalise, empty, merge, polish, refine, upper_half, verified
+from .spectrum import CLEAR, LOWEST, SLOPE, Oval, SearchOptions, Spectrum
 
 DEPTH = 0.4  # growth rate over angular frequency, down to which a band is searched at most
 
