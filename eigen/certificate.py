@@ -1,7 +1,4 @@
-"""Leading modes with the independent count of the unstable ones, and their agreement.
-
-on the real axis far from its shifts.
-"""
+"""Leading modes with the independent count of the unstable ones, and their agreement."""
 
 from __future__ import annotations
 
@@ -175,38 +172,32 @@ class CertifiedSpectrum:
     ----------
     spectrum : Spectrum
     count : Count
-    agrees : bool
-        Both routes find the same number right of `count.line`, up to `count.band`, and the
-        count is certain.
-    unstable_count : int
-        From the spectrum, right of `count.line`; conjugates counted apart.
-    unstable_count_independent : int
+    certificate : Certificate
+        Both numbers right of `count.line`, up to `count.band`; certain if the count and the basis behind it are.
     response_error : float or None
         Largest |log det| error of the reduced basis behind the count at the frequencies
         checked exactly; None if the count was exact.
-    statement : str
-        The verdict in a sentence.
     """
 
     spectrum: Spectrum
     count: Count
-    agrees: bool
-    unstable_count: int
-    unstable_count_independent: int
+    certificate: Certificate
     response_error: float | None
-    statement: str
 
     @property
-    def certificate(self) -> Certificate:
-        """The same as for a cell of a map."""
-        accurate = self.response_error is None or self.response_error < TRUSTED
-        return Certificate(
-            self.unstable_count,
-            self.unstable_count_independent,
-            self.count.certain and accurate,
-            self.count.line,
-            self.count.band,
-        )
+    def agrees(self) -> bool:
+        """Both routes find the same number, and the count is certain."""
+        return self.certificate.agrees
+
+    @property
+    def unstable_count(self) -> int:
+        """Number by the spectrum; conjugates counted apart."""
+        return self.certificate.unstable
+
+    @property
+    def unstable_count_independent(self) -> int:
+        """Number by the count."""
+        return self.certificate.counted
 
     @property
     def stable(self) -> bool | None:
@@ -216,6 +207,25 @@ class CertifiedSpectrum:
         if self.spectrum.count_right_of(self.count.line):
             return False
         return True if self.agrees else None
+
+    @property
+    def statement(self) -> str:
+        """The verdict in a sentence."""
+        listed, counted, where = self.unstable_count, self.count.number, self.certificate.where
+        if self.agrees:
+            beyond = self.spectrum.count_right_of(self.count.line) - listed
+            return f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree" + (
+                f"; {beyond} more are listed beyond that band." if beyond else "."
+            )
+        listing = f"The spectrum lists {listed} unstable eigenvalues{where}"
+        if not self.count.certain:
+            return f"{listing}; the independent count ({counted}) is uncertain: {' '.join(self.count.notes)}"
+        if not self.certificate.certain:
+            return (
+                f"{listing}; the reduced basis behind the independent count ({counted}) is too coarse "
+                f"(error {self.response_error:.2g})."
+            )
+        return f"{listing}, the independent count finds {counted}: they disagree."
 
 
 def certified_spectrum(
@@ -323,9 +333,8 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
     if model is not pencil:
         error = response_error(pencil, basis, _checks(spectrum, winding, finer, basis))
     trusted = winding.certain and (error is None or error < TRUSTED)
-    agrees = trusted and winding.number == listed
-    statement = _statement(spectrum, winding, listed, agrees, error)
-    return CertifiedSpectrum(spectrum, winding, agrees, listed, winding.number, error, statement), basis
+    certificate = Certificate(listed, winding.number, trusted, winding.line, winding.band)
+    return CertifiedSpectrum(spectrum, winding, certificate, error), basis
 
 
 def listed_unstable(spectrum: Spectrum, count: Count) -> int:
@@ -375,27 +384,3 @@ def _checks(spectrum, winding, finer, basis):
     low, high = 0.7 * min(listed), min(1.4 * max(listed), winding.band)
     places = (np.arange((finer - 1) * CHECKED, finer * CHECKED) + 1) * GOLDEN % 1.0
     return list(low * (high / low) ** places)
-
-
-def _statement(spectrum, winding, listed, agrees, error):
-    where = "" if winding.line == 0 else f" with a growth rate above {winding.line:.4g} 1/s"
-    where += "" if np.isinf(winding.band) else f" up to {winding.band:.4g} Hz"
-    if agrees:
-        beyond = spectrum.count_right_of(winding.line) - listed
-        return f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree" + (
-            f"; {beyond} more are listed beyond that band." if beyond else "."
-        )
-    if not winding.certain:
-        return (
-            f"The spectrum lists {listed} unstable eigenvalues{where}; the independent count "
-            f"({winding.number}) is uncertain: {' '.join(winding.notes)}"
-        )
-    if error is not None and error >= TRUSTED:
-        return (
-            f"The spectrum lists {listed} unstable eigenvalues{where}; the reduced basis behind "
-            f"the independent count ({winding.number}) is too coarse (error {error:.2g})."
-        )
-    return (
-        f"The spectrum lists {listed} unstable eigenvalues{where}, the independent count finds "
-        f"{winding.number}: they disagree."
-    )

@@ -274,25 +274,38 @@ PLAY = 0.6
 CERTAIN = 0.1
 
 
+#: Share of a band up to which eigenvalues are counted, clear of those at its end.
+INSIDE = 0.999
+
+
 @dataclass(frozen=True)
-class PhaseCounts:
-    """Counts of unstable eigenvalues, conjugates counted apart.
+class CellCounts:
+    """Of some cells.
 
     Attributes
     ----------
     number : (cells,) int array
+        Eigenvalues right of `line` up to `band`, conjugates counted apart; -1 where nobody asked.
     certain : (cells,) bool array
-        The phase was followed everywhere and ended at its limit.
-    points : int
-        Frequencies at which some determinant was evaluated.
+    line, band : (cells,) arrays, 1/s, Hz
     """
 
     number: np.ndarray
     certain: np.ndarray
-    points: int
+    line: np.ndarray
+    band: np.ndarray
+
+    def select(self, some) -> CellCounts:
+        """Those of some cells."""
+        return CellCounts(*(own[some] for own in vars(self).values()))
+
+    def enter(self, cells: np.ndarray, found: CellCounts) -> None:
+        """Put counts of some cells in."""
+        for own, other in zip(vars(self).values(), vars(found).values()):
+            own[cells] = other
 
 
-def phase_counts(reduced: Any, conditions, hints=None, most_points: int = 400) -> PhaseCounts:
+def phase_counts(reduced: Any, conditions, hints=None, most_points: int = 400) -> CellCounts:
     """Count unstable eigenvalues at several conditions.
 
     Parameters
@@ -304,16 +317,15 @@ def phase_counts(reduced: Any, conditions, hints=None, most_points: int = 400) -
     most_points : int
         Per condition.
     """
-    number, certain = np.zeros(len(conditions), int), np.zeros(len(conditions), bool)
-    points = 0
+    cells = len(conditions)
+    number, certain = np.zeros(cells, int), np.zeros(cells, bool)
     for damping in dict.fromkeys(c.damping for c in conditions):
         members = [i for i, c in enumerate(conditions) if c.damping == damping]
         walk = _Walk(response(reduced, damping), reduced, [conditions[i] for i in members])
         walk.start([() if hints is None else hints[i] for i in members])
         walk.refine(most_points)
         number[members], certain[members] = walk.counts()
-        points += walk.points
-    return PhaseCounts(number, certain, points)
+    return CellCounts(number, certain, np.zeros(cells), np.full(cells, np.inf))
 
 
 class _Walk:
@@ -335,7 +347,6 @@ class _Walk:
         self.order = np.array([grows - len(self._fluid[k]) for k in self._which])
         self.omega = [np.zeros(0) for _ in conditions]
         self.phase = [np.zeros(0) for _ in conditions]
-        self.points = 0
         self._cut = [False] * len(conditions)
         self._laden = [_turning(reduced.laden_frequencies(c), c) for c in conditions]
 
@@ -354,7 +365,6 @@ class _Walk:
         """Phase of d(i omega), for pairs of a cell and a frequency."""
         unique, where = np.unique(omega, return_inverse=True)
         inverse, own = self.response.inverse(unique)
-        self.points += len(omega)
         angle = own[where]
         for first in range(0, len(omega), CHUNK):
             some = slice(first, first + CHUNK)
@@ -465,37 +475,6 @@ def _shared(omega: float, play: float) -> float:
     return float(np.round(omega / step) * step)
 
 
-#: Share of a band up to which eigenvalues are counted, clear of those at its end.
-INSIDE = 0.999
-
-
-@dataclass(frozen=True)
-class CellCounts:
-    """Of some cells.
-
-    Attributes
-    ----------
-    number : (cells,) int array
-        Eigenvalues right of `line` up to `band`, conjugates counted apart; -1 where nobody asked.
-    certain : (cells,) bool array
-    line, band : (cells,) arrays, 1/s, Hz
-    """
-
-    number: np.ndarray
-    certain: np.ndarray
-    line: np.ndarray
-    band: np.ndarray
-
-    def select(self, some) -> CellCounts:
-        """Those of some cells."""
-        return CellCounts(*(own[some] for own in vars(self).values()))
-
-    def enter(self, cells: np.ndarray, found: CellCounts) -> None:
-        """Put counts of some cells in."""
-        for own, other in zip(vars(self).values(), vars(found).values()):
-            own[cells] = other
-
-
 def counted_band(family: PencilFamily, condition: Condition) -> float:
     """Angular frequency up to which eigenvalues are counted: all where the stiffness relaxes, which damps all."""
     return family.reach(condition).band if family.relaxation(condition.loss) is None else np.inf
@@ -530,7 +509,7 @@ def count_unstable(reduced: Any, conditions, hints, within_band: bool = False) -
     if whole.size:
         beside = [_beside(hints[i], conditions[i]) for i in whole]
         found = phase_counts(reduced, [conditions[i] for i in whole], beside)
-        counts.number[whole], counts.certain[whole] = found.number, found.certain
+        counts.enter(whole, found)
     for i in np.setdiff1d(np.arange(cells), whole):
         band = None if np.isinf(bands[i]) else INSIDE * bands[i] / (2 * np.pi)
         found = unstable_count(reduced.pencil(conditions[i]), scale=_scale(reduced), hints=list(hints[i]), band=band)

@@ -11,7 +11,7 @@ from .factor import SingularShiftError, Workspace, petsc_is_complex
 from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, apart_from_creep
 from .pairs import Found, all_pairs, attach_left, biorthogonalise, empty, merge, polish, refine, upper_half, verified
-from .spectrum import CLEAR, LOWEST, SLOPE, Oval, SearchOptions, Spectrum
+from .spectrum import CLEAR, END, LOWEST, SLOPE, Oval, SearchOptions, Spectrum
 
 DEPTH = 0.4  # growth rate over angular frequency, down to which a band is searched at most
 
@@ -115,8 +115,7 @@ def holding_shift(options, growth) -> float:
     """Real shift whose disc up to the limit point holds the band asked for down to a growth rate; 0 without a band."""
     if options.max_frequency is None:
         return 0.0
-    # the search ends 3 per cent short of the limit point
-    end, band = 0.97 * abs(options.limit_point), band_sought(options)
+    end, band = END * abs(options.limit_point), band_sought(options)
     return 0.5 * (band**2 + growth**2 - end**2) / max(end + growth, 1e-3 * end)
 
 

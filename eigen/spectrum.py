@@ -9,6 +9,8 @@ import numpy as np
 
 #: Share of a limit point of eigenvalues right of which an eigenvalue is clearly apart from it.
 CLEAR = 0.8
+#: Share of it at which a search ends: nearer to it no number of restarts helps.
+END = 0.97
 #: Lowest frequency searched where the stiffness relaxes, over the highest, and decay over angular frequency down to
 #: which such a search goes at most; slower and more strongly damped motions shade off into relaxation.
 LOWEST, SLOPE = 0.05, 0.75
