@@ -1,18 +1,23 @@
 """Spectra of large sparse quadratic pencils with a low-rank, frequency-dependent coupling."""
 
-from .basis import NotPositiveError, TransferBasis, lowest_frequencies
-from .block_krylov import LargestPairs, NotConvergedError, largest_pairs
+from .basis import (
+    LargestPairs,
+    NotConvergedError,
+    NotPositiveError,
+    TransferBasis,
+    largest_pairs,
+    lowest_frequencies,
+)
 from .certificate import Certificate, CertifiedSpectrum, certified_spectrum, listed_unstable
 from .columns import Column, ColumnSolver
 from .count import Count, unstable_count
 from .derivative import PencilDerivative, difference, eigenvalue_derivative
 from .factor import SingularShiftError, Workspace
-from .family import Condition, PencilFamily
-from .operator import CoupledPencil, Relaxation
-from .options import CLEAR, SearchOptions
+from .krylov import KrylovPairs, krylov_pairs
+from .operator import Condition, CoupledPencil, PencilFamily, Relaxation
 from .reduction import FamilyReduction
 from .search import leading_modes
-from .spectrum import Mode, Oval, SearchedRegion, Spectrum
+from .spectrum import CLEAR, Mode, Oval, SearchedRegion, SearchOptions, Spectrum
 from .tracking import Branches, TrackOptions, track
 
 __all__ = [
@@ -26,6 +31,7 @@ __all__ = [
     "Count",
     "CoupledPencil",
     "FamilyReduction",
+    "KrylovPairs",
     "LargestPairs",
     "Mode",
     "NotConvergedError",
@@ -44,6 +50,7 @@ __all__ = [
     "certified_spectrum",
     "difference",
     "eigenvalue_derivative",
+    "krylov_pairs",
     "largest_pairs",
     "leading_modes",
     "listed_unstable",

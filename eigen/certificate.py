@@ -1,24 +1,21 @@
-"""Leading modes with the independent count of the unstable ones, and their agreement.
-
-on the real axis far from its shifts.
-"""
+"""Leading modes with the independent count of the unstable ones, and their agreement."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from .basis import TransferBasis
 from .count import Count, Determinant, unstable_count
-from .dense import all_pairs
-from .factor import StructureMatrices, SuperluFactorization, Workspace, condensed_matrix
+from .factor import ScaledLU, StructureMatrices, Workspace
+from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, real_apply
-from .options import SearchOptions
-from .pairs import SAME, Found, acceptable, newton, normalised
+from .pairs import SAME, Found, acceptable, all_pairs, newton, normalised
 from .search import leading_modes
-from .spectrum import Spectrum
+from .spectrum import SearchOptions, Spectrum
 
 
 @dataclass(frozen=True)
@@ -157,6 +154,8 @@ def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
 TRUSTED = 0.1
 #: Points of a count over all frequencies where one up to the end of a band can stand in for it.
 POINTS_BEYOND = 1000
+#: Frequencies at which a basis is compared with the full pencil.
+CHECKED = 2
 #: Finer bases tried at most where the first one leaves a count open.
 FINER = 3
 #: Size below which directions of exact responses are left out of a finer basis, relative to the largest.
@@ -173,38 +172,32 @@ class CertifiedSpectrum:
     ----------
     spectrum : Spectrum
     count : Count
-    agrees : bool
-        Both routes find the same number right of `count.line`, up to `count.band`, and the
-        count is certain.
-    unstable_count : int
-        From the spectrum, right of `count.line`; conjugates counted apart.
-    unstable_count_independent : int
+    certificate : Certificate
+        Both numbers right of `count.line`, up to `count.band`; certain if the count and the basis behind it are.
     response_error : float or None
         Largest |log det| error of the reduced basis behind the count at the frequencies
         checked exactly; None if the count was exact.
-    statement : str
-        The verdict in a sentence.
     """
 
     spectrum: Spectrum
     count: Count
-    agrees: bool
-    unstable_count: int
-    unstable_count_independent: int
+    certificate: Certificate
     response_error: float | None
-    statement: str
 
     @property
-    def certificate(self) -> Certificate:
-        """The same as for a cell of a map."""
-        accurate = self.response_error is None or self.response_error < TRUSTED
-        return Certificate(
-            self.unstable_count,
-            self.unstable_count_independent,
-            self.count.certain and accurate,
-            self.count.line,
-            self.count.band,
-        )
+    def agrees(self) -> bool:
+        """Both routes find the same number, and the count is certain."""
+        return self.certificate.agrees
+
+    @property
+    def unstable_count(self) -> int:
+        """Number by the spectrum; conjugates counted apart."""
+        return self.certificate.unstable
+
+    @property
+    def unstable_count_independent(self) -> int:
+        """Number by the count."""
+        return self.certificate.counted
 
     @property
     def stable(self) -> bool | None:
@@ -215,6 +208,25 @@ class CertifiedSpectrum:
             return False
         return True if self.agrees else None
 
+    @property
+    def statement(self) -> str:
+        """The verdict in a sentence."""
+        listed, counted, where = self.unstable_count, self.count.number, self.certificate.where
+        if self.agrees:
+            beyond = self.spectrum.count_right_of(self.count.line) - listed
+            return f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree" + (
+                f"; {beyond} more are listed beyond that band." if beyond else "."
+            )
+        listing = f"The spectrum lists {listed} unstable eigenvalues{where}"
+        if not self.count.certain:
+            return f"{listing}; the independent count ({counted}) is uncertain: {' '.join(self.count.notes)}"
+        if not self.certificate.certain:
+            return (
+                f"{listing}; the reduced basis behind the independent count ({counted}) is too coarse "
+                f"(error {self.response_error:.2g})."
+            )
+        return f"{listing}, the independent count finds {counted}: they disagree."
+
 
 def certified_spectrum(
     pencil: CoupledPencil,
@@ -223,22 +235,17 @@ def certified_spectrum(
     *,
     workspace: Workspace | None = None,
     basis: TransferBasis | None = None,
-    exact: bool = False,
-    check_points: int = 2,
     whole: bool = True,
+    solver: Callable[..., KrylovPairs] = krylov_pairs,
 ) -> CertifiedSpectrum:
     """Leading modes and an independent count of the unstable ones, with their agreement.
 
     Parameters
     ----------
-    pencil, count, options, workspace
+    pencil, count, options, workspace, solver
         As for `leading_modes`.
     basis : TransferBasis, optional
         For the count of a large pencil; made if missing.
-    exact : bool
-        Count with the full pencil at every frequency instead of the basis; slow.
-    check_points : int
-        Frequencies at which the basis is compared with the full pencil.
     whole : bool
         Count over all frequencies, also where a band was asked for; without, in that band alone where both routes agree
         there. A lightly damped wall has very many modes to pass beyond it.
@@ -252,54 +259,49 @@ def certified_spectrum(
     -------
     CertifiedSpectrum
     """
-    workspace = workspace or Workspace()
-    spectrum = leading_modes(pencil, count, options, workspace=workspace)
+    search = partial(leading_modes, pencil, workspace=workspace or Workspace(), solver=solver)
+    spectrum = search(count, options)
     if pencil.n > Determinant.dense_below:
         basis = basis or TransferBasis(pencil)
     else:
         basis = None
-    asked = pencil, options, workspace, exact, check_points
+    asked = pencil, options, search
     if not whole and options is not None and options.max_frequency is not None and np.isfinite(spectrum.band):
         found, _ = _judged(*asked, spectrum, basis, within=0.999 * spectrum.band)
         if found.agrees:
             return found
     found, basis = _judged(*asked, spectrum, basis)
     for finer in range(1, FINER + 1):
-        if found.agrees or exact or basis is None:
+        if found.agrees or basis is None:
             break
-        basis = _finer(pencil, basis, found, finer, check_points)
+        basis = _finer(pencil, basis, found, finer)
         if basis.size > Determinant.dense_below:
             break
         found, basis = _judged(*asked, found.spectrum, basis, finer)
     return found
 
 
-def _finer(pencil, basis, found, finer, number) -> TransferBasis:
+def _finer(pencil, basis, found, finer) -> TransferBasis:
     """A basis that answers better than the one that left a count open."""
     spectrum = found.spectrum
     if finer == 1 and len(spectrum):  # a mode that is all but neutral has to be met to a fraction of its growth rate
         return basis.enlarged(*(q for q in (spectrum.q, spectrum.left_q) if q is not None))
-    checked = _checks(spectrum, found.count, number, finer - 1, basis)
+    checked = _checks(spectrum, found.count, finer - 1, basis)
     return basis.enlarged(*responses(pencil, checked), compression=DISTINCT)
 
 
-def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, finer=0, within=None):
+def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
     """A spectrum beside a count, and the basis of the count; both may grow by what the count points to. The count is
     that of all frequencies, or `within` a band, Hz.
     """
-    model, scale, hints = pencil, None, []
+    model, scale = pencil, None
     if basis is not None:
-        reduced = basis.reduced(pencil)
-        scale = 2 * np.pi * (float(basis.structural_frequencies[0]) or 1.0)
-        if exact:
-            hints = list(Determinant(reduced).reference_zeros())
-        else:
-            model = reduced
+        model, scale = basis.reduced(pencil), 2 * np.pi * (float(basis.structural_frequencies[0]) or 1.0)
 
     def counted(band=None):
         # a structure that loses stability by itself has very many modes beyond a band that hardly decay
         most = POINTS_BEYOND if band is None and np.isfinite(spectrum.band) and model is not pencil else None
-        return unstable_count(model, scale=scale, hints=[*hints, *spectrum.eigenvalues], band=band, max_points=most)
+        return unstable_count(model, scale=scale, hints=spectrum.eigenvalues, band=band, max_points=most)
 
     winding = counted(within)
     if (
@@ -309,8 +311,8 @@ def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, fi
         and np.isinf(spectrum.band)
     ):
         # all that were asked for are unstable: look at the rest of the unstable ones too
-        spectrum = leading_modes(pencil, winding.number + 2, options, workspace=workspace)
-    if (model is not pencil or basis is None) and winding.number > listed_unstable(spectrum, winding):
+        spectrum = search(winding.number + 2, options)
+    if winding.number > listed_unstable(spectrum, winding):
         distant = distant_pairs(pencil, spectrum, basis, winding.line, options or SearchOptions())
         if distant is not None:
             spectrum = joined(spectrum, distant, winding.line)
@@ -325,17 +327,14 @@ def _judged(pencil, options, workspace, exact, check_points, spectrum, basis, fi
         none_stable = not len(spectrum) or spectrum.growth_rate[-1] > winding.line
         if winding.number > listed_unstable(spectrum, winding) and none_stable:
             band = SearchOptions() if options is None else options
-            spectrum = leading_modes(
-                pencil, winding.number + 2, replace(band, max_frequency=spectrum.band), workspace=workspace
-            )
+            spectrum = search(winding.number + 2, replace(band, max_frequency=spectrum.band))
     listed = listed_unstable(spectrum, winding)
     error = None
     if model is not pencil:
-        error = response_error(pencil, basis, _checks(spectrum, winding, check_points, finer, basis))
+        error = response_error(pencil, basis, _checks(spectrum, winding, finer, basis))
     trusted = winding.certain and (error is None or error < TRUSTED)
-    agrees = trusted and winding.number == listed
-    statement = _statement(spectrum, winding, listed, agrees, error)
-    return CertifiedSpectrum(spectrum, winding, agrees, listed, winding.number, error, statement), basis
+    certificate = Certificate(listed, winding.number, trusted, winding.line, winding.band)
+    return CertifiedSpectrum(spectrum, winding, certificate, error), basis
 
 
 def listed_unstable(spectrum: Spectrum, count: Count) -> int:
@@ -349,8 +348,9 @@ def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> 
     worst = 0.0
     for s, factor in _factored(pencil, frequencies):
         exact = real_apply(pencil.J, factor.solve(pencil.G.toarray().astype(complex)))
-        small = [condensed_matrix(*pencil.fluid_at(s), H) for H in (exact, basis.transfer(pencil, s))]
-        if small[0].size:
+        coupling, _ = pencil.fluid.condensed([s])
+        small = [np.eye(pencil.m) - coupling[0] @ H for H in (exact, basis.transfer(pencil, s))]
+        if pencil.m:
             ratio = np.linalg.det(np.linalg.solve(small[0], small[1]))
             worst = max(worst, float(abs(np.log(ratio))) if ratio != 0 else np.inf)
     return worst
@@ -365,48 +365,22 @@ def responses(pencil: CoupledPencil, frequencies) -> list[np.ndarray]:
     return found
 
 
-def _factored(pencil: CoupledPencil, frequencies) -> Iterator[tuple[complex, SuperluFactorization]]:
+def _factored(pencil: CoupledPencil, frequencies) -> Iterator[tuple[complex, ScaledLU]]:
     """Places i 2 pi f and the factored structure there."""
     structure = StructureMatrices(pencil)
-    factor = SuperluFactorization(structure)
     for f in frequencies:
         s = 2j * np.pi * float(f)
-        factor.refactor(structure.values(s).astype(complex))
-        yield s, factor
+        yield s, ScaledLU(structure.columns(structure.values(s).astype(complex)))
 
 
-def _checks(spectrum, winding, number, finer, basis):
+def _checks(spectrum, winding, finer, basis):
     """Frequencies to compare at: those of the leading modes, where the count is decided; for a finer basis, which is
     made for those, others each time from somewhat below the list to somewhat above it.
     """
     listed = [f for f in spectrum.frequency if 0 < f <= winding.band]
     if not finer:
-        return listed[:number] or list(winding.frequencies[1:2])
+        return listed[:CHECKED] or list(winding.frequencies[1:2])
     listed = listed or list(basis.structural_frequencies[basis.structural_frequencies > 0]) or winding.frequencies[1:2]
     low, high = 0.7 * min(listed), min(1.4 * max(listed), winding.band)
-    places = (np.arange((finer - 1) * number, finer * number) + 1) * GOLDEN % 1.0
+    places = (np.arange((finer - 1) * CHECKED, finer * CHECKED) + 1) * GOLDEN % 1.0
     return list(low * (high / low) ** places)
-
-
-def _statement(spectrum, winding, listed, agrees, error):
-    where = "" if winding.line == 0 else f" with a growth rate above {winding.line:.4g} 1/s"
-    where += "" if np.isinf(winding.band) else f" up to {winding.band:.4g} Hz"
-    if agrees:
-        beyond = spectrum.count_right_of(winding.line) - listed
-        return f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree" + (
-            f"; {beyond} more are listed beyond that band." if beyond else "."
-        )
-    if not winding.certain:
-        return (
-            f"The spectrum lists {listed} unstable eigenvalues{where}; the independent count "
-            f"({winding.number}) is uncertain: {' '.join(winding.notes)}"
-        )
-    if error is not None and error >= TRUSTED:
-        return (
-            f"The spectrum lists {listed} unstable eigenvalues{where}; the reduced basis behind "
-            f"the independent count ({winding.number}) is too coarse (error {error:.2g})."
-        )
-    return (
-        f"The spectrum lists {listed} unstable eigenvalues{where}, the independent count finds "
-        f"{winding.number}: they disagree."
-    )

@@ -9,8 +9,7 @@ import numpy as np
 
 from .certificate import Certificate, certified_spectrum
 from .factor import SingularShiftError, Workspace
-from .family import Condition, PencilFamily
-from .operator import CoupledPencil
+from .operator import Condition, CoupledPencil, PencilFamily
 from .reduced_counts import CellCounts, count_unstable, uncounted
 from .reduction import FamilyReduction, ReducedFamily, StaticSolver
 from .search import leading_modes

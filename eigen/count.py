@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .determinant import CLOSE, MAX_LOG, MAX_PHASE, MAX_PREDICTED, Determinant, middle, principal, thinned
-from .operator import CoupledPencil, fluid_zeros
+from .operator import CoupledPencil
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def unstable_count(
     # a zero of the pencil can hide from a coarse walk only beside a zero of the reference
     hints = [complex(h) for h in hints] + [line + z for z in determinant.reference_zeros()]
     if pencil.b > 1:
-        zeros = fluid_zeros(pencil.S0, pencil.S1)
+        zeros = pencil.fluid.zeros
         hints += list(zeros[zeros.imag > 0])
     walk = _Walk(determinant, max_points or (4000 if dense else 300), band)
     walk.start(scale, hints)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .operator import FLUID_PARTS, CoupledPencil, FluidParts, coupling_of_modes, real_apply
+from .operator import FLUID_PARTS, CoupledPencil, FluidParts, real_apply
 from .spectrum import Mode
 
 
@@ -28,6 +28,31 @@ class PencilDerivative(FluidParts):
     strengths: np.ndarray | None = None
     times: np.ndarray | None = None
     relaxing: tuple | None = None
+
+
+def coupling_of_modes(pencil: CoupledPencil, left_values, left_q, left_u, right_values, right_q, right_u) -> np.ndarray:
+    r"""w_i^H [T(l_i) - T(l_j)] / (l_i - l_j) x_j, the product in which modes are orthogonal.
+
+    For a quadratic pencil this is w^H [(l_i + l_j) M' + C'] x with M', C' the coefficients of
+    lambda^2 and lambda of the full pencil; on the diagonal it is w^H T'(l) x. What relaxes adds the
+    divided differences of its factors.
+
+    Returns
+    -------
+    ndarray, shape (k_left, k_right)
+    """
+    p = pencil
+    y = real_apply(p.J, right_q)
+    wg = real_apply(p.G.T.tocsr(), left_q).conj().T  # w^H G
+    wh, Wh = left_q.conj().T, left_u.conj().T
+    inertia = wh @ real_apply(p.M, right_q) - wg @ (p.A2 @ y) + Wh @ (p.R2 @ y)
+    damping = wh @ real_apply(p.C, right_q) - wg @ (p.A1 @ y + p.B1 @ right_u) + Wh @ (p.R1 @ y + p.S1 @ right_u)
+    first, second = np.asarray(left_values)[:, None], np.asarray(right_values)
+    table = (first + second) * inertia + damping
+    if p.relaxation is not None:
+        for quotient, matrix in zip(p.relaxation.quotients(first, second), p.relaxing):
+            table = table + quotient * (wh @ real_apply(matrix, right_q))
+    return table
 
 
 def eigenvalue_derivative(pencil: CoupledPencil, mode: Mode, change: PencilDerivative) -> complex:

@@ -18,10 +18,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-import scipy.sparse.linalg as spla
 
-from .factor import SingularShiftError, StructureMatrices, SuperluFactorization, condensed_matrix, superlu
-from .operator import CoupledPencil, Relaxation, real_apply, stable_fluid
+from .factor import ScaledLU, SingularShiftError, StructureMatrices, condensed_matrix, is_positive_definite
+from .operator import CoupledPencil, Relaxation, real_apply
 
 #: Largest accepted step of the phase between neighbours, rad.
 LARGEST_STEP = np.pi / 3
@@ -92,49 +91,6 @@ def solved(matrices: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndar
         swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
         logarithms[i] = np.log(lu.diagonal()).sum() + 1j * np.pi * swaps
     return solutions, logarithms
-
-
-class SymmetricLU:
-    """SuperLU of a symmetric matrix with pivots from the diagonal only: their signs are its inertia (Sylvester).
-
-    Raises
-    ------
-    SingularShiftError
-        If a pivot is zero, or had to be taken from elsewhere.
-    """
-
-    def __init__(self, matrix: sp.spmatrix):
-        matrix = sp.csc_matrix(matrix)
-        size = np.abs(matrix.diagonal())
-        scale = sp.diags(1.0 / np.sqrt(np.where(size > 0, size, 1.0)))
-        try:
-            lu = spla.splu(
-                (scale @ matrix @ scale).tocsc(),
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
-        except RuntimeError as error:
-            raise SingularShiftError(f"SuperLU could not factor the matrix ({error}).") from error
-        if not np.array_equal(lu.perm_r, lu.perm_c):
-            raise SingularShiftError("A pivot of the symmetric matrix is zero.")
-        #: Pivots of the matrix scaled to a diagonal of ones.
-        self.pivots = lu.U.diagonal()
-
-    @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues."""
-        return int(np.sum(self.pivots < 0))
-
-
-def is_positive_definite(matrix: sp.spmatrix) -> bool:
-    """Whether a symmetric sparse matrix is positive definite, by its pivots."""
-    if (matrix.diagonal() <= 0).any():
-        return False
-    try:
-        return bool((SymmetricLU(matrix).pivots > 1e-13).all())
-    except SingularShiftError:
-        return False
 
 
 class Oscillators(NamedTuple):
@@ -213,7 +169,7 @@ class Determinant:
     leading_phase : float
         0 or pi.
     fluid : (k,) array
-        Zeros of what the ratio is divided by where the fluid has several unknowns, see `eigen.operator.stable_fluid`.
+        Zeros of what the ratio is divided by where the fluid has several unknowns, see `eigen.operator.FluidMotions`.
     evaluations : int
 
     Raises
@@ -233,8 +189,7 @@ class Determinant:
         if not is_positive_definite(pencil.M):
             raise ValueError("The count needs a positive definite mass matrix.")
         self._prepare_reference()
-        self._scale = None
-        self.fluid = stable_fluid(pencil.S0, pencil.S1, line)
+        self.fluid = pencil.fluid.stable(line)
         self.degree, self.leading_phase = self._at_infinity()
 
     def _prepare_reference(self):
@@ -288,11 +243,9 @@ class Determinant:
                 self._take_modes()
             return
         self._structure = StructureMatrices(p)
-        self._factor = SuperluFactorization(self._structure)
         if not self.structure_is_reference:
             twin = CoupledPencil(M=p.M, C=self._reference[0], K=self._reference[1], relaxation=self._relaxation)
             self._twin = StructureMatrices(twin)
-            self._twin_factor = SuperluFactorization(self._twin)
 
     def _take_modes(self):
         """Represent the structure by its eigenvectors, if they can stand for it."""
@@ -304,7 +257,7 @@ class Determinant:
         if self._dense:
             H = self._J @ la.solve(self._parts[0], self._G, assume_a="pos")
         else:
-            H = p.J @ superlu(sp.csc_matrix(p.M)).solve(p.G.toarray())
+            H = p.J @ ScaledLU(p.M).solve(p.G.toarray())
         grows = (p.B1 != 0).any(axis=0) | (p.S1 != 0).any(axis=0)
         leading = condensed_matrix(
             np.zeros_like(p.A0), np.where(grows, p.B1, p.B0), np.zeros_like(p.R0), np.where(grows, p.S1, p.S0), H
@@ -401,21 +354,18 @@ class Determinant:
 
     def _sparse_structure_at(self, z):
         p, s = self.pencil, self.line + z
-        self._factor.refactor(self._structure.values(s).astype(complex))
-        H = real_apply(p.J, self._factor.solve(p.G.toarray().astype(complex)))[None]
+        factor = ScaledLU(self._structure.columns(self._structure.values(s).astype(complex)))
+        H = real_apply(p.J, factor.solve(p.G.toarray().astype(complex)))[None]
         if self.structure_is_reference:
             return H, np.zeros(1)
-        self._twin_factor.refactor(self._twin.values(z).astype(complex))
-        return H, np.array([self._factor.log_determinant() - self._twin_factor.log_determinant()])
+        twin = ScaledLU(self._twin.columns(self._twin.values(z).astype(complex)))
+        return H, np.array([factor.log_determinant() - twin.log_determinant()])
 
     def _fluid_log(self, s, H):
-        small = condensed_matrix(*self.pencil.fluid_at(s[:, None, None]), H)
-        if not small.size:
+        if not self.pencil.m + self.pencil.b:
             return np.zeros(s.size)
-        if self._scale is None:  # constant positive factors leave the phase alone
-            size = np.abs(small[0]).max(axis=1)
-            self._scale = np.where(size > 0, size, 1.0)
-        return _log_determinant(small / self._scale[:, None])
+        coupling, total = self.pencil.fluid.condensed(s)
+        return total + _log_determinant(np.eye(self.pencil.m) - coupling @ H)
 
 
 class _StructureModes:

@@ -273,57 +273,26 @@ def _release(objects):
         item.destroy()
 
 
-class SuperluFactorization:
-    """Real or complex LU by SuperLU; knows its determinant.
-
-    Parameters
-    ----------
-    structure : StructureMatrices
-    """
-
-    def __init__(self, structure: StructureMatrices):
-        self._structure = structure
-        self._lu = None
-
-    def refactor(self, values: np.ndarray) -> None:
-        """Factor the matrix with these entries on the pattern.
-
-        Raises
-        ------
-        SingularShiftError
-            If a pivot is exactly zero.
-        """
-        self._lu = superlu(self._structure.columns(values))
-        self.dtype = values.dtype
-
-    def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solve for one right-hand side, shape (n,), or a block, shape (n, k)."""
-        return self._solve(b, "N")
-
-    def solve_transposed(self, b: np.ndarray) -> np.ndarray:
-        """Solve with the transpose (not the adjoint)."""
-        return self._solve(b, "T")
-
-    def _solve(self, b, mode):
-        if b.ndim == 2 and b.shape[1] == 0:
-            return np.array(b)
-        if np.iscomplexobj(b) and self.dtype.kind == "f":
-            return self._solve(b.real.copy(), mode) + 1j * self._solve(b.imag.copy(), mode)
-        return self._lu.solve(np.asarray(b, dtype=self.dtype), mode)
-
-    def log_determinant(self) -> complex:
-        """log |det| + i arg det; the argument lies in (-pi, pi]."""
-        return self._lu.log_determinant()
-
-
 class ScaledLU:
-    """SuperLU of D A D with D = |diag A|^(-1/2).
+    """Real or complex SuperLU of D A D with D = |diag A|^(-1/2), for a nearly symmetric pattern; knows its determinant.
 
     Unknowns of different kinds (metres, radians) differ by powers of ten; unscaled, SuperLU leaves
     the diagonal for its pivots and fills in without need.
+
+    Parameters
+    ----------
+    matrix : sparse, shape (n, n)
+    pivoting : float
+        Share of the largest entry of a column below which a pivot is not taken from the diagonal.
+
+    Raises
+    ------
+    SingularShiftError
+        If a pivot is exactly zero.
     """
 
-    def __init__(self, matrix: sp.csc_matrix):
+    def __init__(self, matrix: sp.csc_matrix, pivoting: float = 0.01):
+        matrix = sp.csc_matrix(matrix)
         size = np.abs(matrix.diagonal())
         typical = size.max(initial=0.0) or 1.0
         self._scale = 1.0 / np.sqrt(np.where(size > 1e-12 * typical, size, typical))
@@ -332,35 +301,47 @@ class ScaledLU:
             self._lu = spla.splu(
                 (D @ matrix @ D).tocsc(),
                 permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.01,
+                diag_pivot_thresh=pivoting,
                 options={"SymmetricMode": True},
             )
         except RuntimeError as error:
             raise SingularShiftError(f"SuperLU could not factor the matrix ({error}).") from error
+        self.dtype = matrix.dtype
 
     def solve(self, b: np.ndarray, mode: str = "N") -> np.ndarray:
-        """Solution for one right-hand side or a block; mode "T" with the transpose."""
+        """Solve for one right-hand side, shape (n,), or a block, shape (n, k); mode "T" with the transpose."""
+        if b.ndim == 2 and b.shape[1] == 0:
+            return np.array(b)
+        if np.iscomplexobj(b) and self.dtype.kind == "f":
+            return self.solve(b.real.copy(), mode) + 1j * self.solve(b.imag.copy(), mode)
         scale = self._scale if b.ndim == 1 else self._scale[:, None]
-        return scale * self._lu.solve(scale * b, mode)
+        return scale * self._lu.solve(scale * np.asarray(b, dtype=self.dtype), mode)
+
+    def solve_transposed(self, b: np.ndarray) -> np.ndarray:
+        """Solve with the transpose (not the adjoint)."""
+        return self.solve(b, "T")
 
     def log_determinant(self) -> complex:
-        """log |det A| + i arg det A."""
+        """log |det A| + i arg det A; the argument lies in (-pi, pi]."""
         diagonal = self._lu.U.diagonal()
         sign = _permutation_sign(self._lu.perm_r) * _permutation_sign(self._lu.perm_c)
         phase = float(np.angle(diagonal).sum()) + (np.pi if sign < 0 else 0.0)
         size = float(np.log(np.abs(diagonal)).sum()) - 2.0 * float(np.log(self._scale).sum())
         return complex(size, np.angle(np.exp(1j * phase)))
 
+    def has_positive_pivots(self) -> bool:
+        """Pivots are those of the diagonal, and positive: a symmetric matrix is then positive definite (Sylvester)."""
+        return bool(np.array_equal(self._lu.perm_r, self._lu.perm_c) and (self._lu.U.diagonal() > 1e-13).all())
 
-def superlu(matrix: sp.csc_matrix) -> ScaledLU:
-    """SuperLU for a nearly symmetric pattern.
 
-    Raises
-    ------
-    SingularShiftError
-        If a pivot is exactly zero.
-    """
-    return ScaledLU(sp.csc_matrix(matrix))
+def is_positive_definite(matrix: sp.spmatrix) -> bool:
+    """Whether a symmetric sparse matrix is positive definite, by its pivots."""
+    if (matrix.diagonal() <= 0).any():
+        return False
+    try:
+        return ScaledLU(matrix, pivoting=0.0).has_positive_pivots()
+    except SingularShiftError:
+        return False
 
 
 def petsc_is_complex() -> bool:
@@ -459,7 +440,7 @@ class Workspace:
         elif petsc_is_complex():
             factor = MumpsFactorization(structure)
         else:
-            factor = SuperluFactorization(structure)
+            return ScaledLU(structure.columns(structure.values(shift)))
         factor.refactor(structure.values(shift))
         return factor
 

@@ -24,7 +24,8 @@ import numpy as np
 import scipy.linalg as la
 
 from .factor import ShiftedPencil
-from .operator import creep_edge, real_apply
+from .operator import edge_of, real_apply
+from .spectrum import END
 
 
 @dataclass(frozen=True)
@@ -120,14 +121,16 @@ class _ShiftAndInvert:
         return w, W
 
 
+#: Restarts at most, and those after which a search ends that neither brought a further pair nor halved the error of the
+#: next: next to a limit point no number helps, while in a dense spectrum all pairs converge late and together.
+RESTARTS, PATIENCE = 60, 3
+
+
 def near_shift(
     shifted: ShiftedPencil,
     wanted: int,
     *,
     tolerance: float = 1e-10,
-    subspace: int | None = None,
-    max_restarts: int = 60,
-    patience: int = 3,
     transposed: bool = False,
     limit_point: float | None = None,
     enough: Callable[[np.ndarray, float], bool] | None = None,
@@ -141,12 +144,6 @@ def near_shift(
         Number of eigenvalues, conjugates counted apart.
     tolerance : float
         Relative, on the transformed eigenvalue.
-    subspace : int, optional
-        Largest Krylov basis; default twice the number wanted, or the whole of a small space.
-    max_restarts, patience : int
-        Give up after so many restarts, or after `patience` of them that neither brought a further
-        pair nor halved the error of the next: next to a limit point of eigenvalues no number of
-        restarts helps, while in a dense spectrum all pairs converge late and together.
     transposed : bool
         Left vectors (conjugated) instead of right ones, from the same factor.
     limit_point : float, optional
@@ -174,14 +171,14 @@ def near_shift(
     solver.setProblemType(SLEPc.EPS.ProblemType.NHEP)
     solver.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
-    solver.setTolerances(tolerance, max_restarts)
-    stopping = _Patience(patience, SLEPc.EPS.ConvergedReason, _limit_size(shifted, limit_point))
+    solver.setTolerances(tolerance, RESTARTS)
+    stopping = _Patience(SLEPc.EPS.ConvergedReason, _limit_size(shifted, limit_point))
     if enough is not None and not operator.paired:
         stopping.enough = lambda theta: enough(shifted.shift + 1.0 / theta, 1.0 / np.abs(theta).min())
         stopping.matrix = SLEPc.DS.MatType.A
     solver.setStoppingTest(stopping)
     solver.setMonitor(stopping.watch)
-    subspace = subspace or (size if size <= 5 * wanted else max(2 * wanted, wanted + 24))
+    subspace = size if size <= 5 * wanted else max(2 * wanted, wanted + 24)
     solver.setDimensions(wanted, min(size, subspace))
     start = shell.createVecRight()
     start.setArray(np.random.default_rng(7).standard_normal(size))
@@ -197,7 +194,7 @@ def _limit_size(shifted, limit_point) -> float:
     """Size of the transformed eigenvalue just right of a limit point; 0 without one."""
     if limit_point is None:
         return 0.0
-    shift, place = complex(shifted.shift), 0.97 * limit_point
+    shift, place = complex(shifted.shift), END * limit_point
     mirror = shift.conjugate() if shift.imag else None
     distance = abs(place - shift)
     return 1.0 / (distance if mirror is None else distance * abs(place - mirror))
@@ -206,8 +203,8 @@ def _limit_size(shifted, limit_point) -> float:
 class _Patience:
     """Stopping test: enough pairs, too many restarts, no progress, or a limit point reached."""
 
-    def __init__(self, patience, reasons, limit=0.0):
-        self.patience, self.reasons, self.limit = patience, reasons, limit
+    def __init__(self, reasons, limit=0.0):
+        self.reasons, self.limit = reasons, limit
         self.best, self.since = 0, 0
         self.error = np.inf  # smallest seen of the first pair that has not converged
         self.ritz = np.zeros(0)
@@ -234,7 +231,7 @@ class _Patience:
             self.best, self.since = converged, restart
             if self.enough is not None and self.enough(self._converged(_solver, converged)):
                 return self.reasons.CONVERGED_USER
-        if restart >= max_restarts or restart - self.since >= self.patience:
+        if restart >= max_restarts or restart - self.since >= PATIENCE:
             return self.reasons.DIVERGED_ITS
         return self.reasons.CONVERGED_ITERATING
 
@@ -504,7 +501,7 @@ def oscillating_pairs(
     order = shifted.pencil.order
     most = min(most, order)
     krylov = _Arnoldi(_Operator(shifted, transposed), most)
-    edge = creep_edge(shifted.pencil)
+    edge = edge_of(shifted.pencil.relaxation)
     alive = True
     while True:
         aim = min(most, FIRST if krylov.steps < FIRST else krylov.steps + EVERY)
@@ -548,6 +545,43 @@ def _settled(shift, theta, error, edge, band, tolerance):
     return chosen, 0.5 / lowest if np.isfinite(lowest) else 0.0, settled
 
 
-def _apply(matrix, x):
-    """Sparse product that keeps a real matrix real."""
-    return real_apply(matrix, x) if matrix.dtype.kind == "f" else matrix @ x
+def krylov_pairs(
+    shifted: ShiftedPencil,
+    wanted: int,
+    *,
+    tolerance: float = 1e-12,
+    band: float = np.inf,
+    limit_point: float | None = None,
+    transposed: bool = False,
+    enough: Callable[[np.ndarray, float], bool] | None = None,
+) -> KrylovPairs:
+    """Eigenpairs near the shift of a factored pencil: what a search asks of any eigen-solver.
+
+    Parameters
+    ----------
+    shifted : ShiftedPencil
+        The pencil, its shift, and solves with it.
+    wanted : int
+        Number of eigenvalues, conjugates counted apart; those nearest to the shift, and of a viscoelastic wall those
+        that oscillate.
+    tolerance : float
+        Relative.
+    band : float
+        Angular frequency of interest, rad/s.
+    limit_point : float, optional
+        Real limit point of eigenvalues, at which the search may end.
+    transposed : bool
+        Left vectors (conjugated) instead of right ones.
+    enough : callable, optional
+        enough(eigenvalues, reach) is True where no more are needed.
+
+    Returns
+    -------
+    KrylovPairs
+        With `reach` as large as is known to be complete, and `exhausted` where these are all eigenvalues.
+    """
+    if shifted.pencil.relaxation is not None:
+        return oscillating_pairs(shifted, band=band, transposed=transposed, enough=enough)
+    return near_shift(
+        shifted, wanted, tolerance=tolerance, transposed=transposed, limit_point=limit_point, enough=enough
+    )

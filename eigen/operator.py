@@ -1,14 +1,17 @@
-"""Parameter-separable operator: pencils of a structure with a low-rank coupling, and what relaxes of its stiffness."""
+r"""Parameter-separable operator: structure with a low-rank coupling and relaxing stiffness, and families of such."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
 
-from .options import CLEAR
+from .spectrum import CLEAR, LOWEST, SLOPE, SearchOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +106,9 @@ class Relaxation:
 
 #: Complex columns up to which a sparse product is faster one real column after another.
 FEW = 2
+
+#: Rates of a fluid that rounding leaves, relative to the largest; share by which a zero that is met is moved.
+ROUNDING, MET = 1e-13, 1e-10
 
 FLUID_PARTS = ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")
 
@@ -255,14 +261,14 @@ class CoupledPencil(FluidParts):
         other._check_fluid()
         return other
 
+    @cached_property
+    def fluid(self) -> FluidMotions:
+        """The fluid by its own motions."""
+        return FluidMotions({name: getattr(self, name) for name in FLUID_PARTS})
+
     def fluid_at(self, s: complex):
         """Values A(s), B(s), R(s), S(s) of the fluid polynomials."""
-        return (
-            self.A0 + s * (self.A1 + s * self.A2),
-            self.B0 + s * self.B1,
-            self.R0 + s * (self.R1 + s * self.R2),
-            self.S0 + s * self.S1,
-        )
+        return fluid_values(vars(self), s)
 
     def terms(self, s: complex, q: np.ndarray, U: np.ndarray):
         """Vectors whose sums are the two block rows of T(s) x.
@@ -333,6 +339,16 @@ class CoupledPencil(FluidParts):
         return F, E
 
 
+def fluid_values(p: Mapping[str, np.ndarray], s: complex):
+    """Values A(s), B(s), R(s), S(s) of the polynomials of a coupling."""
+    return (
+        p["A0"] + s * (p["A1"] + s * p["A2"]),
+        p["B0"] + s * p["B1"],
+        p["R0"] + s * (p["R1"] + s * p["R2"]),
+        p["S0"] + s * p["S1"],
+    )
+
+
 def real_apply(matrix, x: np.ndarray) -> np.ndarray:
     """Real sparse matrix times a complex array without making the matrix complex."""
     if not np.iscomplexobj(x):
@@ -366,48 +382,69 @@ def _real_csr(name: str, value) -> sp.csr_matrix:
     return matrix
 
 
-def fluid_zeros(S0: np.ndarray, S1: np.ndarray) -> np.ndarray:
-    """Finite zeros of det (S0 + s S1): the fluid's own swinging between walls that stand."""
-    values = la.eigvals(-S0, S1)
-    return values[np.isfinite(values)]
+class FluidMotions:
+    """Inner unknowns of a fluid condensed by the motions that it has between walls at rest.
 
+    With S(sigma)^-1 S1 = X diag(k) X^-1 at some real sigma, S(s)^-1 = X diag(1 / d) X^-1 S(sigma)^-1 where
+    d = 1 + (s - sigma) k: a place costs products alone, however many unknowns a long line brings.
 
-def stable_fluid(S0: np.ndarray, S1: np.ndarray, line: float = 0.0) -> np.ndarray:
-    """Zeros of a stable polynomial that turns as det (S0 + s S1) does, relative to a line; none of one unknown.
+    Parameters
+    ----------
+    parts : mapping
+        A0 to S1 of a `CoupledPencil`.
 
-    They are those of the fluid alone, mirrored to the left of the line. What is divided by it varies as little as with
-    a single unknown, however many the fluid has.
+    Attributes
+    ----------
+    zeros : (j,) complex array
+        Finite zeros of det S(s).
     """
-    if S0.shape[0] < 2:
-        return np.zeros(0, complex)
-    zeros = fluid_zeros(S0, S1) - line
-    least = 1e-6 * np.abs(zeros).max(initial=0.0)
-    return -np.maximum(np.abs(zeros.real), least) + 1j * zeros.imag
 
+    def __init__(self, parts: Mapping[str, np.ndarray]):
+        S0, S1 = parts["S0"], parts["S1"]
+        self._A = [parts["A0"], parts["A1"], parts["A2"]]
+        size = np.abs(S0).max(initial=0.0), np.abs(S1).max(initial=0.0)
+        shift = size[0] / size[1] if min(size) > 0 else 1.0
+        # of one unknown either of them may be the zero itself
+        self._shift, (sign, log) = max(
+            ((s, np.linalg.slogdet(S0 + s * S1)) for s in (shift, -shift)), key=lambda x: x[1][1]
+        )
+        if sign == 0:
+            raise ValueError("The inner unknowns of the fluid are not determined by their own equations.")
+        self._log = log + 1j * np.angle(sign)
+        columns = np.hstack([S1, *(parts[f"R{power}"] for power in range(3))])
+        rates, rows = np.split(np.linalg.solve(S0 + self._shift * S1, columns), [len(S0)], axis=1)
+        self._rates, X = np.linalg.eig(rates) if len(S0) else (np.zeros(0), np.zeros((0, 0)))
+        # unknowns without a rate of their own leave rounding
+        self._rates[np.abs(self._rates) <= ROUNDING * np.abs(self._rates).max(initial=0.0)] = 0.0
+        self._B = [parts[name] @ X for name in ("B0", "B1")]
+        rows = np.split(np.linalg.solve(X, rows), 3, axis=1)
+        self._R = {power: rows[power] for power in range(3) if parts[f"R{power}"].any()}
+        self.zeros = self._shift - 1.0 / self._rates[self._rates != 0]
 
-def coupling_of_modes(pencil: CoupledPencil, left_values, left_q, left_u, right_values, right_q, right_u) -> np.ndarray:
-    r"""w_i^H [T(l_i) - T(l_j)] / (l_i - l_j) x_j, the product in which modes are orthogonal.
+    def stable(self, line: float = 0.0) -> np.ndarray:
+        """Zeros of a stable polynomial that turns as det S(s) does, relative to a line; none of one unknown.
 
-    For a quadratic pencil this is w^H [(l_i + l_j) M' + C'] x with M', C' the coefficients of
-    lambda^2 and lambda of the full pencil; on the diagonal it is w^H T'(l) x. What relaxes adds the
-    divided differences of its factors.
+        They are those of the fluid alone, mirrored to the left of the line. What is divided by it varies as little as
+        with a single unknown, however many the fluid has.
+        """
+        if self._rates.size < 2:
+            return np.zeros(0, complex)
+        zeros = self.zeros - line
+        least = 1e-6 * np.abs(zeros).max(initial=0.0)
+        return -np.maximum(np.abs(zeros.real), least) + 1j * zeros.imag
 
-    Returns
-    -------
-    ndarray, shape (k_left, k_right)
-    """
-    p = pencil
-    y = real_apply(p.J, right_q)
-    wg = real_apply(p.G.T.tocsr(), left_q).conj().T  # w^H G
-    wh, Wh = left_q.conj().T, left_u.conj().T
-    inertia = wh @ real_apply(p.M, right_q) - wg @ (p.A2 @ y) + Wh @ (p.R2 @ y)
-    damping = wh @ real_apply(p.C, right_q) - wg @ (p.A1 @ y + p.B1 @ right_u) + Wh @ (p.R1 @ y + p.S1 @ right_u)
-    first, second = np.asarray(left_values)[:, None], np.asarray(right_values)
-    table = (first + second) * inertia + damping
-    if p.relaxation is not None:
-        for quotient, matrix in zip(p.relaxation.quotients(first, second), p.relaxing):
-            table = table + quotient * (wh @ real_apply(matrix, right_q))
-    return table
+    def condensed(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A - B S^-1 R at places, (p, m, m), and log det S, (p,); a zero of S that is met is moved by rounding."""
+        s = np.asarray(s, complex)[:, None]
+        away = (s - self._shift) * self._rates
+        below = 1.0 + away
+        below = np.where(np.abs(below) > MET * np.abs(away), below, MET * np.abs(away))
+        s = s[..., None]
+        left = (self._B[0] + s * self._B[1]) / below[:, None, :]
+        coupling = self._A[0] + s * (self._A[1] + s * self._A[2])
+        for power, part in self._R.items():
+            coupling -= s**power * (left @ part)
+        return coupling, self._log + np.log(below).sum(axis=1)
 
 
 #: Share of the size of an eigenvalue below which its imaginary part is no oscillation: a crowd of creep that rounding
@@ -415,17 +452,12 @@ def coupling_of_modes(pencil: CoupledPencil, left_values, left_q, left_u, right_
 OVERDAMPED = 0.1
 
 
-def creep_edge(pencil: CoupledPencil) -> float:
+def edge_of(relaxation: Relaxation | None) -> float:
     """Growth rate right of which a real eigenvalue is clearly no creep, 1/s, negative; minus infinity without.
 
     A stiffness of which all relaxes creeps at the zeros of 1 + phi_g, the slowest of them left of -1/(tau_max (1 + sum
     of strengths)).
     """
-    return edge_of(pencil.relaxation)
-
-
-def edge_of(relaxation: Relaxation | None) -> float:
-    """The same of what relaxes."""
     if relaxation is None:
         return -np.inf
     return float(-CLEAR / (relaxation.times.max() * (1.0 + relaxation.strengths.sum(axis=1).max())))
@@ -434,4 +466,135 @@ def edge_of(relaxation: Relaxation | None) -> float:
 def apart_from_creep(pencil: CoupledPencil, values: np.ndarray) -> np.ndarray:
     """Which eigenvalues oscillate, or lie clearly right of the creep."""
     values = np.asarray(values)
-    return (np.abs(values.imag) > OVERDAMPED * np.abs(values)) | (values.real > creep_edge(pencil))
+    return (np.abs(values.imag) > OVERDAMPED * np.abs(values)) | (values.real > edge_of(pencil.relaxation))
+
+
+class Condition(NamedTuple):
+    """What may differ between the pencils of a family.
+
+    Attributes
+    ----------
+    inertia : float
+        The coupling is a polynomial in sqrt(inertia) lambda, once its inner unknowns are scaled: what the density of a
+        fluid does.
+    alpha, beta : float
+        Damping C = alpha M + beta D, 1/s and s.
+    law : hashable
+        Which coupling parts.
+    loss : float
+        Factor on the loss factors of the stiffness that relaxes; zero leaves it elastic.
+    """
+
+    inertia: float
+    alpha: float
+    beta: float
+    law: Hashable = 0.0
+    loss: float = 0.0
+
+    @property
+    def damping(self) -> tuple[float, float, float]:
+        """What the structure alone depends on."""
+        return self.alpha, self.beta, self.loss
+
+
+class PencilFamily(ABC):
+    """Structure and coupling at one state; what `FamilyReduction` and `ColumnSolver` ask for.
+
+    Attributes
+    ----------
+    mass, damping, stiffness : (n, n) real sparse matrices
+        M, D and K; C = alpha M + beta D.
+    forces : (n, m) real sparse matrix G
+    slope : (m, n) real sparse matrix J
+    added : int
+        Number of coupling forces, the last ones, that are inertia alone: the structure swings with that mass, not with
+        its own.
+    model : callable
+        The `FamilyReduction` made last of it, None when nobody holds that any more.
+    """
+
+    added: int = 0
+    model: Callable[[], Any | None] = staticmethod(lambda: None)
+    mass: object
+    damping: object
+    stiffness: object
+    forces: object
+    slope: object
+
+    @abstractmethod
+    def parts(self, law: Hashable) -> dict[str, np.ndarray]:
+        """A0 to S1 of `CoupledPencil` at inertia 1; the same object for the same law."""
+
+    @abstractmethod
+    def pencil(self, condition: Condition) -> CoupledPencil:
+        """The full pencil; its inner unknowns may be scaled differently."""
+
+    @abstractmethod
+    def search(self, condition: Condition) -> SearchOptions:
+        """What is searched in the spectrum: limit point and band."""
+
+    def relaxation(self, loss: float) -> Relaxation | None:
+        """What relaxes under a factor on the loss factors: the same matrices for every factor, in one order, and the
+        same object for the same factor; None where nothing does.
+        """
+        return None
+
+    def lowest(self, count: int) -> np.ndarray:
+        """Lowest frequencies of the undamped structure, Hz, ascending; none without a small model that has them."""
+        model = self.model()
+        return np.zeros(0) if model is None else model.lowest_frequencies(count)
+
+    def coupling_at(self, s: complex, condition: Condition):
+        """A, B, R, S (s) with the inner unknowns scaled."""
+        return fluid_values(self.parts(condition.law), s * np.sqrt(condition.inertia))
+
+    def reach(self, condition: Condition) -> Reach:
+        """Where leading modes of a condition lie."""
+        options = self.search(condition)
+        floor = -np.inf if options.limit_point is None else CLEAR * options.limit_point
+        band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
+        return Reach(floor, band, edge_of(self.relaxation(condition.loss)))
+
+
+class Reach(NamedTuple):
+    """Growth rates above `floor` (1/s) and angular frequencies up to `band` (rad/s).
+
+    Left of `creep` (1/s), which is minus infinity where nothing relaxes, what oscillates hardly or slowly does not
+    count; see `eigen.operator` and `eigen.search`.
+    """
+
+    floor: float
+    band: float
+    creep: float = -np.inf
+
+    def is_mode(self, values: np.ndarray) -> np.ndarray:
+        """Which eigenvalues are no creep: right of it, or decaying no faster, and oscillating no slower, than a search
+        for modes reaches.
+        """
+        values = np.asarray(values)
+        lowest = LOWEST * self.band if np.isfinite(self.band) else 0.0
+        high = np.abs(values.imag)
+        return (values.real > self.creep) | ((-values.real <= SLOPE * high) & (high >= lowest))
+
+    def leading(self, values: np.ndarray) -> np.ndarray:
+        """Eigenvalues of the upper half-plane in reach, sorted by growth rate.
+
+        Where none lies above the floor the largest of all is given, which then is close to the limit point.
+        """
+        upper = values[(values.imag >= 0) & (values.imag <= self.band)]
+        upper = upper[self.is_mode(upper)]
+        kept = upper[upper.real > self.floor]
+        if not kept.size and upper.size:
+            kept = upper[[int(np.argmax(upper.real))]]
+        return kept[np.argsort(-kept.real)]
+
+
+def bordered(parts: Mapping[str, np.ndarray]) -> np.ndarray:
+    """[-A, -B; R, S] of the parts of a coupling, for each power of the scaled eigenvalue, (3, k + b, k + b)."""
+    k, b = len(parts["A0"]), len(parts["S0"])
+    out = np.zeros((3, k + b, k + b))
+    for power in range(3):
+        out[power, :k, :k], out[power, k:, :k] = -parts[f"A{power}"], parts[f"R{power}"]
+        if power < 2:
+            out[power, :k, k:], out[power, k:, k:] = -parts[f"B{power}"], parts[f"S{power}"]
+    return out

@@ -18,9 +18,8 @@ import scipy.sparse as sp
 
 from .basis import TransferBasis, orthonormal, outside
 from .factor import MumpsFactorization, SingularShiftError, StructureMatrices, Workspace
-from .family import Condition, PencilFamily
-from .operator import CoupledPencil, Relaxation, real_apply
-from .structure_response import Reference
+from .operator import Condition, CoupledPencil, PencilFamily, Relaxation, real_apply
+from .reduced_counts import Reference
 from .viscoelastic import Refined, SmallSpectra
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from .dense import all_pairs
 from .factor import SingularShiftError, Workspace, petsc_is_complex
-from .krylov import near_shift, oscillating_pairs
+from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, apart_from_creep
-from .options import CLEAR, LOWEST, SLOPE, SearchOptions
-from .pairs import Found, attach_left, biorthogonalise, empty, merge, polish, refine, upper_half, verified
-from .spectrum import Oval, Spectrum
+from .pairs import Found, all_pairs, attach_left, biorthogonalise, empty, merge, polish, refine, upper_half, verified
+from .spectrum import CLEAR, END, LOWEST, SLOPE, Oval, SearchOptions, Spectrum
 
 DEPTH = 0.4  # growth rate over angular frequency, down to which a band is searched at most
 
@@ -108,8 +107,16 @@ def plan_shifts(pencil, count, options, workspace):
         return options, first
     beside = 1.5 * abs(options.limit_point)
     if beside < first:
-        return options, beside
+        return options, max(beside, holding_shift(options, 0.25 * options.limit_point))
     return replace(options, limit_point=None), first
+
+
+def holding_shift(options, growth) -> float:
+    """Real shift whose disc up to the limit point holds the band asked for down to a growth rate; 0 without a band."""
+    if options.max_frequency is None:
+        return 0.0
+    end, band = END * abs(options.limit_point), band_sought(options)
+    return 0.5 * (band**2 + growth**2 - end**2) / max(end + growth, 1e-3 * end)
 
 
 def lowest_sought(pencil, count, options, workspace) -> float:
@@ -162,7 +169,10 @@ def next_shift(pencil, found, aim, options, workspace) -> complex:
             return closer
         return min(closer, first_shift(pencil, aim, replace(options, max_frequency=None), workspace))
     if options.limit_point is not None:  # a larger disc hugs the line through the limit point
-        return 3.0 * max(abs(s) for s in found.shifts)
+        last, needed = max(abs(s) for s in found.shifts), holding_shift(options, leading_band(found, aim, options)[0])
+        if not needed:
+            return 3.0 * last
+        return float(np.clip(1.25 * needed, 1.25 * last, 2.0 * last))
     if options.max_frequency is not None and len(found.shifts) == 1:
         natural = first_shift(pencil, aim, replace(options, max_frequency=None), workspace)
         if natural < 0.75 * 2 * np.pi * options.max_frequency:
@@ -177,7 +187,12 @@ def next_shift(pencil, found, aim, options, workspace) -> complex:
 
 
 def leading_modes(
-    pencil: CoupledPencil, count: int, options: SearchOptions | None = None, *, workspace: Workspace | None = None
+    pencil: CoupledPencil,
+    count: int,
+    options: SearchOptions | None = None,
+    *,
+    workspace: Workspace | None = None,
+    solver: Callable[..., KrylovPairs] = krylov_pairs,
 ) -> Spectrum:
     """The eigenpairs of largest growth rate, each verified on the full pencil.
 
@@ -189,6 +204,8 @@ def leading_modes(
     options : SearchOptions, optional
     workspace : Workspace, optional
         Keeps the symbolic factorisation between pencils of one pattern.
+    solver : callable
+        Eigenpairs near a shift, with the arguments and values of `eigen.krylov_pairs`.
 
     Returns
     -------
@@ -221,10 +238,10 @@ def leading_modes(
     if dense:
         return _result(pencil, _dense(pencil, count, options, workspace), count, options)
     options, first = plan_shifts(pencil, count, options, workspace)
-    return _result(pencil, _search(pencil, count, options, workspace, first), count, options)
+    return _result(pencil, _search(pencil, count, options, workspace, first, solver), count, options)
 
 
-def _search(pencil, count, options, workspace, first) -> Found:
+def _search(pencil, count, options, workspace, first, solver) -> Found:
     found = empty(pencil, options.left)
     if pencil.relaxation is not None:
         found.lowest, found.slope = lowest_sought(pencil, count, options, workspace), SLOPE
@@ -237,7 +254,7 @@ def _search(pencil, count, options, workspace, first) -> Found:
         wanted = pairs
         before = number_in_band(found, options)
         while True:
-            got = _at_shift(pencil, shift, wanted, aim, options, workspace, found)
+            got = _at_shift(pencil, shift, wanted, aim, options, workspace, found, solver)
             if found.everything or queue or is_covered(found, aim, options):
                 break
             # no more converge, or a pair that was rejected closes the region
@@ -254,23 +271,17 @@ def _search(pencil, count, options, workspace, first) -> Found:
     return found
 
 
-def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
+def _at_shift(pencil, shift, wanted, aim, options, workspace, found, solver) -> int:
     """Search near one shift and merge; returns the number of eigenvalues that converged."""
     relaxing = pencil.relaxation is not None
+    asked = {"tolerance": options.krylov_tolerance, "limit_point": options.limit_point}
 
     def enough(values, reach):
         return (relaxing or not found.shifts) and would_do(values, _oval(shift, reach, relaxing), found, aim, options)
 
     def search(shifted):
-        if relaxing:
-            return oscillating_pairs(shifted, band=band_sought(options), enough=enough)
-        return near_shift(
-            shifted,
-            wanted,
-            tolerance=options.krylov_tolerance,
-            limit_point=options.limit_point,
-            enough=None if options.shifts else enough,
-        )
+        asked_for = enough if relaxing or not options.shifts else None
+        return solver(shifted, wanted, band=band_sought(options), enough=asked_for, **asked)
 
     shift, shifted, pairs = _clear_of_eigenvalues(pencil, shift, workspace, found, search)
     found.shifts.append(shift)
@@ -282,7 +293,11 @@ def _at_shift(pencil, shift, wanted, aim, options, workspace, found) -> int:
     polish(pencil, shifted, batch, options.tolerance)
     dropped = refine(pencil, batch, aim, band_sought(options), options.tolerance, found)
     if options.left:
-        attach_left(pencil, shifted, batch, wanted, options.krylov_tolerance, found, options.limit_point)
+
+        def transposed(enough):
+            return solver(shifted, wanted, transposed=True, enough=enough, **asked)
+
+        attach_left(pencil, batch, transposed, found)
     merge(found, batch)
     reach = min([pairs.reach * (1 + 1e-9)] + [(1 - 1e-6) * _reach_to(d, shift, relaxing) for d in dropped])
     if reach > 0:

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from .derivative import coupling_of_modes
 from .factor import Workspace
-from .operator import CoupledPencil, coupling_of_modes
-from .options import SearchOptions
+from .operator import CoupledPencil
 from .search import leading_modes
-from .spectrum import Spectrum
+from .spectrum import SearchOptions, Spectrum
 
 
 @dataclass(frozen=True)

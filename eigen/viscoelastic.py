@@ -1,52 +1,303 @@
-"""Leading eigenvalues of reduced pencils of viscoelastic walls, for many conditions at once."""
+r"""Leading eigenvalues of reduced pencils of viscoelastic walls, for many conditions at once.
+
+The exact linear form is several times as large as the pencil. Instead a real quadratic surrogate, :math:`\varphi_g(s)
+\approx a_g + b_g s` matched at a typical frequency, gives places to start from, and two-sided Rayleigh quotient
+iteration (Ruhe 1973; Schreiber 2008) takes them to eigenvalues of the rational problem, all cells at once. Real
+eigenvalues near zero or right of it, which the surrogate may miss because it is too stiff there, are bracketed by the
+sign of the determinant. Cells in which two starts met are solved by the exact linear form.
+"""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import scipy.linalg as la
 
-from .family import Condition, bordered
-from .operator import OVERDAMPED
-from .rational import ALIKE, LEAST, RATIO, SAME, STEP, RationalCells, Refined, Surrogate, real_roots, refined, started
-from .structure_response import relative
+from .count import middle
+from .operator import OVERDAMPED, Condition, bordered
+from .reduced_counts import relative
+
+#: Pairs of a cell and a place evaluated at once, so that they stay in the processor's cache.
+CHUNK = 128
+#: Steps of an iteration at most.
+STEPS = 12
+#: Steps for a scalar Rayleigh quotient.
+SCALAR = 6
+#: Relative change at which an iteration ends; its error falls with the third power.
+SETTLED = 1e-5
+#: Relative distance below which two eigenvalues are one.
+SAME = 1e-7
+#: Relative distance an eigenvalue may lie from its start.
+REACH = 0.6
+#: Places on the real axis at which the sign of the determinant is looked at, and halvings between two of them.
+REAL, HALVINGS = 12, 45
 
 
-class Mode(NamedTuple):
-    """An eigenvalue with its right and left vectors, (n,) each."""
+@dataclass(frozen=True, eq=False)
+class RationalCells:
+    r"""Pencils :math:`\sum_i c_i(s) B_i + \sum_g \varphi_g(s) K_g`.
 
-    value: complex
+    The c_i are 1, s and s^2 of the structure, and 1, z and z^2 of a coupling with z = s sqrt(inertia).
+
+    Attributes
+    ----------
+    bases : list of (6 + g, n, n) real arrays
+        K, M, D, the three parts of a coupling in its powers of z, and the K_g, all of them bordered to one order.
+    law : (cells,) int array
+        Which of the bases.
+    given : (cells, 3) array
+        Root of the inertia, alpha, beta.
+    strengths : (cells, g, j) array
+    times : (j,) array
+    """
+
+    bases: list[np.ndarray]
+    law: np.ndarray
+    given: np.ndarray
+    strengths: np.ndarray
+    times: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Order n of each pencil."""
+        return self.bases[0].shape[1]
+
+    @property
+    def number(self) -> int:
+        """Number of cells."""
+        return len(self.law)
+
+    def factors(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """phi_g(s) of pairs of a cell and a place, (p, g)."""
+        x = s[:, None] * self.times
+        return np.einsum("pgj,pj->pg", self.strengths[cells], x / (1.0 + x))
+
+    def slopes(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Derivatives of the factors, (p, g)."""
+        return np.einsum("pgj,pj->pg", self.strengths[cells], self.times / (1.0 + s[:, None] * self.times) ** 2)
+
+    def weights(self, cells: np.ndarray, s: np.ndarray, factors: np.ndarray | None = None) -> np.ndarray:
+        """What the bases are multiplied by in T(s), (p, 6 + g); with other factors phi_g where given."""
+        root, alpha, beta = self.given[cells].T
+        factors = self.factors(cells, s) if factors is None else factors
+        z = s * root
+        return np.column_stack([np.ones_like(s), s * (s + alpha), s * beta, np.ones_like(s), z, z * z, factors])
+
+    def weight_slopes(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """The same in T'(s)."""
+        root, alpha, beta = self.given[cells].T
+        zero = np.zeros_like(s)
+        return np.column_stack(
+            [zero, 2 * s + alpha, beta + zero, zero, root + zero, 2 * s * root**2, self.slopes(cells, s)]
+        )
+
+    def combined(self, cells: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Sums of the bases with weights, (p, n, n); real for real weights."""
+        n = self.size
+        out = np.empty((len(cells), n, n), weights.dtype)
+        for law in np.unique(self.law[cells]):
+            mine = self.law[cells] == law
+            flat = self.bases[law].reshape(weights.shape[1], -1)
+            if np.iscomplexobj(weights):
+                # one product of real matrices, whose columns are real and imaginary parts
+                both = np.ascontiguousarray(weights[mine]).view(float).reshape(-1, weights.shape[1], 2)
+                out[mine] = np.matmul(flat.T, both).view(complex).reshape(-1, n, n)
+            else:
+                out[mine] = (weights[mine] @ flat).reshape(-1, n, n)
+        return out
+
+    def at(self, cells: np.ndarray, s: np.ndarray, factors: np.ndarray | None = None) -> np.ndarray:
+        """T(s) of pairs of a cell and a place, (p, n, n); with other factors phi_g where given."""
+        return self.combined(cells, self.weights(cells, s, factors))
+
+    def slope(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """T'(s), (p, n, n)."""
+        return self.combined(cells, self.weight_slopes(cells, s))
+
+    def signs(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Sign of det T at real places."""
+        found = np.empty(len(cells))
+        for i in range(0, len(cells), CHUNK):
+            some = slice(i, i + CHUNK)
+            found[some] = np.linalg.slogdet(self.at(cells[some], s[some]))[0]
+        return found
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Eigenvalues (p,) with right and left vectors (p, n), and whether the iteration settled near its start."""
+
+    values: np.ndarray
     right: np.ndarray
     left: np.ndarray
+    settled: np.ndarray | None
+
+    def __getitem__(self, some) -> Refined:
+        settled = None if self.settled is None else self.settled[some]
+        return Refined(self.values[some], self.right[some], self.left[some], settled)
 
 
-def solved_cells(conditions) -> np.ndarray:
-    """Cells to be solved from nothing: all where the conditions follow each other too far apart, or differ in more than
-    the inertia.
+@dataclass(frozen=True)
+class Surrogate:
+    """Real quadratic stand-in phi_g(s) ~ a_g + b_g s of each cell, (cells, g) each."""
+
+    level: np.ndarray
+    slope: np.ndarray
+
+    @classmethod
+    def at(cls, problem: RationalCells, frequency: float) -> Surrogate:
+        """Matched at an angular frequency, rad/s."""
+        cells = np.arange(len(problem.strengths))
+        factors = problem.factors(cells, np.full(len(cells), 1j * frequency))
+        return cls(factors.real, factors.imag / frequency)
+
+
+def started(problem: RationalCells, surrogate: Surrogate | None, cells, values, steps: int = 1) -> Refined:
+    """Eigenvectors of surrogates, or of the pencils themselves without one, and their rational Rayleigh quotients.
+
+    Parameters
+    ----------
+    problem : RationalCells
+    surrogate : Surrogate or None
+    cells : (p,) int array
+    values : (p,) complex array
+        Eigenvalues of the surrogates, or of the pencils.
+    steps : int
+        Inverse iterations; more than one where values are only near those of the pencils.
     """
-    every = np.arange(len(conditions))
-    inertia = np.array([c.inertia for c in conditions])
-    if len(conditions) < LEAST or len({(c.law, c.damping) for c in conditions}) > 1 or not (inertia > 0).all():
-        return every
-    widest = np.abs(np.diff(np.log(inertia))).max()
-    step = min(STEP, int(np.log(RATIO) / max(widest, 1e-300)))
-    return every if step < 2 else np.union1d(every[::step], every[-1:])
+    cells, values = np.asarray(cells, int), np.asarray(values, complex)
+    n = problem.size
+    # without a preferred direction, and the same for every cell
+    probe = np.random.default_rng(7).standard_normal((2, n)) + 0j
+    out = Refined(values.copy(), np.empty((len(values), n), complex), np.empty((len(values), n), complex), None)
+    for first in range(0, len(values), CHUNK):
+        some = slice(first, first + CHUNK)
+        i, s = cells[some], values[some] * (1.0 + 1e-7)
+        factors = None if surrogate is None else surrogate.level[i] + surrogate.slope[i] * s[:, None]
+        matrix = problem.at(i, s, factors)
+        found = _solved_both(matrix, *(np.broadcast_to(own, (len(i), n)) for own in probe))
+        for _ in range(steps - 1):
+            found = _solved_both(matrix, *_images(problem.slope(i, s), *found))
+        x, y = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in found)
+        out.right[some], out.left[some] = x, y
+        out.values[some] = _quotient(problem, i, values[some], x, y)
+    return out
 
 
-def in_between(first: list[Mode], second: list[Mode], share: float) -> list[Mode]:
-    """Modes to start from, a share of the way from one cell to another: between where one has its like there, and all
-    that have none.
+def _quotient(problem: RationalCells, cells, s, x, y) -> np.ndarray:
+    """Zero of y^H T(s) x near s."""
+    projected = np.empty((len(cells), len(problem.bases[0])), complex)
+    for law in np.unique(problem.law[cells]):
+        mine = problem.law[cells] == law
+        for i, basis in enumerate(problem.bases[law]):
+            projected[mine, i] = ((y[mine].conj() @ basis) * x[mine]).sum(axis=1)
+    for _ in range(SCALAR):
+        value = (problem.weights(cells, s) * projected).sum(axis=1)
+        slope = (problem.weight_slopes(cells, s) * projected).sum(axis=1)
+        with np.errstate(all="ignore"):
+            change = value / slope
+        s = s - np.where(np.isfinite(change) & (np.abs(change) < REACH * np.abs(s)), change, 0.0)
+    return s
+
+
+def refined(problem: RationalCells, cells, start: Refined) -> Refined:
+    """Eigenpairs near those to start from.
+
+    Parameters
+    ----------
+    problem : RationalCells
+    cells : (p,) int array
+    start : Refined
     """
-    others, out = list(second), []
-    for mode in first:
-        distance = [abs(mode.value - other.value) for other in others]
-        nearest = int(np.argmin(distance)) if distance else -1
-        if distance and distance[nearest] <= ALIKE * abs(mode.value):
-            other = others.pop(nearest)
-            vectors = mode if share < 0.5 else other
-            mode = vectors._replace(value=(1.0 - share) * mode.value + share * other.value)
-        out.append(mode)
-    return out + others
+    cells = np.asarray(cells, int)
+    found = Refined(start.values.copy(), start.right.copy(), start.left.copy(), np.zeros(len(cells), bool))
+    for first in range(0, len(cells), CHUNK):
+        active = np.arange(first, min(first + CHUNK, len(cells)))
+        for _ in range(STEPS):
+            if not active.size:
+                break
+            active = active[~_stepped(problem, cells, found, active)]
+    near = np.abs(found.values - start.values) <= REACH * np.abs(start.values) + 1e-300
+    return Refined(found.values, found.right, found.left, found.settled & near)
+
+
+def _stepped(problem: RationalCells, cells, found: Refined, active) -> np.ndarray:
+    """One step of the iterations that are still going; which of them have ended."""
+    s = found.values[active]
+    s = np.where(np.abs(s) > 0, s, 1e-12)
+    matrix, slope = problem.at(cells[active], s), problem.slope(cells[active], s)
+    right, left = _images(slope, found.right[active], found.left[active])
+    try:
+        x, y = _solved_both(matrix, right, left)
+    except np.linalg.LinAlgError:  # an exact eigenvalue: a little beside it
+        found.values[active] = s * (1.0 + 1e-10)
+        return np.zeros(len(active), bool)
+    size = np.linalg.norm(x, axis=1, keepdims=True)
+    x, right, y = x / size, right / size, y / np.linalg.norm(y, axis=1, keepdims=True)
+    moved = np.matmul(slope, x[..., None])[..., 0]
+    with np.errstate(all="ignore"):
+        change = (y.conj() * right).sum(axis=1) / (y.conj() * moved).sum(axis=1)
+    lost = ~np.isfinite(change)
+    change[lost] = 0.0
+    found.values[active] = s - change
+    found.right[active], found.left[active] = x, y
+    done = ~lost & (np.abs(change) <= SETTLED * np.abs(s))
+    found.settled[active] = done
+    return done | lost
+
+
+def _images(matrices: np.ndarray, right: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """T right and T^H left of matrices (p, n, n); vectors are (p, n)."""
+    return np.matmul(matrices, right[..., None])[..., 0], np.matmul(left.conj()[:, None], matrices)[:, 0].conj()
+
+
+def _solved_both(matrices: np.ndarray, right: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """T^-1 right and T^-H left of complex matrices (p, n, n), each factored once; vectors are (p, n).
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If one is singular.
+    """
+    factor, solve = la.get_lapack_funcs(("getrf", "getrs"), dtype=complex)
+    x, y = np.empty(right.shape, complex), np.empty(left.shape, complex)
+    for i, matrix in enumerate(matrices):
+        lu, pivots, singular = factor(matrix)
+        if singular:
+            raise np.linalg.LinAlgError("A pencil is singular at the place.")
+        x[i], y[i] = solve(lu, pivots, right[i])[0], solve(lu, pivots, left[i], trans=2)[0]
+    return x, y
+
+
+def real_roots(problem: RationalCells, low: np.ndarray, top: float) -> tuple[np.ndarray, np.ndarray]:
+    """Real eigenvalues between `low` and `top`: cells and values.
+
+    They are looked for where the determinant has other signs at the two ends; of an even number of them only those
+    that the surrogate shows are known, and an independent count sees the others.
+
+    Parameters
+    ----------
+    low : (cells,) array
+        Of each cell, not positive: the edge of its own creep.
+    top : float
+        Positive.
+    """
+    every = np.arange(problem.number)
+    odd = np.flatnonzero(problem.signs(every, low) * problem.signs(every, np.full(problem.number, top)) < 0)
+    slowest = 1.0 / problem.times.max()
+    below = low[odd, None] * [1.0, 0.1]
+    above = np.concatenate([[0.0], np.geomspace(0.1 * slowest, top, REAL)])
+    grid = np.hstack([below, np.broadcast_to(above, (len(odd), len(above)))])
+    signs = problem.signs(np.repeat(odd, grid.shape[1]), grid.ravel()).reshape(grid.shape)
+    rows, gaps = np.nonzero(signs[:, :-1] * signs[:, 1:] < 0)
+    a, b, sign, rows = grid[rows, gaps], grid[rows, gaps + 1], signs[rows, gaps], odd[rows]
+    for _ in range(HALVINGS if rows.size else 0):
+        place = middle(a, b)
+        same = problem.signs(rows, place) == sign
+        a, b = np.where(same, place, a), np.where(same, b, place)
+    return rows, 0.5 * (a + b)
 
 
 #: Eigenvalues of a cell that are taken from the surrogate to the rational pencil.
@@ -59,8 +310,6 @@ ROOM = 1.1
 WATCHED = 2
 #: Lowest motions of the structure from which it is read how much of the stiffness relaxes.
 TYPICAL = 8
-#: Relative distance by which a mode may lie from half-way between its neighbours.
-MOVED = 0.1
 #: Real eigenvalues are looked for up to this many times the highest frequency of typical motions.
 TOP = 3.0
 
@@ -111,7 +360,7 @@ class SmallSpectra:
 
     def leading(self, conditions: list[Condition]) -> np.ndarray:
         """Leading eigenvalues with their conjugates, (cells, w) complex; NaN where there are fewer."""
-        rows, _ = self._found(conditions)
+        rows = self._each(conditions)
         out = np.full((len(conditions), 2 * max(map(len, rows), default=0)), complex(np.nan, np.nan))
         for line, row in zip(out, rows):
             values = np.array(row, complex)
@@ -123,72 +372,13 @@ class SmallSpectra:
         """Leading eigenpairs of each pencil; `chosen` picks among the eigenvalues of a condition in the upper
         half-plane.
         """
-        rows, vectors = self._found(conditions)
-        out = []
-        for i, (condition, row) in enumerate(zip(conditions, rows)):
-            values = chosen(condition, np.array(row, complex))
-            known = [vectors.get((i, complex(value))) for value in values]
-            lacking = [k for k, pair in enumerate(known) if pair is None]
-            if lacking:
-                found = self.pairs(condition, values[lacking])
-                for place, k in enumerate(lacking):
-                    known[k] = found.right[place], found.left[place]
-            size = self.reduced.size + len(self.reduced.coupling(condition.law)["S0"])
-            right, left = (np.array([pair[side] for pair in known]).reshape(len(values), size) for side in (0, 1))
-            out.append(Refined(values, right, left, None))
-        return out
+        rows = self._each(conditions)
+        return [self.pairs(c, chosen(c, np.array(row, complex))) for c, row in zip(conditions, rows)]
 
-    def _found(self, conditions: list[Condition]) -> tuple[list[list[complex]], dict]:
-        """Leading eigenvalues of each cell in the upper half-plane; and right and left vectors, where they came along,
-        by cell and eigenvalue.
-        """
-        solved = solved_cells(conditions)
-        if len(solved) == len(conditions):
-            return self._each(conditions)
-        rows: list[list[complex]] = [[] for _ in conditions]
-        vectors = {}
-
-        def enter(cells, found):
-            for i, row in zip(cells, found[0]):
-                rows[i] = row
-            vectors.update({(cells[i], value): pair for (i, value), pair in found[1].items()})
-
-        enter(solved, self._each([conditions[i] for i in solved]))
-        known = {i: [Mode(v, *vectors[i, v]) for v in rows[i] if (i, v) in vectors] for i in solved}
-        between = np.setdiff1d(np.arange(len(conditions)), solved)
-        next_one = np.searchsorted(solved, between)
-        # beside one solved by the exact linear form, which brings no vectors, none can be started
-        whole = {i: all((i, v) in vectors for v in rows[i] if v.imag > 0) for i in solved}
-        starts = [
-            in_between(known[a], known[b], (i - a) / (b - a)) if whole[a] and whole[b] else []
-            for i, a, b in zip(between, solved[next_one - 1], solved[next_one])
-        ]
-        *found, doubtful = self._from([conditions[i] for i in between], starts)
-        enter(between, found)
-        if doubtful.any():
-            enter(between[doubtful], self._each([conditions[i] for i in between[doubtful]]))
-        return rows, vectors
-
-    def _from(self, conditions: list[Condition], starts) -> tuple[list[list[complex]], dict, np.ndarray]:
-        """The same from modes near those of each cell; and in which cells one of them was lost."""
-        problem = self.problem(conditions)
-        cells = np.repeat(np.arange(len(conditions)), [len(own) for own in starts])
-        rows: list[list[complex]] = [[] for _ in conditions]
-        vectors = {}
-        doubtful = np.array([not own for own in starts])
-        if cells.size:
-            values, right, left = (np.array(part) for part in zip(*(mode for own in starts for mode in own)))
-            found = refined(problem, cells, Refined(values, right, left, None))
-            near = np.abs(found.values - values) <= MOVED * np.abs(values)
-            doubtful[cells[~_entered(found, found.settled & near, cells, rows, vectors)]] = True
-        self._add_real(problem, conditions, rows)
-        return rows, vectors, doubtful
-
-    def _each(self, conditions: list[Condition]) -> tuple[list[list[complex]], dict]:
-        """The same, every cell from nothing."""
+    def _each(self, conditions: list[Condition]) -> list[list[complex]]:
+        """Leading eigenvalues of each cell in the upper half-plane."""
         problem = self.problem(conditions)
         rows: list[list[complex]] = [[] for _ in conditions]
-        vectors = {}
         doubtful = np.zeros(len(conditions), bool)
         cells, start = self._starts(conditions, problem)
         place = _places(cells, start.values.real)  # rank in its cell, by growth rate
@@ -198,25 +388,22 @@ class SmallSpectra:
             if not taken.size:
                 break
             found = refined(problem, cells[taken], start[taken])
-            lost = taken[~_entered(found, found.settled, cells[taken], rows, vectors)]
+            new = [ok and _joined(rows[i], v) for i, v, ok in zip(cells[taken], found.values, found.settled)]
+            lost = taken[~np.array(new, bool)]
             for i, growth in zip(cells[lost], start.values[lost].real):
                 watched = sorted((v.real for v in rows[i]), reverse=True)[:WATCHED]
                 doubtful[i] |= len(watched) < WATCHED or growth > watched[-1]
             # one after another as long as all that were found are unstable
             wanted = np.array([bool(row) and min(v.real for v in row) > 0 for row in rows])
             first += TAKEN
-        self._add_real(problem, conditions, rows)
+        edges = np.array([self.reduced.family.reach(c).creep for c in conditions])
+        for i, value in zip(*real_roots(problem, edges, self._top)):
+            _joined(rows[i], value)
         for i in np.flatnonzero(doubtful):
             # modes of a doubtful cell go on in the next one
             row = self._followed(problem, i, rows[i - 1], rows[i]) if i and doubtful[i - 1] else None
             rows[i] = list(self._exactly(conditions[i])) if row is None else row
-        return rows, vectors
-
-    def _add_real(self, problem: RationalCells, conditions, rows) -> None:
-        """Put real eigenvalues to those of each cell."""
-        edges = np.array([self.reduced.family.reach(c).creep for c in conditions])
-        for i, value in zip(*real_roots(problem, edges, self._top)):
-            _joined(rows[i], complex(value))
+        return rows
 
     def pairs(self, condition: Condition, values) -> Refined:
         """Eigenpairs of one pencil at eigenvalues, or near places close to them."""
@@ -231,7 +418,7 @@ class SmallSpectra:
         starts = np.array(sorted(before, key=lambda value: -value.real)[:TAKEN], complex)
         cells = np.full(starts.size, cell)
         found, row = refined(problem, cells, started(problem, None, cells, starts)), []
-        if not (found.settled.all() and all(_joined(row, complex(value)) for value in found.values)):
+        if not (found.settled.all() and all(_joined(row, value) for value in found.values)):
             return None
         for value in known:
             _joined(row, value)
@@ -292,19 +479,6 @@ def _places(cells: np.ndarray, growth: np.ndarray) -> np.ndarray:
     out = np.empty(len(cells), int)
     out[order] = np.arange(len(cells)) - begins
     return out
-
-
-def _entered(
-    found: Refined, kept: np.ndarray, cells: np.ndarray, rows: list[list[complex]], vectors: dict
-) -> np.ndarray:
-    """Put those kept among the eigenvalues and vectors of their cells; which of all were new there."""
-    new = np.zeros(len(cells), bool)
-    for j in np.flatnonzero(kept):
-        i, value = cells[j], complex(found.values[j])
-        if _joined(rows[i], value):
-            vectors[i, value] = found.right[j], found.left[j]
-            new[j] = True
-    return new
 
 
 def _joined(row: list[complex], value: complex) -> bool:

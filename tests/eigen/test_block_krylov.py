@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 
-import eigen.block_krylov
+import eigen.basis
 from eigen import NotConvergedError, NotPositiveError, largest_pairs
 from eigen.factor import FullRows
 
@@ -66,7 +66,7 @@ def test_what_is_not_positive_or_does_not_converge_is_told(monkeypatch):
     values[-2:] *= -1.0
     with pytest.raises(NotPositiveError):
         found(a, (vectors * values) @ vectors.T, 4, 4)
-    monkeypatch.setattr(eigen.block_krylov, "MOST_BLOCKS", 2)
+    monkeypatch.setattr(eigen.basis, "MOST_BLOCKS", 2)
     with pytest.raises(NotConvergedError, match="Fewer than 6 eigenpairs converged in a Krylov space of 6 vectors"):
         found(a, k, 6, 3)
 

@@ -13,8 +13,7 @@ from eigen import (
     Relaxation,
     SearchOptions,
     lowest_frequencies,
-    structure_response,
-    viscoelastic,
+    reduced_counts,
 )
 from eigen.reduced_counts import phase_counts
 from eigen.reduction import POWERS, FamilyReduction, ReducedFamily
@@ -151,7 +150,7 @@ class Unstable(RelaxingFamily):
 @pytest.mark.parametrize("followed", [30, 10])
 def test_counts_where_the_structure_is_unstable_by_itself(seed, followed, monkeypatch):
     """Also where its own phase is followed once for all cells from the lower modes on."""
-    monkeypatch.setattr(structure_response, "BESIDE", followed)
+    monkeypatch.setattr(reduced_counts, "BESIDE", followed)
     family, conditions = Unstable(seed), random_conditions(seed, 12)
     reduced = ReducedFamily(family, np.eye(SIZE))
     values = [dense(family, c) for c in conditions]
@@ -160,20 +159,6 @@ def test_counts_where_the_structure_is_unstable_by_itself(seed, followed, monkey
     assert counts.certain.all()
     assert counts.number.tolist() == [int((v.real > 0).sum()) for v in values]
     assert sum(counts.number) > 0
-
-
-@pytest.mark.parametrize("cells", [41, 61])
-@pytest.mark.parametrize("seed", range(8))
-def test_cells_of_a_line_are_those_solved_one_by_one(seed, cells):
-    """Though every other one, or two of three on the closer line, start from their neighbours."""
-    family = RelaxingFamily(seed, coupling=0.3)
-    reduced = ReducedFamily(family, np.eye(SIZE))
-    line = [Condition(x, 0.05, 0.0, float(seed % 2), 0.6) for x in np.geomspace(0.01, 3.0, cells)]
-    assert len(viscoelastic.solved_cells(line)) == 21
-    together = reduced.eigenvalues(line)
-    for condition, row in zip(line, together):
-        alone, row = (family.reach(condition).leading(r)[:4] for r in (reduced.eigenvalues([condition])[0], row))
-        assert row == pytest.approx(alone, rel=1e-9)
 
 
 def test_lowest_frequencies_of_a_small_model():

@@ -6,9 +6,8 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from eigen import CoupledPencil, Relaxation, SearchOptions, TransferBasis, Workspace, certified_spectrum, leading_modes
-from eigen.dense import all_eigenvalues, all_pairs
-from eigen.operator import apart_from_creep, creep_edge
-from eigen.pairs import newton
+from eigen.operator import apart_from_creep, edge_of
+from eigen.pairs import all_eigenvalues, all_pairs, newton
 from tests.systems.beam import beam
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues
@@ -124,7 +123,7 @@ def test_a_branch_whose_time_vanishes_is_stiffness_damping():
     a, b = (leading_modes(p, 4, search).eigenvalues for p in (fast, rayleigh))
     np.testing.assert_allclose(a, b, rtol=1e-6)
     # the crowd of creep is the limit point of stiffness damping
-    assert creep_edge(fast) == pytest.approx(-0.8 / beta, rel=1e-6)
+    assert edge_of(fast.relaxation) == pytest.approx(-0.8 / beta, rel=1e-6)
 
 
 def test_creep_is_no_mode_but_divergence_is():

@@ -98,6 +98,28 @@ def test_a_line_of_more_waves_than_a_count_follows_is_counted_in_its_band():
     assert found.agrees and found.stable and np.isfinite(found.count.band)
 
 
+@pytest.mark.parametrize("elements", [67, 100])
+def test_seventy_modes_of_a_line_are_listed_and_counted(elements):
+    """50 m at 300 m/s have a mode every 3 Hz; more elements of the line change neither the list nor the verdict.
+
+    The work stays bounded.
+    """
+    line = {"upstream.length": 50.0, "upstream.wave_speed": 300.0, "upstream.elements": elements}
+    keys = SMALL | LINE | line | {"fluid.continuity": STORAGE, "fluid.density": 1000.0, "drive.pressure": 2e3}
+    model = ValveModel(thesis_case(keys))
+    linear, mu = linearise(model, LoadPath(model).go_to(2e3).q, 2e3), Mu.of(model.case)
+    pencil = linear.pencil(mu)
+    search = select_search(
+        SearchOptions(max_frequency=200.0), mu, lambda n: np.zeros(n), 70, model.flow.resolved(mu.pipes)
+    )
+    found = certified_spectrum(pencil, 70, search.options, basis=TransferBasis(pencil, modes=70))
+    spectrum = found.spectrum
+    assert found.agrees and found.stable and spectrum.status == "complete" and len(spectrum) == 70
+    waves = np.sort(spectrum.frequency[spectrum.frequency > 20.0])
+    assert abs(np.median(np.diff(waves)) - 3.0) < 0.1 and waves[-1] > 190.0
+    assert spectrum.applications < 1500 and found.count.evaluations < 4000
+
+
 def installations(number: int, seed: int, states: int = 3) -> list[str]:
     """Random lines, rigid and elastic, fed by reservoirs and pumps, before walls of both kinds of damping, `states`
     conditions each, at 8 x 14; sentences of those that are left open. Every one of them must say so itself.

@@ -14,7 +14,7 @@ from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, TransferBasis, certified_spectrum
-from eigen.dense import all_eigenvalues
+from eigen.pairs import all_eigenvalues
 
 MESH = {"mesh.around": 6, "mesh.along": 8}
 #: What a state may be refused with: a discharge that gives back all the head there is, a wall that touches its pipe.

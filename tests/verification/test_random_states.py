@@ -11,9 +11,8 @@ import pytest
 
 from dbvfiv.model import select_search
 from eigen import CertifiedSpectrum, SearchOptions, TransferBasis, certified_spectrum, unstable_count
-from eigen.dense import all_eigenvalues
 from eigen.operator import apart_from_creep
-from eigen.pairs import acceptable
+from eigen.pairs import acceptable, all_eigenvalues
 from tests.small_valves import FORMER
 from tests.verification.random_states import (
     RandomState,

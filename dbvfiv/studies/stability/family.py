@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, Workspace, lowest_frequencies
-from eigen.family import Reach
-from eigen.operator import edge_of
+from eigen.operator import Reach, edge_of
 
 from ...case.parameters import OUTSIDE, PIPES, Mu
 from ...model.dynamics import LinearisedState

@@ -26,7 +26,7 @@ from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.modes.run import run_modes
 from dbvfiv.studies.session import load_result
 from eigen import SingularShiftError
-from eigen.reduced_counts import PhaseCounts
+from eigen.reduced_counts import CellCounts
 from tests.small_valves import FORMER, THESIS_SET
 
 from .axes import AXES
@@ -291,7 +291,8 @@ def test_cells_that_the_count_does_not_confirm_are_uncertain(case, monkeypatch):
 
 
 def _more(conditions):
-    return PhaseCounts(np.full(len(conditions), 4), np.ones(len(conditions), bool), 0)
+    cells = len(conditions)
+    return CellCounts(np.full(cells, 4), np.ones(cells, bool), np.zeros(cells), np.full(cells, np.inf))
 
 
 def _refuse(*_arguments, **_options):
