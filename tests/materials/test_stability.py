@@ -28,7 +28,7 @@ from dbvfiv.materials import (
     stable_range,
     strain_levels,
 )
-from dbvfiv.materials.hill import invariants, moduli_of, rubber_slopes
+from dbvfiv.materials.hill import rubber_moduli
 from dbvfiv.materials.stability import hill_margin, principal_log_strains
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "materials.md"
@@ -50,7 +50,7 @@ def _principal_energy(law, ln):
 
 
 def _moduli(law, ln):
-    return moduli_of(ln, rubber_slopes(law.parameters, *invariants(ln)))
+    return rubber_moduli(law.parameters, ln)[0]
 
 
 LAWS = [
