@@ -89,7 +89,7 @@ class Valve:
         return Valve(change_case(self.case, changes), self.name)
 
     def damping(self) -> DampingReport:
-        """How much the wall damps by the case: materials, fits of their loss factors, damping ratio over frequency.
+        """Damping of the wall by the case: materials, fits of their loss factors, damping ratio over frequency.
 
         Raises
         ------

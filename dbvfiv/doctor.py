@@ -1,4 +1,4 @@
-"""What this machine offers, what is missing, and the command that mends it."""
+"""Check of this machine: features, missing parts, and the command that mends each."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Report:
-    """What was found."""
+    """Features found on this machine."""
 
     dbvfiv: str
     python: str
@@ -51,7 +51,7 @@ class Report:
 
     @property
     def healthy(self) -> bool:
-        """Whether every solver can work."""
+        """True where every solver can work."""
         return not any(problem.fatal for problem in self.problems)
 
     def to_dict(self) -> dict[str, Any]:
@@ -155,7 +155,7 @@ def _reference_blas() -> str:
 
 
 def _factors(PETSc: Any, name: str) -> bool:
-    """Whether PETSc factors a small unsymmetric matrix with this package."""
+    """True where PETSc factors a small unsymmetric matrix with this package."""
     PETSc.Sys.pushErrorHandler("ignore")
     try:
         matrix = PETSc.Mat().createAIJ((2, 2), nnz=2, comm=PETSc.COMM_SELF)

@@ -1,4 +1,4 @@
-"""What a running study tells the outside: progress bars, files and plots are observers."""
+"""Reports of a running study to the outside: progress bars, files and plots are observers."""
 
 from __future__ import annotations
 

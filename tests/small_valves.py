@@ -3,6 +3,7 @@
 from functools import cache
 from types import MappingProxyType
 
+import dbvfiv
 from dbvfiv.model import ValveModel
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.studies.case import THESIS, thesis_case
@@ -12,11 +13,21 @@ THESIS_SET = tuple(f"--set={key}={value}" for key, value in THESIS.items())
 #: Rows and columns at even distances; with the element of earlier versions too.
 EVEN = MappingProxyType({"mesh.rows": "uniform", "mesh.columns": "uniform"})
 FORMER = MappingProxyType({"mesh.element": "MITC4", **EVEN})
+#: The coarsest mesh on which studies give sound answers.
+SMALL = MappingProxyType({"mesh.around": 6, "mesh.along": 8})
+
+
+def load_small(*keys):
+    """The 12-inch valve on the small mesh with tables of keys changed, later ones first."""
+    changes = dict(SMALL)
+    for some in keys:
+        changes |= some
+    return dbvfiv.load(thesis_case(), changes)
 
 
 @cache
 def small_model(*changes):
-    case = thesis_case({"mesh.around": 6, "mesh.along": 8} | dict(changes))
+    case = thesis_case(SMALL | dict(changes))
     return ValveModel(case)
 
 

@@ -98,6 +98,34 @@ class Softening(Relaxing):
     density: Density = _density(...)
 
 
+class Ogden(Relaxing):
+    """Incompressible W = sum mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3), l the principal stretches."""
+
+    kind: Literal["ogden"] = key(..., "Incompressible Ogden rubber with any number of terms.")
+    mu: tuple[Annotated[Modulus, Field(ge=-1e12, le=1e12)], ...] = key(
+        ..., "Modulus of each term; half the sum of mu alpha is the shear modulus at small strain.", min_length=1
+    )
+    alpha: tuple[Annotated[Number, Field(ge=-30, le=30)], ...] = key(
+        ..., "Exponent of each term, as many as mu, none of them 0.", min_length=1
+    )
+    density: Density = _density(...)
+
+    @model_validator(mode="after")
+    def _terms_agree(self) -> Ogden:
+        if len(self.alpha) != len(self.mu):
+            raise BrokenRule("alpha", f"{len(self.alpha)} exponents for {len(self.mu)} moduli", "there must be as many")
+        if 0.0 in self.alpha:
+            raise BrokenRule("alpha", "a list with a 0 in it", "no exponent may be 0")
+        modulus = 0.5 * sum(mu * alpha for mu, alpha in zip(self.mu, self.alpha))
+        if modulus <= 0:
+            raise BrokenRule(
+                "mu",
+                f"moduli that make the small-strain shear modulus, half the sum of mu alpha, {modulus:g} Pa",
+                "it must be greater than 0",
+            )
+        return self
+
+
 class NeoHookean(Relaxing):
     """Incompressible W = G/2 (I1 - 3)."""
 
@@ -162,10 +190,11 @@ class Fit(Relaxing):
     )
     planar: Path | None = key(None, "CSV file of a test in planar tension (pure shear), fitted with the others.")
     biaxial: Path | None = key(None, "CSV file of a test in equibiaxial tension, fitted with the others.")
-    law: Literal["softening", "mooney-rivlin", "neo-hookean", "yeoh"] = key("softening", "Form of its energy.")
+    law: Literal["softening", "mooney-rivlin", "neo-hookean", "yeoh", "ogden"] = key("softening", "Form of its energy.")
     terms: Literal[1, 2, 3] | None = key(
         None,
-        "Number of constants: mooney-rivlin 2 (c10, c01) or 3 (and c11), yeoh 3 or 2; the first of them if not given.",
+        "Number of constants: mooney-rivlin 2 (c10, c01) or 3 (and c11), yeoh 3 or 2; of terms: ogden 2, 1 or 3; the "
+        "first of them if not given.",
     )
     constraint: Literal["none", "non-negative", "stable"] = key(
         "none", "On the constants: none, at least 0, or stable in every state up to stable_to."
@@ -208,7 +237,17 @@ class BuiltIn(Relaxing):
 
 
 Card = (
-    MooneyRivlin | Yeoh | Softening | NeoHookean | Isotropic | Orthotropic | HalpinTsai | Fit | ShippedRubber | BuiltIn
+    MooneyRivlin
+    | Yeoh
+    | Softening
+    | Ogden
+    | NeoHookean
+    | Isotropic
+    | Orthotropic
+    | HalpinTsai
+    | Fit
+    | ShippedRubber
+    | BuiltIn
 )
 KINDS = {c.model_fields["kind"].annotation.__args__[0]: c for c in Card.__args__}
 

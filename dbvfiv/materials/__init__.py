@@ -13,10 +13,12 @@ from dbvfiv.materials.damping import (
     shipped_loss_names,
 )
 from dbvfiv.materials.damping_report import DampingReport, describe_damping, outside_band
+from dbvfiv.materials.energy import energy_of
 from dbvfiv.materials.fit import RubberFit, fit_mooney_rivlin, fit_rubber, form_of, uniaxial_stress
 from dbvfiv.materials.isotropic import IsotropicElastic
-from dbvfiv.materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, PARAMETER_COUNT, Law, MaterialError, energy_of
+from dbvfiv.materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN, PARAMETER_COUNT, Law, MaterialError
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
+from dbvfiv.materials.ogden import Ogden
 from dbvfiv.materials.orthotropic import OrthotropicPly
 from dbvfiv.materials.ply_fit import fibre_ply, halpin_tsai, ply_from_constituents
 from dbvfiv.materials.prony import Prony, PronyFit, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
@@ -35,6 +37,7 @@ __all__ = [
     "MaterialDamping",
     "MaterialError",
     "MooneyRivlin",
+    "Ogden",
     "OrthotropicPly",
     "PARAMETER_COUNT",
     "Prony",

@@ -32,6 +32,7 @@ from dbvfiv.materials.hill import hill_moduli, invariants, knee_slopes, least_mo
 from dbvfiv.materials.law import Law, MaterialError
 from dbvfiv.materials.least_squares import LEAST_MARGIN, nonnegative, stable_constants, states_within
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
+from dbvfiv.materials.ogden import Ogden
 from dbvfiv.materials.rubber_tests import TensionTest
 from dbvfiv.materials.softening import LEAST_SHARE, SofteningRubber
 from dbvfiv.materials.stability import StableRange, stable_range_of
@@ -296,8 +297,6 @@ def equivalent_strain(mode: str, strain) -> np.ndarray:
 
 CONSTRAINTS = ("none", "non-negative", "stable")
 ERRORS = ("absolute", "relative")
-#: Forms that the wall takes.
-TAKEN = ("softening", "neo-hookean", "mooney-rivlin", "yeoh")
 #: x_0 that are tried before the best is refined.
 _KNEES = 80
 #: Of the matrix of a fit: what is smaller is noise of its arithmetic.
@@ -396,13 +395,10 @@ class RubberFit:
         Raises
         ------
         MaterialError
-            If the wall has no such law, or the constants give no positive shear modulus.
+            If the constants give no positive shear modulus.
         """
-        if self.form.name not in TAKEN:
-            raise MaterialError(
-                f"The wall has no law of the form {self.form.name}; it takes {' and '.join(TAKEN)}. "
-                "The fit is for comparison."
-            )
+        if self.form.name == "ogden":
+            return Ogden(tuple(self.constants.tolist()), tuple(self.exponents.tolist()), density)
         first, second, third, fourth = (*(float(c) for c in self.constants), 0.0, 0.0, 0.0)[:4]
         if self.form.softens:
             return SofteningRubber(first, second, float(self.exponents[0]), third, density, fourth)

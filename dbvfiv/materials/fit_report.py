@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dbvfiv.materials.fit import TAKEN, RubberFit, all_forms, fit_rubber, form_of
+from dbvfiv.materials.fit import RubberFit, all_forms, fit_rubber, form_of
 from dbvfiv.materials.law import MaterialError
 from dbvfiv.materials.rubber_tests import Curve, CycleReport, TensionTest, describe_cycles, loading_tests
 
@@ -113,12 +113,12 @@ class FitReport:
         return [*rows, ""]
 
     def _of_forms(self) -> list[str]:
-        rows = [f"{'form':16} {'rms, MPa':>9}  {'R2':>8}  {'condition':>9}  {'mu, MPa':>8}  stable to  wall"]
+        rows = [f"{'form':16} {'rms, MPa':>9}  {'R2':>8}  {'condition':>9}  {'mu, MPa':>8}  stable to"]
         for fit in self.fits:
             reach = _strain(fit.stable_range.equivalent_strain)
             rows.append(
                 f"{fit.form.title:16} {fit.rms / 1e6:9.4g}  {fit.r_squared:8.5f}  {fit.condition_number:9.3g}  "
-                f"{fit.shear_modulus / 1e6:8.4g}  {reach:>9}  {'yes' if fit.form.name in TAKEN else 'no'}"
+                f"{fit.shear_modulus / 1e6:8.4g}  {reach:>9}"
             )
         rows += [f"{title}: {why}" for title, why in self.refused.items()]
         rows.append(
@@ -176,8 +176,8 @@ def describe_fits(
     curves : list of Curve
         Of `loading_cycles.read_tests`.
     law, terms : optional
-        The form told in full; the softening rubber if not given and the tests suffice for it, else of those that the
-        wall takes and that are stable as far as the tests reach the one of least residual.
+        The form told in full; the softening rubber if not given and the tests suffice for it, else of those but Ogden's
+        that are stable as far as the tests reach the one of least residual.
     constraint, stable_to, error, cycle
         See `fit.fit_rubber` and `loading_cycles.loading_tests`.
 
@@ -210,25 +210,27 @@ def describe_fits(
 
 
 def _best(fits: list[RubberFit]) -> RubberFit:
-    """Least residual of those for the wall, the softening rubber and the stable ones first."""
-    possible = [f for f in fits if f.form.name in TAKEN and f.shear_modulus > 0.0]
+    """Least residual, the softening rubber and the stable ones first; Ogden's exponents are taken where asked for."""
+    possible = [f for f in fits if f.form.name != "ogden" and f.shear_modulus > 0.0]
     if not possible:
         raise MaterialError("No fit finds a positive stiffness; does stress grow with strain in the tests?")
     return min(possible, key=lambda f: (not f.form.softens, f.stable_range.equivalent_strain < f.reach, f.rms))
 
 
 def toml_table(fit: RubberFit, name: str, density: float, loss_factor: float | None = None) -> list[str]:
-    """The fitted rubber as a table of a case file; why there is none, as remarks, for a form that the wall lacks."""
-    if fit.form.name not in TAKEN:
-        return [f"# The wall has no law of the form {fit.form.name}; it takes {', '.join(TAKEN)} (--law)."]
+    """The fitted rubber as a table of a case file; why there is none, as a remark."""
     if fit.shear_modulus <= 0.0:
         return ["# These constants have no positive shear modulus: no wall can be made of them."]
     kind, values = fit.form.name, dict(zip(fit.form.names, fit.constants))
     if kind == "neo-hookean":
         values = {"shear_modulus": fit.shear_modulus}
     rows = [f"[materials.{name}]", f'kind = "{kind}"']
-    rows += [f'{key} = "{value / 1e6:.12g} MPa"' for key, value in values.items()]
-    rows += [f"{key} = {value:.12g}" for key, value in zip(fit.form.exponent_names, fit.exponents)]
+    if kind == "ogden":
+        rows.append("mu = [" + ", ".join(f'"{value / 1e6:.12g} MPa"' for value in fit.constants) + "]")
+        rows.append("alpha = [" + ", ".join(f"{value:.12g}" for value in fit.exponents) + "]")
+    else:
+        rows += [f'{key} = "{value / 1e6:.12g} MPa"' for key, value in values.items()]
+        rows += [f"{key} = {value:.12g}" for key, value in zip(fit.form.exponent_names, fit.exponents)]
     rows.append(f'density = "{density:g} kg/m^3"')
     if loss_factor is not None:
         rows.append(f"loss_factor = {loss_factor:.4g}")
@@ -267,6 +269,6 @@ def _summary(fit: RubberFit) -> dict[str, Any]:
         "shear_modulus": fit.shear_modulus,
         "stable_equivalent_strain": fit.stable_range.equivalent_strain,
         "tested_equivalent_strain": fit.reach,
-        "wall": fit.form.name in TAKEN,
+        "wall": True,  # each form has a law
         "residuals": fit.by_test,
     }

@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dbvfiv.materials.law import OGDEN_FROM
+
 #: Powers (i, j) of I1 - 3 and I2 - 3 that the first five constants of a wall's rubber multiply.
 RUBBER_POWERS = ((1, 0), (0, 1), (1, 1), (2, 0), (3, 0))
 _TRACELESS = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
@@ -49,12 +51,32 @@ def knee_slopes(i1, x0: float) -> Slopes:
     return Slopes(first, none, -0.5 * first / (x0 + i1), none, none)
 
 
-def rubber_slopes(parameters, i1, i2) -> Slopes:
-    """Derivatives of a rubber's energy by I1 and I2, Pa, from its parameters (see `law.Law`), at I1 - 3 and I2 - 3."""
+def rubber_moduli(parameters, log_stretches) -> tuple[np.ndarray, np.ndarray]:
+    """Hill moduli of a rubber and its principal Kirchhoff stresses but for a pressure, Pa.
+
+    Parameters
+    ----------
+    parameters : array_like
+        See `law.Law`.
+    log_stretches : array_like, shape (..., 3)
+
+    Returns
+    -------
+    moduli, stress : arrays (..., 5, 5) and (..., 3)
+    """
+    ln = np.asarray(log_stretches, dtype=float)
+    i1, i2 = invariants(ln)
     parts = [(c, polynomial_slopes(i1, i2, power)) for c, power in zip(parameters, RUBBER_POWERS) if c != 0.0]
     if parameters[5] != 0.0:
         parts.append((parameters[5], knee_slopes(i1, parameters[6])))
-    return Slopes(*(sum(c * slopes[k] for c, slopes in parts) for k in range(5)))
+    slopes = Slopes(*(sum((c * slopes[k] for c, slopes in parts), np.zeros_like(i1)) for k in range(5)))
+    moduli = moduli_of(ln, slopes)
+    stress = 2.0 * (np.exp(2.0 * ln) * slopes.w1[..., None] - np.exp(-2.0 * ln) * slopes.w2[..., None])
+    terms = np.reshape(parameters[OGDEN_FROM:], (-1, 2))
+    for mu, alpha in terms[terms[:, 0] != 0.0]:
+        moduli = moduli + mu * ogden_moduli(ln, [alpha])[..., 0, :, :]
+        stress = stress + mu * np.exp(alpha * ln)
+    return moduli, stress
 
 
 def invariants(log_stretches) -> tuple[np.ndarray, np.ndarray]:

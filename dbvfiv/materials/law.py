@@ -1,4 +1,4 @@
-"""Base class of material laws, their constants checked, and one traceable strain energy that serves them all.
+"""Base of material laws: invariants of a sheet, constants checked, and what every law gives.
 
 With C2 the in-plane block of the right Cauchy-Green tensor and c = (2 E13, 2 E23) its transverse
 shear pair, det C = 1 gives C33 = 1/det C2 + c' C2^-1 c, so that S33 = 0 holds in closed form
@@ -33,7 +33,6 @@ import math
 from numbers import Real
 from typing import NamedTuple, Protocol, runtime_checkable
 
-import jax.numpy as jnp
 import numpy as np
 
 from dbvfiv.errors import CaseError
@@ -104,62 +103,11 @@ def plane_stress_invariants(e) -> PlaneStressInvariants:
     return PlaneStressInvariants(i1, i2, gap, area)
 
 
-#: x0 of a rubber without a knee, so that its term and the derivatives are zeros at strains no sheet can have, too.
-_NO_KNEE = 1e100
-
-
-def rubber_energy(parameters, e):
-    """Energy of an incompressible sheet with S33 = 0: Mooney-Rivlin, powers of x = I1 - 3, and a knee.
-
-        W = Mooney-Rivlin + C20 x^2 + C30 x^3 + m0 x0 (sqrt(1 + x/x0) - 1)
-
-    The last term is evaluated as m0 x/(1 + sqrt(1 + x/x0)), which loses no digits near x = 0, and is 0 for m0 = 0,
-    whatever x0 is.
-
-    Parameters
-    ----------
-    parameters : array_like, shape (>= 7,)
-        ``[c10, c01, c11, c20, c30, m0, x0, ...]``, Pa but for x0.
-    e : array_like, shape (5,)
-
-    Returns
-    -------
-    scalar, J/m3. Not meaningful where det C2 <= 0, which is no deformation of a sheet.
-    """
-    i1 = plane_stress_invariants(e).i1_minus_3
-    m0, x0 = parameters[5], parameters[6] + (parameters[6] == 0) * _NO_KNEE
-    knee = m0 * i1 / (1 + (1 + i1 / x0) ** 0.5)
-    return mooney_rivlin_energy(parameters, e) + (parameters[3] + parameters[4] * i1) * i1 * i1 + knee
-
-
-def mooney_rivlin_energy(parameters, e):
-    """Three-parameter Mooney-Rivlin energy of an incompressible sheet with S33 = 0.
-
-        W = C10 (I1 - 3) + C01 (I2 - 3) + C11 (I1 - 3)(I2 - 3)
-          = (C10 + C01)(I1 - 3) + C01 (I2 - I1) + C11 (I1 - 3)(I2 - 3)
-
-    The second line is what is evaluated: its first term carries the small-strain stiffness.
-
-    Parameters
-    ----------
-    parameters : array_like, shape (>= 3,)
-        ``[c10, c01, c11, ...]``, Pa.
-    e : array_like, shape (5,)
-
-    Returns
-    -------
-    scalar, J/m3. Not meaningful where det C2 <= 0, which is no deformation of a sheet.
-    """
-    c10, c01, c11 = parameters[0], parameters[1], parameters[2]
-    inv = plane_stress_invariants(e)
-    return (c10 + c01) * inv.i1_minus_3 + c01 * inv.i2_minus_i1 + c11 * inv.i1_minus_3 * inv.i2_minus_3
-
-
 LINEAR_ELASTIC = 0
 MOONEY_RIVLIN = 1
 PARAMETER_COUNT = 8
-#: Constants of a rubber among the parameters, and the one of them that is no modulus: x0.
-RUBBER_CONSTANTS, KNEE = 7, 6
+#: Place of x0 among the parameters of a rubber, and of the first of Ogden's mu_1, alpha_1, mu_2, ...
+KNEE, OGDEN_FROM = 6, PARAMETER_COUNT
 
 
 @runtime_checkable
@@ -169,12 +117,13 @@ class Law(Protocol):
     Attributes
     ----------
     kind : int
-        ``LINEAR_ELASTIC`` (0) or ``MOONEY_RIVLIN`` (1, with Yeoh's terms and a knee); a class constant.
+        ``LINEAR_ELASTIC`` (0) or ``MOONEY_RIVLIN`` (1, with Yeoh's terms, a knee and Ogden's terms); a class constant.
     density : float
         Reference density, kg/m3.
-    parameters : numpy.ndarray, shape (8,), float64
+    parameters : numpy.ndarray, shape (8,), or (8 + 2 n,) of a rubber with n terms of Ogden's; float64
         Kind 0: ``[Q11, Q22, Q12, Q66, Q55, Q44, 0, 0]`` with Q55 for the 13 and Q44 for the 23
-        shear. Kind 1: ``[c10, c01, c11, c20, c30, m0, x0, 0]``, see `rubber_energy`. All in Pa but x0.
+        shear. Kind 1: ``[c10, c01, c11, c20, c30, m0, x0, 0, mu_1, alpha_1, ...]``, see `rubber_energy`. All in
+        Pa but x0 and the exponents.
     small_strain_shear_modulus : float
         In-plane shear modulus (12) in the reference state, Pa.
     """
@@ -196,55 +145,3 @@ def padded(*constants: float) -> np.ndarray:
     parameters = np.zeros(PARAMETER_COUNT)
     parameters[: len(constants)] = constants
     return parameters
-
-
-def linear_elastic_energy(parameters, e):
-    """St Venant-Kirchhoff energy of an orthotropic sheet in plane stress.
-
-        W = (Q11 e1^2 + 2 Q12 e1 e2 + Q22 e2^2 + Q66 e3^2 + Q55 e4^2 + Q44 e5^2) / 2
-
-    Parameters
-    ----------
-    parameters : array_like, shape (>= 6,)
-        ``[Q11, Q22, Q12, Q66, Q55, Q44, ...]``, Pa.
-    e : array_like, shape (5,)
-        Green-Lagrange strains ``[E11, E22, 2 E12, 2 E13, 2 E23]``.
-
-    Returns
-    -------
-    scalar, J/m3
-    """
-    q11, q22, q12, q66, q55, q44 = (parameters[i] for i in range(6))
-    in_plane = q11 * e[0] ** 2 + 2.0 * q12 * e[0] * e[1] + q22 * e[1] ** 2 + q66 * e[2] ** 2
-    return 0.5 * (in_plane + q55 * e[3] ** 2 + q44 * e[4] ** 2)
-
-
-def energy_of(kind, parameters, e):
-    """Strain energy of any law from its number and constants; traceable in all three arguments.
-
-    One compiled function then serves a wall of mixed materials. The rubber branch is fed a zero
-    strain where it is not selected, so neither it nor its derivatives can spoil the other one.
-
-    Parameters
-    ----------
-    kind : int or traced integer scalar
-    parameters : array_like, shape (8,)
-    e : array_like, shape (5,)
-
-    Returns
-    -------
-    scalar, J/m3
-
-    Examples
-    --------
-    >>> from dbvfiv.materials import MooneyRivlin, energy_of
-    >>> law = MooneyRivlin(c10=4e5, c01=1e5, c11=0.0, density=1300.0)
-    >>> e = [0.1, 0.0, 0.02, 0.0, 0.01]
-    >>> bool(abs(energy_of(law.kind, law.parameters, e) - law.energy(e)) < 1e-9)
-    True
-    """
-    parameters = jnp.asarray(parameters)
-    e = jnp.asarray(e)
-    is_rubber = jnp.asarray(kind) == MOONEY_RIVLIN
-    rubber = rubber_energy(parameters, jnp.where(is_rubber, e, 0.0))
-    return jnp.where(is_rubber, rubber, linear_elastic_energy(parameters, e))

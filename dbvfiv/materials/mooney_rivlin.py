@@ -13,10 +13,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from dbvfiv.materials.energy import mooney_rivlin_energy
 from dbvfiv.materials.law import (
     MOONEY_RIVLIN,
     MaterialError,
-    mooney_rivlin_energy,
     padded,
     require_finite,
     require_positive,

@@ -14,10 +14,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from dbvfiv.materials.energy import linear_elastic_energy
 from dbvfiv.materials.law import (
     LINEAR_ELASTIC,
     MaterialError,
-    linear_elastic_energy,
     padded,
     require_finite,
     require_positive,

@@ -25,6 +25,7 @@ from dbvfiv.materials.fit import RubberFit, fit_rubber, form_of
 from dbvfiv.materials.isotropic import IsotropicElastic
 from dbvfiv.materials.law import Law, MaterialError, require_finite
 from dbvfiv.materials.mooney_rivlin import MooneyRivlin
+from dbvfiv.materials.ogden import Ogden
 from dbvfiv.materials.orthotropic import OrthotropicPly
 from dbvfiv.materials.ply_fit import fibre_ply, ply_from_constituents
 from dbvfiv.materials.rubber_tests import loading_tests, read_tests
@@ -157,6 +158,7 @@ _LAWS: dict[str, Callable[[Any], Law]] = {
     "mooney-rivlin": lambda c: MooneyRivlin(c.c10, c.c01, c.c11, c.density),
     "yeoh": lambda c: Yeoh(c.c10, c.c20, c.c30, c.density),
     "softening": lambda c: SofteningRubber(c.mu_inf, c.mu_0, c.x_0, c.c, c.density, c.c_3),
+    "ogden": lambda c: Ogden(c.mu, c.alpha, c.density),
     "neo-hookean": lambda c: MooneyRivlin.neo_hookean(c.shear_modulus, c.density),
     "isotropic": lambda c: IsotropicElastic(c.youngs_modulus, c.poisson_ratio, c.density),
     "orthotropic": lambda c: OrthotropicPly(c.e1, c.e2, c.nu12, c.g12, c.g13, c.g23, c.density),

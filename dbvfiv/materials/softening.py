@@ -15,7 +15,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from dbvfiv.materials.law import MOONEY_RIVLIN, MaterialError, padded, require_finite, require_positive, rubber_energy
+from dbvfiv.materials.energy import rubber_energy
+from dbvfiv.materials.law import MOONEY_RIVLIN, MaterialError, padded, require_finite, require_positive
 
 #: Least mu_inf over mu_0 with which the law is stable at all strains for any x_0 (0.0048 serves). Without it the power
 #: law loses Hill's condition in equibiaxial tension, by 0.3 % of its stiffness at rest, where x_0 < 0.02.

@@ -33,15 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from dbvfiv.materials.hill import (
-    Slopes,
-    assembled,
-    differences,
-    invariants,
-    least_modulus,
-    moduli_of,
-    rubber_slopes,
-)
+from dbvfiv.materials.hill import assembled, differences, least_modulus, rubber_moduli
 from dbvfiv.materials.law import MOONEY_RIVLIN, Law, MaterialError, plane_stress_invariants
 
 LARGEST_LOG_STRAIN = float(np.log(10.0))
@@ -61,6 +53,11 @@ def principal_log_strains(strains) -> np.ndarray:
     numpy.ndarray, shape (..., 3)
         Ascending, with zero sum; NaN where det C2 <= 0, which no sheet can reach.
     """
+    return _principal(strains)[0]
+
+
+def _principal(strains) -> tuple[np.ndarray, np.ndarray]:
+    """`principal_log_strains`, and the squares (..., 3) of the cosines between their axes and the normal."""
     e = np.asarray(strains, dtype=float)
     inv = plane_stress_invariants(np.moveaxis(e, -1, 0))
     possible = inv.in_plane_determinant > 0.0
@@ -75,10 +72,10 @@ def principal_log_strains(strains) -> np.ndarray:
     c[..., 2, 2] = 3.0 + i1 - c[..., 0, 0] - c[..., 1, 1]
     # both diagonal entries negative also gives a positive determinant
     possible &= (c[..., 0, 0] > 0.0) & (c[..., 1, 1] > 0.0)
-    values = np.linalg.eigvalsh(np.where(possible[..., None, None], c, np.eye(3)))
+    values, axes = np.linalg.eigh(np.where(possible[..., None, None], c, np.eye(3)))
     ln = 0.5 * np.log(np.maximum(values, np.finfo(float).tiny))
     ln -= ln.mean(axis=-1, keepdims=True)
-    return np.where(possible[..., None], ln, np.nan)
+    return np.where(possible[..., None], ln, np.nan), axes[..., 2, :] ** 2
 
 
 def hill_margin(law: Law, log_stretches) -> np.ndarray:
@@ -86,7 +83,7 @@ def hill_margin(law: Law, log_stretches) -> np.ndarray:
     ln = np.asarray(log_stretches, dtype=float)
     valid = np.all(np.isfinite(ln), axis=-1)
     ln = np.where(valid[..., None], ln, 0.0)
-    moduli = moduli_of(ln, rubber_slopes(law.parameters, *invariants(ln)))
+    moduli = rubber_moduli(law.parameters, ln)[0]
     return np.where(valid, least_modulus(moduli) / (2.0 * law.small_strain_shear_modulus), -np.inf)
 
 
@@ -126,26 +123,27 @@ def stability_margin(law: Law, strains, instantaneous: float = 1.0) -> np.ndarra
     if law.kind != MOONEY_RIVLIN:
         return np.where(finite, 1.0, -np.inf)
     e = np.where(finite[..., None], e, 0.0)
-    logs = principal_log_strains(e)
+    logs, normal = _principal(e)
     possible = finite & np.isfinite(logs[..., 0])
-    ln, e = (np.where(possible[..., None], x, 0.0) for x in (logs, e))
-    slopes = rubber_slopes(law.parameters, *invariants(ln))
-    moduli = moduli_of(ln, slopes)
+    ln = np.where(possible[..., None], logs, 0.0)
+    moduli, stress = rubber_moduli(law.parameters, ln)
     least = least_modulus(moduli)
     if instantaneous > 1.0:
-        stressed = (1.0 - 1.0 / instantaneous) * _stress_moduli(e, ln, slopes)
+        stressed = (1.0 - 1.0 / instantaneous) * _stress_moduli(ln, stress, normal)
         least = np.minimum(least, least_modulus(moduli - stressed))
     return np.where(possible, least / (2.0 * law.small_strain_shear_modulus), -np.inf)
 
 
-def _stress_moduli(e, ln, slopes: Slopes) -> np.ndarray:
-    """2 tau : (D D) as moduli (..., 5, 5) in principal axes, with the pressure that makes S33 = 0."""
-    c11, c22, c12, c13, c23 = 1.0 + 2.0 * e[..., 0], 1.0 + 2.0 * e[..., 1], e[..., 2], e[..., 3], e[..., 4]
-    # third row of C^-1, det C = 1
-    row = c12 * c23 - c13 * c22, c12 * c13 - c11 * c23, c11 * c22 - c12 * c12
-    pressure = 2.0 * (slopes.w1 - slopes.w2 * sum(x * x for x in row)) / row[2]
-    w1, w2 = slopes.w1[..., None], slopes.w2[..., None]
-    tau = 2.0 * (np.exp(2.0 * ln) * w1 - np.exp(-2.0 * ln) * w2) - pressure[..., None]
+def _stress_moduli(ln, stress, normal) -> np.ndarray:
+    """2 tau : (D D) as moduli (..., 5, 5) in principal axes, with the pressure that makes S33 = 0.
+
+    Parameters
+    ----------
+    ln, stress, normal : (..., 3) arrays
+        Logarithmic strains, stresses but for a pressure, squared cosines between the axes and the normal.
+    """
+    share = normal * np.exp(-2.0 * ln)  # S33 is the sum of (tau_i - p) share_i
+    tau = stress - np.sum(stress * share, axis=-1, keepdims=True) / share.sum(axis=-1, keepdims=True)
     pairs = tau.sum(axis=-1, keepdims=True) - tau
     # (b_i + b_j)/(b_i - b_j) (ln l_i - ln l_j): from D to rates of the logarithmic strain
     apart = differences(ln)

@@ -12,7 +12,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from dbvfiv.materials.law import MOONEY_RIVLIN, padded, require_finite, require_positive, rubber_energy
+from dbvfiv.materials.energy import rubber_energy
+from dbvfiv.materials.law import MOONEY_RIVLIN, padded, require_finite, require_positive
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..shell.kernel_rubber import FAST, first_invariant, has_more
+from ..materials.law import OGDEN_FROM
+from ..shell.kernel_rubber import FAST, first_invariant, has_more, ogden_terms
 from ..shell.kernel_section import linear_response, point_strain
 from ..shell.kernel_strain import numbers_of, strains_at
 
@@ -50,6 +51,10 @@ def _rubber_energy(constants, e):
         total += (constants[3] + constants[4] * x) * x * x
         if constants[5] != 0.0:
             total += constants[5] * x / (1 + np.sqrt(1 + x / constants[6]))
+    if constants.shape[0] > OGDEN_FROM:
+        out = np.empty(6)
+        ogden_terms(constants, e, out)
+        total += out[0]
     return total
 
 

@@ -1,5 +1,5 @@
 """Stress and tangent of incompressible rubbers in plane stress, in closed form for compiled loops: Mooney-Rivlin with
-C10, C01, C11, powers of x = I1 - 3 by C20 and C30 (Yeoh), and the knee m0 x0 (sqrt(1 + x/x0) - 1).
+C10, C01, C11, powers of x = I1 - 3 by C20 and C30 (Yeoh), the knee m0 x0 (sqrt(1 + x/x0) - 1), and Ogden's terms.
 
 The law is defined by its energy in `dbvfiv.materials`; this is its first and second derivative with respect to [E11,
 E22, 2E12, 2E13, 2E23], checked against automatic differentiation of that energy.
@@ -12,7 +12,11 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from ..materials.law import OGDEN_FROM
+from ..materials.ogden import OGDEN_ANGLES, OGDEN_ELLIPSE, OGDEN_FOCI, OGDEN_SPREAD
+
 FAST = {"contract", "reassoc", "arcp", "nsz"}
+_COS, _SIN = np.cos(OGDEN_ANGLES), np.sin(OGDEN_ANGLES)
 
 
 @numba.njit(fastmath=FAST, inline="always")
@@ -75,9 +79,59 @@ def i1_slopes(constants, e):
     return first, second
 
 
+@numba.njit(cache=True)
+def ogden_terms(constants, e, out):
+    """Fill out (6,): energy of Ogden's terms and its derivatives by I1, I2, I1 I1, I1 I2, I2 I2; see
+    `dbvfiv.materials.ogden`.
+    """
+    out[:] = 0.0
+    largest = 0.0
+    for p in range(OGDEN_FROM, constants.shape[0], 2):
+        if constants[p] != 0.0:
+            largest = max(largest, abs(constants[p + 1]))
+    if largest == 0.0:
+        return
+    i1 = first_invariant(e)
+    trace = 2 * (e[0] + e[1])
+    det = 4 * e[0] * e[1] - e[2] * e[2]
+    b1 = 2 * e[1] * e[3] - e[2] * e[4]
+    b2 = 2 * e[0] * e[4] - e[2] * e[3]
+    gap = (det * (trace + det) + (e[3] + b1) * b1 + (e[4] + b2) * b2) / (1 + trace + det)
+    third = 1 + i1 / 3
+    inverse = 1 + (i1 + gap) / 3
+    upper = np.log(third + 2 * np.sqrt(max(third * third - inverse, 0.0)))
+    lower = -np.log(inverse + 2 * np.sqrt(max(inverse * inverse - third, 0.0)))
+    half = max(0.5 * (upper - lower), min(OGDEN_FOCI, OGDEN_SPREAD / largest))
+    s = min(OGDEN_ELLIPSE, 0.5 * np.arcsinh(2 * np.pi / half))
+    along = half * np.cosh(s)
+    across = half * np.sinh(s)
+    for k in range(_COS.shape[0]):
+        w = complex(0.5 * (upper + lower) + along * _COS[k], across * _SIN[k])
+        weight = complex(across * _COS[k], along * _SIN[k])
+        z = np.exp(w)
+        y = z - 1
+        inv = 1 / (y * y * y + z * (gap - i1 * y))
+        value = 0j
+        slope = 0j
+        for p in range(OGDEN_FROM, constants.shape[0], 2):
+            if constants[p] != 0.0:
+                power = constants[p] * np.exp(0.5 * constants[p + 1] * w)
+                value += power / constants[p + 1]
+                slope += 0.5 * power
+        first = weight * slope * z * inv
+        second = first * z * inv
+        out[0] += (weight * value * z * inv * ((i1 * y + 2 * (i1 - gap)) * y - 3 * gap) / y).real
+        out[1] += (first * z).real
+        out[2] -= first.real
+        out[3] += (second * z * z).real
+        out[4] -= (second * z).real
+        out[5] += second.real
+    out /= _COS.shape[0]
+
+
 @numba.njit(fastmath=FAST, inline="always")
 def rubber_stress(constants, e, s):
-    """Fill the stress s (5,) for the `RUBBER_CONSTANTS` of a law and strains e (5,)."""
+    """Fill the stress s (5,) for the parameters of a law and strains e (5,)."""
     a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2 = _deformation(constants, e)
     sum_ab = a + b
     s[0] = 2 * (w1 * (1 + h0) + w2 * (b + h + sum_ab * h0))
@@ -92,6 +146,14 @@ def rubber_stress(constants, e, s):
         s[2] += w * h2
         s[3] += w * h3
         s[4] += w * h4
+    if constants.shape[0] > OGDEN_FROM:
+        w = np.empty(6)
+        ogden_terms(constants, e, w)
+        s[0] += 2 * (w[1] * (1 + h0) + w[2] * (b + h + sum_ab * h0))
+        s[1] += 2 * (w[1] * (1 + h1) + w[2] * (a + h + sum_ab * h1))
+        s[2] += w[1] * h2 + w[2] * (sum_ab * h2 - 2 * c)
+        s[3] += w[1] * h3 + w[2] * (sum_ab * h3 - 2 * g)
+        s[4] += w[1] * h4 + w[2] * (sum_ab * h4 - 2 * k)
 
 
 @numba.njit(fastmath=FAST, inline="always")
@@ -167,3 +229,28 @@ def rubber_tangent(constants, e, s, t):
         t[3, 3] += w * h33 + v * h3 * h3
         t[3, 4] += w * h34 + v * h3 * h4
         t[4, 4] += w * h44 + v * h4 * h4
+    if constants.shape[0] > OGDEN_FROM:
+        o = np.empty(6)
+        ogden_terms(constants, e, o)
+        p = (2 * p0, 2 * p1, h2, h3, h4)
+        q = (2 * q0, 2 * q1, q2, q3, q4)
+        for i in range(5):
+            s[i] += o[1] * p[i] + o[2] * q[i]
+            for j in range(i, 5):
+                t[i, j] += o[3] * p[i] * p[j] + o[4] * (p[i] * q[j] + q[i] * p[j]) + o[5] * q[i] * q[j]
+        w = o[1] + o[2] * r
+        t[0, 0] += 4 * (w * h00 + o[2] * 2 * h0)
+        t[0, 1] += 4 * (w * h01 + o[2] * (1 + h0 + h1))
+        t[0, 2] += 2 * (w * h02 + o[2] * h2)
+        t[0, 3] += 2 * (w * h03 + o[2] * h3)
+        t[0, 4] += 2 * (w * h04 + o[2] * h4)
+        t[1, 1] += 4 * (w * h11 + o[2] * 2 * h1)
+        t[1, 2] += 2 * (w * h12 + o[2] * h2)
+        t[1, 3] += 2 * (w * h13 + o[2] * h3)
+        t[1, 4] += 2 * (w * h14 + o[2] * h4)
+        t[2, 2] += w * h22 - 2 * o[2]
+        t[2, 3] += w * h23
+        t[2, 4] += w * h24
+        t[3, 3] += w * h33 - 2 * o[2]
+        t[3, 4] += w * h34
+        t[4, 4] += w * h44 - 2 * o[2]

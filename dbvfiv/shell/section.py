@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..materials.law import KNEE, RUBBER_CONSTANTS
+from ..materials.law import KNEE, OGDEN_FROM
 from ..materials.prony import Prony
 
 LINEAR, RUBBER = 0, 1
@@ -116,8 +116,12 @@ class Section:
 
     @cached_property
     def parameters(self) -> np.ndarray:
-        """(np, 8) constants of the law at each layer point."""
-        return np.repeat([layer.law.parameters for layer in self.layers], self.points_per_layer, axis=0)
+        """(np, 8), or (np, 8 + 2 n) with Ogden rubbers of up to n terms: constants of the law at each layer point."""
+        given = [layer.law.parameters for layer in self.layers]
+        constants = np.zeros((len(given), max(len(each) for each in given)))
+        for row, each in zip(constants, given):
+            row[: len(each)] = each
+        return np.repeat(constants, self.points_per_layer, axis=0)
 
     @cached_property
     def directions(self) -> np.ndarray:
@@ -162,7 +166,7 @@ class Section:
         -------
         stiffness : (8, 8) array
             See `linear_stiffness`.
-        points, constants, scales : (k, 2), (k, 7), (k,) arrays
+        points, constants, scales : (k, 2), (k, 8 + 2 n), (k,) arrays
             See `rubber_points`.
         """
         if factors is None:
@@ -172,7 +176,8 @@ class Section:
         points, constants, scales = self.rubber_points
         chosen = kept != 0
         scaled = constants[chosen] * kept[chosen, None]
-        scaled[:, KNEE] = constants[chosen, KNEE]  # a strain, no stress
+        for place in (KNEE, *range(OGDEN_FROM + 1, constants.shape[1], 2)):  # a strain and exponents, no stress
+            scaled[:, place] = constants[chosen, place]
         return self._linear_stiffness(factor), points[chosen], scaled, scales[chosen]
 
     @cached_property
@@ -214,20 +219,20 @@ class Section:
         an incompressible material of its shear modulus does in plane stress.
         """
         total = self.linear_stiffness[:6, :6].copy()
-        for (zeta, weight), constants in zip(*self.rubber_points[:2]):
-            modulus = 2 * (constants[0] + constants[1]) + constants[5]
+        moduli = np.repeat([layer.law.small_strain_shear_modulus for layer in self.layers], self.points_per_layer)
+        for (zeta, weight), modulus in zip(self.rubber_points[0], moduli[self.kinds == RUBBER]):
             rubber = modulus * np.array([[4.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 1.0]])
             total += weight * np.kron(np.array([[1.0, zeta], [zeta, zeta**2]]), rubber)
         return total
 
     @cached_property
     def rubber_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points (k, 2), constants (k, 7) and shear scale (k,) of the points that carry rubber."""
+        """Points (k, 2), constants (k, 8 + 2 n) and shear scale (k,) of the points that carry rubber."""
         chosen = self.kinds == RUBBER
         return (
-            self.points[chosen].copy(),
-            self.parameters[chosen, :RUBBER_CONSTANTS].copy(),
-            self.shear_scale[chosen].copy(),
+            self.points[chosen],
+            self.parameters[chosen],
+            self.shear_scale[chosen],
         )
 
 

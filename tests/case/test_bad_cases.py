@@ -97,8 +97,16 @@ BAD = {
     "material that is a number": ("[materials]\nCR = 3", "materials.CR"),
     "material without a kind": ("[materials.A]\nc10 = 1e6", r"materials\.A\.kind is missing"),
     "material of an unknown kind": (
-        "[materials.A]\nkind = 'ogden'",
-        r'materials\.A\.kind is given as "ogden".*neo-hookean',
+        "[materials.A]\nkind = 'gent'",
+        r'materials\.A\.kind is given as "gent".*neo-hookean',
+    ),
+    "Ogden terms that do not agree": (
+        "[materials.A]\nkind='ogden'\nmu=['1 MPa']\nalpha=[2, 3]\ndensity=1300",
+        r"materials\.A\.alpha.*as many",
+    ),
+    "Ogden rubber without stiffness": (
+        "[materials.A]\nkind='ogden'\nmu=['1 MPa']\nalpha=[-2]\ndensity=1300",
+        r"materials\.A\.mu.*greater than 0",
     ),
     "material kind that is a list": ("[materials.A]\nkind = [1]", r"materials\.A\.kind"),
     "Mooney-Rivlin without stiffness": (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax
 import numpy as np
 import pytest
 
@@ -32,7 +33,7 @@ def test_closed_form_of_the_channel_is_the_root_of_its_equations():
     directions = tuple(0.3 * area * np.random.default_rng(1).standard_normal((3, len(z))))
     for order in range(4):
         ours, closed = (
-            np.asarray(along(lambda x, law=law: law.steady(x, parameters)[0], *directions[:order])(area))
+            np.asarray(jax.jit(along(lambda x, law=law: law.steady(x, parameters)[0], *directions[:order]))(area))
             for law in (searched, channel)
         )
         assert np.abs(ours - closed).max() <= 1e-12 * np.abs(closed).max(), order

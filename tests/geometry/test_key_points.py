@@ -37,10 +37,10 @@ def by_points(case: Case, folder, points: int = 17, extra: int = 0, **more) -> C
     "more",
     [
         {},
-        {"valve.lip_rise": 0.01},
+        pytest.param({"valve.lip_rise": 0.01}, marks=pytest.mark.slow),
         {"valve.cuff_length": 0.06, "valve.cuff_radius": 0.09, "valve.flare_length": 0.05},
-        {"valve.scale": 0.4},
-        {"valve.saddle": "smooth"},
+        pytest.param({"valve.scale": 0.4}, marks=pytest.mark.slow),
+        pytest.param({"valve.saddle": "smooth"}, marks=pytest.mark.slow),
     ],
 )
 def test_the_parametric_shape_comes_back(more, tmp_path):

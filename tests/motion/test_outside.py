@@ -10,8 +10,9 @@ from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.outside import OutsideCorrection
 from dbvfiv.studies.transient.study import Runner
+from tests.observers import Stop
 from tests.small_valves import make_valve
-from tests.studies.transient.runs import Stop, transient
+from tests.studies.transient.runs import transient
 from tests.verification.test_transient_modes import three_routes
 
 WATER = {"outside.fluid": "same", "fluid.density": 1000.0}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.materials import IsotropicElastic, MooneyRivlin, OrthotropicPly, SofteningRubber, Yeoh
+from dbvfiv.materials import IsotropicElastic, MooneyRivlin, Ogden, OrthotropicPly, SofteningRubber, Yeoh
 from dbvfiv.shell import Layer, Section, Shell, StepWall
 from tests.shell.structures import random_state
 
@@ -45,6 +45,14 @@ SECTIONS = {
     ),
     "softening rubber": Section(
         (Layer(SofteningRubber(2e5, 1e6, 3e-3, 9e6, 1300.0), 0.006), Layer(MooneyRivlin(4e5, 1e5, 2e5, 1300.0), 0.006)),
+        2,
+    ),
+    "Ogden rubber": Section(
+        (
+            Layer(Ogden((0.618e6, 1.18e3, -9.81e3), (1.3, 5.0, -2.0), 1000.0), 0.004),
+            Layer(Ogden((3e5,), (4.0,), 1000.0), 0.004),
+            Layer(MooneyRivlin(4e5, 1e5, 2e5, 1300.0), 0.004),
+        ),
         2,
     ),
     "ply only": Section((Layer(OrthotropicPly(25e6, 1e6, 0.25, 0.5e6, 0.5e6, 0.2e6, 1.0), 0.012, 30.0, 5 / 6),)),

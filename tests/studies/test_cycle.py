@@ -11,9 +11,9 @@ from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.stepper import Stepper
-from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import Session, load_result, resume_result
+from tests.observers import Stop
 
 CASE = {
     "mesh.around": 6,
@@ -120,21 +120,9 @@ def test_file_figures_and_fields(found, file, tmp_path):
     assert again.export(tmp_path / "cycle.vtkhdf").stat().st_size > 0
 
 
-class _Stopper(Observer):
-    """Interrupts after a number of cycles."""
-
-    def __init__(self, after: int):
-        self.left = after
-
-    def item(self, result):
-        self.left -= 1
-        if not self.left:
-            raise KeyboardInterrupt
-
-
 def test_interrupted_and_resumed(found, tmp_path):
     path = tmp_path / "part.h5"
-    part = session_of(cycle__exponents=0).perform("cycle", path, _Stopper(2))
+    part = session_of(cycle__exponents=0).perform("cycle", path, Stop(2))
     assert part.interrupted and len(part.points) == 2 and part.points[0].stable is None
     whole = resume_result(path)
     assert whole.complete and np.allclose(

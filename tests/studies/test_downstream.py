@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import dbvfiv
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import CaseError, SolveError
@@ -14,25 +13,17 @@ from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions, TransferBasis, certified_spectrum
-from tests.small_valves import FORMER
+from tests.small_valves import FORMER, load_small
 from tests.verification.test_transient_modes import QUASI, STORAGE, check_three_routes, three_routes
 
-SMALL = {"mesh.around": 6, "mesh.along": 8}
 PIPE = {"downstream.pipe_diameter": "305 mm", "downstream.length": 5.0, "downstream.loss": 1.5}
 LIGHT = {"fluid.density": 10.0, "drive.pressure": "6 kPa", "damping.alpha": 0.0}
-
-
-def load(*keys):
-    changes = dict(SMALL)
-    for some in keys:
-        changes |= some
-    return dbvfiv.load(thesis_case(), changes)
 
 
 def test_heads_along_the_pipe():
     """What the reservoir gives is lost in the line, in the valve and in the pipe, or leaves it."""
     line = {"upstream.length": 10.0, "upstream.loss": 2.0}
-    state = load(PIPE, line, {"downstream.pressure": "1 m"}).steady(pressure="3 m")
+    state = load_small(PIPE, line, {"downstream.pressure": "1 m"}).steady(pressure="3 m")
     found, density = state.hydraulics, 1000.0
     speed = state.volume_flow / (0.25 * np.pi * 0.305**2)
     assert state.downstream_velocity == pytest.approx(speed, rel=1e-6)
@@ -52,7 +43,7 @@ def test_heads_along_the_pipe():
 
 
 def test_a_pressure_downstream_shifts_the_drive():
-    free, held = load(LIGHT), load(LIGHT, {"downstream.pressure": "4 kPa"})
+    free, held = load_small(LIGHT), load_small(LIGHT, {"downstream.pressure": "4 kPa"})
     one, other = free.steady(pressure="6 kPa"), held.steady(pressure="10 kPa")
     assert other.q == pytest.approx(one.q, rel=1e-7, abs=1e-10)
     assert other.hydraulics.kv == pytest.approx(one.hydraulics.kv, rel=1e-7)
@@ -63,7 +54,7 @@ def test_a_pressure_downstream_shifts_the_drive():
 
 
 def test_a_drive_that_does_not_overcome_it_is_refused():
-    held = load({"downstream.pressure": "20 kPa"})
+    held = load_small({"downstream.pressure": "20 kPa"})
     for pressure in ("18 kPa", "20 kPa"):
         with pytest.raises(CaseError, match=r"not above downstream.pressure = 20 kPa, so nothing flows"):
             held.steady(pressure=pressure)
@@ -72,28 +63,28 @@ def test_a_drive_that_does_not_overcome_it_is_refused():
 
 
 def test_a_valve_at_rest_against_it():
-    held = load({"downstream.pressure": "20 kPa"})
+    held = load_small({"downstream.pressure": "20 kPa"})
     assert held.modes(pressure="20 kPa", in_vacuo=True).modes[0].frequency == pytest.approx(
-        load().modes(pressure=0, in_vacuo=True).modes[0].frequency, rel=1e-9
+        load_small().modes(pressure=0, in_vacuo=True).modes[0].frequency, rel=1e-9
     )
 
 
 def test_equilibria_do_not_depend_on_density():
-    water, light = (load(PIPE, {"fluid.density": rho}).steady(pressure="18 kPa") for rho in (1000.0, 2.0))
+    water, light = (load_small(PIPE, {"fluid.density": rho}).steady(pressure="18 kPa") for rho in (1000.0, 2.0))
     assert light.lip_opening == pytest.approx(water.lip_opening, rel=1e-9)
     assert light.outlet_pressure == pytest.approx(water.outlet_pressure, rel=1e-9)
 
 
 def test_a_valve_at_the_pressure_it_sees_is_that_of_a_free_discharge():
-    state = load(PIPE).steady(pressure="18 kPa")
-    free = load().steady(pressure=state.flange_pressure - state.outlet_pressure)
+    state = load_small(PIPE).steady(pressure="18 kPa")
+    free = load_small().steady(pressure=state.flange_pressure - state.outlet_pressure)
     assert free.q == pytest.approx(state.q, rel=1e-6, abs=1e-9)
     assert free.mass_flow == pytest.approx(state.mass_flow, rel=1e-6)
 
 
 @pytest.mark.slow
 def test_onset_with_a_pipe_behind_is_where_modes_cross():
-    valve = load(LIGHT, PIPE, {"onset.coarse_mesh": 0, "onset.normal_form": False})
+    valve = load_small(LIGHT, PIPE, {"onset.coarse_mesh": 0, "onset.normal_form": False})
     (point,) = valve.onset("density=10:300:3:log", pressure="6 kPa").points
     assert point["confirmed"]
     modes = valve.modes(density=point["value"], count=4).modes
@@ -167,10 +158,10 @@ def test_three_hundred_random_discharges():
 
 
 def test_walks_reach_states_against_a_pressure():
-    case = load(LIGHT, {"downstream.pressure": "4 kPa"}).case
+    case = load_small(LIGHT, {"downstream.pressure": "4 kPa"}).case
     walk, place = StabilityWalk(case), Mu.of(case)
     for pressure in (6e3, 9e3, 5e3):
-        state = load(LIGHT).steady(pressure=pressure - 4e3)
+        state = load_small(LIGHT).steady(pressure=pressure - 4e3)
         assert walk.equilibrium(place.at(pressure=pressure)) == pytest.approx(state.q, rel=1e-6, abs=1e-9)
 
 
@@ -182,20 +173,20 @@ KEYS = {"drive.pressure": 2e3, "fluid.density": 60.0, "damping.alpha": 0.0, "ons
 
 @pytest.mark.slow
 def test_onset_over_the_length_of_the_pipe():
-    valve = load(PIPE, KEYS, FORMER)  # the mesh that has its onset at these lengths
+    valve = load_small(PIPE, KEYS, FORMER)  # the mesh that has its onset at these lengths
     found = valve.onset("tail_length=0.2:60:4:log")
     assert found.points and found.certified.all()
     for point in found.points:
         assert point["confirmed"] and point["criticality"] in ("super", "sub")
-        there = load(PIPE, KEYS, FORMER, {"downstream.length": point["value"]}).modes(count=4).modes
+        there = load_small(PIPE, KEYS, FORMER, {"downstream.length": point["value"]}).modes(count=4).modes
         assert min(abs(mode.growth_rate) for mode in there) < 1e-4
 
 
 @pytest.mark.slow
 def test_sensitivity_to_the_length_of_the_pipe():
-    (found,) = load(PIPE, KEYS).steady(pressure=2e3).sensitivity("tail_length").sensitivities
+    (found,) = load_small(PIPE, KEYS).steady(pressure=2e3).sensitivity("tail_length").sensitivities
     low, high = (
-        load(PIPE, KEYS, {"downstream.length": 5.0 + step}).modes(count=4).modes[0].growth_rate
+        load_small(PIPE, KEYS, {"downstream.length": 5.0 + step}).modes(count=4).modes[0].growth_rate
         for step in (-0.02, 0.02)
     )
     assert found.growth_rate == pytest.approx((high - low) / 0.04, rel=1e-3)
@@ -203,23 +194,23 @@ def test_sensitivity_to_the_length_of_the_pipe():
 
 @pytest.mark.slow
 def test_modes_over_the_length_of_the_pipe_are_those_of_each_length():
-    found = load(PIPE, KEYS).sweep("tail_length=1:50:5:log")
+    found = load_small(PIPE, KEYS).sweep("tail_length=1:50:5:log")
     assert found.certified
     for i, value in enumerate(found.values):
-        leading = load(PIPE, KEYS, {"downstream.length": float(value)}).modes(count=4).modes[0]
+        leading = load_small(PIPE, KEYS, {"downstream.length": float(value)}).modes(count=4).modes[0]
         growth = max(b.growth_rate[i] for b in found.branches if np.isfinite(b.growth_rate[i]))
         assert growth == pytest.approx(leading.growth_rate, rel=1e-6)
 
 
 @pytest.mark.slow
 def test_map_over_the_length_of_the_pipe():
-    found = load(PIPE, KEYS, {"map.x": "density=10:200:3:log", "map.y": "tail_length=1:20:3:log"}).map()
+    found = load_small(PIPE, KEYS, {"map.x": "density=10:200:3:log", "map.y": "tail_length=1:20:3:log"}).map()
     assert not found.failures and found.grid("certified").all()
     (growth,) = found.grid("growth_rate")
-    leading = load(PIPE, KEYS, {"downstream.length": 20.0, "fluid.density": 200.0}).modes(count=4).modes[0]
+    leading = load_small(PIPE, KEYS, {"downstream.length": 20.0, "fluid.density": 200.0}).modes(count=4).modes[0]
     assert growth[-1, -1] == pytest.approx(leading.growth_rate, rel=1e-6)
 
 
 def test_a_case_without_a_pipe_has_no_length_to_change():
     with pytest.raises(CaseError, match="no tail_length to change.*downstream.pipe_diameter"):
-        load(LIGHT).onset("tail_length=1:50:5:log")
+        load_small(LIGHT).onset("tail_length=1:50:5:log")

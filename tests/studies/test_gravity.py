@@ -20,29 +20,21 @@ from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.stability.place import is_surrounding
 from dbvfiv.studies.stability.walk import StabilityWalk
-from tests.small_valves import EVEN, make_valve
+from tests.small_valves import EVEN, SMALL, load_small, make_valve
 from tests.verification.test_transient_modes import check_three_routes, three_routes
 
-SMALL = {"mesh.around": 6, "mesh.along": 8}
 DOWN, UP = {"gravity.direction": "-z"}, {"gravity.direction": "+z"}
 WET = {"outside.fluid": "same"}
 LEVEL = 1000.0 * GRAVITY * 0.56
-
-
-def load(*keys):
-    changes = dict(SMALL)
-    for some in keys:
-        changes |= some
-    return dbvfiv.load(thesis_case(), changes)
 
 
 @pytest.mark.slow
 def test_a_valve_that_weighs_nothing_sees_the_level_alone():
     """One rubber as heavy as the fluid on both of its sides: the drive is that over the level."""
     floating = {"layers": [{"material": "CR", "thickness": 0.014}], "fluid.density": 1300.0}
-    lying = load(floating, WET).steady(pressure=12e3)
+    lying = load_small(floating, WET).steady(pressure=12e3)
     for gravity, sign in ((DOWN, -1.0), (UP, 1.0)):
-        state = load(floating, WET, gravity).steady(pressure=12e3 + sign * 1.3 * LEVEL)
+        state = load_small(floating, WET, gravity).steady(pressure=12e3 + sign * 1.3 * LEVEL)
         assert state.q == pytest.approx(lying.q, rel=1e-7, abs=1e-10)
         assert state.mass_flow == pytest.approx(lying.mass_flow, rel=1e-8)
         assert state.hydraulics.loss_coefficient == pytest.approx(lying.hydraulics.loss_coefficient, rel=1e-7)
@@ -51,7 +43,7 @@ def test_a_valve_that_weighs_nothing_sees_the_level_alone():
 
 @pytest.mark.parametrize("keys", [{"upstream.length": 10.0, "upstream.loss": 1.0, "drive.at": "line"}], ids=str)
 def test_heads_and_jet_of_a_valve_that_discharges_downwards(keys):
-    state = load(DOWN, keys).steady(pressure=12e3)
+    state = load_small(DOWN, keys).steady(pressure=12e3)
     flange, jet = state.station_velocity[-1], state.outlet_velocity
     fall = state.flange_pressure / 1000.0 + 0.5 * flange**2 + GRAVITY * 0.56
     assert 0.5 * jet**2 == pytest.approx(fall, rel=1e-8)
@@ -62,8 +54,8 @@ def test_heads_and_jet_of_a_valve_that_discharges_downwards(keys):
 
 def test_forces_balance_and_the_tangent_is_that_of_the_residual():
     for keys in (DOWN, UP | WET):
-        model = load(keys).model
-        q = load(keys).steady(pressure=12e3).q
+        model = load_small(keys).model
+        q = load_small(keys).steady(pressure=12e3).q
         v = 1e-6 * np.random.default_rng(0).standard_normal(model.size)
         tangent = model.tangent(q, 12e3)
         found = model.residual(q + v, 12e3) - model.residual(q - v, 12e3)
@@ -74,7 +66,7 @@ def test_forces_balance_and_the_tangent_is_that_of_the_residual():
 
 
 def test_a_valve_that_hangs_holds_still_water():
-    model = load(UP).model
+    model = load_small(UP).model
     state = rest_state(model)
     assert state.mass_flow == 0.0 and state.pressure == pytest.approx(LEVEL)
     depth = model.mesh.z
@@ -83,7 +75,7 @@ def test_a_valve_that_hangs_holds_still_water():
 
 def test_less_than_the_level_does_not_flow():
     with pytest.raises(SolveError, match="nothing flows.*by the level of the lips"):
-        find_equilibrium(load(UP).model, 5e3)
+        find_equilibrium(load_small(UP).model, 5e3)
 
 
 @pytest.mark.slow
@@ -106,7 +98,7 @@ def test_energies_balance():
 def test_classes_of_motion_hold_the_weight():
     """The tangent of each class is that of the whole weight, by differences of its force."""
     model = make_valve(DOWN)
-    q = load(DOWN).steady(pressure=12e3).q
+    q = load_small(DOWN).steady(pressure=12e3).q
     bare = make_valve()
     for symmetry in SYMMETRIES.values():
         heavy, light = (linearise_class(m, q, 12e3, symmetry).structure for m in (model, bare))
@@ -141,22 +133,22 @@ def test_higher_forms_hold_the_weight():
 @pytest.mark.slow
 def test_studies_over_the_density_follow_the_steady_state():
     keys = DOWN | {"drive.pressure": "6 kPa", "damping.alpha": 0.0}
-    case = load(keys).case
-    assert not is_surrounding(case, "density") and is_surrounding(load().case, "density")
-    swept = load(keys).sweep("density=10:400:3:log")
+    case = load_small(keys).case
+    assert not is_surrounding(case, "density") and is_surrounding(load_small().case, "density")
+    swept = load_small(keys).sweep("density=10:400:3:log")
     assert swept.certified and len(swept.points) == 3
     walk, place = StabilityWalk(case), Mu.of(case)
     for number, density in ((0, 10.0), (2, 400.0)):
-        valve = load(keys, {"fluid.density": density})
+        valve = load_small(keys, {"fluid.density": density})
         there = place.at(density=density)
         assert walk.equilibrium(there) == pytest.approx(valve.steady(pressure="6 kPa").q, rel=1e-6, abs=1e-9)
         leading = valve.modes(count=4).modes[0]
         assert walk.spectrum(there, 4).eigenvalues[0].real == pytest.approx(leading.growth_rate, rel=1e-6)
         growth = max(b.growth_rate[number] for b in swept.branches if np.isfinite(b.growth_rate[number]))
         assert growth == pytest.approx(leading.growth_rate, rel=1e-6)
-    (found,) = load(keys).steady(pressure="6 kPa").sensitivity("density").sensitivities
+    (found,) = load_small(keys).steady(pressure="6 kPa").sensitivity("density").sensitivities
     low, high = (
-        load(keys, {"fluid.density": 1000.0 + step}).modes(count=4).modes[0].growth_rate for step in (-1.0, 1.0)
+        load_small(keys, {"fluid.density": 1000.0 + step}).modes(count=4).modes[0].growth_rate for step in (-1.0, 1.0)
     )
     assert found.growth_rate == pytest.approx((high - low) / 2.0, rel=1e-3)
 
@@ -168,8 +160,8 @@ LOSSES = {"damping.model": "loss factor", "materials.constants": "stable"}
 @pytest.mark.parametrize("keys", [DOWN, DOWN | LOSSES], ids=["beta", "loss factors"])
 def test_normal_forms_hold_the_weight(keys):
     """Those of a wall that relaxes are those of one that does not where nothing relaxes."""
-    model = load(keys, {"damping.beta": 1e-3} if "damping.model" not in keys else {}).model
-    q = load(keys).steady(pressure=6e3).q
+    model = load_small(keys, {"damping.beta": 1e-3} if "damping.model" not in keys else {}).model
+    q = load_small(keys).steady(pressure=6e3).q
     mu = {"inlet": 6e3, "density": 1000.0, "storage": 1.0, "alpha": 1.0, "beta": 1e-3, "loss_factor": 0.0}
     forms, residual = ValveMemoryForms(model, q, mu), ValveResidual(model)
     random, zero = np.random.default_rng(2), np.zeros(model.size)
@@ -186,11 +178,11 @@ def test_normal_forms_hold_the_weight(keys):
 @pytest.mark.slow
 def test_a_map_over_the_density():
     axes = {"map.x": "pressure=3 kPa:6 kPa:2:log", "map.y": "density=10:1000:3:log"}
-    found = load(DOWN, {"damping.alpha": 0.0}, axes).map()
+    found = load_small(DOWN, {"damping.alpha": 0.0}, axes).map()
     assert not found.failures and found.grid("certified").all()
     (growth,) = found.grid("growth_rate")
     keys = {"fluid.density": 10.0, "drive.pressure": 3e3, "damping.alpha": 0.0}
-    assert growth[0, 0] == pytest.approx(load(DOWN, keys).modes(count=4).modes[0].growth_rate, rel=1e-6)
+    assert growth[0, 0] == pytest.approx(load_small(DOWN, keys).modes(count=4).modes[0].growth_rate, rel=1e-6)
 
 
 @pytest.mark.slow

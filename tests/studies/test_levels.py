@@ -130,6 +130,7 @@ def test_levels_of_a_valve_through_which_nothing_flows():
     assert found.where == "rest, as 1 kPa was not reached" and set(found.levels.values()) == {0.1}
 
 
+@pytest.mark.slow
 def test_levels_at_the_operating_point_of_a_pump(tmp_path):
     """Those at its pressure, which the levels themselves move a little."""
     (tmp_path / "pump.csv").write_text("flow [L/s],head [m]\n0,5\n100,4\n300,0.5\n")

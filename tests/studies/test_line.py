@@ -5,31 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
-from dbvfiv.studies.case import THESIS, thesis_case
+from dbvfiv.studies.case import THESIS
 from dbvfiv.studies.stability.place import is_surrounding
 from dbvfiv.studies.stability.walk import StabilityWalk
-from tests.small_valves import FORMER
+from tests.small_valves import FORMER, SMALL, load_small
 
-SMALL = {"mesh.around": 6, "mesh.along": 8}
 LINE = {"upstream.length": 20.0, "upstream.diameter": "300 mm", "upstream.loss": 1.5}
 FRICTION = LINE | {"upstream.friction": 0.02}
 LIGHT = {"fluid.density": 10.0, "drive.pressure": "6 kPa", "damping.alpha": 0.0}
 
 
-def load(*keys):
-    changes = dict(SMALL)
-    for some in keys:
-        changes |= some
-    return dbvfiv.load(thesis_case(), changes)
-
-
 @pytest.mark.parametrize("at", ["reservoir", "line"])
 def test_heads_along_the_line(at):
-    state = load(FRICTION, {"drive.at": at}).steady(pressure="18 kPa")
+    state = load_small(FRICTION, {"drive.at": at}).steady(pressure="18 kPa")
     found, pipe = state.hydraulics, 0.25 * np.pi * 0.3**2
     speed = state.volume_flow / pipe
     lost = (0.02 * 20.0 / 0.3 + 1.5) * speed**2 / (2 * GRAVITY)
@@ -39,19 +30,19 @@ def test_heads_along_the_line(at):
     assert found.total_head == pytest.approx(far - lost, rel=1e-6)
     assert state.flange_pressure == pytest.approx(state.station_pressure[-1], rel=1e-12)
     # the valve itself is that of its pressure at the flange
-    alone = load().steady(pressure=state.flange_pressure)
+    alone = load_small().steady(pressure=state.flange_pressure)
     assert alone.mass_flow == pytest.approx(state.mass_flow, rel=1e-6)
     assert alone.hydraulics.kv == pytest.approx(found.kv, rel=1e-6)
 
 
 def test_without_losses_a_gauge_at_the_far_end_shows_the_pressure_at_the_flange():
-    bare = load().steady(pressure="18 kPa")
-    behind = load({"upstream.length": 20.0, "drive.at": "line"}).steady(pressure="18 kPa")
+    bare = load_small().steady(pressure="18 kPa")
+    behind = load_small({"upstream.length": 20.0, "drive.at": "line"}).steady(pressure="18 kPa")
     assert behind.mass_flow == pytest.approx(bare.mass_flow, rel=1e-9) and behind.line_loss == 0.0
 
 
 def test_equilibria_do_not_depend_on_density():
-    water, light = (load(FRICTION, {"fluid.density": rho}).steady(pressure="18 kPa") for rho in (1000.0, 2.0))
+    water, light = (load_small(FRICTION, {"fluid.density": rho}).steady(pressure="18 kPa") for rho in (1000.0, 2.0))
     assert light.lip_opening == pytest.approx(water.lip_opening, rel=1e-9)
     assert light.flange_pressure == pytest.approx(water.flange_pressure, rel=1e-9)
 
@@ -78,22 +69,22 @@ def test_verdicts_name_the_continuity_law(command_line):
 
 @pytest.mark.slow
 def test_modes_over_the_length_are_those_of_each_length():
-    found = load(LIGHT, LINE).sweep("pipe_length=1:50:5:log")
+    found = load_small(LIGHT, LINE).sweep("pipe_length=1:50:5:log")
     assert found.certified
     for i, value in enumerate(found.values):
-        leading = load(LIGHT, LINE, {"upstream.length": float(value)}).modes(count=4).modes[0]
+        leading = load_small(LIGHT, LINE, {"upstream.length": float(value)}).modes(count=4).modes[0]
         growth = max(b.growth_rate[i] for b in found.branches if np.isfinite(b.growth_rate[i]))
         assert growth == pytest.approx(leading.growth_rate, rel=1e-6)
 
 
 def test_friction_moves_the_steady_state_with_the_length():
-    swept = load(LIGHT, FRICTION).sweep("pipe_length=2:80:3:log")
+    swept = load_small(LIGHT, FRICTION).sweep("pipe_length=2:80:3:log")
     assert swept.certified and len(swept.points) == 3
-    case = load(LIGHT, FRICTION).case
-    assert not is_surrounding(case, "pipe_length") and is_surrounding(load(LIGHT, LINE).case, "pipe_length")
+    case = load_small(LIGHT, FRICTION).case
+    assert not is_surrounding(case, "pipe_length") and is_surrounding(load_small(LIGHT, LINE).case, "pipe_length")
     walk, place = StabilityWalk(case), Mu.of(case)
     for number, length in ((0, 2.0), (2, 80.0)):
-        valve = load(LIGHT, FRICTION, {"upstream.length": length})
+        valve = load_small(LIGHT, FRICTION, {"upstream.length": length})
         there = place.at(pipe_length=length)
         state = valve.steady(pressure="6 kPa")
         assert walk.equilibrium(there) == pytest.approx(state.q, rel=1e-6, abs=1e-9)
@@ -106,30 +97,32 @@ def test_friction_moves_the_steady_state_with_the_length():
 def test_onset_over_the_length_whether_or_not_the_steady_state_is_found_anew():
     keys = {"drive.pressure": 2e3, "fluid.density": 100.0, "damping.alpha": 0.0, "damping.beta": 1e-3}
     keys |= {"onset.coarse_mesh": 0, **FORMER}  # the mesh that has its onset at these lengths
-    found = [load(LINE, keys, more).onset("pipe_length=60:400:3:log") for more in ({}, {"upstream.friction": 1e-9})]
+    found = [
+        load_small(LINE, keys, more).onset("pipe_length=60:400:3:log") for more in ({}, {"upstream.friction": 1e-9})
+    ]
     ((one,), (other,)) = (result.points for result in found)
     assert one["confirmed"] and other["confirmed"] and one["criticality"] == other["criticality"] is not None
     assert one["value"] == pytest.approx(other["value"], rel=1e-5)
     assert one["crossing_speed"] == pytest.approx(other["crossing_speed"], rel=1e-3)
-    modes = load(LINE, keys, {"upstream.length": one["value"]}).modes(count=4).modes
+    modes = load_small(LINE, keys, {"upstream.length": one["value"]}).modes(count=4).modes
     assert min(abs(mode.growth_rate) for mode in modes) < 1e-5
 
 
 def test_map_over_the_length(tmp_path):
     axes = {"map.x": "pressure=1 kPa:6 kPa:3:log", "map.y": "pipe_length=5:100:3:log"}
-    found = load(LIGHT, LINE, axes).map()
+    found = load_small(LIGHT, LINE, axes).map()
     assert not found.failures and found.grid("certified").all()
     (growth,) = found.grid("growth_rate")
-    leading = load(LIGHT, LINE, {"upstream.length": 100.0, "drive.pressure": 6e3}).modes(count=4).modes[0]
+    leading = load_small(LIGHT, LINE, {"upstream.length": 100.0, "drive.pressure": 6e3}).modes(count=4).modes[0]
     assert growth[-1, -1] == pytest.approx(leading.growth_rate, rel=1e-6)
 
 
 @pytest.mark.slow
 def test_sensitivity_to_the_length():
     for line in (LINE, FRICTION):
-        (found,) = load(LIGHT, line).steady(pressure="6 kPa").sensitivity("pipe_length").sensitivities
+        (found,) = load_small(LIGHT, line).steady(pressure="6 kPa").sensitivity("pipe_length").sensitivities
         low, high = (
-            load(LIGHT, line, {"upstream.length": 20.0 + step}).modes(count=4).modes[0].growth_rate
+            load_small(LIGHT, line, {"upstream.length": 20.0 + step}).modes(count=4).modes[0].growth_rate
             for step in (-0.02, 0.02)
         )
         assert found.growth_rate == pytest.approx((high - low) / 0.04, rel=1e-3)
@@ -137,4 +130,4 @@ def test_sensitivity_to_the_length():
 
 def test_a_case_without_a_line_has_no_length_to_change():
     with pytest.raises(CaseError, match="no pipe_length to change.*upstream.length"):
-        load(LIGHT).onset("pipe_length=1:50:5:log")
+        load_small(LIGHT).onset("pipe_length=1:50:5:log")

@@ -25,13 +25,13 @@ WATER = Mu(density=1000.0, alpha=5.0, beta=0.003)
 
 
 @pytest.fixture(scope="module")
-def model():
-    return ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16}))
+def model(coarse_model):
+    return coarse_model
 
 
 @pytest.fixture(scope="module")
-def state(model):
-    return LoadPath(model).go_to(6e3)
+def state(opened):
+    return opened
 
 
 @pytest.fixture(scope="module")

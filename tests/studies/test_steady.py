@@ -11,9 +11,9 @@ from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions, find_equilibria, model_warnings
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.state import LipCentre
-from dbvfiv.observer import Observer
 from dbvfiv.record.states import summarise
 from dbvfiv.studies.case import Case, thesis_case
+from tests.observers import Stop
 
 
 @pytest.fixture(scope="module")
@@ -151,23 +151,8 @@ def test_failed_pressures_are_reported_and_the_list_goes_on(model):
     assert [state.pressure for state in result.states] == [2e3]
 
 
-class Interrupt(Observer):
-    """Stops a run at its second item."""
-
-    def __init__(self):
-        self.items, self.ended = 0, None
-
-    def item(self, result):
-        self.items += 1
-        if self.items == 2:
-            raise KeyboardInterrupt
-
-    def end(self, interrupted):
-        self.ended = interrupted
-
-
 def test_an_interrupt_keeps_what_is_done(model):
-    observer = Interrupt()
+    observer = Stop(2)
     result = find_equilibria(model, [2e3, 4e3, 6e3], observer=observer)
     assert result.interrupted and observer.ended is True
     assert [state.pressure for state in result.states] == [2e3, 4e3]

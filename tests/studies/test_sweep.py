@@ -12,10 +12,10 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.modes.run import ModesOptions, run_modes
 from dbvfiv.studies.sweep.run import SweepOptions, run_sweep
+from tests.observers import Stop
 
 LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
 OPTIONS = SweepOptions(count=4)
@@ -23,30 +23,18 @@ DENSITY = parse_axis("density=1:1000:13:log")
 
 
 @pytest.fixture(scope="module")
-def model():
-    return ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16}))
+def model(coarse_model):
+    return coarse_model
 
 
 @pytest.fixture(scope="module")
-def state(model):
-    return LoadPath(model).go_to(6e3)
+def state(opened):
+    return opened
 
 
 @pytest.fixture(scope="module")
 def over_density(model, state):
     return run_sweep(model, DENSITY, LIGHT, OPTIONS, state=state)
-
-
-class _Stopper(Observer):
-    """Interrupts after a number of values."""
-
-    def __init__(self, after: int):
-        self.left = after
-
-    def item(self, result):
-        self.left -= 1
-        if not self.left:
-            raise KeyboardInterrupt
 
 
 def nearest(branches, column, eigenvalue):
@@ -130,7 +118,7 @@ def test_pressure(model):
 @pytest.mark.parametrize("range_", ["density=1:1000:13:log", "pressure=2 kPa:14 kPa:7"])
 def test_an_interrupt_keeps_what_is_done(model, state, over_density, range_):
     axis = parse_axis(range_)
-    found = run_sweep(model, axis, LIGHT, OPTIONS, _Stopper(3), state)
+    found = run_sweep(model, axis, LIGHT, OPTIONS, Stop(3), state)
     assert found.interrupted and not found.certified and not found.failures
     assert list(found.values) == list(axis.values[:3]) and len(found.unstable_count) == 3
     assert found.branches.eigenvalues.shape[1] == 3 and np.isfinite(found.branches.eigenvalues[0]).all()

@@ -21,20 +21,6 @@ def bratu_1d(points: int) -> JaxSystem:
     return JaxSystem(residual, points, sparsity=pattern)
 
 
-def bratu_2d(points: int) -> JaxSystem:
-    """Five-point differences on ``points`` x ``points`` interior nodes."""
-    h = 1.0 / (points + 1)
-
-    def residual(u, mu):
-        full = jnp.pad(u.reshape(points, points), 1)
-        laplacian = (full[2:, 1:-1] + full[:-2, 1:-1] + full[1:-1, 2:] + full[1:-1, :-2] - 4 * full[1:-1, 1:-1]) / h**2
-        return laplacian.ravel() + mu["lambda"] * jnp.exp(u)
-
-    line = sp.diags([1.0, 1.0, 1.0], [-1, 0, 1], shape=(points, points))
-    one = sp.identity(points)
-    return JaxSystem(residual, points**2, sparsity=sp.kron(line, one) + sp.kron(one, line))
-
-
 def bratu_chebyshev(order: int) -> JaxSystem:
     """On the square by Chebyshev collocation, (order - 1)^2 interior points, dense."""
     i = np.arange(order + 1)

@@ -27,8 +27,8 @@ def ask():
         process.stdin.close()
 
 
-#: Kinds of which many moments are tried only with the slow tests; each kind's file is written by the same code.
-DEAR = ("steady", "sweep", "sensitivity", "levels", "closure", "modes", "cycle")
+#: Kinds that are killed only with the slow tests; each kind's file is written by the same code.
+DEAR = ("steady", "sweep", "sensitivity", "levels", "closure", "modes", "cycle", "onset")
 
 
 @pytest.mark.parametrize("kind", [pytest.param(k, marks=pytest.mark.slow) if k in DEAR else k for k in KINDS])

@@ -7,8 +7,6 @@ mesh), look at the differences and write the file anew:
     python tests/verification/test_fiv_onset.py
 
 Graded rows and columns and the enhanced element moved the onset at 6 kPa from 89.3 to 64.0 kg/m3 (quasi-steady) and
-from dbvfiv.case.parameters import Mu
-from dbvfiv.case.parameters import Mu
 from 11.0 to 5.9 (storage), and the leading growth rate at 10 kg/m3 from 47.6 to 27.9 1/s: the limits of fine meshes are
 53.5 kg/m3 and 25.7 1/s, so most of what this mesh of 10 x 20 was wrong by is gone (see test_valve_meshes).
 """
@@ -18,6 +16,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+pytestmark = pytest.mark.slow
 
 PINNED = Path(__file__).with_suffix(".json")
 MESH = {"mesh.around": 10, "mesh.along": 20, "damping.alpha": 0.0, "damping.beta": 0.003}

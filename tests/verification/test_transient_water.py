@@ -37,7 +37,7 @@ def approach(pressure: float, mesh, duration: float, step: float):
     return off, float(rate), valve.modes(count=2).modes[0].growth_rate
 
 
-@pytest.mark.parametrize("pressure", [18e3, 36e3])
+@pytest.mark.parametrize("pressure", [18e3, pytest.param(36e3, marks=pytest.mark.slow)])
 def test_water_settles_as_the_slowest_mode_allows(pressure):
     off, rate, slowest = approach(pressure, (8, 12), 0.6, 2e-3)
     print(

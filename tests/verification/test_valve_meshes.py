@@ -76,6 +76,7 @@ STEPS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keys, onset, growth", STEPS)
 def test_what_each_choice_takes_off(keys, onset, growth):
     """From the earlier mesh to the present one: errors of the consistent mass took off a part of those of the fluid's
@@ -86,6 +87,7 @@ def test_what_each_choice_takes_off(keys, onset, growth):
     assert found == pytest.approx((onset, growth), rel=2e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mesh, onset, flow", [((28, 96), 53.925, 10.7325), ((56, 48), 53.677, 10.6920)])
 def test_errors_along_and_around(mesh, onset, flow):
     """Twice the rows, or twice the columns, alone: 0.15 and 0.3 % of the onset, 0.25 and 0.13 % of the flow at 6 kPa,

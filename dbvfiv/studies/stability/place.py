@@ -151,7 +151,7 @@ def require_parameter(case: Case, name: str) -> None:
 
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
-    level (0.1 for 10 %); length of the line (m) and density (kg/m3) where the steady state depends on them.
+    level (0.1 for 10 %); any other by its key, such as the length of the line where the steady state depends on it.
 
     Raises
     ------
@@ -159,21 +159,20 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
         For values that the case does not allow.
     """
     changes: dict[str, object] = {}
-    if "pipe_length" in design:
-        changes["upstream.length"] = design["pipe_length"]
-    if "density" in design:
-        changes["fluid.density"] = design["density"]
-    if "thickness" in design:
-        changes["valve.thickness_factor"] = case.valve.thickness_factor * design["thickness"]
-    if "strain" in design:
-        rubbers = case.materials.levels({layer.material for layer in case.layers})
-        changes |= case.materials.at_levels(dict.fromkeys(rubbers, design["strain"]))
-    if "angle" in design:
-        layers = case.to_dict()["layers"]
-        for layer in layers:
-            if layer["angle"]:
-                layer["angle"] = design["angle"] if layer["angle"] > 0 else -design["angle"]
-        changes["layers"] = layers
+    for name, value in design.items():
+        if name == "thickness":
+            changes[PARAMETERS[name].key] = case.valve.thickness_factor * value
+        elif name == "strain":
+            rubbers = case.materials.levels({layer.material for layer in case.layers})
+            changes |= case.materials.at_levels(dict.fromkeys(rubbers, value))
+        elif name == "angle":
+            layers = case.to_dict()["layers"]
+            for layer in layers:
+                if layer["angle"]:
+                    layer["angle"] = value if layer["angle"] > 0 else -value
+            changes[PARAMETERS[name].key] = layers
+        else:
+            changes[PARAMETERS[name].key] = value
     return case.replace(changes) if changes else case
 
 

@@ -42,7 +42,7 @@ def heaving(n: int, symmetry: str, axis: int) -> float:
     return 4.0 * float(flux @ (PotentialFlow(symmetry=symmetry, closed=BODY).impedance(panels) @ flux))
 
 
-@pytest.mark.parametrize("symmetry, axis", [("SS", 2), ("AS", 0), ("SA", 1)])
+@pytest.mark.parametrize("symmetry, axis", [pytest.param("SS", 2, marks=pytest.mark.slow), ("AS", 0), ("SA", 1)])
 def test_a_heaving_sphere_carries_half_the_fluid_it_displaces(symmetry, axis):
     errors = [heaving(n, symmetry, axis) / (2.0 * np.pi / 3.0) - 1.0 for n in (3, 6, 12)]
     assert abs(errors[-1]) < 0.001  # 864 panels

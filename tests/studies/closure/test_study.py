@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
-from dbvfiv.observer import Observer
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure import walk
 from dbvfiv.studies.closure.energy import EnergyLedger
 from dbvfiv.studies.closure.valve import Passage, closure_model
 from dbvfiv.studies.session import Session
+from tests.observers import Stop
 from tests.small_valves import EVEN
 
 COARSE = EVEN | {
@@ -172,11 +172,7 @@ def test_a_pressure_that_is_not_reached_ends_the_list(case):
 
 
 def test_an_interrupt_keeps_what_was_found(case):
-    class Stop(Observer):
-        def item(self, result):
-            raise KeyboardInterrupt
-
-    result = closure(case, [1e3, 2e3], observer=Stop())
+    result = closure(case, [1e3, 2e3], observer=Stop(1))
     assert not result.complete and not result.failures
     assert [state.pressure for state in result.states] == [1e3]
 

@@ -27,6 +27,7 @@ from dbvfiv.studies.modes.run import run_modes
 from dbvfiv.studies.session import load_result
 from eigen import SingularShiftError
 from eigen.reduced_counts import CellCounts
+from tests.observers import Stop
 from tests.small_valves import FORMER, THESIS_SET
 
 from .axes import AXES
@@ -101,17 +102,6 @@ def test_a_missing_state_is_a_marked_gap(case, monkeypatch):
     assert np.isfinite(result.grid("growth_rate")[0][:, [0, 1, 3, 4, 5]]).all()
 
 
-class _StopAfter(Observer):
-    def __init__(self, number):
-        self.left, self.seen = number, []
-
-    def item(self, result):
-        self.seen.append(result.value)
-        self.left -= 1
-        if not self.left:
-            raise KeyboardInterrupt
-
-
 def same(result, whole):
     """To the last digit, columns put in for the curves included."""
     assert len(result.columns) == len(whole.columns)
@@ -126,9 +116,9 @@ def same(result, whole):
 
 def test_an_interrupted_map_resumes_to_the_same_numbers(case, whole, tmp_path):
     path = tmp_path / "map.h5"
-    first = _StopAfter(3)
+    first = Stop(3)
     assert not Valve(case, "valve").map(output=path, observer=first).complete
-    second = _StopAfter(100)
+    second = Stop(100)
     result = resume(path, observer=second)
     assert result.complete and not set(first.seen) & set(second.seen)
     again = load_result(path)
@@ -211,7 +201,7 @@ def test_killed_run_resumes(case, whole, tmp_path):
     process.wait()
     kept = len(load_result(path).columns)
     assert kept >= 2
-    observer = _StopAfter(100)
+    observer = Stop(100)
     result = resume(path, observer=observer)
     assert len(observer.seen) == len(result.columns) - kept
     same(result, whole)
@@ -220,9 +210,9 @@ def test_killed_run_resumes(case, whole, tmp_path):
 @pytest.mark.slow
 def test_workers_find_the_same_digits_also_when_they_go_on(case, whole, tmp_path):
     path = tmp_path / "map.h5"
-    first = _StopAfter(4)
+    first = Stop(4)
     assert not Valve(case, "valve").map(workers=2, output=path, observer=first).complete
-    second = _StopAfter(100)
+    second = Stop(100)
     result = resume(path, workers=2, observer=second)
     assert not set(first.seen) & set(second.seen)
     same(result, whole)
@@ -235,7 +225,7 @@ def test_a_map_interrupted_in_its_curves_ends_with_the_same_curves(coarse_case, 
     case = coarse_case.replace(axes | {"damping.beta": 0.001} | dict(FORMER))  # whose curves need three rounds
     whole, path = run_map(case), tmp_path / "map.h5"
     stop = 2 * len(whole.columns) // 3
-    assert not Valve(case, "valve").map(output=path, observer=_StopAfter(stop)).complete
+    assert not Valve(case, "valve").map(output=path, observer=Stop(stop)).complete
     kept = load_result(path)
     assert not kept.complete and max(column.level for column in kept.columns) >= 3
     same(resume(path), whole)

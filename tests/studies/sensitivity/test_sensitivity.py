@@ -7,8 +7,8 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.observer import Observer
 from dbvfiv.studies.case import THESIS, thesis_case
+from tests.observers import Stop
 
 CHANGES = {"mesh.around": 8, "mesh.along": 14, "damping.alpha": 0, "fluid.density": 10, "drive.pressure": 6e3}
 NAMES = ["pressure", "beta", "layer 3 angle", "alpha"]
@@ -55,18 +55,9 @@ def test_the_file_says_the_same_and_draws(found, tmp_path):
     assert widths == pytest.approx([s.growth_rate * s.value / 100 for s in largest if s.value])
 
 
-class _StopAtSecond(Observer):
-    left = 2
-
-    def item(self, result):
-        self.left -= 1
-        if not self.left:
-            raise KeyboardInterrupt
-
-
 def test_an_interrupted_run_goes_on_with_the_same_digits(valve, found, tmp_path):
     path = tmp_path / "s.h5"
-    part = valve.sensitivity(NAMES, output=path, observer=_StopAtSecond())
+    part = valve.sensitivity(NAMES, output=path, observer=Stop(2))
     assert not part.complete and len(dbvfiv.load_result(path).sensitivities) == 2
     assert dbvfiv.resume(path).sensitivities == found.sensitivities
 

@@ -14,8 +14,9 @@ from dbvfiv.motion.stepper import StepOptions, Stepper
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient.figures import energies
 from dbvfiv.studies.transient.keeping import FACES
+from tests.observers import Stop
 
-from .runs import Stop, transient
+from .runs import transient
 
 #: Water drawn back through a valve that stands open, from the first instant on.
 SHUTTING = {

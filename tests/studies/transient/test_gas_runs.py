@@ -8,8 +8,9 @@ import pytest
 import dbvfiv
 from dbvfiv.studies.transient.keeping import GAS
 from dbvfiv.studies.transient.result import beyond_model
+from tests.observers import Stop
 
-from .runs import SHORT, Stop, transient
+from .runs import SHORT, transient
 
 AIR = {"fluid.density": 1.2, "fluid.continuity": "storage", "fluid.sound_speed": 343.0, "drive.pressure": 6e3}
 

@@ -24,8 +24,9 @@ from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient import keeping
 from dbvfiv.studies.transient.keeping import HISTORY, RESTART, STATES, Progress, rows_to_keep, tables_of
 from dbvfiv.studies.transient.study import Runner, run_transient
+from tests.observers import Stop
 
-from .runs import SHORT, Stop, transient
+from .runs import SHORT, transient
 
 
 def test_a_file_holds_the_run(tmp_path, valve):

@@ -10,8 +10,9 @@ import dbvfiv
 from dbvfiv.record.record import StoredRecord
 from dbvfiv.studies.case import Case
 from dbvfiv.studies.transient.keeping import HISTORY, LINE, rows_to_keep, tables_of
+from tests.observers import Stop
 
-from .runs import SHORT, Stop, transient
+from .runs import SHORT, transient
 
 WAVES = {
     "upstream.length": 6.0,

@@ -14,8 +14,9 @@ from dbvfiv.studies.case import Case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient.keeping import HISTORY, MEMORY_COLUMNS, RELAXING, rows_to_keep, tables_of
 from dbvfiv.studies.transient.study import run_transient
+from tests.observers import Stop
 
-from .runs import SHORT, Stop, transient
+from .runs import SHORT, transient
 
 LOSSY = {"damping.model": "loss factor", "drive.pressure": 6e3, "fluid.density": 50.0}
 

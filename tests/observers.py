@@ -1,0 +1,27 @@
+"""An observer that interrupts a run as Ctrl-C does."""
+
+from dbvfiv.observer import Observer
+
+
+class Stop(Observer):
+    """Interrupt after some items.
+
+    Attributes
+    ----------
+    seen : list
+        Items so far, or their values where they have one.
+    ended : bool or None
+        Word of the study's end: it was interrupted.
+    """
+
+    def __init__(self, after: int = 10**9):
+        self.left, self.seen, self.ended = after, [], None
+
+    def item(self, result):
+        self.seen.append(getattr(result, "value", result))
+        self.left -= 1
+        if not self.left:
+            raise KeyboardInterrupt
+
+    def end(self, interrupted):
+        self.ended = interrupted
