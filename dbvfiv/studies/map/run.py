@@ -16,9 +16,8 @@ from ..stability.verdict import NOT_VALID, OUTCOMES
 from ..stability.walk import StabilityWalk
 from .checks import Check, check_cells
 from .column import ColumnTask, MapColumn, MapPlan, grid_of
-from .curves import OnsetCurve, doubts, linked
+from .curves import OnsetCurve, Web, doubts, linked
 from .pool import ColumnPool
-from .web import Web
 
 
 @dataclass(frozen=True)

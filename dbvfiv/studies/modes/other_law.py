@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..stability.verdict import Verdict
-from .certificate import Certificate
-from .mode import ModeShape, rows_of
+from .mode import Certificate, ModeShape, rows_of
 from .run import FoundModes
 
 #: Kind of the note that holds them.

@@ -8,8 +8,6 @@ from ...errors import CaseError
 from ..case import Case
 
 QUASI_STEADY, STORAGE = "quasi-steady", "storage"
-#: What a command takes in place of fluid.continuity.
-CHOICES = (QUASI_STEADY, STORAGE, "both")
 _WHY = (
     "storage conserves volume under moving walls (what they displace has to go somewhere) and agrees with the water "
     "tunnel of the thesis, in which water was stable from 2 to 50 kPa, so a prediction should rest on it; quasi-steady "
@@ -21,21 +19,6 @@ _WORDS = {True: "stable", False: "unstable", None: "undecided"}
 def other_law(case: Case) -> str:
     """The continuity law that a case does not use."""
     return QUASI_STEADY if case.fluid.continuity == STORAGE else STORAGE
-
-
-def law_changes(law: str | None, study: str) -> dict[str, str | None]:
-    """Keys of the case that a law asked for on the command line changes.
-
-    Raises
-    ------
-    CaseError
-        For a word that is no choice.
-    """
-    if law is not None and law not in CHOICES:
-        raise CaseError(f"--law is given as {law!r}; it must be {', '.join(CHOICES[:-1])} or {CHOICES[-1]}.")
-    if law == "both":
-        return {f"{study}.continuity": "both"}
-    return {"fluid.continuity": law, f"{study}.continuity": "case" if law else None}
 
 
 def require_two_laws(case: Case, study: str, without: str = "") -> None:
