@@ -19,12 +19,12 @@ from ...record.table import TableSpec
 from ...record.vtkhdf import Step, motion
 from ..result import StudyResult
 from ..session import describe_surroundings
-from ..stability.laws import compare_states
+from ..stability.dimensions import compare_states, read_other_law
 from ..stability.verdict import Verdict
 from ..state import State, states_of
-from . import figures, other_law
+from . import figures
 from .figures import animate_mode
-from .mode import CURVE, MODE, Certificate, ModeShape
+from .mode import CURVE, MODE, Certificate, ModeShape, OtherLaw, read_law, side_by_side
 
 
 @dataclass(frozen=True)
@@ -205,10 +205,10 @@ class ModesResult(StudyResult):
         return case.outside.words if case.modes.in_vacuo or not case.continuity else f"under {case.continuity}"
 
     @cached_property
-    def other_law(self) -> other_law.OtherLaw | None:
+    def other_law(self) -> OtherLaw | None:
         """Modes of the same state under the other continuity law; None where that was not asked for."""
-        notes = self.record.notes(other_law.NOTE)
-        return other_law.read(notes[-1], self.case.outside.words) if notes else None
+        note = read_other_law(self.record)
+        return read_law(note, self.case.outside.words) if note else None
 
     @property
     def comparison(self) -> str | None:
@@ -288,7 +288,7 @@ class ModesResult(StudyResult):
         other = self.other_law
         if other is None:
             return [*head, *rows, "", self.sentence, *notes]
-        table = other_law.side_by_side(self.case.fluid.continuity, [mode.summary() for mode in self.modes], other)
+        table = side_by_side(self.case.fluid.continuity, [mode.summary() for mode in self.modes], other)
         return [*table, "", self.sentence, other.sentence, self.comparison, *notes]
 
     def steps(self, valve: WholeValve, mode: int | None = None, phases: int = 24) -> Sequence[Step]:

@@ -15,13 +15,12 @@ from ...record.record import GrowingRecord
 from ...record.states import state_row
 from ..case import Case
 from ..session import Session
-from ..stability.laws import STORAGE, other_law, require_two_laws
+from ..stability.dimensions import LAW, STORAGE, other_law, require_two_laws
 from ..stability.place import condition_of
 from ..stability.verdict import FLUTTERS, STABLE, Verdict, oscillates
 from ..stability.walk import StabilityWalk
 from ..study import Study
-from .mode import CURVE, Certificate, rows_of
-from .other_law import NOTE, note_of
+from .mode import CURVE, Certificate, law_note, rows_of
 from .result import COUNT, COUNTED, MODES, REFUSAL, STATE, ModesResult, tables_of
 from .run import ModesOptions, run_modes
 
@@ -43,7 +42,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     done = {note.get("symmetry", EQUILIBRIA) for note in record.notes("certificate")}
     chosen = chosen_symmetries(case.modes.symmetry, case.part)
     missing = [symmetry for symmetry in chosen if symmetry.name not in done]
-    further = both and not record.notes(NOTE)
+    further = both and not record.notes(LAW)
     if not (missing or further):
         return
     state = session.equilibrium(record)
@@ -59,7 +58,7 @@ def run(session: Session, record: GrowingRecord) -> None:
         law = other_law(case)
         mu = Mu.of(session.model.case).at(storage=float(law == STORAGE))
         found = run_modes(session.model, state, mu, options=ModesOptions.of(case), observer=record)
-        record.note(NOTE, **note_of(found, law))
+        record.note(LAW, **law_note(found, law))
 
 
 def _require_one_class(case: Case) -> None:
