@@ -21,8 +21,7 @@ prepare()
 import numpy as np  # noqa: E402
 
 from dbvfiv.studies.case import thesis_case  # noqa: E402
-from dbvfiv.studies.onset.run import run_onset  # noqa: E402
-from dbvfiv.studies.onset.search import OnsetOptions  # noqa: E402
+from dbvfiv.studies.onset.search import OnsetOptions, run_onset  # noqa: E402
 from dbvfiv.studies.stability.walk import StabilityWalk  # noqa: E402
 
 MESH = (28, 48)

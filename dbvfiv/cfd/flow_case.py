@@ -1,4 +1,4 @@
-"""The question of a run and its case on disk."""
+"""Inputs of a run and its case on disk."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .foam import Stream, case_files, write_mesh
 if TYPE_CHECKING:
     from ..model.state import SteadyState
 
-#: Holds the question, beside the files of OpenFOAM.
+#: Holds the inputs of the run, beside the files of OpenFOAM.
 NOTE = "question.json"
 #: Of water at 20 degrees, m2/s.
 WATER_VISCOSITY = 1.0e-6
@@ -112,7 +112,7 @@ class FlowCase:
         )
 
     @property
-    def question(self) -> dict[str, Any]:
+    def inputs(self) -> dict[str, Any]:
         """Quantities in which two runs must agree for one to continue the other."""
         shape = hashlib.sha256(np.round(self.state.nodal, 9).tobytes() + self.mesh.nodes.tobytes()).hexdigest()[:16]
         return {
@@ -134,7 +134,7 @@ class FlowCase:
         folder = Path(folder)
         try:
             known = (folder / NOTE).exists()
-            if known and json.loads((folder / NOTE).read_text()) != self.question:
+            if known and json.loads((folder / NOTE).read_text()) != self.inputs:
                 raise CaseError(
                     f"{str(folder)!r} holds the flow through another shape or on another mesh; name a new one."
                 )
@@ -149,7 +149,7 @@ class FlowCase:
             (folder / "Allrun").chmod(0o755)
             if not known:
                 write_mesh(self.cells, folder)
-                (folder / NOTE).write_text(json.dumps(self.question, indent=1) + "\n")
+                (folder / NOTE).write_text(json.dumps(self.inputs, indent=1) + "\n")
         except OSError as error:
             raise CaseError(f"{str(folder)!r} cannot be written ({error.strerror or error}).") from error
         return not known

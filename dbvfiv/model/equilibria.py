@@ -12,7 +12,7 @@ from ..case.quantity import GRAVITY
 from ..errors import SolveError
 from ..geometry.divisions import grading
 from ..observer import Observer
-from .load_steps import Loading, LoadStepOptions, LoadSteps, Way
+from .load_steps import Loading, LoadStepOptions, LoadStepResult, LoadSteps
 from .material_stability import beyond_levels, material_stability
 from .newton import NewtonOptions
 from .state import SteadyState, describe_state
@@ -116,7 +116,7 @@ class LoadPath(LoadSteps):
         still = self.pressure == self.model.flow.back
         return self.model.weight is not None and (still or not np.any(self.q))
 
-    def _loaded(self, target: float) -> Way:
+    def _loaded(self, target: float) -> LoadStepResult:
         """Put on pressure, levels and weight together, and step on from there."""
         ramp = LoadSteps(Loading(self.model, target), self.options)
         try:
@@ -128,7 +128,7 @@ class LoadPath(LoadSteps):
             ) from error
         self.q, self.pressure = ramp.q, target
         settled = self.settle()
-        return Way(way.iterations + settled.iterations, way.steps, settled)
+        return LoadStepResult(way.iterations + settled.iterations, way.steps, settled)
 
     def _too_wide(self) -> str:
         """Clause on a passage that leaves no finite flow, of the last equilibrium; empty for other causes."""

@@ -38,8 +38,8 @@ class LoadStepOptions:
 
 
 @dataclass(frozen=True)
-class Way:
-    """Path to a pressure: Newton iterations over all load steps, number of load steps, last equilibrium iteration."""
+class LoadStepResult:
+    """Newton iterations over all load steps to a pressure, number of load steps, last equilibrium iteration."""
 
     iterations: int
     steps: int
@@ -79,7 +79,7 @@ class LoadSteps:
         self.slope: np.ndarray | None = None
         self.step = self.options.first_step
 
-    def reach(self, target: float) -> Way:
+    def reach(self, target: float) -> LoadStepResult:
         """Walk to a pressure, Pa; `self.pressure` and `self.q` hold the equilibrium.
 
         Raises
@@ -101,7 +101,7 @@ class LoadSteps:
                 self._accept(result, aim)
                 self.step = max(2 * abs(step), self.options.first_step)
                 if last:
-                    return Way(iterations, steps, result)
+                    return LoadStepResult(iterations, steps, result)
                 step = np.copysign(min(2 * abs(step), abs(target - self.pressure), self.options.max_step), step)
                 self.observer.progress(f"equilibrium at {aim:.6g} Pa, {result.iterations} iterations")
                 continue

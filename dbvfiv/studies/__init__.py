@@ -1,4 +1,4 @@
-"""Studies: a room for each question that the program answers.
+"""Studies: one package for each analysis that the program offers.
 
 A room holds the study's keys of the case file (`keys`), how it runs (`study`), what comes of it (`result`), its figures
 and its command. What several rooms share lies beside them: the `session` that they ask, the `study` and `result` that

@@ -12,25 +12,25 @@ from ..record.mesh import MeshData
 from ..record.record import Record
 from ..record.table import Column
 
-WAY_ON = (
+PATH_RESTART = (
     Column("path/slope", "m/Pa, rad/Pa", "Derivative of the free unknowns by the pressure"),
     Column("path/step", "Pa", "Load step that is tried next"),
 )
 
 
-def way_on_shapes(mesh: MeshData) -> dict[str, tuple[int, ...]]:
+def restart_shapes(mesh: MeshData) -> dict[str, tuple[int, ...]]:
     """Shapes of those columns that are not scalars."""
     return {"path/slope": (int(mesh.free.sum()),)}
 
 
-def way_on(path: LoadSteps) -> dict[str, Any]:
+def restart_row(path: LoadSteps) -> dict[str, Any]:
     """Restart columns of the state that a load path has just reached."""
     slope = np.full(path.model.size, np.nan) if path.slope is None else path.slope
     return {"path/slope": slope, "path/step": path.step}
 
 
-def go_on(path: LoadSteps, record: Record, table: str, row: int, state: SteadyState) -> None:
-    """Stand where another walk stood when it had reached the state in a row of a table."""
+def restore_path(path: LoadSteps, record: Record, table: str, row: int, state: SteadyState) -> None:
+    """Restore a load path as it was at the state in a row of a table."""
     path.q, path.pressure = state.q, state.pressure
     slope = record.value(table, "path/slope", row)
     path.slope = slope if np.isfinite(slope).all() else None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from ..case.parameters import PARAMETERS
 from ..case.quantity import number_or_text
 from ..errors import CaseError
 
@@ -36,6 +37,47 @@ def with_unit(given: str | list[str] | None) -> str | list[str] | None:
                     f"'{part} m' for a head of the fluid."
                 )
     return given
+
+
+#: What a command takes in place of fluid.continuity.
+LAWS = ("quasi-steady", "storage", "both")
+
+
+def law_changes(law: str | None, study: str) -> dict[str, str | None]:
+    """Keys of the case that a law asked for on the command line changes.
+
+    Raises
+    ------
+    CaseError
+        For a word that is no choice.
+    """
+    if law is not None and law not in LAWS:
+        raise CaseError(f"--law is given as {law!r}; it must be {', '.join(LAWS[:-1])} or {LAWS[-1]}.")
+    if law == "both":
+        return {f"{study}.continuity": "both"}
+    return {"fluid.continuity": law, f"{study}.continuity": "case" if law else None}
+
+
+def refuse_moved(ranges: Mapping[str, str], **given: str | None) -> None:
+    """Refuse a value for a parameter that a range moves.
+
+    Parameters
+    ----------
+    ranges : mapping
+        From the keys of the case that hold ranges to those.
+    given
+        Values of parameters as the command line has them; None where there is none.
+
+    Raises
+    ------
+    CaseError
+    """
+    for key, text in ranges.items():
+        name = text.partition("=")[0].strip()
+        if name in PARAMETERS and given.get(name) is not None:
+            raise CaseError(
+                f"--{name} is given as {given[name]!r}, but {key} = {text!r} moves the {name}; one of them has to go."
+            )
 
 
 #: What several studies take in place of keys of the case.

@@ -18,7 +18,7 @@ from .case import Case
 
 @dataclass(frozen=True)
 class Study:
-    """A question that the program answers.
+    """One analysis that the program offers.
 
     Attributes
     ----------

@@ -13,8 +13,7 @@ from ..observer import Observer
 from ..report.content import Part, Picture, Table
 from ..studies.case import thesis_case
 from ..studies.closure.result import ClosureResult
-from ..studies.kept import kept_run
-from ..studies.session import Session
+from ..studies.session import Session, kept_run
 from ..studies.steady.result import SteadyResult
 from ..studies.transient.result import TransientResult
 

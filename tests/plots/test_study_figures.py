@@ -10,7 +10,7 @@ from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map import figures as map_figures
 from dbvfiv.studies.map.column import MapPlan
 from dbvfiv.studies.onset import figures as onset_figures
-from dbvfiv.studies.onset.intervals import known_intervals, uncertain_intervals
+from dbvfiv.studies.onset.line import known_intervals, uncertain_intervals
 from dbvfiv.studies.stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 
 

@@ -13,9 +13,8 @@ from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.buckling import class_matrices
 from dbvfiv.studies.closure.valve import closure_model
-from dbvfiv.studies.map.classes import leading_of as leading_of_map
-from dbvfiv.studies.onset.classes import leading_of, merge_points
-from dbvfiv.studies.onset.intervals import common_stretches, joined_stretches
+from dbvfiv.studies.onset.line import common_stretches, joined_stretches, merge_points
+from dbvfiv.studies.stability.dimensions import leading_class
 
 OTHERS = ["SA", "AS", "AA"]
 SMALL = {"mesh.around": 8, "mesh.along": 14, "drive.pressure": "6 kPa", "damping.alpha": 0}
@@ -74,13 +73,8 @@ def test_a_crossing_inside_what_another_class_has_unstable_is_no_edge():
 
 
 def test_leading_takes_the_largest_growth_rate():
-    scan = {"values": [1.0, 2.0, 2.5], "growth_rate": [-3.0, 1.0, 0.0], "frequency": [5.0, 6.0, 0.0]}
-    part = {"symmetry": "AS", "scan": scan | {"certified": [True, False, True]}}
-    found = leading_of(*np.array([[1.0, 2.0], [-1.0, -2.0], [7.0, 8.0]]), [True, True], [part])
-    assert found["symmetry"] == ["SS", "AS"] and found["growth_rate"] == [-1.0, 1.0]
-    assert found["certified"] == [True, False] and found["frequency"] == [7.0, 6.0]
-    grid = {"symmetry": "AA", "growth_rate": [[0.0, 1.0]], "frequency": [[2.0, 3.0]]}
-    cells = leading_of_map(np.array([[-1.0, np.nan]]), np.array([[9.0, np.nan]]), [grid])
+    rates, frequencies = [[[-1.0, np.nan]], [[0.0, 1.0]]], [[[9.0, np.nan]], [[2.0, 3.0]]]
+    cells = leading_class(["SS", "AA"], np.array(rates), np.array(frequencies))
     assert cells["symmetry"] == [["AA", None]] and cells["growth_rate"][0][0] == 0.0 and cells["frequency"][0][0] == 2.0
 
 

@@ -19,8 +19,7 @@ from dbvfiv.observer import Observer
 from dbvfiv.studies.case import Case, load_case
 from dbvfiv.studies.map.run import run_map
 from dbvfiv.studies.modes.run import ModesOptions, run_modes
-from dbvfiv.studies.onset.run import run_onset
-from dbvfiv.studies.onset.search import OnsetOptions
+from dbvfiv.studies.onset.search import OnsetOptions, run_onset
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import UNDECIDED, Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk

@@ -6,7 +6,7 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.states import LAYERS, layer_shapes, state_table
 from ...record.table import TEXT, Column, Shown, TableSpec
-from ..load_path import WAY_ON, way_on_shapes
+from ..load_path import PATH_RESTART, restart_shapes
 
 #: Tables: of the walk along back pressures, of the flow before it is turned back, of the turn in time.
 STATES, PATH, BUCKLING, OPENED, REVERSAL = "states", "path", "buckling", "opened", "reversal"
@@ -181,7 +181,7 @@ SAMPLE = (
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     """Tables of a back-pressure result on a mesh."""
     walks = [table for prefix in ("", COMPARED) for table in _walk_tables(prefix, mesh)]
-    opened = state_table(OPENED, mesh, WAY_ON, way_on_shapes(mesh))
+    opened = state_table(OPENED, mesh, PATH_RESTART, restart_shapes(mesh))
     return (*walks, opened, TableSpec(REVERSAL, SAMPLE, chunk=256))
 
 

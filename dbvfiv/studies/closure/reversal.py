@@ -25,7 +25,7 @@ from ...observer import Observer
 from ...record.record import GrowingRecord
 from ...record.states import read_states, state_row
 from ..case import Case
-from ..load_path import go_on, way_on
+from ..load_path import restart_row, restore_path
 from .columns import OPENED
 from .valve import InnerFace, contact_law, face_plane
 
@@ -51,14 +51,14 @@ def turn_back(case: Case, record: GrowingRecord) -> None:
     path = LoadPath(model, SteadyOptions.of(model.case), observer=record)
     states, failures = read_states(record, OPENED), []
     if states:
-        go_on(path, record, OPENED, len(states) - 1, states[-1])
+        restore_path(path, record, OPENED, len(states) - 1, states[-1])
     known = {state.pressure for state in states}
     for pressure in np.geomspace(case.closure.open_pressure, case.closure.open_pressure / 50, OPEN_STATES).tolist():
         if pressure in known:
             continue
         record.progress(f"steady state at {pressure:.6g} Pa")
         try:
-            record.append(OPENED, state_row(model, path.go_to(pressure)) | way_on(path))
+            record.append(OPENED, state_row(model, path.go_to(pressure)) | restart_row(path))
         except SolveError as error:
             failures.append(str(error))
             record.fail(str(error))

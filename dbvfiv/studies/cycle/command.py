@@ -9,8 +9,7 @@ import typer
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
 from ..case import Case
-from ..request import DensityOption, PressureOption, Request
-from ..stability.fixed import refuse_moved
+from ..request import DensityOption, PressureOption, Request, refuse_moved
 
 ORDER = 42
 

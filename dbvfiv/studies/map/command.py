@@ -9,8 +9,7 @@ import typer
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
 from ..case import Case
-from ..request import ClassesOption, Request, with_unit
-from ..stability.fixed import refuse_moved
+from ..request import ClassesOption, Request, refuse_moved, with_unit
 
 ORDER = 30
 

@@ -14,14 +14,14 @@ from eigen.columns import DIRECT, MISSING
 
 from ...model.symmetry import equilibria_of
 from ..result import StudyResult
-from ..stability.classes import NOTE as CLASS_NOTE
+from ..stability.dimensions import leading_class, read_classes
 from ..stability.place import describe_fixed, fixed_conditions
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, Verdict
-from . import classes, cycles, figures
-from .checks import Check
+from . import cycles, figures
 from .column import MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, linked
 from .rows import gap_sentence, read_checks, read_columns, read_curves
+from .run import Check
 
 LAWS = {0.0: "quasi-steady", 1.0: "storage"}
 
@@ -88,24 +88,18 @@ class MapResult(StudyResult):
             "warnings": list(self.warnings),
             "interrupted": not self.complete,
         }
-        document = shared | pictures[0] | {"classes": [classes.summary_of(note) for note in self.classes]}
+        document = shared | pictures[0] | {"classes": [_class_summary(note) for note in self.classes]}
         if len(pictures) > 1:
             document["laws"] = pictures
         return document
 
     @cached_property
     def classes(self) -> list[dict[str, Any]]:
-        """Cells in the other classes of motion, where they were asked for; see `dbvfiv.studies.map.classes`."""
-        notes = {note["symmetry"]: note for note in self.record.notes(CLASS_NOTE)}
-        return list(notes.values())
+        """Cells in the other classes of motion, where they were asked for."""
+        return read_classes(self.record)
 
     def _picture(self, law: int) -> dict[str, Any]:
-        tables = self.grid("growth_rate")[law], self.grid("frequency")[law]
-        leading = (
-            {"leading": classes.leading_of(*tables, self.classes, equilibria_of(self.case.part).name)}
-            if self.classes
-            else {}
-        )
+        leading = {"leading": self._leading(law)} if self.classes else {}
         followed = cycles.summary_of(self.record, self.plan, law) if self.case.map.cycles else {}
         mine = [curve for curve in self.curves if curve.law == law]
         return (
@@ -124,6 +118,15 @@ class MapResult(StudyResult):
             | leading
             | followed
         )
+
+    def _leading(self, law: int) -> dict[str, Any]:
+        """Growth rate, frequency and class of the most unstable motion in each cell, (y, x)."""
+        names = [equilibria_of(self.case.part).name, *(note["symmetry"] for note in self.classes)]
+        rates, frequencies = (
+            np.stack([self.grid(name)[law], *(np.array(note[name], float) for note in self.classes)])
+            for name in ("growth_rate", "frequency")
+        )
+        return leading_class(names, rates, frequencies)
 
     def shortfall(self) -> str | None:
         gaps = len(self.failures)
@@ -195,3 +198,16 @@ class MapResult(StudyResult):
 
 def _axis(axis) -> dict[str, Any]:
     return {"parameter": axis.parameter, "values": list(axis.values), "log": axis.log}
+
+
+def _class_summary(note: dict[str, Any]) -> dict[str, Any]:
+    """Plain numbers of a class for JSON."""
+    return {
+        "symmetry": note["symmetry"],
+        "motion": note["motion"],
+        "growth_rate": note["growth_rate"],
+        "frequency": note["frequency"],
+        "unstable_count": note["unstable"],
+        "unstable_count_independent": note["counted"],
+        "certified": [[bool(cell) for cell in row] for row in note["certified"]],
+    }

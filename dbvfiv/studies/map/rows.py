@@ -15,12 +15,12 @@ from ...record.table import Column, TableSpec
 from ..case import Case
 from ..stability.verdict import FLUTTERS, OUTCOMES, STABLE, UNDECIDED
 from ..study import nothing_to_resume
-from .checks import Check
 from .column import CELLS, MapColumn, MapPlan
 from .curves import OnsetCurve
 from .cycles import ROWS as CYCLE_ROWS
 from .cycles import SPEC as CYCLE_SPEC
 from .cycles import vouched_rows
+from .run import Check
 
 COLUMNS, CELL_ROWS, ONSETS = "columns", "cells", "onsets"
 _COLUMNS = (

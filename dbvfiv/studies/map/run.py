@@ -1,9 +1,12 @@
-"""Stability over two parameters: columns of cells, refined near onset, and exact onset curves on top."""
+"""Stability over two parameters: columns of cells, refined near onset, exact onset curves on top, and checks of cells
+with the full pencil.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +17,68 @@ from ..case import Case
 from ..stability.place import check_scan
 from ..stability.verdict import NOT_VALID, OUTCOMES
 from ..stability.walk import StabilityWalk
-from .checks import Check, check_cells
 from .column import ColumnTask, MapColumn, MapPlan, grid_of
-from .curves import OnsetCurve, doubts, linked
+from .curves import OnsetCurve, Web, doubts, linked
 from .pool import ColumnPool
-from .web import Web
+
+#: Grids kept of another symmetry class.
+_GRIDS = ("growth_rate", "frequency", "unstable", "counted", "certified")
+#: Largest accepted |difference| / |eigenvalue|.
+ACCEPTED = 1e-6
+
+
+@dataclass(frozen=True)
+class Check:
+    """One cell, solved directly.
+
+    Attributes
+    ----------
+    x, y : float
+    law : int
+        Number of the continuity law.
+    growth_rate, frequency : float
+        Of the full pencil, 1/s and Hz.
+    error : float
+        |difference of the leading eigenvalue| over its size.
+    unstable : int
+    agrees : bool
+        Error within `ACCEPTED` and the same number of unstable eigenvalues.
+    """
+
+    x: float
+    y: float
+    law: int
+    growth_rate: float
+    frequency: float
+    error: float
+    unstable: int
+    agrees: bool
+
+
+def check_cells(plan: MapPlan, columns: tuple[MapColumn, ...], walk: StabilityWalk, number: int) -> tuple[Check, ...]:
+    """Check cells spread over the map by a sequence that fills the plane evenly."""
+    usable = [column for column in columns if not column.failure and column.level == 0]
+    if not usable:
+        return ()
+    cells, laws = len(plan.along.values), len(plan.laws)
+    # steps of the golden section in both directions (Roberts' sequence)
+    picks = sorted(
+        (int((0.5 + 0.7548776662 * i) % 1 * len(usable)), int((0.5 + 0.5698402910 * i) % 1 * cells), i % laws)
+        for i in range(number)
+    )
+    return tuple(_check(plan, usable[i], j, law, walk) for i, j, law in picks)
+
+
+def _check(plan: MapPlan, column: MapColumn, j: int, law: int, walk: StabilityWalk) -> Check:
+    along = plan.along.values[j]
+    spectrum = walk.spectrum(plan.place(column.value, along, plan.laws[law]), 4)
+    kept = complex(column.cells["growth_rate"][law, j], 2 * np.pi * column.cells["frequency"][law, j])
+    true = complex(spectrum.eigenvalues[0]) if len(spectrum) else complex(np.nan)
+    error = abs(kept - true) / max(abs(true), 1.0)
+    unstable = spectrum.unstable_count
+    agrees = error <= ACCEPTED and unstable == int(column.cells["unstable"][law, j])
+    x, y = (along, column.value) if plan.transposed else (column.value, along)
+    return Check(x, y, law, true.real, true.imag / (2 * np.pi), float(error), unstable, bool(agrees))
 
 
 @dataclass(frozen=True)
@@ -47,6 +107,15 @@ class FoundMap:
     def grid(self, name: str) -> np.ndarray:
         """A quantity of the cells on the grid; see `dbvfiv.studies.map.column.grid_of`."""
         return grid_of(self.plan, self.columns, name)
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """None: a column without a state is a gap of the map, which says why itself."""
+        return ()
+
+    def note(self) -> dict[str, Any]:
+        """Note that a record keeps of another symmetry class: grids as tables (y, x)."""
+        return {name: self.grid(name)[0].tolist() for name in _GRIDS}
 
 
 #: Rounds of columns put in for the onset curves.

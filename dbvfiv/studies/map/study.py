@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from ...observer import Observers
+from ...observer import Observer, Observers
 from ...record.record import GrowingRecord
 from ..session import Session
+from ..stability.dimensions import add_classes
 from ..stability.walk import StabilityWalk
 from ..study import Study
-from .classes import look_at_classes
 from .column import MapPlan
 from .cycles import follow_cycles
 from .result import MapResult
 from .rows import KeepColumns, keep_checks, keep_curves, known_columns, rows_to_keep, tables_of
 from .run import run_map
+
+#: Cells alone, under one law: the laws differ in no class but that of the equilibria. Onsets of the other classes are
+#: located along a line, by `onset`.
+_PLAIN = {"map.curve": False, "map.refine": 0, "map.continuity": "case", "map.workers": 1}
 
 
 def run(session: Session, record: GrowingRecord, workers: int | None = None) -> None:
@@ -36,7 +40,12 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
         raise KeyboardInterrupt
     keep_checks(record, found.checks)
     keep_curves(record, found.curves)
-    look_at_classes(case, record, walk)
+    add_classes(
+        record,
+        case.map.symmetry,
+        case.part,
+        lambda symmetry: run_map(case.replace(_PLAIN), Observer(), walk=walk.in_class(symmetry)),
+    )
     follow_cycles(case, record, plan, list(found.columns), walk)
 
 

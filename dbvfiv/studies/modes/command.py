@@ -10,8 +10,7 @@ import typer
 from ...case.quantity import number_or_text
 from ...errors import CaseError
 from ..case import Case
-from ..request import DensityOption, LawOption, Request, with_unit
-from ..stability.laws import law_changes
+from ..request import DensityOption, LawOption, Request, law_changes, with_unit
 
 ORDER = 25
 

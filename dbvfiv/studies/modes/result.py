@@ -1,12 +1,14 @@
-"""Leading modes of one state: what their file holds and what can be read off them."""
+"""Leading modes of one state: content of their file, what can be read off it, and fields for ParaView."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from ...errors import CaseError
@@ -14,17 +16,83 @@ from ...model.symmetry import EQUILIBRIA, asks_for_equilibria, symmetry_named
 from ...record.mesh import MeshData, WholeValve
 from ...record.states import state_table
 from ...record.table import TableSpec
-from ...record.vtkhdf import Step
+from ...record.vtkhdf import Step, motion
 from ..result import StudyResult
 from ..session import describe_surroundings
-from ..stability.laws import compare_states
+from ..stability.dimensions import compare_states, read_other_law
 from ..stability.verdict import Verdict
 from ..state import State, states_of
-from . import figures, other_law
-from .certificate import CURVE, Certificate
+from . import figures
 from .figures import animate_mode
-from .mode import MODE, ModeShape
-from .steps import cycle_steps, mode_steps
+from .mode import CURVE, MODE, Certificate, ModeShape, OtherLaw, read_law, side_by_side
+
+
+@dataclass(frozen=True)
+class _ModeSteps(Sequence):
+    """Modes as steps, made one at a time; "time" is the number of the mode."""
+
+    result: StudyResult
+    valve: WholeValve
+
+    def __len__(self) -> int:
+        return len(self.result.modes)
+
+    def __getitem__(self, number):
+        mode, valve, mesh = self.result.modes[number], self.valve, self.result.mesh
+        shape, parity = mode.shape[:, :3], symmetry_named(mode.symmetry).parity(valve.sign)[:, None]
+        points = motion(mesh, valve, self.result.state.nodal) | {
+            "mode_real": valve.vectors(shape.real) * parity,
+            "mode_imag": valve.vectors(shape.imag) * parity,
+            "mode_amplitude": mode.amplitude[valve.node],
+        }
+        ones = np.ones(len(valve.quads))
+        cells = {
+            "thickness": valve.cells(mesh.thickness),
+            "growth_rate": mode.growth_rate * ones,
+            "frequency": mode.frequency * ones,
+        }
+        return Step(float(mode.number), points, cells)
+
+
+@dataclass(frozen=True)
+class _CycleSteps(Sequence):
+    """Phases of one cycle as steps, the first repeated at the end; "time" is time in s, or the share of a cycle where
+    nothing oscillates.
+    """
+
+    result: StudyResult
+    valve: WholeValve
+    mode: ModeShape
+    phases: int
+
+    def __len__(self) -> int:
+        return self.phases + 1
+
+    def __getitem__(self, number):
+        share = range(self.phases + 1)[number] / self.phases
+        mode, state, mesh = self.mode, self.result.state, self.result.mesh
+        moved = mode.at_phase(2 * np.pi * share) * mode.drawn_amplitude(state)
+        parity = symmetry_named(mode.symmetry).parity(self.valve.sign)[:, None]
+        points = motion(mesh, self.valve, state.nodal + moved)
+        if np.any(parity < 0):
+            opposite = motion(mesh, self.valve, state.nodal - moved)
+            points = {name: np.where(parity < 0, opposite[name], field) for name, field in points.items()}
+        points |= {"oscillation": self.valve.vectors(moved[:, :3]) * parity}
+        value = share / mode.frequency if mode.frequency > 0 else share
+        return Step(value, points, {"thickness": self.valve.cells(mesh.thickness)})
+
+
+def mode_steps(result: StudyResult, valve: WholeValve) -> Sequence[Step]:
+    """All modes: the equilibrium as ``displacement``, shapes as ``mode_real``, ``mode_imag`` and ``mode_amplitude``
+    (largest 1).
+    """
+    return _ModeSteps(result, valve)
+
+
+def cycle_steps(result: StudyResult, valve: WholeValve, mode: ModeShape, phases: int = 24) -> Sequence[Step]:
+    """One cycle of a mode about the equilibrium, at an amplitude that shows well; growth or decay is left out."""
+    return _CycleSteps(result, valve, mode, phases)
+
 
 STATE, MODES, COUNT = "state", "modes", "count"
 #: Kind of the note that says why the constants of the rubber do not hold at the state.
@@ -137,10 +205,10 @@ class ModesResult(StudyResult):
         return case.outside.words if case.modes.in_vacuo or not case.continuity else f"under {case.continuity}"
 
     @cached_property
-    def other_law(self) -> other_law.OtherLaw | None:
+    def other_law(self) -> OtherLaw | None:
         """Modes of the same state under the other continuity law; None where that was not asked for."""
-        notes = self.record.notes(other_law.NOTE)
-        return other_law.read(notes[-1], self.case.outside.words) if notes else None
+        note = read_other_law(self.record)
+        return read_law(note, self.case.outside.words) if note else None
 
     @property
     def comparison(self) -> str | None:
@@ -220,11 +288,11 @@ class ModesResult(StudyResult):
         other = self.other_law
         if other is None:
             return [*head, *rows, "", self.sentence, *notes]
-        table = other_law.side_by_side(self.case.fluid.continuity, [mode.summary() for mode in self.modes], other)
+        table = side_by_side(self.case.fluid.continuity, [mode.summary() for mode in self.modes], other)
         return [*table, "", self.sentence, other.sentence, self.comparison, *notes]
 
     def steps(self, valve: WholeValve, mode: int | None = None, phases: int = 24) -> Sequence[Step]:
-        """The modes one after the other, or one cycle of one of them; see `dbvfiv.studies.modes.steps`."""
+        """The modes one after the other, or one cycle of one of them."""
         return mode_steps(self, valve) if mode is None else cycle_steps(self, valve, self.mode(mode), phases)
 
     def drawers(self, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:

@@ -26,8 +26,7 @@ from ...model.material_stability import material_stability
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...observer import Observer
-from ..solving import solving
-from ..stability.family import ValveFamily
+from ..stability.family import ValveFamily, solving
 from ..stability.verdict import STABLE, UNDECIDED, Verdict
 
 #: Structural modes in the basis behind the independent count.

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import brentq
 
-from ...case.parameters import Mu
+from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, NotValidError, SolveError
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, Symmetry, asks_for_equilibria, chosen_symmetries
@@ -14,16 +15,19 @@ from ...record.record import GrowingRecord
 from ...record.states import state_row
 from ..case import Case
 from ..session import Session
-from ..stability.laws import STORAGE, other_law, require_two_laws
-from ..stability.margin import critical_damping_factor
-from ..stability.verdict import Verdict
+from ..stability.dimensions import LAW, STORAGE, other_law, require_two_laws
+from ..stability.place import condition_of
+from ..stability.verdict import FLUTTERS, STABLE, Verdict, oscillates
 from ..stability.walk import StabilityWalk
 from ..study import Study
-from .certificate import CURVE, Certificate
-from .mode import rows_of
-from .other_law import NOTE, note_of
+from .mode import CURVE, Certificate, law_note, rows_of
 from .result import COUNT, COUNTED, MODES, REFUSAL, STATE, ModesResult, tables_of
 from .run import ModesOptions, run_modes
+
+#: Factors asked, from that of the case outwards; below a twentieth a wall is as good as undamped.
+LOWER, HIGHER = np.geomspace(1.0, 0.05, 9), np.geomspace(1.0, 10.0, 7)
+#: Relative accuracy of the factor.
+ACCURACY = 1e-4
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -38,7 +42,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     done = {note.get("symmetry", EQUILIBRIA) for note in record.notes("certificate")}
     chosen = chosen_symmetries(case.modes.symmetry, case.part)
     missing = [symmetry for symmetry in chosen if symmetry.name not in done]
-    further = both and not record.notes(NOTE)
+    further = both and not record.notes(LAW)
     if not (missing or further):
         return
     state = session.equilibrium(record)
@@ -54,7 +58,7 @@ def run(session: Session, record: GrowingRecord) -> None:
         law = other_law(case)
         mu = Mu.of(session.model.case).at(storage=float(law == STORAGE))
         found = run_modes(session.model, state, mu, options=ModesOptions.of(case), observer=record)
-        record.note(NOTE, **note_of(found, law))
+        record.note(LAW, **law_note(found, law))
 
 
 def _require_one_class(case: Case) -> None:
@@ -114,6 +118,55 @@ def _critical_factor(session: Session, state: SteadyState, verdict: Verdict) -> 
         return critical_damping_factor(walk, place, verdict)
     except SolveError:
         return np.nan
+
+
+def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) -> float:
+    """Factor on the loss factors, or on beta, at which flutter begins, next to 1.
+
+    It lies below 1 where the state is stable and above where it flutters.
+
+    Parameters
+    ----------
+    walk : StabilityWalk
+    place : Mu
+    verdict : Verdict
+        On the place.
+
+    Returns
+    -------
+    float
+        NaN where the wall has no such damping, the verdict is another, or no factor in reach makes the difference.
+
+    Raises
+    ------
+    SolveError
+        If there is no steady state.
+    """
+    name = "loss_factor" if place.loss_factor > 0 else "beta"
+    own = place[name]
+    if own <= 0 or verdict.outcome not in (STABLE, FLUTTERS):
+        return np.nan
+    factors = LOWER if verdict.outcome == STABLE else HIGHER
+    factors = factors[own * factors <= PARAMETERS[name].high]
+    places = [place.at(**{name: own * factor}) for factor in factors]
+    column = walk.column(places, len(places), edges=True)
+
+    def growth(values) -> float:
+        values = np.asarray(values)
+        modes = values[oscillates(values)]
+        return float(modes.real.max()) if modes.size else np.nan
+
+    def at(factor: float) -> float:
+        return growth(column.eigenvalues(condition_of(place.at(**{name: own * factor}))))
+
+    rates = [growth(row) for row in column.leading]
+    for a, b, low, high in zip(factors[:-1], factors[1:], rates[:-1], rates[1:]):
+        if not (np.isfinite(low) and np.isfinite(high)):
+            return np.nan
+        if low * high <= 0:
+            found = brentq(at, min(a, b), max(a, b), rtol=ACCURACY) if column.eigenvalues else np.nan
+            return float(f"{found:.8g}")  # rounding of factorisations would part a resumed run from a whole one
+    return np.nan
 
 
 STUDY = Study("modes", tables_of, run, ModesResult)

@@ -9,9 +9,7 @@ import typer
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
 from ..case import Case
-from ..request import ClassesOption, DensityOption, LawOption, PressureOption, Request
-from ..stability.fixed import refuse_moved
-from ..stability.laws import law_changes
+from ..request import ClassesOption, DensityOption, LawOption, PressureOption, Request, law_changes, refuse_moved
 
 ORDER = 28
 

@@ -11,7 +11,7 @@ from ...case.parameters import PARAMETERS
 from ...drawing.style import ACCENT, COMPUTED, HALO, PUBLISHED, REST, limits, log_axis, new_figure, parameter_label
 from ..result import StudyResult
 from ..stability.place import describe_fixed
-from .intervals import Interval
+from .line import Interval
 
 _UNSTABLE = "#f6ddcf"
 

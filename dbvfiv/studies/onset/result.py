@@ -13,20 +13,17 @@ from matplotlib.figure import Figure
 from ...case.parameters import PARAMETERS
 from ...model.symmetry import equilibria_of
 from ..result import StudyResult
-from ..stability.classes import NOTE as CLASS_NOTE
-from ..stability.crossings import WATCHED
-from ..stability.laws import compare_ranges
+from ..stability.dimensions import compare_ranges, leading_class, read_classes, read_other_law
 from ..stability.place import describe_fixed, fixed_conditions
-from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict, lowered
-from . import classes, figures, other_law
-from .intervals import Interval, common_stretches, joined_stretches, known_intervals, uncertain_intervals
-from .point import FINE, OnsetSample
-from .rows import read_points, read_samples
+from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, lowered
+from . import figures
+from .line import Interval, StabilityLine, common_stretches, disagreements, joined_stretches, merge_points
+from .point import FINE, OnsetSample, read_points, read_samples
 
 CRITICALITY = {"super": "supercritical", "sub": "subcritical"}
 
 
-class OnsetResult(StudyResult):
+class OnsetResult(StudyResult, StabilityLine):
     """Onsets in ascending order of the parameter, and the scan that found them.
 
     Attributes
@@ -34,10 +31,6 @@ class OnsetResult(StudyResult):
     parameter : str
     points : tuple of dict
         One for each onset, see `dbvfiv.studies.onset.point.OnsetPoint.summary`; None where something is not known.
-    values, growth_rates, frequencies : (s,), (s, 4), (s, 4) arrays, SI, 1/s, Hz
-        The scan; NaN where there are fewer modes.
-    certified : (s,) bool array
-        An independent count agrees there.
 
     Examples
     --------
@@ -53,91 +46,67 @@ class OnsetResult(StudyResult):
 
     @cached_property
     def points(self) -> tuple[dict[str, Any], ...]:
-        return tuple(classes.merge_points(self._own_points, self._own_intervals(True), self.classes, self._own))
+        own = super().unstable_intervals
+        return tuple(merge_points(self._own_points, own, self.classes, self._own))
 
     @cached_property
     def _own_points(self) -> list[dict[str, Any]]:
         """Onsets within the symmetry of the model."""
         return read_points(self.record)
 
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Onsets within the symmetry of the model at which its state changes between stable and unstable."""
+        return tuple(point["value"] for point in self._own_points if point["edge"])
+
+    @cached_property
+    def samples(self) -> tuple[OnsetSample, ...]:
+        """Scan on the mesh of the case; values without a state belong to the run and not to its result."""
+        samples = read_samples(self.record)
+        found = {s.value: s for s in samples if s.mesh == FINE and not (s.failure and s.verdict.holds)}
+        return tuple(found[value] for value in sorted(found))
+
     @cached_property
     def classes(self) -> list[dict[str, Any]]:
-        """Onsets in the other classes of motion, where they were asked for; see `dbvfiv.studies.onset.classes`."""
-        notes = {note["symmetry"]: note for note in self.record.notes(CLASS_NOTE)}
-        return [{name: value for name, value in note.items() if name != "what"} for note in notes.values()]
+        """Onsets in the other symmetry classes, where they were asked for; see `FoundOnsets.note`."""
+        return read_classes(self.record)
+
+    @cached_property
+    def other_law(self) -> dict[str, Any] | None:
+        """Onsets under the other continuity law, where that was asked for; see `FoundOnsets.note`."""
+        return read_other_law(self.record)
 
     @cached_property
     def leading(self) -> dict[str, Any]:
         """Growth rate, frequency and class of the most unstable motion at the values that all classes were asked at."""
-        own = (self.values, self.growth_rates[:, 0], self.frequencies[:, 0], self.certified)
-        return classes.leading_of(*own, self.classes, self._own)
-
-    @cached_property
-    def _scan(self) -> list[OnsetSample]:
-        # the second mesh and values without a state belong to the run and not to its result
-        samples = read_samples(self.record)
-        found = {s.value: s for s in samples if s.mesh == FINE and not (s.failure and s.verdict.holds)}
-        return [found[value] for value in sorted(found)]
-
-    @cached_property
-    def values(self) -> np.ndarray:
-        return np.array([sample.value for sample in self._scan])
-
-    @cached_property
-    def _modes(self) -> np.ndarray:
-        table = np.full((len(self._scan), WATCHED), complex(np.nan, np.nan))
-        for row, sample in zip(table, self._scan):
-            row[: len(sample.eigenvalues)] = sample.eigenvalues
-        return table
-
-    @property
-    def growth_rates(self) -> np.ndarray:
-        return self._modes.real
-
-    @property
-    def frequencies(self) -> np.ndarray:
-        return self._modes.imag / (2 * np.pi)
-
-    @cached_property
-    def certified(self) -> np.ndarray:
-        return np.array([sample.certified for sample in self._scan], bool)
-
-    @property
-    def verdicts(self) -> tuple[Verdict, ...]:
-        """Verdicts on the values of the scan, in the symmetry class of the equilibria."""
-        return tuple(sample.verdict for sample in self._scan)
+        scans = {self._own: self.scan_summary()} | {part["symmetry"]: part["scan"] for part in self.classes}
+        values = sorted(set.intersection(*(set(scan["values"]) for scan in scans.values())))
+        rows = [[scan["values"].index(value) for value in values] for scan in scans.values()]
+        rates, frequencies, certified = (
+            np.array([[scan[name][i] for i in at] for scan, at in zip(scans.values(), rows)], kind)
+            for name, kind in (("growth_rate", float), ("frequency", float), ("certified", bool))
+        )
+        found = leading_class(list(scans), rates, frequencies)
+        found["symmetry"] = [name or self._own for name in found["symmetry"]]
+        return {"values": values} | found | {"certified": certified.all(axis=0).tolist()}
 
     @property
     def unstable_intervals(self) -> list[Interval]:
-        """Intervals of the scanned range in which the state is known to be unstable."""
-        parts = [self._own_intervals(True), *(part["unstable"] for part in self.classes)]
-        return joined_stretches(parts) if self.classes else parts[0]
+        """Intervals of the scanned range in which the state is known to be unstable in a symmetry class asked for."""
+        own = super().unstable_intervals
+        return joined_stretches([own, *(part["unstable"] for part in self.classes)]) if self.classes else own
 
     @property
     def stable_intervals(self) -> list[Interval]:
-        """Intervals of the scanned range in which the state is known to be stable.
-
-        It is stable there in all symmetry classes that were asked for.
-        """
-        parts = [self._own_intervals(False), *(part["stable"] for part in self.classes)]
-        return common_stretches(parts) if self.classes else parts[0]
+        """Intervals of the scanned range in which the state is known to be stable in all classes asked for."""
+        own = super().stable_intervals
+        return common_stretches([own, *(part["stable"] for part in self.classes)]) if self.classes else own
 
     @property
     def uncertain_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which neither stability nor instability is claimed."""
-        own = uncertain_intervals(self.values, self.certified)
-        parts = [own, *(part["uncertain"] for part in self.classes)]
-        return joined_stretches(parts) if self.classes else own
-
-    def _own_intervals(self, unstable: bool) -> list[Interval]:
-        edges = [point["value"] for point in self._own_points if point["edge"]]
-        return known_intervals(self.values, self.growth_rates[:, 0], self.certified, edges, unstable)
-
-    @cached_property
-    def other_law(self) -> dict[str, Any] | None:
-        """Onsets under the other continuity law, where that was asked for; see `dbvfiv.studies.onset.other_law`."""
-        notes = self.record.notes(other_law.NOTE)
-        return {name: value for name, value in notes[-1].items() if name != "what"} if notes else None
+        own = super().uncertain_intervals
+        return joined_stretches([own, *(part["uncertain"] for part in self.classes)]) if self.classes else own
 
     @property
     def disagreements(self) -> list[tuple[float, float, str]]:
@@ -145,7 +114,7 @@ class OnsetResult(StudyResult):
         if self.other_law is None:
             return []
         own = self.case.fluid.continuity
-        return other_law.disagreements(own, self._own_intervals(False), self._own_intervals(True), self.other_law)
+        return disagreements(own, super().stable_intervals, super().unstable_intervals, self.other_law)
 
     @property
     def comparison(self) -> str | None:
@@ -160,13 +129,7 @@ class OnsetResult(StudyResult):
         return {
             "parameter": self.parameter,
             "points": list(self.points),
-            "scan": {
-                "values": self.values.tolist(),
-                "growth_rate": self.growth_rates[:, 0].tolist(),
-                "frequency": self.frequencies[:, 0].tolist(),
-                "certified": self.certified.tolist(),
-                "verdict": [verdict.summary() for verdict in self.verdicts],
-            },
+            "scan": self.scan_summary(),
             "leading": self.leading,
             "classes": self.classes,
             "fixed": fixed_conditions(self.case, self.parameter),

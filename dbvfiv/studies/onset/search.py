@@ -1,9 +1,11 @@
-"""Scan, location and confirmation of onsets along one parameter of a case."""
+"""Search for the onsets at which a valve loses or regains stability along one parameter: scan, location, confirmation
+on both sides, and the uncertainty that the mesh leaves, from a second, coarser one.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,15 +13,17 @@ from eigen import Certificate
 
 from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
+from ...materials import outside_band
 from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...observer import Observer
 from ..case import Case
 from ..stability.crossings import WATCHED, Crossing, Sample, Scan, locate
-from ..stability.place import condition_of, is_surrounding
-from ..stability.verdict import Verdict
+from ..stability.place import check_scan, condition_of, is_surrounding
+from ..stability.verdict import Verdict, not_valid_at
 from ..stability.walk import StabilityWalk
+from .line import FoundOnsets
 from .normal_form import MISSING, described
-from .point import FINE, OnsetPoint, OnsetSample, Side
+from .point import COARSE, FINE, OnsetPoint, OnsetSample, Side
 
 #: Relative distance from an onset at which it is confirmed on both sides.
 ASIDE = 2e-3
@@ -332,3 +336,145 @@ def _confirmed(below: Side, above: Side, gains: bool, certified: bool, line: flo
             f"the eigenvalues {below.eigenvalue:.5g} and {above.eigenvalue:.5g} 1/s on both sides do not show it.",
         )
     return True, ""
+
+
+#: Order at which results of the four-node shell converge with the mesh size.
+ORDER = 2.0
+#: Ratio of mesh widths below which a second mesh says nothing.
+LEAST_RATIO = 1.15
+#: Relative accuracy of onsets on the second mesh.
+LOCATED = 1e-6
+#: Largest relative difference of frequencies of one onset on two meshes.
+ALIKE = 0.25
+
+
+def coarse_case(case: Case, share: float) -> tuple[Case, float]:
+    """The case on fewer elements, and the ratio of mesh widths."""
+    mesh = case.mesh
+    around, along = (max(6, int(round(share * n))) for n in (mesh.around, mesh.along))
+    return case.replace({"mesh.around": around, "mesh.along": along}), float(
+        np.sqrt(mesh.around * mesh.along / (around * along))
+    )
+
+
+def with_uncertainty(
+    case: Case, options: OnsetOptions, points: list[OnsetPoint], observer: Observer, warnings: list[str], known=()
+) -> list[OnsetPoint]:
+    """Onsets again on a coarser mesh, matched by frequency and direction; Richardson's rule with the order of the
+    element.
+
+    Parameters
+    ----------
+    observer : Observer
+        Told of the samples on that mesh, and again of each point.
+    known : iterable of OnsetSample and OnsetPoint
+        Of an interrupted run.
+    """
+    coarse, ratio = coarse_case(case, options.coarse_mesh)
+    if ratio < LEAST_RATIO:
+        warnings.append("The mesh is too coarse for a second one, so onsets carry no uncertainty.")
+        return points
+    size = f"{coarse.mesh.around} x {coarse.mesh.along}"
+    observer.progress(f"second mesh, {size}")
+    search = OnsetSearch(coarse, replace(options, normal_form=False), observer, known=known, mesh=COARSE)
+    found = []
+    for crossing in search.scan.run(options.values):
+        try:
+            value = locate(search.scan, crossing, LOCATED)
+            expected = complex(search.scan.within(value).eigenvalues[crossing.index])
+            eigenvalue = search.critical(search.place(value), expected).eigenvalue
+        except SolveError:
+            continue
+        found.append((value, abs(eigenvalue.imag) / (2 * np.pi), crossing.high.unstable > crossing.low.unstable))
+    done = []
+    for point in points:
+        alike = [
+            c for c in found if c[2] == point.gains and abs(c[1] - point.frequency) <= ALIKE * max(point.frequency, 1.0)
+        ]
+        if alike:
+            value = min(alike, key=lambda c: abs(c[0] - point.value))[0]
+            found = [c for c in found if c[0] != value]
+            point = replace(point, coarse_value=value, uncertainty=abs(point.value - value) / (ratio**ORDER - 1.0))
+        else:
+            sentence = f"The mesh of {size} has no onset like it, so its uncertainty is unknown."
+            point = replace(point, note=point.note if sentence in point.note else f"{point.note} {sentence}".strip())
+        observer.item(point)
+        done.append(point)
+    return done
+
+
+def run_onset(
+    case: Case,
+    options: OnsetOptions | None = None,
+    observer: Observer | None = None,
+    known: Iterable[OnsetSample | OnsetPoint] = (),
+    walk: StabilityWalk | None = None,
+) -> FoundOnsets:
+    """All onsets of a case along one parameter.
+
+    Parameters
+    ----------
+    case : Case
+    options : OnsetOptions, optional
+        Those of the case by default.
+    observer : Observer, optional
+        `item` is told of every `OnsetSample` and `OnsetPoint` as it is found, and of a point again when more is known
+        about it.
+    known : iterable of OnsetSample and OnsetPoint
+        What an interrupted run had found, in its order; it is not solved again.
+    walk : StabilityWalk, optional
+        Of a case that differs in load, surroundings and `onset` alone, for steady states it knows.
+
+    Raises
+    ------
+    CaseError
+        If the case has nothing that the parameter could change.
+    SolveError
+        If the case has no flow, or no state of the scan was found.
+    """
+    options = options or OnsetOptions.of(case)
+    check_scan(case, options.parameter)
+    observer = observer or Observer()
+    known = list(known)
+    observer.begin("onset", None)
+    failures: list[str] = []
+    warnings: list[str] = []
+    search = OnsetSearch(case, options, observer, walk, known=known)
+    points: list[OnsetPoint] = []
+    interrupted = False
+    try:
+        crossings = search.scan.run(options.values)
+        unsound = {s.value: s.failure for s in search.asked if not s.verdict.holds}
+        failures += [why for value, why in search.scan.failures.items() if value not in unsound]
+        if unsound:
+            warnings.append(not_valid_at(options.parameter, unsound))
+        if not (search.scan.samples or unsound):
+            raise SolveError(
+                f"No state of the scan over {options.parameter} was found: "
+                f"{failures[0] if failures else 'the range is empty.'}"
+            )
+        for crossing in crossings:
+            observer.progress(f"onset between {crossing.low.value:.6g} and {crossing.high.value:.6g}")
+            try:
+                search.point(crossing)
+            except SolveError as error:
+                failures.append(str(error))
+        warnings += search.uncertainties()
+        points = list(search.points.values())
+        if points and options.coarse_mesh > 0:
+            points = with_uncertainty(case, options, points, observer, warnings, known)
+    except KeyboardInterrupt:
+        interrupted = True
+        points = points or list(search.points.values())
+    for p in points:
+        if not p.confirmed:
+            warnings.append(f"The onset at {options.parameter} = {p.value:.6g} is not confirmed: {p.note}")
+    outside = outside_band(case, [p.frequency for p in points])
+    warnings += [] if outside is None else [outside]
+    for sentence in warnings:
+        observer.warn(sentence)
+    observer.end(interrupted)
+    points = sorted(points, key=lambda p: p.value)
+    return FoundOnsets(
+        case, options.symmetry, tuple(search.asked), tuple(points), tuple(failures), tuple(warnings), interrupted
+    )

@@ -5,21 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ...errors import CaseError
+from ...model.symmetry import Symmetry
 from ...observer import Observers
 from ...record.record import GrowingRecord
 from ..case import Case
 from ..session import Session
-from ..stability.classes import NOTE as CLASS
-from ..stability.classes import classes_to_look_at
-from ..stability.laws import other_law, require_two_laws
+from ..stability.dimensions import LAW, add_classes, other_law, require_two_laws
 from ..stability.walk import StabilityWalk
 from ..study import Study
-from .classes import note_of_class
-from .other_law import NOTE, note_of
+from .line import FoundOnsets
+from .point import KeepItems, known_items, tables_of
 from .result import OnsetResult
-from .rows import KeepItems, known_items, tables_of
-from .run import run_onset
-from .search import OnsetOptions
+from .search import OnsetOptions, run_onset
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -40,30 +37,20 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.fail(sentence)
     if found.interrupted:
         raise KeyboardInterrupt
-    _look_at_classes(session, record, walk)
-    if both and not record.notes(NOTE):
+
+    def find(symmetry: Symmetry) -> FoundOnsets:
+        # cycles that leave the symmetry have normal forms of their own, which are not looked for
+        options = replace(OnsetOptions.of(session.case), normal_form=False, symmetry=symmetry.name)
+        return run_onset(session.case, options, walk=walk.in_class(symmetry))
+
+    add_classes(record, session.case.onset.symmetry, session.case.part, find)
+    if both and not record.notes(LAW):
         record.progress("the other continuity law")
         other = session.replace({"fluid.continuity": other_law(session.case)})
         found = run_onset(other.case, walk=StabilityWalk(other.case, record, other.model))
         if found.interrupted:
             raise KeyboardInterrupt
-        record.note(NOTE, **note_of(found))
-
-
-def _look_at_classes(session: Session, record: GrowingRecord, walk: StabilityWalk) -> None:
-    """Onsets in the other classes of motion, where they are asked for. Cycles that leave the symmetry have normal forms
-    of their own, which are not looked for.
-    """
-    for symmetry in classes_to_look_at(record, session.case.onset.symmetry, session.case.part):
-        options = replace(OnsetOptions.of(session.case), normal_form=False, symmetry=symmetry.name)
-        found = run_onset(session.case, options, walk=walk.in_class(symmetry))
-        for sentence in found.failures:
-            record.fail(f"In class {symmetry.name}: {sentence}")
-        for sentence in found.warnings:
-            record.warn(f"In class {symmetry.name}: {sentence}")
-        if found.interrupted:
-            raise KeyboardInterrupt
-        record.note(CLASS, **note_of_class(found))
+        record.note(LAW, continuity=other.case.fluid.continuity, **found.note())
 
 
 def _require_two_laws(case: Case) -> None:

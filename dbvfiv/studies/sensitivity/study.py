@@ -14,8 +14,7 @@ from ...model.state import SteadyState
 from ...record.record import GrowingRecord
 from ...record.states import read_states, state_row
 from ..session import Session
-from ..solving import solving
-from ..stability.family import ValveFamily
+from ..stability.family import ValveFamily, solving
 from ..stability.place import condition_of
 from ..study import Study
 from .derivatives import differentiate, parameters_of

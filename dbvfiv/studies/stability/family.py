@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from eigen import Condition, CoupledPencil, PencilFamily, Relaxation, SearchOptions, Workspace, lowest_frequencies
+from eigen import (
+    Condition,
+    CoupledPencil,
+    PencilFamily,
+    Relaxation,
+    SearchOptions,
+    SingularShiftError,
+    Workspace,
+    lowest_frequencies,
+)
 from eigen.operator import Reach, edge_of
 
 from ...case.parameters import OUTSIDE, PIPES, Mu
+from ...errors import SolveError
 from ...model.dynamics import LinearisedState
 from ...model.leading import LeadingSearch, select_search
 
@@ -133,3 +143,18 @@ def condition_point(condition: Condition) -> Mu:
     """Parameter point of a condition."""
     density, alpha, beta, law, loss_factor = condition
     return Mu(law, density=density, alpha=alpha, beta=beta, loss_factor=loss_factor)
+
+
+class solving:
+    """Turns what an eigenvalue search refuses into a sentence that names the pressure."""
+
+    def __init__(self, pressure: float):
+        self.pressure = pressure
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind, error, _trace) -> None:
+        if isinstance(error, (SingularShiftError, np.linalg.LinAlgError)):
+            said = str(error).rstrip(".")
+            raise SolveError(f"The modes at {self.pressure:.6g} Pa were not found: {said}.") from error

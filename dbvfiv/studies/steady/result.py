@@ -23,7 +23,7 @@ from ...record.states import shown_summary, state_table
 from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
 from ...record.vtkhdf import Step, layer_field_names, motion
 from ..case import Case
-from ..load_path import WAY_ON, way_on_shapes
+from ..load_path import PATH_RESTART, restart_shapes
 from ..measured.curves import MeasuredCurve, MeasuredParts, MeasuredTaps, lacking, state_at
 from ..measured.figures import draw_shapes
 from ..measured.kept import joined, kept_tables
@@ -241,7 +241,7 @@ STATES = "states"
 
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     """Tables of a steady result on a mesh."""
-    return (state_table(STATES, mesh, WAY_ON, way_on_shapes(mesh)),)
+    return (state_table(STATES, mesh, PATH_RESTART, restart_shapes(mesh)),)
 
 
 class SteadyResult(StudyResult):

@@ -15,7 +15,7 @@ from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_w
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
 from ...record.states import read_states, shown_summary, state_row
-from ..load_path import go_on, way_on
+from ..load_path import restart_row, restore_path
 from ..measured.kept import keep_measured
 from ..session import Session
 from ..study import Study, print_rows
@@ -32,7 +32,7 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
     states = read_states(record, STATES)
     known = {state.pressure for state in states}
     if states:
-        go_on(path, record, STATES, len(states) - 1, states[-1])
+        restore_path(path, record, STATES, len(states) - 1, states[-1])
     keep_measured(record, "steady.measured", case.steady.measured, KINDS, case.fluid.density)
     record.begin("steady", len(pressures))
     for sentence in model_warnings(model):
@@ -46,7 +46,7 @@ def run_steady(session: Session, record: GrowingRecord) -> None:
             except SolveError as error:
                 record.fail(str(error))
                 continue
-            record.append(STATES, state_row(model, state) | way_on(path))
+            record.append(STATES, state_row(model, state) | restart_row(path))
             states.append(state)
             record.item(state)
     finally:

@@ -20,7 +20,7 @@ from ...model.leading import growth_floor
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, chosen_symmetries, symmetry_named
 from ...observer import Observer
-from ..solving import solving
+from ..stability.family import solving
 from ..stability.verdict import Verdict, not_valid_at
 from ..stability.walk import StabilityWalk
 from .spectra import Check, SpectraAlong

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.studies.map.column import MapColumn, MapPlan
-from dbvfiv.studies.map.curves import linked
+from dbvfiv.studies.map.curves import Web, linked
 from dbvfiv.studies.map.run import run_map
-from dbvfiv.studies.map.web import Web
 from dbvfiv.studies.stability.walk import StabilityWalk
 
 

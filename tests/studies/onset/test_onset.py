@@ -9,8 +9,7 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.run import run_map
-from dbvfiv.studies.onset.run import run_onset
-from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
+from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch, run_onset
 from dbvfiv.studies.stability.place import condition_of
 from tests.small_valves import FORMER
 

@@ -1,0 +1,257 @@
+"""Samples and onsets along a parameter line, and the stretches between them that are known to be stable or unstable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...model.symmetry import EQUILIBRIA
+from ..case import Case
+from ..stability.crossings import WATCHED
+from ..stability.verdict import Verdict
+from .point import OnsetPoint, OnsetSample
+
+Interval = tuple[float, float]
+
+#: Relative distance from an onset within which values of a scan say nothing of the state.
+BESIDE = 1e-7
+#: Stretches narrower than this part of their place are what is left of the search for an onset.
+_SLIVER = 1e-6
+
+
+class StabilityLine:
+    """Numbers of a scan, which whoever derives gives as `samples` and `edges`.
+
+    Attributes
+    ----------
+    samples : tuple of OnsetSample
+        In ascending order of the parameter, those of narrow tongues included.
+    edges : tuple of float
+        Onsets at which the state changes between stable and unstable.
+    """
+
+    samples: tuple[OnsetSample, ...]
+    edges: tuple[float, ...]
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        """(s,) values of the parameter, SI."""
+        return np.array([sample.value for sample in self.samples])
+
+    @cached_property
+    def _modes(self) -> np.ndarray:
+        table = np.full((len(self.samples), WATCHED), complex(np.nan, np.nan))
+        for row, sample in zip(table, self.samples):
+            row[: len(sample.eigenvalues)] = sample.eigenvalues
+        return table
+
+    @property
+    def growth_rates(self) -> np.ndarray:
+        """(s, 4) growth rates of the leading modes, 1/s; NaN where there are fewer."""
+        return self._modes.real
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """(s, 4) frequencies of the leading modes, Hz."""
+        return self._modes.imag / (2 * np.pi)
+
+    @cached_property
+    def certified(self) -> np.ndarray:
+        """(s,) bool, whether an independent count of the unstable modes agrees; nothing is claimed beside others."""
+        return np.array([sample.certified for sample in self.samples], bool)
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Verdicts on the values of the scan, in one symmetry class."""
+        return tuple(sample.verdict for sample in self.samples)
+
+    @property
+    def unstable_intervals(self) -> list[Interval]:
+        """Intervals of the scanned range in which the state is known to be unstable."""
+        return known_intervals(self.values, self.growth_rates[:, 0], self.certified, self.edges, True)
+
+    @property
+    def stable_intervals(self) -> list[Interval]:
+        """Intervals of the scanned range in which the state is known to be stable."""
+        return known_intervals(self.values, self.growth_rates[:, 0], self.certified, self.edges, False)
+
+    @property
+    def uncertain_intervals(self) -> list[Interval]:
+        """Intervals of the scanned range in which neither stability nor instability is claimed."""
+        return uncertain_intervals(self.values, self.certified)
+
+    def scan_summary(self) -> dict[str, Any]:
+        """Plain numbers of the scan for JSON."""
+        return {
+            "values": self.values.tolist(),
+            "growth_rate": self.growth_rates[:, 0].tolist(),
+            "frequency": self.frequencies[:, 0].tolist(),
+            "certified": self.certified.tolist(),
+            "verdict": [verdict.summary() for verdict in self.verdicts],
+        }
+
+
+@dataclass(frozen=True)
+class FoundOnsets(StabilityLine):
+    """Onsets along one parameter, and the scan that found them.
+
+    Attributes
+    ----------
+    case : Case
+    symmetry : str
+        Class of the motions.
+    samples : tuple of OnsetSample
+    points : tuple of OnsetPoint
+        In ascending order of the parameter.
+    failures, warnings : tuples of str
+    interrupted : bool
+    """
+
+    case: Case
+    symmetry: str
+    samples: tuple[OnsetSample, ...]
+    points: tuple[OnsetPoint, ...]
+    failures: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    interrupted: bool = False
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        return tuple(point.value for point in self.points if point.edge)
+
+    def note(self) -> dict[str, Any]:
+        """Note that a record keeps of another symmetry class or of the other continuity law."""
+        own = self.symmetry == EQUILIBRIA
+        named = {} if own else {"symmetry": self.symmetry}
+        further = {} if own else {"uncertain": [list(stretch) for stretch in self.uncertain_intervals]}
+        return {
+            "points": [point.summary() | named for point in self.points],
+            "scan": self.scan_summary(),
+            "stable": [list(stretch) for stretch in self.stable_intervals],
+            "unstable": [list(stretch) for stretch in self.unstable_intervals],
+            "failures": list(self.failures),
+            "warnings": list(self.warnings),
+        } | further
+
+
+def known_intervals(
+    values: np.ndarray, growth: np.ndarray, certified: np.ndarray, edges: Iterable[float], unstable: bool
+) -> list[Interval]:
+    """Intervals in which a state is known to be unstable, or stable.
+
+    Parameters
+    ----------
+    values : (s,) array
+        Values of the scan, ascending.
+    growth : (s,) array, 1/s
+        Growth rate of the leading mode there.
+    certified : (s,) bool array
+        Nothing is claimed beside a value without a certificate.
+    edges : iterable of float
+        Onsets at which the state changes between stable and unstable.
+    unstable : bool
+        True for the unstable intervals, False for the stable ones.
+    """
+    edges, found = sorted(edges), []
+    # right at an onset the sign of the growth rate is that of rounding
+    away = [all(abs(v - e) > BESIDE * abs(e) for e in edges) or v in (values[0], values[-1]) for v in values]
+    values, growth, certified = (np.asarray(part)[np.array(away, bool)] for part in (values, growth, certified))
+    for i in range(len(values) - 1):
+        if not (certified[i] and certified[i + 1]):
+            continue
+        marks = [values[i], *(e for e in edges if values[i] < e < values[i + 1]), values[i + 1]]
+        state = bool(growth[i] > 0)
+        for a, b in zip(marks[:-1], marks[1:]):
+            if state == unstable:
+                _append(found, float(a), float(b))
+            state = not state
+    return found
+
+
+def uncertain_intervals(values: np.ndarray, certified: np.ndarray) -> list[Interval]:
+    """Intervals in which nothing is claimed, because a neighbour in the scan lacks a certificate."""
+    found: list[Interval] = []
+    for i in range(len(values) - 1):
+        if not (certified[i] and certified[i + 1]):
+            _append(found, float(values[i]), float(values[i + 1]))
+    return found
+
+
+def common_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
+    """Stretches that lie in all of some lists."""
+    found = list(map(tuple, parts[0]))
+    for part in parts[1:]:
+        pairs = ((max(a, c), min(b, d)) for a, b in found for c, d in part)
+        found = [(low, high) for low, high in pairs if low < high]
+    return sorted(found)
+
+
+def joined_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
+    """Stretches that lie in any of some lists, those that touch joined."""
+    found: list[Interval] = []
+    for low, high in sorted(tuple(stretch) for part in parts for stretch in part):
+        if found and low <= found[-1][1]:
+            found[-1] = (found[-1][0], max(found[-1][1], high))
+        else:
+            found.append((low, high))
+    return found
+
+
+def _append(found: list[Interval], low: float, high: float) -> None:
+    """Add an interval, joined with the last one if they touch."""
+    if found and found[-1][1] == low:
+        found[-1] = (found[-1][0], high)
+    else:
+        found.append((low, high))
+
+
+def disagreements(
+    own: str, stable: Sequence[Interval], unstable: Sequence[Interval], other: dict[str, Any]
+) -> list[tuple[float, float, str]]:
+    """Stretches (start, stop, law that is stable) in which one law is stable and the other is not.
+
+    Parameters
+    ----------
+    own : str
+        The case's law, with its `stable` and `unstable` stretches.
+    other : dict
+        Note on the other law, see `FoundOnsets.note`.
+    """
+    found = [(*part, own) for part in common_stretches([stable, other["unstable"]])]
+    found += [(*part, other["continuity"]) for part in common_stretches([unstable, other["stable"]])]
+    found = [part for part in found if part[1] - part[0] > _SLIVER * abs(part[1])]
+    joined: list[tuple[float, float, str]] = []
+    for low, high, law in sorted(found):
+        if joined and joined[-1][2] == law and low - joined[-1][1] <= _SLIVER * abs(low):
+            joined[-1] = (joined[-1][0], high, law)
+        else:
+            joined.append((low, high, law))
+    return joined
+
+
+def merge_points(
+    own: Iterable[dict[str, Any]], unstable: Sequence[Interval], classes, name: str = EQUILIBRIA
+) -> list[dict[str, Any]]:
+    """Points of all classes in ascending order. Where another class is unstable a crossing is no edge of stability.
+
+    Parameters
+    ----------
+    own : iterable of dict
+        Points of the class of the equilibria, with the stretches `unstable` in which that is unstable.
+    classes : sequence of dict
+        Notes on the others, see `FoundOnsets.note`.
+    name : str
+        Of the class of the equilibria.
+    """
+    parts = {name: (list(own), unstable)} | {c["symmetry"]: (c["points"], c["unstable"]) for c in classes}
+    merged = []
+    for name, (points, _) in parts.items():
+        elsewhere = [stretch for other, (_, found) in parts.items() if other != name for stretch in found]
+        for point in points:
+            covered = any(low <= point["value"] <= high for low, high in elsewhere)
+            merged.append(point | {"symmetry": name, "edge": point["edge"] and not covered})
+    return sorted(merged, key=lambda point: point["value"])
