@@ -99,11 +99,10 @@ class _ShiftAndInvert:
 
     def _left(self, z):
         """y = E^T (F - sigma E)^-T z; the left vector of T is part of (F - sigma E)^-T z."""
-        p, s, n = self.shifted.pencil, self.shifted.shift, self.n
-        z1, z2, z3 = z[:n], z[n : 2 * n] / self.scale, z[2 * n :]
-        w, W = self.shifted.solve_transposed(-(z1 + s * z2), -z3)
+        p = self.shifted.pencil
+        w, W = self.left_vector(z)
         # a is the multiplier of dq/dt = v, from the second block column
-        a = z2 + _apply(self._CT, w)
+        a = z[self.n : 2 * self.n] / self.scale + _apply(self._CT, w)
         e2 = real_apply(self._MT, w)
         e3 = p.S1.T @ W
         if p.m:
@@ -115,10 +114,8 @@ class _ShiftAndInvert:
 
     def left_vector(self, z):
         """Left vector of the polynomial from an eigenvector of the transposed operator."""
-        w, W = self.shifted.solve_transposed(
-            -(z[: self.n] + self.shifted.shift * z[self.n : 2 * self.n] / self.scale), -z[2 * self.n :]
-        )
-        return w, W
+        n = self.n
+        return self.shifted.solve_transposed(-(z[:n] + self.shifted.shift * z[n : 2 * n] / self.scale), -z[2 * n :])
 
 
 #: Restarts at most, and those after which a search ends that neither brought a further pair nor halved the error of the

@@ -109,6 +109,8 @@ FEW = 2
 
 #: Rates of a fluid that rounding leaves, relative to the largest; share by which a zero that is met is moved.
 ROUNDING, MET = 1e-13, 1e-10
+#: Relative error of a fluid condensed by its motions beyond which every place is solved for.
+ALIKE = 1e-7
 
 FLUID_PARTS = ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")
 
@@ -386,12 +388,8 @@ class FluidMotions:
     """Inner unknowns of a fluid condensed by the motions that it has between walls at rest.
 
     With S(sigma)^-1 S1 = X diag(k) X^-1 at some real sigma, S(s)^-1 = X diag(1 / d) X^-1 S(sigma)^-1 where
-    d = 1 + (s - sigma) k: a place costs products alone, however many unknowns a long line brings.
-
-    Parameters
-    ----------
-    parts : mapping
-        A0 to S1 of a `CoupledPencil`.
+    d = 1 + (s - sigma) k: a place costs products alone, however many unknowns a long line brings. Made of the parts A0
+    to S1 of a `CoupledPencil`.
 
     Attributes
     ----------
@@ -401,7 +399,7 @@ class FluidMotions:
 
     def __init__(self, parts: Mapping[str, np.ndarray]):
         S0, S1 = parts["S0"], parts["S1"]
-        self._A = [parts["A0"], parts["A1"], parts["A2"]]
+        self._parts = parts
         size = np.abs(S0).max(initial=0.0), np.abs(S1).max(initial=0.0)
         shift = size[0] / size[1] if min(size) > 0 else 1.0
         # of one unknown either of them may be the zero itself
@@ -417,9 +415,22 @@ class FluidMotions:
         # unknowns without a rate of their own leave rounding
         self._rates[np.abs(self._rates) <= ROUNDING * np.abs(self._rates).max(initial=0.0)] = 0.0
         self._B = [parts[name] @ X for name in ("B0", "B1")]
-        rows = np.split(np.linalg.solve(X, rows), 3, axis=1)
+        try:
+            rows = np.split(np.linalg.solve(X, rows), 3, axis=1)
+        except np.linalg.LinAlgError:
+            rows = [parts[f"R{power}"] for power in range(3)]  # no basis: the probe below shows it
         self._R = {power: rows[power] for power in range(3) if parts[f"R{power}"].any()}
         self.zeros = self._shift - 1.0 / self._rates[self._rates != 0]
+        probe = np.array([1j * self._shift])
+        exact, other = self._by_solves(probe)[0], self.condensed(probe)[0]
+        if not np.abs(exact - other).max(initial=0.0) <= ALIKE * np.abs(exact).max(initial=0.0):
+            self.condensed = self._by_solves  # motions that are hardly independent of each other
+
+    def _by_solves(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As `condensed`, with a factorisation at every place."""
+        A, B, R, S = fluid_values(self._parts, np.asarray(s, complex)[:, None, None])
+        sign, log = np.linalg.slogdet(S)
+        return A - B @ np.linalg.solve(S, R), log + 1j * np.angle(sign)
 
     def stable(self, line: float = 0.0) -> np.ndarray:
         """Zeros of a stable polynomial that turns as det S(s) does, relative to a line; none of one unknown.
@@ -441,7 +452,7 @@ class FluidMotions:
         below = np.where(np.abs(below) > MET * np.abs(away), below, MET * np.abs(away))
         s = s[..., None]
         left = (self._B[0] + s * self._B[1]) / below[:, None, :]
-        coupling = self._A[0] + s * (self._A[1] + s * self._A[2])
+        coupling = fluid_values(self._parts, s)[0].astype(complex)
         for power, part in self._R.items():
             coupling -= s**power * (left @ part)
         return coupling, self._log + np.log(below).sum(axis=1)
@@ -587,14 +598,3 @@ class Reach(NamedTuple):
         if not kept.size and upper.size:
             kept = upper[[int(np.argmax(upper.real))]]
         return kept[np.argsort(-kept.real)]
-
-
-def bordered(parts: Mapping[str, np.ndarray]) -> np.ndarray:
-    """[-A, -B; R, S] of the parts of a coupling, for each power of the scaled eigenvalue, (3, k + b, k + b)."""
-    k, b = len(parts["A0"]), len(parts["S0"])
-    out = np.zeros((3, k + b, k + b))
-    for power in range(3):
-        out[power, :k, :k], out[power, k:, :k] = -parts[f"A{power}"], parts[f"R{power}"]
-        if power < 2:
-            out[power, :k, k:], out[power, k:, k:] = -parts[f"B{power}"], parts[f"S{power}"]
-    return out

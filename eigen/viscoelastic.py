@@ -9,6 +9,7 @@ sign of the determinant. Cells in which two starts met are solved by the exact l
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy as np
 import scipy.linalg as la
 
 from .count import middle
-from .operator import OVERDAMPED, Condition, bordered
+from .operator import OVERDAMPED, Condition
 from .reduced_counts import relative
 
 #: Pairs of a cell and a place evaluated at once, so that they stay in the processor's cache.
@@ -298,6 +299,17 @@ def real_roots(problem: RationalCells, low: np.ndarray, top: float) -> tuple[np.
         same = problem.signs(rows, place) == sign
         a, b = np.where(same, place, a), np.where(same, b, place)
     return rows, 0.5 * (a + b)
+
+
+def bordered(parts: Mapping[str, np.ndarray]) -> np.ndarray:
+    """[-A, -B; R, S] of the parts of a coupling, for each power of the scaled eigenvalue, (3, k + b, k + b)."""
+    k, b = len(parts["A0"]), len(parts["S0"])
+    out = np.zeros((3, k + b, k + b))
+    for power in range(3):
+        out[power, :k, :k], out[power, k:, :k] = -parts[f"A{power}"], parts[f"R{power}"]
+        if power < 2:
+            out[power, :k, k:], out[power, k:, k:] = -parts[f"B{power}"], parts[f"S{power}"]
+    return out
 
 
 #: Eigenvalues of a cell that are taken from the surrogate to the rational pencil.
