@@ -399,7 +399,7 @@ class FluidMotions:
 
     def __init__(self, parts: Mapping[str, np.ndarray]):
         S0, S1 = parts["S0"], parts["S1"]
-        self._parts = parts
+        self._parts, self._A = parts, [parts[f"A{power}"] for power in range(3)]
         size = np.abs(S0).max(initial=0.0), np.abs(S1).max(initial=0.0)
         shift = size[0] / size[1] if min(size) > 0 else 1.0
         # of one unknown either of them may be the zero itself
@@ -452,7 +452,7 @@ class FluidMotions:
         below = np.where(np.abs(below) > MET * np.abs(away), below, MET * np.abs(away))
         s = s[..., None]
         left = (self._B[0] + s * self._B[1]) / below[:, None, :]
-        coupling = fluid_values(self._parts, s)[0].astype(complex)
+        coupling = self._A[0] + s * (self._A[1] + s * self._A[2])
         for power, part in self._R.items():
             coupling -= s**power * (left @ part)
         return coupling, self._log + np.log(below).sum(axis=1)
