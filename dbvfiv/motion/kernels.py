@@ -53,7 +53,7 @@ def _rubber_energy(constants, e):
             total += constants[5] * x / (1 + np.sqrt(1 + x / constants[6]))
     if constants.shape[0] > OGDEN_FROM:
         out = np.empty(6)
-        ogden_terms(constants, e, out)
+        ogden_terms(constants, e, True, out)
         total += out[0]
     return total
 

@@ -79,10 +79,10 @@ def i1_slopes(constants, e):
     return first, second
 
 
-@numba.njit(cache=True)
-def ogden_terms(constants, e, out):
-    """Fill out (6,): energy of Ogden's terms and its derivatives by I1, I2, I1 I1, I1 I2, I2 I2; see
-    `dbvfiv.materials.ogden`.
+@numba.njit(fastmath=FAST)
+def ogden_terms(constants, e, energy, out):
+    """Fill out (6,): energy of Ogden's terms, where it is asked for, and its derivatives by I1, I2, I1 I1, I1 I2,
+    I2 I2; see `dbvfiv.materials.ogden`.
     """
     out[:] = 0.0
     largest = 0.0
@@ -106,21 +106,27 @@ def ogden_terms(constants, e, out):
     along = half * np.cosh(s)
     across = half * np.sinh(s)
     for k in range(_COS.shape[0]):
-        w = complex(0.5 * (upper + lower) + along * _COS[k], across * _SIN[k])
+        real = 0.5 * (upper + lower) + along * _COS[k]
+        turn = across * _SIN[k]
         weight = complex(across * _COS[k], along * _SIN[k])
-        z = np.exp(w)
+        z = np.exp(real) * complex(np.cos(turn), np.sin(turn))
         y = z - 1
-        inv = 1 / (y * y * y + z * (gap - i1 * y))
+        characteristic = y * y * y + z * (gap - i1 * y)
+        size = characteristic.real * characteristic.real + characteristic.imag * characteristic.imag
+        inv = z * complex(characteristic.real / size, -characteristic.imag / size)
         value = 0j
         slope = 0j
         for p in range(OGDEN_FROM, constants.shape[0], 2):
+            half_power = 0.5 * constants[p + 1]
             if constants[p] != 0.0:
-                power = constants[p] * np.exp(0.5 * constants[p + 1] * w)
+                swing = half_power * turn
+                power = constants[p] * np.exp(half_power * real) * complex(np.cos(swing), np.sin(swing))
                 value += power / constants[p + 1]
                 slope += 0.5 * power
-        first = weight * slope * z * inv
-        second = first * z * inv
-        out[0] += (weight * value * z * inv * ((i1 * y + 2 * (i1 - gap)) * y - 3 * gap) / y).real
+        first = weight * slope * inv
+        second = first * inv
+        if energy:
+            out[0] += (weight * value * inv * ((i1 * y + 2 * (i1 - gap)) * y - 3 * gap) / y).real
         out[1] += (first * z).real
         out[2] -= first.real
         out[3] += (second * z * z).real
@@ -148,7 +154,7 @@ def rubber_stress(constants, e, s):
         s[4] += w * h4
     if constants.shape[0] > OGDEN_FROM:
         w = np.empty(6)
-        ogden_terms(constants, e, w)
+        ogden_terms(constants, e, False, w)
         s[0] += 2 * (w[1] * (1 + h0) + w[2] * (b + h + sum_ab * h0))
         s[1] += 2 * (w[1] * (1 + h1) + w[2] * (a + h + sum_ab * h1))
         s[2] += w[1] * h2 + w[2] * (sum_ab * h2 - 2 * c)
@@ -231,7 +237,7 @@ def rubber_tangent(constants, e, s, t):
         t[4, 4] += w * h44 + v * h4 * h4
     if constants.shape[0] > OGDEN_FROM:
         o = np.empty(6)
-        ogden_terms(constants, e, o)
+        ogden_terms(constants, e, False, o)
         p = (2 * p0, 2 * p1, h2, h3, h4)
         q = (2 * q0, 2 * q1, q2, q3, q4)
         for i in range(5):
