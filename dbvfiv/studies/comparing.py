@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -44,6 +45,28 @@ def plain(values: np.ndarray) -> list[float | None]:
 def cell(value: float, width: int, form: str) -> str:
     """A number of a table for people; a dash where a run has nothing."""
     return (f"{value:{form}}" if np.isfinite(value) else "-").rjust(width)
+
+
+def tabulate_deviations(runs: Sequence[Iterable[Any]]) -> list[str]:
+    """Tables of the deviations of runs from the same measured data, one for each kind of data (a title and a number for
+    each point, `off`): a row for each point that runs have, a column for each run; nothing
+    if no run has any.
+    """
+    kinds: dict[str, list[dict[str, float]]] = {}
+    for number, parts in enumerate(runs):
+        for part in parts:
+            title, values = part.off
+            kinds.setdefault(title, [{} for _ in runs])[number] = values
+    lines = []
+    for title, columns in kinds.items():
+        names = list(dict.fromkeys(name for column in columns for name in column))
+        width = max(len(name) for name in names) + 2
+        lines += ["", title, " " * width + "".join(f"{number:>10}" for number in range(1, len(runs) + 1))]
+        lines += [
+            f"{name:<{width}}" + "".join(cell(column.get(name, np.nan), 10, ".4g") for column in columns)
+            for name in names
+        ]
+    return lines
 
 
 def save_figure(draw: Callable[[], Figure], path: Path) -> Path:

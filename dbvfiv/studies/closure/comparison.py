@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from ...drawing.style import REST, new_figure
 from ...errors import CaseError
 from .. import comparing
-from ..measured import table
 from ..measured.figures import MEASURED, draw_section_of_runs, some_sections
 from .result import ClosureResult
 
@@ -115,7 +114,7 @@ def compare(results: Sequence[ClosureResult]) -> Comparison:
         values,
         [result.critical_pressure for result in results],
         [None if result.safety is None else result.safety.factor for result in results],
-        table.told([result.measured for result in results]),
+        comparing.tabulate_deviations([result.measured for result in results]),
     )
 
 

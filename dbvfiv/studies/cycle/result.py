@@ -24,7 +24,7 @@ from ...record.record import Record
 from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
 from ...record.vtkhdf import Step, motion
 from ...shell.recovery import layer_fields
-from ..orbits.orbit import Orbit
+from ..orbits import Orbit
 from ..result import StudyResult
 from ..stability.place import describe_fixed, fixed_conditions, rebuilder
 from ..stability.verdict import Verdict

@@ -19,10 +19,9 @@ from ...motion.state import consistent_state
 from ...motion.stepper import StepFailure, Stepper
 from ...observer import Observer
 from ..case import Case
-from ..orbits.onset import Onset, onset_at
+from ..orbits import Onset, onset_at
 from ..session import load_result
-from ..stability.correction import OnsetCorrection
-from ..stability.crossings import Crossing, Scan, locate
+from ..stability.crossings import Crossing, OnsetCorrection, Scan, locate
 from ..stability.place import condition_of, is_surrounding
 from ..stability.walk import StabilityWalk
 

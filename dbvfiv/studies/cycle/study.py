@@ -14,8 +14,7 @@ from ...errors import CaseError, SolveError
 from ...motion.periodic import check_periodic
 from ...record.record import GrowingRecord
 from ..case import Case
-from ..orbits.follower import Follower
-from ..orbits.onset import MODES
+from ..orbits import MODES, Follower
 from ..session import Session
 from ..stability.place import check_scan
 from ..stability.verdict import Verdict

@@ -17,8 +17,7 @@ from ...case.axis import Axis
 from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
 from ..case import Case
-from ..stability.correction import OnsetCorrection
-from ..stability.crossings import Sample, Scan, locate
+from ..stability.crossings import OnsetCorrection, Sample, Scan, locate
 from ..stability.place import condition_of, is_surrounding, point_under
 from ..stability.verdict import NOT_VALID, OUTCOMES, UNDECIDED, Verdict, describe_counts
 from ..stability.walk import StabilityWalk

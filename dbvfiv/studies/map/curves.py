@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..stability.correction import ACCURATE
+from ..stability.crossings import ACCURATE
 from .column import MapColumn, MapPlan
 
 #: Distance in the unit square, frequencies counted relatively, up to which onsets of neighbouring columns are linked.

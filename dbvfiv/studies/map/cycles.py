@@ -13,8 +13,7 @@ from ...errors import SolveError
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ..case import Case
-from ..orbits.follower import Follower
-from ..orbits.onset import onset_at
+from ..orbits import Follower, onset_at
 from ..stability.walk import StabilityWalk
 from .column import MapColumn, MapPlan
 

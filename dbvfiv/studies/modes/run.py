@@ -26,7 +26,7 @@ from ...model.material_stability import material_stability
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...observer import Observer
-from ..stability.family import ValveFamily, solving
+from ..stability.family import ValveFamily, name_state_in_failures
 from ..stability.verdict import STABLE, UNDECIDED, Verdict
 
 #: Structural modes in the basis behind the independent count.
@@ -191,7 +191,7 @@ def run_modes(
     linear = linearise_class(model, state.q, state.pressure, symmetry)
     pencil = linear.pencil(mu, not without_fluid)
     observer.progress("searching")
-    with solving(state.pressure):
+    with name_state_in_failures(state.pressure):
         family = ValveFamily(linear, options.search.max_frequency, options.count)
         search = family.leading_under(mu, without_fluid)
         asked = replace(search.options, shifts=options.search.shifts, tolerance=options.search.tolerance)

@@ -14,7 +14,7 @@ from ...model.state import SteadyState
 from ...record.record import GrowingRecord
 from ...record.states import read_states, state_row
 from ..session import Session
-from ..stability.family import ValveFamily, solving
+from ..stability.family import ValveFamily, name_state_in_failures
 from ..stability.place import condition_of
 from ..study import Study
 from .derivatives import differentiate, parameters_of
@@ -67,7 +67,7 @@ def _find_mode(session: Session, state: SteadyState, mu: Mu) -> Mode:
         raise CaseError(f"Coupled modes need an inlet pressure greater than {model.flow.back:g}.")
     linear = linearise(model, state.q, state.pressure)
     family = ValveFamily(linear, session.case.modes.max_frequency, session.case.modes.count)
-    with solving(state.pressure):
+    with name_state_in_failures(state.pressure):
         options = replace(family.search(condition_of(Mu.of(session.case))), left=True)
         found = leading_modes(linear.pencil(mu), number + _MARGIN, options)
     if len(found) < number:

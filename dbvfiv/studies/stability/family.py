@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 
 from eigen import (
@@ -10,14 +13,13 @@ from eigen import (
     PencilFamily,
     Relaxation,
     SearchOptions,
-    SingularShiftError,
     Workspace,
     lowest_frequencies,
 )
 from eigen.operator import Reach, edge_of
 
 from ...case.parameters import OUTSIDE, PIPES, Mu
-from ...errors import SolveError
+from ...errors import CaseError, SolveError
 from ...model.dynamics import LinearisedState
 from ...model.leading import LeadingSearch, select_search
 
@@ -145,16 +147,17 @@ def condition_point(condition: Condition) -> Mu:
     return Mu(law, density=density, alpha=alpha, beta=beta, loss_factor=loss_factor)
 
 
-class solving:
-    """Turns what an eigenvalue search refuses into a sentence that names the pressure."""
+@contextmanager
+def name_state_in_failures(pressure: float) -> Iterator[None]:
+    """Turn what an eigenvalue search refuses into a sentence with the pressure, Pa, of the state.
 
-    def __init__(self, pressure: float):
-        self.pressure = pressure
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind, error, _trace) -> None:
-        if isinstance(error, (SingularShiftError, np.linalg.LinAlgError)):
-            said = str(error).rstrip(".")
-            raise SolveError(f"The modes at {self.pressure:.6g} Pa were not found: {said}.") from error
+    Raises
+    ------
+    SolveError
+    """
+    try:
+        yield
+    except CaseError:
+        raise
+    except (ArithmeticError, ValueError) as error:
+        raise SolveError(f"The modes at {pressure:.6g} Pa were not found: {str(error).rstrip('.')}.") from error

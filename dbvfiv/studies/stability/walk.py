@@ -4,7 +4,7 @@ known.
 
 from __future__ import annotations
 
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...observer import Observer
 from ..case import Case
-from .family import ValveFamily
+from .family import ValveFamily, name_state_in_failures
 from .place import condition_of, moving_surroundings, rebuilder
 from .verdict import Verdict
 
@@ -249,7 +249,7 @@ class StabilityWalk:
         """
         self.require_valid(place)
         family = self.family(place)
-        with _explained(place):
+        with name_state_in_failures(place.pressure):
             return self.built(place).solver.direct(family, condition_of(place), count)
 
     def column(self, places: list[Mu], snapshots: int = 3, edges: bool = False, spectra=None, count: int = 2) -> Column:
@@ -283,7 +283,7 @@ class StabilityWalk:
         if not sound:
             raise refusal
         family = self.family(places[0])
-        with _explained(places[0]):
+        with name_state_in_failures(places[0].pressure):
             conditions = [condition_of(places[i]) for i in sound]
             column = self.built(places[0]).solver.solve(family, conditions, snapshots, edges, spectra, count)
         return column if refusal is None else column.spread(sound, len(places))
@@ -321,12 +321,3 @@ class StabilityWalk:
             line=own.line,
             band=min(own.band, self.search(place).claimed),
         )
-
-
-@contextmanager
-def _explained(place: Mu):
-    """Turns what numerics refuse into a sentence with the pressure."""
-    try:
-        yield
-    except (ArithmeticError, ValueError) as error:
-        raise SolveError(f"The modes at {place.pressure:.6g} Pa were not found: {str(error).rstrip('.')}.") from error

@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from ...drawing.style import new_figure, parameter_label
 from ...errors import CaseError
 from .. import comparing
-from ..measured import table
 from ..measured.figures import MEASURED, draw_curve, draw_section_of_runs, some_sections
 from ..state import State
 from .result import SteadyResult, flow_at
@@ -91,7 +90,7 @@ def compare(results: Sequence[SteadyResult]) -> Comparison:
     places = {result.case.pressure_at for result in results}
     remark = f"The pressures are not of one place: {' and '.join(sorted(places))}." if len(places) > 1 else ""
     flows = [np.array([_at(result, pressure, name) for result in results]) for name in ("mass_flow", "volume_flow")]
-    told = table.told([result.measured for result in results])
+    told = comparing.tabulate_deviations([result.measured for result in results])
     return Comparison(comparing.labels(results, _QUIET), pressure, *flows, remark, told)
 
 

@@ -20,7 +20,7 @@ from ...model.leading import growth_floor
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, chosen_symmetries, symmetry_named
 from ...observer import Observer
-from ..stability.family import solving
+from ..stability.family import name_state_in_failures
 from ..stability.verdict import Verdict, not_valid_at
 from ..stability.walk import StabilityWalk
 from .spectra import Check, SpectraAlong
@@ -182,7 +182,7 @@ def run_sweep(
     run = _Run(model, line, axis, options, observer, keep)
     interrupted, failures = False, ()
     try:
-        with solving(start.pressure):
+        with name_state_in_failures(start.pressure):
             run.follow(axis.values)
     except KeyboardInterrupt:
         interrupted = True
