@@ -91,7 +91,7 @@ def test_heads_of_the_fluid():
         assert case.drive.pressure == case.steady.pressures[0] == pytest.approx(19613.3, rel=1e-12)
     changed = thesis_case({"fluid.density": 10}).replace({"closure.pressures": ["3 m"]})
     assert changed.closure.pressures == pytest.approx((3 * 10 * 9.80665,), rel=1e-14)
-    for key, given in (("drive.pressure", "2 mm"), ("sweep.over", "pressure=1 m:2 m:3"), ("fluid.density", "2 m")):
+    for key, given in (("drive.pressure", "2 mm"), ("sweep.over", "density=1 m:2 m:3"), ("fluid.density", "2 m")):
         with pytest.raises(CaseError):
             thesis_case({key: given})
     with pytest.raises(CaseError, match="modulus|pressure"):
