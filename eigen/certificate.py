@@ -54,7 +54,7 @@ class Certificate:
 
     @property
     def stable(self) -> bool | None:
-        """Whether all eigenvalues up to the band decay; None without agreement."""
+        """True where all eigenvalues up to the band decay; None without agreement."""
         return self.unstable == 0 if self.agrees else None
 
     @property

@@ -108,7 +108,7 @@ class Column:
         return np.array([self.certificate(i).agrees for i in range(len(self.unstable))], bool)
 
     def certificate(self, cell: int) -> Certificate:
-        """What vouches for a cell."""
+        """Certificate of a cell."""
         accurate = self.how[cell] == DIRECT or self.error <= TOLERANCE
         known = bool(np.isfinite(self.growth_rate[cell]))
         return Certificate(
@@ -337,7 +337,7 @@ def _accurate(reduction: FamilyReduction, conditions, snapshots: int, count: int
 
 
 def _is_banded(family: PencilFamily, condition: Condition) -> bool:
-    """Whether all modes of a band are close to neutral, as they are where only it makes modes leading."""
+    """True where all modes of a band are close to neutral, as they are where only it makes modes leading."""
     return condition.loss == 0 and np.isfinite(family.reach(condition).band)
 
 

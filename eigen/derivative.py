@@ -135,7 +135,7 @@ def _changed(pencil, mode, change):
 
 
 def _relaxation_changed(pencil, mode, change):
-    """What a change of the relaxation adds to the first row of (dT) x."""
+    """Contribution of a change of the relaxation to the first row of (dT) x."""
     if change.strengths is None and change.times is None and change.relaxing is None:
         return 0.0
     known, s, q = pencil.relaxation, mode.eigenvalue, mode.q

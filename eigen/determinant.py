@@ -41,7 +41,7 @@ def grid(scale: float, top: float, beside) -> list[float]:
 
 
 def middle(a, b) -> np.ndarray:
-    """Where intervals are parted: on the positive axis in proportion where they are wide, else in length."""
+    """Places at which intervals are parted: on the positive axis in proportion where they are wide, else in length."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     return np.where((a > 0) & (b > 4 * a), np.sqrt(np.abs(a * b)), 0.5 * (a + b))
 
@@ -306,7 +306,7 @@ class Determinant:
         return complex(self.at([z])[0])
 
     def at(self, places) -> np.ndarray:
-        """The same at many places, shape (k,); a dense pencil is evaluated in stacks."""
+        """Values at many places, shape (k,); a dense pencil is evaluated in stacks."""
         places = np.asarray(places, complex)
         self.evaluations += places.size
         stack = max(1, int(_STACK / self.pencil.n**2)) if self._dense else 1
@@ -424,7 +424,7 @@ def _passive_part(matrix, mass, dense):
 
 
 def _dissipates(relaxation: Relaxation | None) -> bool:
-    """Whether every motion loses energy in what relaxes, whose parts are not negative."""
+    """True where every motion loses energy in what relaxes, whose parts are not negative."""
     if relaxation is None:
         return False
     weight = (relaxation.strengths * relaxation.times).sum(axis=1)

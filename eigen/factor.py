@@ -101,7 +101,7 @@ class StructureMatrices:
         self.load(pencil)
 
     def fits(self, pencil: CoupledPencil) -> bool:
-        """Whether a pencil has the very pattern of the one this was made for."""
+        """True where a pencil has the very pattern of the one this was made for."""
         parts = _parts(pencil)
         return (
             self._sources is not None
@@ -110,7 +110,7 @@ class StructureMatrices:
         )
 
     def covers(self, pencil: CoupledPencil) -> bool:
-        """Whether all entries of a pencil lie on the common pattern, though its parts may have fewer."""
+        """True where all entries of a pencil lie on the common pattern, though its parts may have fewer."""
         if pencil.M.shape != self.shape:
             return False
         keys = _keys(self.indptr, self.indices, self.shape[1])
@@ -335,7 +335,7 @@ class ScaledLU:
 
 
 def is_positive_definite(matrix: sp.spmatrix) -> bool:
-    """Whether a symmetric sparse matrix is positive definite, by its pivots."""
+    """True where a symmetric sparse matrix is positive definite, by its pivots."""
     if (matrix.diagonal() <= 0).any():
         return False
     try:
@@ -345,7 +345,7 @@ def is_positive_definite(matrix: sp.spmatrix) -> bool:
 
 
 def petsc_is_complex() -> bool:
-    """Whether the PETSc that is installed computes with complex numbers."""
+    """True where the PETSc that is installed computes with complex numbers."""
     from petsc4py import PETSc
 
     return np.dtype(PETSc.ScalarType).kind == "c"

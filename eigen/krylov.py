@@ -522,7 +522,7 @@ def oscillating_pairs(
 
 
 def _settled(shift, theta, error, edge, band, tolerance):
-    """Which pairs have converged, the reach, and whether all right of the creep, if not far off, are among them."""
+    """Mask of converged pairs, the reach, and whether all right of the creep, if not far off, are among them."""
     size = np.abs(theta)
     good = (error <= tolerance) & (size > 1e-12 * size.max(initial=0.0))
     if isinstance(shift, complex):

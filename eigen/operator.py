@@ -100,7 +100,7 @@ class Relaxation:
         return self.factors(line), self.replace(self.strengths / below, self.times / below)
 
     def replace(self, strengths, times=None) -> Relaxation:
-        """The same matrices with other strengths and, where given, times."""
+        """Matrices with other strengths and, where given, times."""
         return Relaxation(self.matrices, strengths, self.times if times is None else times)
 
 
@@ -254,7 +254,7 @@ class CoupledPencil(FluidParts):
         return () if self.relaxation is None else self.relaxation.matrices
 
     def replace(self, **parts) -> CoupledPencil:
-        """The same pencil with some parts exchanged; the structure is not checked again where the fluid alone is."""
+        """Pencil with some parts exchanged; the structure is not checked again where the fluid alone is."""
         if not set(parts) <= set(FLUID_PARTS):
             return replace(self, **parts)
         other = object.__new__(type(self))
@@ -475,13 +475,13 @@ def edge_of(relaxation: Relaxation | None) -> float:
 
 
 def apart_from_creep(pencil: CoupledPencil, values: np.ndarray) -> np.ndarray:
-    """Which eigenvalues oscillate, or lie clearly right of the creep."""
+    """Mask of eigenvalues that oscillate, or lie clearly right of the creep."""
     values = np.asarray(values)
     return (np.abs(values.imag) > OVERDAMPED * np.abs(values)) | (values.real > edge_of(pencil.relaxation))
 
 
 class Condition(NamedTuple):
-    """What may differ between the pencils of a family.
+    """Parts that may differ between the pencils of a family.
 
     Attributes
     ----------
@@ -504,7 +504,7 @@ class Condition(NamedTuple):
 
     @property
     def damping(self) -> tuple[float, float, float]:
-        """What the structure alone depends on."""
+        """Parameters of the structure alone."""
         return self.alpha, self.beta, self.loss
 
 
@@ -542,10 +542,10 @@ class PencilFamily(ABC):
 
     @abstractmethod
     def search(self, condition: Condition) -> SearchOptions:
-        """What is searched in the spectrum: limit point and band."""
+        """Region searched in the spectrum: limit point and band."""
 
     def relaxation(self, loss: float) -> Relaxation | None:
-        """What relaxes under a factor on the loss factors: the same matrices for every factor, in one order, and the
+        """Relaxation under a factor on the loss factors: the same matrices for every factor, in one order, and the
         same object for the same factor; None where nothing does.
         """
         return None
@@ -560,7 +560,7 @@ class PencilFamily(ABC):
         return fluid_values(self.parts(condition.law), s * np.sqrt(condition.inertia))
 
     def reach(self, condition: Condition) -> Reach:
-        """Where leading modes of a condition lie."""
+        """Region in which leading modes of a condition lie."""
         options = self.search(condition)
         floor = -np.inf if options.limit_point is None else CLEAR * options.limit_point
         band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
@@ -579,8 +579,8 @@ class Reach(NamedTuple):
     creep: float = -np.inf
 
     def is_mode(self, values: np.ndarray) -> np.ndarray:
-        """Which eigenvalues are no creep: right of it, or decaying no faster, and oscillating no slower, than a search
-        for modes reaches.
+        """Mask of eigenvalues that are no creep: right of it, or decaying no faster, and oscillating no slower, than a
+        search for modes reaches.
         """
         values = np.asarray(values)
         lowest = LOWEST * self.band if np.isfinite(self.band) else 0.0

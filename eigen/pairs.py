@@ -187,7 +187,7 @@ def balanced(pencil: CoupledPencil, eigenvalues, q, u) -> np.ndarray:
 
 
 def preferable(residual, backward, old_residual, old_backward):
-    """Whether a pair is better than the one before: closer, or at rounding level at last."""
+    """True where a pair is better than the one before: closer, or at rounding level at last."""
     return (residual < old_residual) & ((backward <= ROUNDING) | (old_backward > ROUNDING)) | (
         (backward <= ROUNDING) & (old_backward > ROUNDING)
     )
@@ -311,7 +311,7 @@ class Found:
 
     @property
     def region(self) -> SearchedRegion:
-        """Where all were found."""
+        """Oval in which all were found."""
         return SearchedRegion(tuple(self.ovals.values()), self.everything, self.lowest, self.slope)
 
     def note(self, sentence: str) -> None:
@@ -491,7 +491,7 @@ def attach_left(pencil, batch, solve, found) -> None:
 
 
 def _all_there(batch, values) -> bool:
-    """Whether each eigenvalue of the right vectors has turned up."""
+    """True where every eigenvalue of the right vectors has turned up."""
     if values.size < batch.values.size:
         return False
     gaps = np.abs(values[:, None] - batch.values).min(axis=0)

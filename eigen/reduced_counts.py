@@ -115,7 +115,7 @@ class Response:
 
 
 class RelaxingResponse:
-    """The same of a structure that relaxes; phases are those relative to a passive structure, see the module.
+    """Response of a structure that relaxes; phases are those relative to a passive structure, see the module.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ INSIDE = 0.999
 
 @dataclass(frozen=True)
 class CellCounts:
-    """Of some cells.
+    """Counts of unstable eigenvalues of some cells.
 
     Attributes
     ----------
@@ -296,7 +296,7 @@ class CellCounts:
     band: np.ndarray
 
     def select(self, some) -> CellCounts:
-        """Those of some cells."""
+        """Counts of some cells."""
         return CellCounts(*(own[some] for own in vars(self).values()))
 
     def enter(self, cells: np.ndarray, found: CellCounts) -> None:
@@ -410,7 +410,7 @@ class _Walk:
         self._add(cells, omega)
 
     def _own_zeros(self, cell: int) -> np.ndarray:
-        """Where the fluid alone would swing, near which phases turn fast where it has several unknowns."""
+        """Frequencies of the fluid alone, near which phases turn fast where it has several unknowns."""
         if self.inner < 2:
             return np.zeros(0)
         zeros = self._kinds[self._which[cell]].zeros
@@ -481,7 +481,7 @@ def counted_band(family: PencilFamily, condition: Condition) -> float:
 
 
 def uncounted(family: PencilFamily, conditions) -> CellCounts:
-    """What is known before anything is counted."""
+    """Knowledge before anything is counted."""
     cells = len(conditions)
     bands = np.array([counted_band(family, c) for c in conditions])
     band = np.where(np.isinf(bands), np.inf, INSIDE * bands / (2 * np.pi))
@@ -519,7 +519,7 @@ def count_unstable(reduced: Any, conditions, hints, within_band: bool = False) -
 
 
 def _beside(hints, condition: Condition):
-    """Those hints that a count looks beside: the leading ones, and all unstable ones where they cost nothing else."""
+    """Hints that a count looks beside: the leading ones, and all unstable ones where they cost nothing else."""
     number = 2 if condition.loss == 0 else max(2, int((np.asarray(hints).real > 0).sum()) + 1)
     return hints[:number]
 

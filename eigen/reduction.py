@@ -159,7 +159,7 @@ class ReducedFamily:
         return np.array(parts).reshape(-1, self.size, self.size)
 
     def relaxation(self, loss: float) -> Relaxation | None:
-        """What relaxes, on the space."""
+        """Relaxation on the space."""
         full = self.family.relaxation(loss)
         return None if full is None else Relaxation(tuple(self.relaxing), full.strengths, full.times)
 
@@ -244,7 +244,7 @@ class ReducedFamily:
         return out
 
     def _leading(self, condition: Condition) -> np.ndarray:
-        """What multiplies the rates of velocities and inner unknowns, (k + b, k + b)."""
+        """Matrix that multiplies the rates of velocities and inner unknowns, (k + b, k + b)."""
         k, c, root = self.size, self.coupling(condition.law), np.sqrt(condition.inertia)
         b = c["S0"].shape[0]
         matrix = np.zeros((k + b, k + b))
@@ -296,7 +296,7 @@ class ReducedFamily:
         return self.several_pairs([condition], most, share)[0]
 
     def _linear_pairs(self, condition: Condition, most: int, share: float) -> Pairs:
-        """The same of a condition where nothing relaxes."""
+        """Small pencil of a condition where nothing relaxes."""
         reach = self.family.reach(condition)
         floor, band = reach.floor, reach.band
         values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
@@ -354,8 +354,8 @@ SETTLED, SAME = 1e-6, 1e-10
 
 @dataclass(frozen=True)
 class _Products:
-    """What a residual needs of structural vectors, whatever their eigenvalues: their images under M, K, the damping of
-    the material (None without), what relaxes, and the coupling.
+    """Parts that a residual needs of structural vectors, whatever their eigenvalues: their images under M, K, the
+    damping of the material (None without), what relaxes, and the coupling.
     """
 
     mass: np.ndarray
@@ -504,7 +504,7 @@ class FamilyReduction:
         return self._all_corrected([pairs], [condition])[0]
 
     def _all_corrected(self, several: list[Pairs], conditions) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The same of several conditions, those of one factor on the loss factors in one block."""
+        """Spectra of several conditions, those of one factor on the loss factors in one block."""
         found = {}
         for loss in dict.fromkeys(c.loss for c in conditions):
             members = [i for i, c in enumerate(conditions) if c.loss == loss]

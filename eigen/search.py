@@ -27,7 +27,7 @@ def number_in_band(found, options) -> int:
 
 
 def would_do(values, oval: Oval, found, aim, options) -> bool:
-    """Whether eigenvalues that have converged in an oval are all that is asked for."""
+    """True where eigenvalues that have converged in an oval are all that is asked for."""
     apart = values[apart_from_limit(values, options) & (values.imag >= -1e-11 * np.abs(values))]
     trial = Found(apart, *(np.zeros(0),) * 4, lowest=found.lowest, slope=found.slope)
     trial.ovals[oval.shift] = oval
@@ -35,7 +35,7 @@ def would_do(values, oval: Oval, found, aim, options) -> bool:
 
 
 def apart_from_limit(values, options) -> np.ndarray:
-    """Which eigenvalues do not belong to those that crowd around the limit point."""
+    """Mask of eigenvalues that do not belong to those that crowd around the limit point."""
     if options.limit_point is None:
         return np.ones(values.size, bool)
     return np.abs(values - options.limit_point) > 0.05 * abs(options.limit_point)
@@ -80,7 +80,7 @@ def _widest_covered(found, aim) -> tuple[float, float] | None:
 
 
 def is_covered(found, aim, options) -> bool:
-    """Whether the leading modes asked for are known to be the leading ones."""
+    """True where the leading modes asked for are known to be the leading ones."""
     if found.everything:
         return True
     growth, band = leading_band(found, aim, options)
@@ -308,7 +308,7 @@ def _at_shift(pencil, shift, wanted, aim, options, workspace, found, solver) -> 
 
 
 def _oval(shift, reach, relaxing) -> Oval:
-    """Where all eigenvalues are known after a search at a shift."""
+    """Oval in which all eigenvalues are known after a search at a shift."""
     if relaxing:
         return Oval(shift if isinstance(shift, complex) else complex(shift, reach), reach, False)
     return Oval(shift, reach, isinstance(shift, complex) and not petsc_is_complex())

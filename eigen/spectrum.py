@@ -84,7 +84,7 @@ class SearchOptions:
 
 @dataclass(frozen=True)
 class Oval:
-    """Where a Krylov search at one shift has found every eigenvalue.
+    """Oval in which a Krylov search at one shift has found every eigenvalue.
 
     A real shift gives a disc; of a pencil that relaxes one that touches the real axis at the shift, given with its
     centre shift + i reach in place of the shift, and its mirror image. A complex shift in real arithmetic gives the
@@ -115,7 +115,7 @@ class Oval:
         return np.stack([a - half, a + half], axis=-1)
 
     def contains(self, eigenvalue: complex) -> bool:
-        """Whether a point (or its conjugate) lies in the oval."""
+        """True where a point (or its conjugate) lies in the oval."""
         low, high = self.interval(np.array([complex(eigenvalue).imag]))[0]
         return bool(low <= complex(eigenvalue).real <= high)
 
@@ -142,7 +142,7 @@ class SearchedRegion:
     slope: float = np.inf
 
     def contains(self, eigenvalue: complex) -> bool:
-        """Whether every eigenvalue at this place would have been found."""
+        """True where every eigenvalue at this place would have been found."""
         return self.everything or any(o.contains(eigenvalue) for o in self.ovals)
 
     def complete_between(self, band: float, samples: int = 400) -> tuple[float, float]:
@@ -289,7 +289,7 @@ class Spectrum:
         )
 
     def select(self, chosen) -> Spectrum:
-        """The same result with some of the pairs."""
+        """Result with some of the pairs."""
 
         def cut(array):
             return None if array is None else array[..., chosen]

@@ -80,14 +80,14 @@ class RationalCells:
         return np.einsum("pgj,pj->pg", self.strengths[cells], self.times / (1.0 + s[:, None] * self.times) ** 2)
 
     def weights(self, cells: np.ndarray, s: np.ndarray, factors: np.ndarray | None = None) -> np.ndarray:
-        """What the bases are multiplied by in T(s), (p, 6 + g); with other factors phi_g where given."""
+        """Factors by which the bases are multiplied in T(s), (p, 6 + g); with other factors phi_g where given."""
         root, alpha, beta = self.given[cells].T
         factors = self.factors(cells, s) if factors is None else factors
         z = s * root
         return np.column_stack([np.ones_like(s), s * (s + alpha), s * beta, np.ones_like(s), z, z * z, factors])
 
     def weight_slopes(self, cells: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """The same in T'(s)."""
+        """Factors in T'(s)."""
         root, alpha, beta = self.given[cells].T
         zero = np.zeros_like(s)
         return np.column_stack(

@@ -290,7 +290,7 @@ class ClosureWalk:
         self.record.item(SimpleNamespace(**row))
 
     def _restart(self) -> dict[str, Any]:
-        """What it takes to go on from the present state."""
+        """Restart data of the present state."""
         pressed, steps = self.model.pressed, self.steps
         multiplier = np.zeros(pressed.mesh.node_count)
         multiplier[pressed.contact.nodes] = pressed.multiplier
