@@ -90,6 +90,7 @@ class _CaseOfStudies(PhysicsCase):
     def replace(self, changes: Mapping[str, Any]) -> Self:
         made = super().replace(changes)
         made._replace_list_by_pressure({key_path(dotted) for dotted in changes})
+        made.closure.reach_rated_pressure()
         return made
 
     def _replace_list_by_pressure(self, changed: Collection[tuple[str, ...]]) -> None:

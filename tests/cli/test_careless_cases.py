@@ -4,6 +4,7 @@ import time
 
 import pytest
 
+from dbvfiv.studies.case import load_case
 from dbvfiv.studies.session import Session
 
 #: What was given, and a word that the sentence must hold.
@@ -13,7 +14,7 @@ CARELESS = [
     (["drive.pressure=2 m", "downstream.pressure=2 m"], "nothing flows"),
     (["outside.fluid=same", "downstream.pressure=5 m"], "nothing flows"),
     (["drive.pressure=20 kPa", "downstream.pressure=12 kPa", "steady.pressures=[2 kPa, 12 kPa]"], "steady.pressures"),
-    (["closure.rated_pressure=60 kPa"], "closure.pressures"),
+    (["closure.rated_pressure=60 kPa", "closure.pressures=[20 kPa]"], "closure.pressures"),
     (["closure.rated_pressure=10 m", "closure.pressures=[1 m, 2 m]"], "closure.pressures"),
     (
         [
@@ -59,7 +60,6 @@ def test_one_sentence_for_a_careless_case(command_line, one_sentence, changes, w
         ("modes", "--set", "downstream.pressure=30 kPa"),
         ("steady", "-p", "1 m", "--set", "downstream.pressure=2 m"),
         ("map", "--x", "density=1:100:3:log", "--y", "alpha=1:2:2", "--set", "downstream.pressure=30 kPa"),
-        ("closure", "-p", "5 kPa", "--set", "closure.rated_pressure=10 kPa"),
     ],
 )
 def test_studies_refuse_contradictions_before_they_solve(command_line, one_sentence, monkeypatch, arguments):
@@ -74,3 +74,14 @@ def test_a_case_that_fits(command_line):
     assert "835 mm long, bill 416 mm wide and 36 mm high" in outcome.out  # 2 x (190 + 18) mm, two lips of 18 mm
     assert "4.771 m3" in outcome.out  # 30 m of 450 mm
     assert "a head of 1 m" in outcome.out and len(outcome.out.splitlines()) < 25
+
+
+def test_default_back_pressures_reach_the_rated_one():
+    assert load_case(None, ("closure.rated_pressure=60 kPa",)).closure.pressures == (7e3, 14e3, 21e3, 28e3, 60e3)
+    assert load_case(None, ("closure.rated_pressure=10 kPa",)).closure.pressures == (7e3, 14e3, 21e3, 28e3)
+    named = load_case(None, ("closure.rated_pressure=60 kPa",)).replace({"closure.pressures": ["5 kPa"]})
+    assert named.closure.pressures == (5e3,)
+    late = load_case(None, ("drive.pressure=1 m",)).replace({"closure.rated_pressure": "40 kPa"})
+    assert late.closure.pressures == (7e3, 14e3, 21e3, 28e3, 40e3)
+    changed = load_case(None, ("closure.rated_pressure=60 kPa",)).replace({"closure.rated_pressure": "40 kPa"})
+    assert changed.closure.pressures == (7e3, 14e3, 21e3, 28e3, 40e3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import StrictBool, StrictInt, ValidationInfo, field_validator
+from pydantic import StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
 
 from ...case.measured import AREA, MEASURED_FILES, SHAPE, find_measured
 from ...case.parameters import PARAMETERS
@@ -13,12 +13,16 @@ from ...case.physics import LoadPressure
 from ...case.quantity import Length, Number, Pressure, Time
 from ...case.section import Section, key
 
+_PRESSURES = (7e3, 14e3, 21e3, 28e3)
+
 
 class Keys(Section):
     """Back pressure on the outside, no flow."""
 
     pressures: tuple[LoadPressure, ...] = key(
-        (7e3, 14e3, 21e3, 28e3), "Static back pressures, outside over inside.", min_length=1
+        _PRESSURES,
+        "Static back pressures, outside over inside; without them those up to a rated_pressure that is higher.",
+        min_length=1,
     )
     rated_pressure: Pressure | None = key(
         None,
@@ -83,6 +87,14 @@ class Keys(Section):
         "storage; quasi-steady they stop it at once, and the "
         "pressure of the incompressible fluid knows no bounds.",
     )
+
+    @model_validator(mode="after")
+    def reach_rated_pressure(self) -> Keys:
+        """Let pressures that were not given go up to the rated one."""
+        if "pressures" not in self.model_fields_set:
+            higher = (self.rated_pressure or 0.0) > _PRESSURES[-1]
+            self.__dict__["pressures"] = (*_PRESSURES, self.rated_pressure) if higher else _PRESSURES
+        return self
 
     @field_validator("measured", mode="before")
     @classmethod
