@@ -242,6 +242,33 @@ built in and may be replaced the same way.
 """
 
 
+#: Words of the trade for what a key holds, written as keys, and the key that holds it.
+SYNONYMS = {
+    "hardness": "materials.NAME(neo-hookean).shear_modulus",
+    "durometer": "materials.NAME(neo-hookean).shear_modulus",
+    "shore_a": "materials.NAME(neo-hookean).shear_modulus",
+    "pipe_length": "upstream.length",
+    "pipe": "upstream.length",
+    "back_pressure": "closure.rated_pressure",
+    "rated_back_pressure": "closure.rated_pressure",
+    "backpressure": "closure.rated_pressure",
+    "cracking_head": "steady.cracking_area",
+    "cracking_pressure": "steady.cracking_area",
+    "submerged": "outside.fluid",
+    "submergence": "downstream.pressure",
+    "tailwater": "downstream.pressure",
+    "nominal_size": "valve.scale",
+    "bill_length": "valve.duckbill_length",
+    "bill_width": "valve.lip_half_width",
+    "heads": "steady.pressures",
+}
+
+
+def synonym(key: str) -> str | None:
+    """Key that a word of the trade stands for, if there is one."""
+    return SYNONYMS.get(re.sub(r"[\s-]+", "_", key.strip().lower()).rpartition(".")[2])
+
+
 def explain(model: type[Section], key: str | None = None) -> list[KeyInfo]:
     """Return the keys of a case that a word stands for: a key, a section, or all of them for None.
 
@@ -261,7 +288,8 @@ def explain(model: type[Section], key: str | None = None) -> list[KeyInfo]:
         found = [i for i in infos if _plain(i.key).startswith(plain + ".")]
     found += [i for i in infos if plain == "materials" and i.key.startswith("materials.NAME") and i not in found]
     if not found:
-        near = difflib.get_close_matches(plain, [_plain(i.key) for i in infos], n=1, cutoff=0.0)
+        near = [synonym(key)] if synonym(key) else []
+        near += difflib.get_close_matches(plain, [_plain(i.key) for i in infos], n=1, cutoff=0.0)
         shown = " ".join(key.split())[:60]
         raise CaseError(f"{shown!r} is not a key of the case file; the nearest valid key is {near[0]}.", key=key)
     return _unique(found)

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from ..errors import CaseError
-from .describe import allowed_words, element_model
+from .describe import allowed_words, element_model, synonym
 from .materials import KINDS, Materials
 from .section import BrokenRule, Section
 
@@ -169,7 +169,7 @@ def _unknown(path: KeyPath, owner: type[Section] | None, model: type[Section]) -
         names += ["NAME"]
     place = ".".join(path[:-1])
     close = difflib.get_close_matches(key.lower(), names, n=1, cutoff=0.6)
-    nearest = _elsewhere(key, model) or (".".join(filter(None, (place, close[0]))) if close else None)
+    nearest = _elsewhere(key, model) or synonym(key) or (".".join(filter(None, (place, close[0]))) if close else None)
     if nearest:
         hint = f"the nearest valid key is {nearest}"
     else:
