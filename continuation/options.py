@@ -100,7 +100,7 @@ class ContinuationOptions:
     max_points : int
         Points to add at most.
     limits : mapping of str to (float, float)
-        Range per parameter; the branch ends exactly on the limit it meets.
+        Range of each parameter; the branch ends exactly on the limit it meets.
     method : {"arclength", "natural"}
         Natural continuation steps in the parameter and cannot pass a fold.
     direction : {+1, -1}
@@ -114,7 +114,8 @@ class ContinuationOptions:
     state_scale : float
         Unit of the state in the arclength.
     parameter_scales : mapping of str to float
-        Unit of each parameter in the arclength; 1 if absent.
+        Unit of each parameter in the arclength.  By default a fifth of the range of its limits, so that the
+        first step goes over 1 % of the range and the longest over 10 %; 1 without limits.
     folds, branch_points : bool
         Look for folds and simple branch points.
     eigenvalues : int
@@ -161,6 +162,12 @@ class ContinuationOptions:
     stop_at: frozenset[str] = frozenset()
     detect_closed: bool = True
     newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+    def unit(self, name: str) -> float:
+        """Unit of a parameter in the arclength."""
+        low, high = self.limits.get(name, (-np.inf, np.inf))
+        own = 0.2 * (high - low) if np.isfinite(high - low) else 1.0
+        return float(self.parameter_scales.get(name, own))
 
     def __post_init__(self):
         require(
