@@ -288,7 +288,7 @@ def _tracer(system, mu, parameters, condition, options, observers, monitors):
     options = options or ContinuationOptions()
     if len(set(parameters)) != 2:
         raise ValueError(f"A curve needs two different parameters, not {parameters}.")
-    problem = Problem(system, mu, parameters, condition, options.state_scale, options.parameter_scales)
+    problem = Problem(system, mu, parameters, condition, options.state_scale, options.units(parameters))
     return Tracer(problem, options, monitors if options.eigenvalues else monitors[:1], observers)
 
 

@@ -73,7 +73,7 @@ def solve_augmented(tracer, condition, z, frame, names=None, system=None, mu=Non
         names or problem.names,
         condition,
         options.state_scale,
-        options.parameter_scales,
+        options.units(names or problem.names),
     )
     result = correct(augmented, z, frame, options.newton, None, options.location_tolerance)
     return result if result.converged else f"Newton's method on the augmented system: {result.reason}"

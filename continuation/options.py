@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 
 
 class ContinuationError(Exception):
@@ -115,7 +116,7 @@ class ContinuationOptions:
         Unit of the state in the arclength.
     parameter_scales : mapping of str to float
         Unit of each parameter in the arclength.  By default a fifth of the range of its limits, so that the
-        first step goes over 1 % of the range and the longest over 10 %; 1 without limits.
+        first step goes over 1 % of the range and the longest over 10 %; 1 without limits and for orbits.
     folds, branch_points : bool
         Look for folds and simple branch points.
     eigenvalues : int
@@ -163,11 +164,10 @@ class ContinuationOptions:
     detect_closed: bool = True
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
-    def unit(self, name: str) -> float:
-        """Unit of a parameter in the arclength."""
-        low, high = self.limits.get(name, (-np.inf, np.inf))
-        own = 0.2 * (high - low) if np.isfinite(high - low) else 1.0
-        return float(self.parameter_scales.get(name, own))
+    def units(self, names) -> dict[str, float]:
+        """Unit of each parameter in the arclength."""
+        own = {name: 0.2 * (high - low) for name, (low, high) in self.limits.items() if isfinite(high - low)}
+        return {name: float(self.parameter_scales.get(name, own.get(name, 1.0))) for name in names}
 
     def __post_init__(self):
         require(

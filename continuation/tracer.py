@@ -16,7 +16,6 @@ from continuation.branch import Branch, CurvePoint
 from continuation.options import NotConverged, SingularSystem
 from continuation.problem import Local, Problem, correct
 
-
 #: Largest distance of the curve from a chord, in chord lengths: an arc whose ends turn by 1.6 rad reaches 0.4.
 FARTHEST = 0.5
 #: Distance in chord lengths within which two located points are one.
@@ -133,6 +132,8 @@ class Tracer:
         self.monitors = list(monitors)
         self.observers = as_observers(observers)
         self.frame = problem.natural_frame()
+        # Retries that are left, and the length of the curve for which they must do.
+        self._retries, self._doubted = options.max_subdivisions if options.locate else 0, 0.0
 
     # -- points
 
@@ -305,10 +306,10 @@ class Tracer:
         """One accepted step: the point, the next step, why the branch ends, if it does, and the special points.
 
         A step is refused when its corrector fails or leaves the curve.  Test functions that contradict each other are
-        a sign of that too, so a step with a special point that cannot be located is tried again, shorter.
+        a sign of that too, so a step with a special point that cannot be located is tried again, shorter; up to
+        ``max_subdivisions`` times until the curve is past that point.
         """
         options = self.options
-        retries = options.max_subdivisions if options.locate else 0
         while True:
             z, used, normal, ending = self._predict(before, step)
             if ending and used == 0.0:
@@ -321,8 +322,9 @@ class Tracer:
                 found = self._between(branch, before, after)
                 doubtful = [s for s in found if not s.located and s.kind != "zero eigenvalue"]
                 left = [s for s in found if s.located and self._beyond(s.z)]
-                if doubtful and retries:
-                    retries -= 1
+                if doubtful and self._retries and used > options.min_step * (1 + 1e-9):
+                    self._retries -= 1
+                    self._doubted = max(self._doubted, used)
                     trouble = f"a {doubtful[0].kind} was seen and not located"
                 elif left:
                     # The curve left the limits and came back within the step.
@@ -339,6 +341,9 @@ class Tracer:
             if used <= options.min_step * (1 + 1e-9):
                 return f"step below its minimum: {trouble}"
             step = max(used * options.shrink, options.min_step)
+        self._doubted -= after.step
+        if self._doubted <= 0.0:
+            self._retries, self._doubted = options.max_subdivisions if options.locate else 0, 0.0
         angle = self._angle(before, after)
         factor = (options.target_iterations + 1) / (after.iterations + 1)
         if angle > 0 and options.method == "arclength":
