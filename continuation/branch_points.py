@@ -10,9 +10,10 @@ from continuation.event_location import locate_zero, solve_augmented, special_at
 from continuation.linear import Bordered
 from continuation.options import SingularSystem
 from continuation.system import SystemBase
+from continuation.tracer import Monitor
 
 
-class BranchPointMonitor:
+class BranchPointMonitor(Monitor):
     """Simple branch points: ``[[F_u, F_p], [t']]`` becomes singular.
 
     Where the linearisation offers ``determinant_sign`` the sign of that determinant is
@@ -56,11 +57,9 @@ class BranchPointMonitor:
         g0, g1 = before.tests["branch point"], after.tests["branch point"]
         if before.data["borders"][0] is not borders[0]:
             g0 = self._test(tracer, before, borders)
-        special = self._examine(tracer, before, after, index, g0, g1, borders)
-        self._adapt(tracer, after)
-        return special
+        return self._examine(tracer, before, after, index, g0, g1, borders)
 
-    def _adapt(self, tracer, point):
+    def accept(self, tracer, before, point, found):
         """Turn the borders towards the vectors just found, for a well-scaled test function.
 
         A generic part stays, so that no other vector ever is out of their sight.

@@ -15,7 +15,7 @@ from continuation.tracer import Tracer
 
 def branch_tracer(system, mu, parameter, options, events=(), spectrum=None, observers=None):
     """The tracer of a branch with the monitors the options ask for."""
-    problem = Problem(system, mu, (parameter,), None, options.state_scale, options.parameter_scales)
+    problem = Problem(system, mu, (parameter,), None, options.state_scale, options.units([parameter]))
     monitors: list = []
     if options.folds and options.method == "arclength":
         monitors.append(FoldMonitor())

@@ -22,7 +22,7 @@ from continuation.options import (
 )
 from continuation.problem import Problem
 from continuation.stability import CountMonitor
-from continuation.tracer import Tracer
+from continuation.tracer import Monitor, Tracer
 
 
 def solve_bogdanov_takens(tracer, z, v, w):
@@ -38,7 +38,7 @@ def bogdanov_takens_special(tracer, result, tangent, index):
     return special_at(tracer, "bogdanov-takens", CurvePoint(result.z, tangent), index, True, "", values, vectors)
 
 
-class FoldCurveMonitor:
+class FoldCurveMonitor(Monitor):
     """Cusps (quadratic coefficient zero) and Bogdanov-Takens points (``w' B v`` zero)."""
 
     def measure(self, tracer, point):
@@ -87,7 +87,7 @@ class FoldCurveMonitor:
         )
 
 
-class HopfCurveMonitor:
+class HopfCurveMonitor(Monitor):
     """``l1`` and its zeros, zero-Hopf points, and the end of the curve at ``omega = 0``.
 
     Parameters
@@ -288,7 +288,7 @@ def _tracer(system, mu, parameters, condition, options, observers, monitors):
     options = options or ContinuationOptions()
     if len(set(parameters)) != 2:
         raise ValueError(f"A curve needs two different parameters, not {parameters}.")
-    problem = Problem(system, mu, parameters, condition, options.state_scale, options.parameter_scales)
+    problem = Problem(system, mu, parameters, condition, options.state_scale, options.units(parameters))
     return Tracer(problem, options, monitors if options.eigenvalues else monitors[:1], observers)
 
 

@@ -17,11 +17,15 @@ from continuation.conditions import FoldCondition, null_pair
 from continuation.normal_form import fold_coefficient
 from continuation.options import DerivativeMissing, SingularSystem
 from continuation.problem import Problem, correct
+from continuation.tracer import Monitor
 
 #: Largest distance of a located point from its bracket, in chord lengths.
 SLACK = 0.02
 #: Halvings of a bracket, after which an event stays bracketed.
 HALVINGS = 16
+#: Intervals of a step in which two folds are looked for are cut in two so often, where the parabola of a test function
+#: comes nearer to zero than this share of its smaller end.
+TURNS, TOUCH = 8, 0.3
 
 
 def special_at(tracer, kind, point, index, located, reason="", values=None, vectors=None) -> SpecialPoint:
@@ -69,7 +73,7 @@ def solve_augmented(tracer, condition, z, frame, names=None, system=None, mu=Non
         names or problem.names,
         condition,
         options.state_scale,
-        options.parameter_scales,
+        options.units(names or problem.names),
     )
     result = correct(augmented, z, frame, options.newton, None, options.location_tolerance)
     return result if result.converged else f"Newton's method on the augmented system: {result.reason}"
@@ -127,7 +131,7 @@ def locate_zero(tracer, before, after, indicator, attempt):
     return None, guess, reason
 
 
-class FoldMonitor:
+class FoldMonitor(Monitor):
     """Folds: the parameter's part of the tangent changes sign."""
 
     def measure(self, tracer, point):
@@ -135,7 +139,11 @@ class FoldMonitor:
 
     def between(self, tracer, before, after, index, found):
         if before.tests["fold"] * after.tests["fold"] >= 0 and after.tests["fold"] != 0:
-            return []
+            turn = self._turn(tracer, before, after)
+            if turn is None:
+                return []
+            first = self.between(tracer, before, turn, index, found)
+            return first + self.between(tracer, turn, after, index, found)
         problem = tracer.problem
         if not tracer.options.locate:
             return [special_at(tracer, "fold", after, index, False, "location was not asked for")]
@@ -154,6 +162,31 @@ class FoldMonitor:
         tangent = np.append(v, 0.0)
         fold = CurvePoint(result.z, tangent / problem.norm(tangent))
         return [special_at(tracer, "fold", fold, index, True, "", values, {"right": v, "left": w})]
+
+    def _turn(self, tracer, before, after, depth=TURNS):
+        """Point between two folds within one step, or None.
+
+        The parameter's part of the tangent at both ends and its mean, the way of the parameter over the length of the
+        step, give a parabola; where that comes near to zero the curve is looked at.
+        """
+        i, problem = tracer.problem.n, tracer.problem
+        length = problem.norm(after.z - before.z)
+        t0, t1 = before.tests["fold"], after.tests["fold"]
+        sign, mean = np.sign(t0), (after.z[i] - before.z[i]) / max(length, 1e-300)
+        bend = 3.0 * sign * (t0 + t1 - 2.0 * mean)
+        slope = sign * (t1 - t0) - bend
+        if depth == 0 or t0 == 0 or not bend > 0 or not 0 < -slope < 2 * bend:
+            return None
+        if abs(t0) - slope**2 / (4 * bend) > TOUCH * min(abs(t0), abs(t1)):
+            return None
+        middle = tracer.at(before, after, float(np.clip(-slope / (2 * bend), 0.05, 0.95)))
+        if middle is None:
+            return None
+        self.measure(tracer, middle)
+        if middle.tests["fold"] * t0 < 0:
+            return middle
+        first = self._turn(tracer, before, middle, depth - 1)
+        return first if first is not None else self._turn(tracer, middle, after, depth - 1)
 
 
 def solve_fold(tracer, guess):
@@ -184,7 +217,7 @@ class Event:
     stop: bool = False
 
 
-class EventMonitor:
+class EventMonitor(Monitor):
     """Sign changes of an `Event`."""
 
     def __init__(self, event: Event):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 
 
 class ContinuationError(Exception):
@@ -100,7 +101,7 @@ class ContinuationOptions:
     max_points : int
         Points to add at most.
     limits : mapping of str to (float, float)
-        Range per parameter; the branch ends exactly on the limit it meets.
+        Range of each parameter; the branch ends exactly on the limit it meets.
     method : {"arclength", "natural"}
         Natural continuation steps in the parameter and cannot pass a fold.
     direction : {+1, -1}
@@ -114,7 +115,8 @@ class ContinuationOptions:
     state_scale : float
         Unit of the state in the arclength.
     parameter_scales : mapping of str to float
-        Unit of each parameter in the arclength; 1 if absent.
+        Unit of each parameter in the arclength.  By default a fifth of the range of its limits, so that the
+        first step goes over 1 % of the range and the longest over 10 %; 1 without limits and for orbits.
     folds, branch_points : bool
         Look for folds and simple branch points.
     eigenvalues : int
@@ -161,6 +163,11 @@ class ContinuationOptions:
     stop_at: frozenset[str] = frozenset()
     detect_closed: bool = True
     newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+    def units(self, names) -> dict[str, float]:
+        """Unit of each parameter in the arclength."""
+        own = {name: 0.2 * (high - low) for name, (low, high) in self.limits.items() if isfinite(high - low)}
+        return {name: float(self.parameter_scales.get(name, own.get(name, 1.0))) for name in names}
 
     def __post_init__(self):
         require(

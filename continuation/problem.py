@@ -190,6 +190,10 @@ class Local:
         return direction if problem.dot(direction, reference) >= 0 else -direction
 
 
+#: Relative size of corrections that are rounding, and the share of ``F`` that such a correction leaves at least.
+ROUNDING, STALLED = 64 * np.finfo(float).eps, 0.7
+
+
 @dataclass(frozen=True)
 class Correction:
     """Outcome of Newton's method on a `Problem`.
@@ -220,6 +224,8 @@ def correct(problem, z, frame, newton, normal=None, step_tolerance=1e-8) -> Corr
 
     Converged means that ``F`` meets its tolerance and, where there are conditions, that the
     last correction was small, relative to the point: the conditions have no natural size.
+    A point whose corrections are rounding and no longer lessen ``F`` has converged too, as
+    where large terms cancel; its residual says how far.
     """
     start = z
     reason, size = "maximum iterations", np.inf
@@ -238,7 +244,8 @@ def correct(problem, z, frame, newton, normal=None, step_tolerance=1e-8) -> Corr
                 break
             first = size if first is None else first
             settled = problem.condition is None or last <= step_tolerance
-            if size <= newton.tolerance and settled:
+            rounded = last <= ROUNDING and size > STALLED * previous
+            if (size <= newton.tolerance and settled) or rounded:
                 if old is not None:
                     local = Local(problem, z, frame)
                 return Correction(z, local, True, "converged", iteration, size)

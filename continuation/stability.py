@@ -15,6 +15,7 @@ from continuation.event_location import SLACK, locate_zero, solve_augmented, spe
 from continuation.normal_form import hopf_normal_form
 from continuation.options import ContinuationError, DerivativeMissing
 from continuation.spectra import count_unstable, match_modes, mode_distance
+from continuation.tracer import Monitor
 
 
 def hopf_borders(linear, omega, vector):
@@ -65,7 +66,7 @@ def describe_hopf(tracer, result, tangent, index):
     return special_at(tracer, "hopf", CurvePoint(result.z[:-1], tangent), index, True, "", values, vectors)
 
 
-class SpectrumMonitor:
+class SpectrumMonitor(Monitor):
     """Count of unstable eigenvalues, and Hopf points by tracking each mode.
 
     A pair that enters the right half plane while another leaves it does not change the
@@ -105,10 +106,13 @@ class SpectrumMonitor:
         self._between(tracer, before, after, index, 0, found, special)
         if self._past is not None:
             special += self._probe(tracer, self._past, before, after, index, special)
+        return special
+
+    def accept(self, tracer, before, after, found):
+        if self._past is not None:
             # Vectors of points left behind would only fill memory.
             self._past.data.pop("modes", None)
-        self._past, self._recent = before, special
-        return special
+        self._past, self._recent = before, found
 
     def _probe(self, tracer, past, before, after, index, special):
         """Look for a crossing and its return within one step.
@@ -175,7 +179,10 @@ class SpectrumMonitor:
                 self._between(tracer, before, middle, index, depth + 1, found, special)
                 self._between(tracer, middle, after, index, depth + 1, found, special)
                 return
-        if contradictory:
+        # A pair may become two real eigenvalues so near to a fold that no interval holds only one of both.
+        change = after.unstable - before.unstable
+        through_zero = known and not oscillating and explained and (change - len(explained)) % 2 == 0
+        if contradictory and not (through_zero and abs(change) <= len(explained)):
             reason = (
                 f"the count of unstable eigenvalues went from {before.unstable} to "
                 f"{after.unstable}, the modes that could be followed explain {expected:+d}"
@@ -299,5 +306,7 @@ class CountMonitor(SpectrumMonitor):
         point.unstable = count_unstable(rest, tracer.options.stability_tolerance)
 
     def between(self, tracer, before, after, index, found):
-        before.data.pop("modes", None)
         return []
+
+    def accept(self, tracer, before, after, found):
+        before.data.pop("modes", None)

@@ -16,6 +16,25 @@ from continuation.branch import Branch, CurvePoint
 from continuation.options import NotConverged, SingularSystem
 from continuation.problem import Local, Problem, correct
 
+#: Largest distance of the curve from a chord, in chord lengths: an arc whose ends turn by 1.6 rad reaches 0.4.
+FARTHEST = 0.5
+#: Distance in chord lengths within which two located points are one.
+KNOWN = 1e-6
+
+
+class Monitor:
+    """Test functions of a curve and the events between two of its points."""
+
+    def measure(self, tracer, point) -> None:
+        """Evaluate the test functions at a point."""
+
+    def between(self, tracer, before, after, index, found) -> list:
+        """Special points of a step that may still be refused; ``found`` holds those of other monitors."""
+        return []
+
+    def accept(self, tracer, before, after, found) -> None:
+        """Note that the step was accepted."""
+
 
 class Observer:
     """Hooks of a run, which do nothing by default; override those of interest."""
@@ -103,9 +122,7 @@ class Tracer:
     ----------
     problem : Problem
     options : ContinuationOptions
-    monitors : sequence
-        Objects with ``measure(tracer, point)`` and
-        ``between(tracer, before, after, index, found)``.
+    monitors : sequence of Monitor
     observers
         See `Observer`.
     """
@@ -115,6 +132,8 @@ class Tracer:
         self.monitors = list(monitors)
         self.observers = as_observers(observers)
         self.frame = problem.natural_frame()
+        # Retries that are left, and the length of the curve for which they must do.
+        self._retries, self._doubted = options.max_subdivisions if options.locate else 0, 0.0
 
     # -- points
 
@@ -133,12 +152,14 @@ class Tracer:
         )
 
     def at(self, before: CurvePoint, after: CurvePoint, fraction: float) -> CurvePoint | None:
-        """The point of the curve over a fraction of the chord, or None if not reached."""
+        """The point of the curve over a fraction of the chord, or None if there is none near the chord."""
         chord = after.z - before.z
         normal = self.problem.weights * chord
         scale = np.abs(normal).max()
-        correction = self.correct(before.z + fraction * chord, normal / scale)
-        if not correction.converged:
+        start = before.z + fraction * chord
+        correction = self.correct(start, normal / scale)
+        far = self.problem.norm(correction.z - start) > FARTHEST * self.problem.norm(chord)
+        if not correction.converged or far:
             return None
         return self.corrected_point(correction, chord)
 
@@ -151,19 +172,18 @@ class Tracer:
         return s, away
 
     def root(self, before: CurvePoint, after: CurvePoint, function, tolerance=1e-10) -> CurvePoint | None:
-        """Zero of a function of points between two of opposite sign (Illinois)."""
+        """Zero of a function of points between two of opposite sign (Illinois); None where the curve is lost."""
         a, b = 0.0, 1.0
         fa, fb = function(before), function(after)
-        best, side = None, 0
+        point, side = None, 0
         for _ in range(60):
             s = (a * fb - b * fa) / (fb - fa)
             width = b - a
             s = min(max(s, a + 1e-3 * width), b - 1e-3 * width)
             point = self.at(before, after, s)
             if point is None:
-                return best
+                return None
             f = function(point)
-            best = point
             if abs(f) == 0.0 or width < tolerance:
                 return point
             if (f > 0) == (fb > 0):
@@ -174,7 +194,7 @@ class Tracer:
                 a, fa = s, f
                 fb = fb / 2 if side == -1 else fb
                 side = -1
-        return best
+        return point if b - a < np.sqrt(tolerance) else None
 
     # -- the run
 
@@ -231,37 +251,49 @@ class Tracer:
             outcome = self._advance(branch, before, step)
             if isinstance(outcome, str):
                 return outcome
-            after, step, ending = outcome
-            found: list = []
-            for monitor in self.monitors:
-                found += monitor.between(self, before, after, len(branch) - 1, found)
+            after, step, ending, found = outcome
             last = [s for s in found if s.values.pop("beyond", None)]
             if last:
                 branch.special += found
                 for special in found:
                     self._notify("found", branch, special)
                 return f"stopped at: {last[0].kind}"
-            # In the order in which the branch meets them.
-            found.sort(key=lambda s: (s.index, self.fraction(before, after, s.z)[0]))
+            stopping = [s for s in found if s.kind in options.stop_at or s.values.get("stop")]
+            if stopping:
+                after, found = self._stop_at(before, after, stopping[0], found)
+                ending = f"stopped at: {stopping[0].kind}"
             branch.points.append(after.record())
             branch.special += found
             self.frame = self.problem.frame(after.local.basis)
             if self.problem.condition is not None:
                 self.problem.condition.adapt(after.local.condition)
+            for monitor in self.monitors:
+                monitor.accept(self, before, after, found)
             closed = options.detect_closed and self._closed(branch, first, before, after)
             before = after
             self._remember(branch, step)
             self._notify("accepted", branch)
             for special in found:
                 self._notify("found", branch, special)
-            stopping = [s.kind for s in found if s.kind in options.stop_at or s.values.get("stop")]
-            if stopping:
-                return f"stopped at: {stopping[0]}"
             if ending:
                 return ending
             if closed:
                 return "closed: the curve came back to its first point"
         return "largest number of points reached"
+
+    def _stop_at(self, before, after, special, found):
+        """Point of the curve at a special point, and what was found up to it; the point after one not located."""
+        if not special.located or special.z.size != after.z.size:
+            return after, found
+        share = self.fraction(before, after, special.z)[0]
+        point = self.at(before, after, share)
+        if point is None:
+            return after, found
+        point.z = special.z.copy()
+        point.step = self.problem.norm(point.z - before.z)
+        for monitor in self.monitors:
+            monitor.measure(self, point)
+        return point, found[: found.index(special) + 1]
 
     def _remember(self, branch, step):
         branch.next_step = float(step)
@@ -271,51 +303,92 @@ class Tracer:
             branch.restart.update(p=condition.p, q=condition.q)
 
     def _advance(self, branch, before, step):
-        """One accepted step: the point, the next step, and why the branch ends, if it does."""
-        problem, options = self.problem, self.options
+        """One accepted step: the point, the next step, why the branch ends, if it does, and the special points.
+
+        A step is refused when its corrector fails or leaves the curve.  Test functions that contradict each other are
+        a sign of that too, so a step with a special point that cannot be located is tried again, shorter; up to
+        ``max_subdivisions`` times until the curve is past that point.
+        """
+        options = self.options
         while True:
             z, used, normal, ending = self._predict(before, step)
             if ending and used == 0.0:
                 return ending
-            correction = self.correct(z, normal)
-            trouble = None
-            if not correction.converged:
-                trouble = correction.reason
-            else:
-                try:
-                    after = self.corrected_point(correction, before.tangent)
-                except SingularSystem:
-                    trouble = "singular"
+            after, trouble = self._attempt(before, z, normal)
             if trouble is None:
-                cosine = np.clip(problem.dot(after.tangent, before.tangent), -1.0, 1.0)
-                angle = float(np.arccos(cosine))
-                if options.method == "arclength" and angle > options.max_angle:
-                    trouble = "the tangent turns too far"
-                elif options.method == "natural" and angle > 1.0:
-                    trouble = "the tangent turns too far"
-                elif self._jumped(before, after, z):
-                    trouble = "the corrector went far from the prediction"
+                after.step = used
+                after, ending, trouble = self._land_on_limit(before, after, self._beyond(after.z), ending)
+            if trouble is None:
+                found = self._between(branch, before, after)
+                doubtful = [s for s in found if not s.located and s.kind != "zero eigenvalue"]
+                left = [s for s in found if s.located and self._beyond(s.z)]
+                if doubtful and self._retries and used > options.min_step * (1 + 1e-9):
+                    self._retries -= 1
+                    self._doubted = max(self._doubted, used)
+                    trouble = f"a {doubtful[0].kind} was seen and not located"
+                elif left:
+                    # The curve left the limits and came back within the step.
+                    turn = self.at(before, after, self.fraction(before, after, left[0].z)[0])
+                    if turn is None:
+                        trouble = "the curve was lost at its limit"
+                    else:
+                        crossed = self._beyond(left[0].z)
+                        after, ending, trouble = self._land_on_limit(before, turn, crossed, None)
+                        found = [] if trouble else self._between(branch, before, after)
             if trouble is None:
                 break
             self._notify("refused", branch, trouble, used)
             if used <= options.min_step * (1 + 1e-9):
                 return f"step below its minimum: {trouble}"
             step = max(used * options.shrink, options.min_step)
-        after.step = used
-        crossed = None if ending else self._beyond(after.z)
-        if crossed:
-            landed = self._land(before, after, *crossed)
-            if landed is not None:
-                after, ending = landed, f"limit of {crossed[0]} reached"
-        for monitor in self.monitors:
-            monitor.measure(self, after)
+        self._doubted -= after.step
+        if self._doubted <= 0.0:
+            self._retries, self._doubted = options.max_subdivisions if options.locate else 0, 0.0
+        angle = self._angle(before, after)
         factor = (options.target_iterations + 1) / (after.iterations + 1)
         if angle > 0 and options.method == "arclength":
             factor = min(factor, 0.7 * options.max_angle / angle)
         factor = float(np.clip(factor, options.shrink, options.growth))
         if ending is None:
             step = float(np.clip(used * factor, options.min_step, options.max_step))
-        return after, step, ending
+        return after, step, ending, found
+
+    def _attempt(self, before, z, normal):
+        """The corrected point, and why it is not accepted, if it is not."""
+        correction = self.correct(z, normal)
+        if not correction.converged:
+            return None, correction.reason
+        try:
+            after = self.corrected_point(correction, before.tangent)
+        except SingularSystem:
+            return None, "singular"
+        most = self.options.max_angle if self.options.method == "arclength" else 1.0
+        if self._angle(before, after) > most:
+            return None, "the tangent turns too far"
+        if self._jumped(before, after, z):
+            return None, "the corrector went far from the prediction"
+        return after, None
+
+    def _angle(self, before, after) -> float:
+        return float(np.arccos(np.clip(self.problem.dot(after.tangent, before.tangent), -1.0, 1.0)))
+
+    def _between(self, branch, before, after) -> list:
+        """Special points of a step in the order in which the branch meets them, without those it knows."""
+        found: list = []
+        for monitor in self.monitors:
+            monitor.measure(self, after)
+        for monitor in self.monitors:
+            found += monitor.between(self, before, after, len(branch) - 1, found)
+        found.sort(key=lambda s: (s.index, self.fraction(before, after, s.z[: before.z.size])[0]))
+        near = KNOWN * self.problem.norm(after.z - before.z)
+
+        def known(special):
+            others = (s for s in branch.special[-4:] if s.kind == special.kind and s.z.size == special.z.size)
+            return special.located and any(
+                s.located and s.z.size == before.z.size and self.problem.norm(s.z - special.z) <= near for s in others
+            )
+
+        return [s for s in found if not known(s)]
 
     def _jumped(self, before, after, prediction) -> bool:
         """True when the correction is too long for the step: likely another branch."""
@@ -343,26 +416,44 @@ class Tracer:
             limit = high if direction[n + i] > 0 else low
             reach = (limit - before.z[n + i]) / direction[n + i]
             if 0.0 <= reach <= used * (1 + 1e-9):
-                used, ending = reach, f"limit of {name} reached"
-                normal = np.zeros(problem.n + problem.k + problem.e)
-                normal[n + i] = 1.0
+                used, ending, last = reach, f"limit of {name} reached", (n + i, limit)
+                normal = np.eye(1, problem.n + problem.k + problem.e, n + i)[0]
         z = before.z + used * direction
+        if ending:
+            z[last[0]] = last[1]
         return z, used, normal, ending
 
     def _beyond(self, z):
+        """Index of the first parameter beyond its limits and the limit, or None."""
         for i, name in enumerate(self.problem.names):
             if name in self.options.limits:
                 low, high = self.options.limits[name]
                 value = z[self.problem.n + i]
                 if value < low or value > high:
-                    return name, self.problem.n + i, low if value < low else high
+                    return i, low if value < low else high
         return None
 
-    def _land(self, before, after, name, index, limit):
-        landed = self.root(before, after, lambda point: point.z[index] - limit)
-        if landed is not None:
-            landed.step = self.problem.norm(landed.z - before.z)
-        return landed
+    def _land_on_limit(self, before, after, crossed, ending):
+        """The last point, exactly on the limit that the curve crosses; why the branch ends; what went wrong."""
+        if ending is None and crossed is None:
+            return after, None, None
+        if ending is not None:
+            return after, ending, None
+        (i, limit), n = crossed, self.problem.n
+        ending = f"limit of {self.problem.names[i]} reached"
+        landed = self.root(before, after, lambda point: point.z[n + i] - limit)
+        if landed is None:
+            return after, None, "the curve was lost at its limit"
+        start = landed.z.copy()
+        start[n + i] = limit
+        correction = self.correct(start, np.eye(1, start.size, n + i)[0])
+        near = KNOWN * self.problem.norm(after.z - before.z)
+        if correction.converged and self.problem.norm(correction.z - landed.z) <= near:
+            landed = self.corrected_point(correction, landed.tangent)
+        # At a fold on the limit only the zero along the curve is left: exact to rounding.
+        landed.z[n + i] = limit
+        landed.step = self.problem.norm(landed.z - before.z)
+        return landed, ending, None
 
     def _closed(self, branch, first, before, after) -> bool:
         if len(branch) < 6:

@@ -36,7 +36,9 @@ def circle():
 
 
 def s_curve(**options):
-    return continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS, **options))
+    """Branch whose arclength is that of the plane of ``x`` and ``a``."""
+    options = ContinuationOptions(limits=LIMITS, parameter_scales={"a": 1.0}, **options)
+    return continue_branch(cusp(), [-1.5], MU, "a", options)
 
 
 def test_every_point_is_an_equilibrium_and_the_end_is_the_limit():
@@ -242,7 +244,7 @@ from tests.systems.normal_forms import cusp
 def die(branch):
     if len(branch) == 11:
         os.kill(os.getpid(), signal.SIGKILL)
-continue_branch(cusp(), [-1.5], {MU}, "a", ContinuationOptions(limits={LIMITS}),
+continue_branch(cusp(), [-1.5], {MU}, "a", ContinuationOptions(limits={LIMITS}, parameter_scales={{"a": 1.0}}),
                 observers=[Checkpoint({str(path)!r}, 5), die])
 """
     root = Path(__file__).parents[2]
@@ -253,7 +255,7 @@ continue_branch(cusp(), [-1.5], {MU}, "a", ContinuationOptions(limits={LIMITS}),
     left = Branch.load(path)
     assert len(left) == 10 and left.reason == "running"
     whole = s_curve()
-    longer = resume(cusp(), left, ContinuationOptions(limits=LIMITS))
+    longer = resume(cusp(), left, ContinuationOptions(limits=LIMITS, parameter_scales={"a": 1.0}))
     assert len(longer) == len(whole)
     assert np.allclose(longer.values(), whole.values(), rtol=0, atol=1e-9)
 
