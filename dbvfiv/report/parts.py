@@ -15,6 +15,7 @@ from ..materials.stability import StableRange, stable_range
 from ..model.symmetry import symmetry_named
 from ..record.mesh import MeshData
 from ..record.states import shown_summary
+from ..studies.closure.safety import rated_sentence
 from ..studies.map.result import LAWS
 from . import live
 from .content import Part, Table, picture, pictures_of
@@ -369,7 +370,8 @@ def shutting(found: Gathered) -> tuple[str, ...]:
     sentence = (
         f"Under {last.pressure / 1e3:.4g} kPa of back pressure it {how}, sealed over {last.sealed_length * 1e3:.3g} mm."
     )
-    return (sentence,) if result.safety is None else (sentence, result.safety.sentence)
+    safety = () if result.safety is None else (result.safety.sentence,)
+    return tuple(s for s in (rated_sentence(result), sentence, *safety) if s)
 
 
 _STRAINS = "Strains and stresses in the layers"

@@ -76,12 +76,14 @@ def test_a_case_that_fits(command_line):
     assert "a head of 1 m" in outcome.out and len(outcome.out.splitlines()) < 25
 
 
-def test_default_back_pressures_reach_the_rated_one():
-    assert load_case(None, ("closure.rated_pressure=60 kPa",)).closure.pressures == (7e3, 14e3, 21e3, 28e3, 60e3)
-    assert load_case(None, ("closure.rated_pressure=10 kPa",)).closure.pressures == (7e3, 14e3, 21e3, 28e3)
+def test_default_back_pressures_reach_one_and_a_half_times_the_rated_one():
+    defaults = (7e3, 14e3, 21e3, 28e3)
+    assert load_case(None, ("closure.rated_pressure=60 kPa",)).closure.pressures == (*defaults, 60e3, 90e3)
+    assert load_case(None, ("closure.rated_pressure=10 kPa",)).closure.pressures == (7e3, 10e3, 14e3, 15e3)
+    assert load_case().closure.pressures == defaults
     named = load_case(None, ("closure.rated_pressure=60 kPa",)).replace({"closure.pressures": ["5 kPa"]})
     assert named.closure.pressures == (5e3,)
     late = load_case(None, ("drive.pressure=1 m",)).replace({"closure.rated_pressure": "40 kPa"})
-    assert late.closure.pressures == (7e3, 14e3, 21e3, 28e3, 40e3)
+    assert late.closure.pressures == (*defaults, 40e3, 60e3)
     changed = load_case(None, ("closure.rated_pressure=60 kPa",)).replace({"closure.rated_pressure": "40 kPa"})
-    assert changed.closure.pressures == (7e3, 14e3, 21e3, 28e3, 40e3)
+    assert changed.closure.pressures == (*defaults, 40e3, 60e3)

@@ -14,6 +14,8 @@ from ...case.quantity import Length, Number, Pressure, Time
 from ...case.section import Section, key
 
 _PRESSURES = (7e3, 14e3, 21e3, 28e3)
+#: Back pressure up to which a rated valve is examined, over the rated one: EN 12266-1 tests shells at 1.5 times theirs.
+EXAMINED = 1.5
 
 
 class Keys(Section):
@@ -21,7 +23,8 @@ class Keys(Section):
 
     pressures: tuple[LoadPressure, ...] = key(
         _PRESSURES,
-        "Static back pressures, outside over inside; without them those up to a rated_pressure that is higher.",
+        "Static back pressures, outside over inside; where only a rated_pressure is given, the default ones below 1.5 "
+        "times that, itself and 1.5 times that.",
         min_length=1,
     )
     rated_pressure: Pressure | None = key(
@@ -90,10 +93,13 @@ class Keys(Section):
 
     @model_validator(mode="after")
     def reach_rated_pressure(self) -> Keys:
-        """Let pressures that were not given go up to the rated one."""
+        """Let pressures that were not given go up to 1.5 times the rated one."""
         if "pressures" not in self.model_fields_set:
-            higher = (self.rated_pressure or 0.0) > _PRESSURES[-1]
-            self.__dict__["pressures"] = (*_PRESSURES, self.rated_pressure) if higher else _PRESSURES
+            self.__dict__["pressures"] = _PRESSURES
+            if self.rated_pressure:
+                last = EXAMINED * self.rated_pressure
+                below = {pressure for pressure in _PRESSURES if pressure < last}
+                self.__dict__["pressures"] = tuple(sorted(below | {self.rated_pressure, last}))
         return self
 
     @field_validator("measured", mode="before")

@@ -44,8 +44,17 @@ from .columns import (
     valid_rows,
 )
 from .reversal import Turn
-from .safety import ClassBuckling, Closing, SafetyFactor, find_safety, first_buckling, read_classes, sentences
-from .valve import ClosureModel, Passage, closure_model, layer_maxima
+from .safety import (
+    ClassBuckling,
+    Closing,
+    SafetyFactor,
+    find_safety,
+    first_buckling,
+    rated_verdict,
+    read_classes,
+    sentences,
+)
+from .valve import ClosureModel, Passage, closure_model, film_leak, layer_maxima
 
 
 class PressedState(SimpleNamespace):
@@ -78,9 +87,17 @@ class PressedState(SimpleNamespace):
         reference = results.reference_opening / results.mesh.part.copies
         return Passage(results.mesh.z, self.opening, reference, results.case.closure.shut_fraction)
 
+    @cached_property
+    def leak(self) -> float:
+        """Leak of the whole valve through the gaps that are left, m3/s; 0 where a section is shut all over."""
+        mesh, fluid = self.results.mesh, self.results.case.fluid
+        x = (mesh.nodes[:, 0] + self.nodal[:, 0])[mesh.rows]
+        gap = np.where(self.opening[:, None] > 0.0, self.gap[mesh.rows], 0.0)
+        return film_leak(self.pressure, mesh.z, x, gap, mesh.part.copies, fluid.density, fluid.dynamic_viscosity)
+
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
-        values = {c.name: getattr(self, c.name) for c in SUMMARY}
+        values = {c.name: getattr(self, c.name) for c in SUMMARY} | {"leak": self.leak}
         extremes = zip(self.results.mesh.layer_titles(), *layer_maxima(self.layers))
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()} | {
             "sealed_intervals": [list(pair) for pair in self.passage.shut_intervals],
@@ -303,6 +320,7 @@ class ClosureResult(StudyResult):
             "first_buckling": first_buckling(self.critical_pressure, self.classes, own),
             "classes": [part.summary() for part in self.classes],
             "safety": None if self.safety is None else self.safety.summary(),
+            "rated": rated_verdict(self),
             "softest": {"pressure": softest.pressure, "lowest_stiffness_eigenvalue": softest.lowest_eigenvalue}
             if softest
             else None,

@@ -103,6 +103,53 @@ def find_safety(result: StudyResult) -> SafetyFactor | None:
     return SafetyFactor(pressure / rated, False, limit, pressure, rated, followed, held)
 
 
+def rated_verdict(result: StudyResult) -> dict[str, Any] | None:
+    """Answer at the rated back pressure, in SI units; None where no rated one is given or nothing was found.
+
+    ``pressure``, whether it is ``examined``, ``shut`` and ``sealed`` there, without any gap left, ``leak`` in m3/s,
+    ``buckles_at`` and ``examined_to`` in Pa, the ``margin`` to the first limit as a share of the rated pressure, and
+    whether that is a lower bound, ``at_least``.
+    """
+    rated, safety = result.case.closure.rated_pressure, result.safety
+    if rated is None or safety is None:
+        return None
+    state = next((s for s in result.states if np.isclose(s.pressure, rated) and not s.beyond_limit), None)
+    seen = state is not None and not safety.seal_assumed
+    return {
+        "pressure": rated,
+        "examined": state is not None,
+        "shut": bool(state.closed) if seen else None,
+        "sealed": state.leak == 0.0 if seen else None,
+        "leak": state.leak if seen else None,
+        "buckles_at": result.critical_pressure,
+        "examined_to": safety.followed_to,
+        "margin": safety.factor - 1.0,
+        "at_least": safety.at_least,
+    }
+
+
+def rated_sentence(result: StudyResult) -> str | None:
+    """Answer at the rated back pressure in one sentence; None where no rated one is given."""
+    told = rated_verdict(result)
+    if told is None:
+        return None
+    begin = f"Rated back pressure {told['pressure'] / 1e3:.6g} kPa:"
+    if not told["examined"]:
+        return f"{begin} not examined; {result.walk_failure or 'it is not among closure.pressures.'}"
+    seal = "sealing not examined, as the supports hold the lips shut"
+    if told["sealed"] is not None:
+        ideal = told["leak"] > 0 and not result.case.fluid.dynamic_viscosity
+        still = " at most, as fluid.viscosity is none" if ideal else ""
+        seal = f"{'shut' if told['shut'] else 'open'}, leak {told['leak'] * 3.6e6:.3g} L/h{still}"
+        seal = "sealed, leak 0 L/h" if told["sealed"] else seal
+    at = told["buckles_at"]
+    buckles = (
+        f"no buckling up to {told['examined_to'] / 1e3:.6g} kPa" if at is None else f"buckles at {at / 1e3:.6g} kPa"
+    )
+    least = "at least " if told["at_least"] else ""
+    return f"{begin} {seal}; {buckles}; margin {least}{told['margin']:.0%}."
+
+
 def _rising(result: StudyResult) -> list[Any]:
     """Points of the path as the pressure rises, up to where arclength takes over."""
     rising: list[Any] = []
@@ -281,6 +328,7 @@ def sentences(result: StudyResult) -> list[str]:
         *_buckling(result),
         *(part.sentence for part in result.classes),
         *([] if safety is None else [safety.sentence]),
+        *([answer] if (answer := rated_sentence(result)) else []),
         *([] if result.closing is None else _closing(result.closing)),
         *result.measured.sentences(),
     ]

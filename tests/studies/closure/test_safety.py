@@ -10,6 +10,7 @@ import pytest
 import dbvfiv
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.safety import find_safety
+from dbvfiv.studies.closure.valve import film_leak
 from dbvfiv.studies.session import load_result
 from tests.small_valves import FORMER
 
@@ -65,6 +66,29 @@ def test_where_equilibria_end_is_a_limit():
     found = find_safety(result([1e3, 1.8e3], [0.1, 0.1], failure="No equilibrium was found.", rated_pressure=3e3))
     assert (found.limit, found.factor) == ("end of the path", pytest.approx(0.6))
     assert find_safety(SimpleNamespace(walk=[])) is None
+
+
+def test_leak_is_that_of_a_laminar_film_and_of_a_jet_at_its_ends():
+    z, x = np.linspace(0.0, 0.1, 5), np.tile(np.linspace(0.0, 0.2, 9), (5, 1))
+    gap, pressure, viscosity = np.full((5, 9), 5e-5), 3e4, 1.0016e-3
+    film = pressure * (2 * 5e-5) ** 3 * (2 * 0.2) / (12 * viscosity * 0.1)
+    assert film_leak(pressure, z, x, gap, 4, 1e-6, viscosity) == pytest.approx(film, rel=1e-6)
+    jet = 4 * 5e-5 * 0.2 * np.sqrt(2 * pressure / 1000.0)
+    assert film_leak(pressure, z, x, gap, 4, 1000.0, 0.0) == pytest.approx(jet, rel=1e-12)
+    assert film_leak(pressure, z, x, gap, 4, 1000.0, viscosity) < min(film, jet)
+    gap[2] = -1e-6
+    assert film_leak(pressure, z, x, gap, 4, 1000.0, viscosity) == 0.0
+
+
+@pytest.mark.slow
+def test_a_rated_valve_is_answered_up_to_one_and_a_half_times_its_rating():
+    found = dbvfiv.load(thesis_case(), THIN | {"closure.rated_pressure": "2 kPa"}).closure()
+    assert found.case.closure.pressures == (2e3, 3e3)
+    told = found.summary()["rated"]
+    assert told["examined"] and told["pressure"] == 2e3 and told["examined_to"] == 3e3
+    assert told["shut"] and not told["sealed"] and told["leak"] == found.states[0].leak > 0
+    (sentence,) = (line for line in found.lines() if line.startswith("Rated back pressure 2 kPa"))
+    assert "L/h" in sentence and "no buckling up to 3 kPa" in sentence and "margin at least 50%" in sentence
 
 
 THIN = {
