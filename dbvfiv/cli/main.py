@@ -57,7 +57,7 @@ def _root(
 
 def build() -> typer.Typer:
     """All commands, in the order of their help."""
-    app = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app = typer.Typer(add_completion=True, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
     app.callback()(_root)
     commands = [(command.__name__, command) for command in _BEFORE]
     commands += studies.study_commands()
