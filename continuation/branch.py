@@ -18,6 +18,8 @@ import numpy as np
 
 #: Version of the layout of files.
 FORMAT = 1
+#: Special points that the text of a branch lists.
+SHOWN = 7
 
 
 @dataclass
@@ -57,6 +59,10 @@ class SpecialPoint:
     values: dict = field(default_factory=dict)
     vectors: dict = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        at = ", ".join(f"{name} = {value:.8g}" for name, value in self.mu.items())
+        return f"<SpecialPoint: {self.kind} at {at}, {'located' if self.located else 'not located: ' + self.reason}>"
+
 
 @dataclass
 class CurvePoint:
@@ -93,6 +99,10 @@ class CurvePoint:
     eigenvalues: np.ndarray = field(default_factory=lambda: np.empty(0, complex))
     local: Any = None
     data: dict = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        known = "" if self.unstable < 0 else f", {self.unstable} unstable"
+        return f"<CurvePoint: {self.z.size} unknowns, residual {self.residual:.2g}{known}>"
 
     def record(self) -> CurvePoint:
         """Copy for a result: without linearisation and notes."""
@@ -135,6 +145,17 @@ class Branch:
     reason: str = "running"
     next_step: float = 0.0
     restart: dict = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """What it is, over which parameters, the first special points, and why it ended."""
+        over = []
+        for i, name in enumerate(self.names):
+            at = [point.z[self.size + i] for point in self.points] or [np.nan]
+            over.append(f"{name} {min(at):.6g} to {max(at):.6g}")
+        head = f"<Branch of {self.kind}: {len(self)} points of {self.size} unknowns, {', '.join(over)}; {self.reason}"
+        listed = [f"  {special!r}" for special in self.special[:SHOWN]]
+        more = len(self.special) - len(listed)
+        return "\n".join([head, *listed, *([f"  and {more} more special points"] if more else [])]) + ">"
 
     def __len__(self) -> int:
         return len(self.points)

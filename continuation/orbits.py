@@ -120,6 +120,10 @@ class Orbit:
     motion: PeriodicMotion
     floquet: Exponents
 
+    def __repr__(self) -> str:
+        at = ", ".join(f"{name} = {value:.8g}" for name, value in self.mu.items())
+        return f"<Orbit: period {self.period:.8g}, {len(self.motion.coefficients) // 2} harmonics, {at}>"
+
     @property
     def period(self) -> float:
         return self.motion.period

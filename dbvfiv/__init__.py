@@ -23,6 +23,17 @@ _PUBLIC = {
     "CaseError": "errors",
     "SolveError": "errors",
     "Observer": "observer",
+    "ClosureResult": "studies.closure.result",
+    "CycleResult": "studies.cycle.result",
+    "LevelsResult": "studies.levels.result",
+    "MapResult": "studies.map.result",
+    "ModesResult": "studies.modes.result",
+    "OnsetResult": "studies.onset.result",
+    "SensitivityResult": "studies.sensitivity.result",
+    "State": "studies.state",
+    "SteadyResult": "studies.steady.result",
+    "SweepResult": "studies.sweep.result",
+    "TransientResult": "studies.transient.result",
 }
 __all__ = sorted(_PUBLIC)
 

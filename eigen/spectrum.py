@@ -251,6 +251,11 @@ class Spectrum:
     def __len__(self) -> int:
         return self.eigenvalues.size
 
+    def __repr__(self) -> str:
+        lead = f"leading {complex(self.eigenvalues[0]):.6g} 1/s, " if len(self.eigenvalues) else ""
+        worst = f"largest residual {self.residual.max():.1g}" if len(self.residual) else "none found"
+        return f"<Spectrum: {len(self.eigenvalues)} of {self.asked} modes, {self.status}, {lead}{worst}>"
+
     @property
     def growth_rate(self) -> np.ndarray:
         """Real parts, 1/s."""
@@ -320,3 +325,6 @@ class Mode:
     u: np.ndarray
     left_q: np.ndarray | None = None
     left_u: np.ndarray | None = None
+
+    def __repr__(self) -> str:
+        return f"<Mode: eigenvalue {complex(self.eigenvalue):.6g} 1/s, {self.q.size} + {self.u.size} unknowns>"

@@ -10,8 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from eigen import CoupledPencil
+
+from ..case.parameters import Mu
 from ..exchange.files import state_name, write_shapes
 from ..model import ValveModel
+from ..model.dynamics import linearise
 from ..model.state import SteadyState
 from ..record.record import GrowingRecord
 from ..record.states import LAYERS, read_states, summarise
@@ -70,6 +74,19 @@ class State(SteadyState):
     def solution(self) -> SteadyState:
         """The state by itself, to start from for instance."""
         return SteadyState(**{f.name: getattr(self, f.name) for f in fields(SteadyState)})
+
+    def pencil(self, **changes: Any) -> CoupledPencil:
+        """Operator of small motions about this state: M, C, K, G and J as sparse matrices, the fluid's parts dense.
+
+        Fluid and damping may differ from those it was found with, see `modes`. Rows of M, C and K are the unknowns of
+        ``q``, those of ``model.shell.dofs``.
+
+        Examples
+        --------
+        >>> state.pencil(density=1.2, alpha=0).K     # doctest: +SKIP
+        """
+        point = Mu.of(self._session(changes, {}).case)
+        return linearise(self.model, self.q, self.pressure).pencil(point)
 
     def modes(
         self, *, count: int | None = None, output: str | Path | None = None, observer: Any = None, **changes: Any

@@ -1,0 +1,46 @@
+"""The faces of the package in a script: names at the top, texts of results, the operator of a state."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+import dbvfiv
+from continuation import ContinuationOptions, continue_branch
+from dbvfiv.studies.case import thesis_case
+from tests.systems.brusselator import brusselator
+
+LINES, WIDTH = 10, 200
+
+
+def is_short(thing):
+    lines = repr(thing).splitlines()
+    return len(lines) <= LINES and max(map(len, lines)) <= WIDTH
+
+
+@pytest.fixture(scope="module")
+def state():
+    return dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6}).steady("12 kPa")
+
+
+def test_results_are_named_at_the_top():
+    for name in dbvfiv.__all__:
+        assert getattr(dbvfiv, name).__doc__, name
+    assert {"State", "SteadyResult", "ModesResult", "ClosureResult", "CycleResult"} <= set(dbvfiv.__all__)
+
+
+def test_pencil_of_a_state_has_the_eigenvalues_of_its_modes(state):
+    modes, pencil = state.modes(count=2), state.pencil()
+    assert pencil.M.shape == pencil.K.shape == (state.q.size,) * 2
+    values = scipy.linalg.eigvals(*pencil.first_order())
+    for found in modes.summary()["modes"]:
+        value = complex(found["growth_rate"], 2 * np.pi * found["frequency"])
+        assert abs(values - value).min() < 1e-7 * abs(value)
+    assert all(map(is_short, (state, state.results, modes)))
+
+
+def test_texts_of_a_branch_and_its_points_are_short():
+    options = ContinuationOptions(eigenvalues=2, limits={"B": (0.0, 4.0)})
+    branch = continue_branch(brusselator(), [1.0, 0.5], {"A": 1.0, "B": 0.5}, "B", options)
+    assert "limit of B reached" in repr(branch) and "hopf at A = 1, B = 2, located" in repr(branch)
+    branch.special *= 20
+    assert all(map(is_short, (branch, branch.points[0], branch.special[0]))) and "13 more" in repr(branch)
