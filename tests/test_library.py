@@ -1,5 +1,7 @@
 """The faces of the package in a script: names at the top, texts of results, the operator of a state."""
 
+import textwrap
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -44,3 +46,46 @@ def test_texts_of_a_branch_and_its_points_are_short():
     assert "limit of B reached" in repr(branch) and "hopf at A = 1, B = 2, located" in repr(branch)
     branch.special *= 20
     assert all(map(is_short, (branch, branch.points[0], branch.special[0]))) and "13 more" in repr(branch)
+
+
+SCRIPTS = {
+    "valve": """
+        import dbvfiv
+
+        valve = dbvfiv.load("cases/dbv12.toml", {"mesh.around": 4})
+        state = valve.steady("12 kPa")
+        print(state.mass_flow, state.pencil().K.shape)
+        print(state.modes(count=3).plot("figures"), valve.onset().summary())
+    """,
+    "own equations": """
+        import jax.numpy as jnp
+
+        from continuation import ContinuationOptions, continue_branch
+        from continuation.jax_system import JaxSystem
+
+        system = JaxSystem(lambda u, mu: jnp.stack([mu["a"] + u[0] - u[0] ** 3]), 1)
+        branch = continue_branch(system, [-1.5], {"a": -2.0}, "a", ContinuationOptions(limits={"a": (-2.0, 2.0)}))
+        print(branch, branch.values(), [point.mu["a"] for point in branch.of_kind("fold")])
+    """,
+    "own operator": """
+        import numpy as np
+
+        from eigen import CoupledPencil
+
+        pencil = CoupledPencil(M=np.eye(2), C=0.1 * np.eye(2), K=np.diag([1.0, 4.0]))
+        print(pencil.n, [part.shape for part in pencil.first_order()])
+    """,
+}
+
+
+@pytest.mark.slow
+def test_a_type_checker_finds_nothing_wrong_with_three_scripts(tmp_path):
+    api = pytest.importorskip("mypy.api", reason="the package mypy is not installed")
+    files = []
+    for name, text in SCRIPTS.items():
+        files.append(tmp_path / f"{name.replace(' ', '_')}.py")
+        files[-1].write_text(textwrap.dedent(text))
+    said, errors, status = api.run(
+        ["--cache-dir", str(tmp_path), "--ignore-missing-imports", "--follow-imports=silent", *map(str, files)]
+    )
+    assert status == 0, said + errors
