@@ -7,6 +7,7 @@ A material card is data only; what it does under strain is the business of the
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -126,11 +127,38 @@ class Ogden(Relaxing):
         return self
 
 
+#: Shore A hardness for which Gent's relation holds (Qi, Joyce and Boyce, Rubber Chem. Technol. 76, 2003, 419-435).
+SOFTEST, HARDEST = 20.0, 80.0
+_SHORE = re.compile(r"\s*(\d+(?:\.\d*)?)\s*(?:°\s*)?sh(?:ore)?[\s-]*a\s*", re.IGNORECASE)
+
+
+def shear_modulus_of(shore: float) -> float:
+    """Shear modulus, Pa, of an incompressible rubber of a hardness in Shore A (Gent, Rubber Chem. Technol. 31, 1958,
+    896-906): a third of ``E = 0.0981 (56 + 7.66 S) / (0.137505 (254 - 2.54 S))`` MPa.
+    """
+    return 1e6 / 3.0 * 0.0981 * (56.0 + 7.66 * shore) / (0.137505 * (254.0 - 2.54 * shore))
+
+
+def _by_hardness(given: Any) -> Any:
+    match = _SHORE.fullmatch(given) if isinstance(given, str) else None
+    if match is None:
+        return given
+    if not SOFTEST <= float(match[1]) <= HARDEST:
+        raise ValueError(f"while hardness tells the modulus from {SOFTEST:g} to {HARDEST:g} Shore A")
+    return float(f"{shear_modulus_of(float(match[1])):.15g}")
+
+
 class NeoHookean(Relaxing):
     """Incompressible W = G/2 (I1 - 3)."""
 
     kind: Literal["neo-hookean"] = key(..., "Incompressible neo-Hookean rubber.")
-    shear_modulus: Modulus = key(..., "Shear modulus G.", gt=0, le=1e13)
+    shear_modulus: Annotated[Modulus, BeforeValidator(_by_hardness)] = key(
+        ...,
+        'Shear modulus G, or the hardness of the rubber, "60 Shore A", 20 to 80, by Gent (1958): a reading that is 5 '
+        "points off changes G by a fifth.",
+        gt=0,
+        le=1e13,
+    )
     density: Density = _density(...)
 
 
