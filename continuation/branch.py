@@ -147,7 +147,7 @@ class Branch:
     restart: dict = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        """What it is, over which parameters, the first special points, and why it ended."""
+        """Kind, parameters with their ranges, the first special points, and the reason of the end."""
         over = []
         for i, name in enumerate(self.names):
             at = [point.z[self.size + i] for point in self.points] or [np.nan]
