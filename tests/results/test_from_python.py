@@ -80,7 +80,9 @@ def test_arrays_and_single_texts(valve):
 
 
 def test_what_the_package_offers():
-    public = {"Valve", "load", "load_result", "resume", "CaseError", "SolveError", "Observer"}
+    results = "Steady Modes Sweep Sensitivity Levels Onset Map Closure Transient Cycle"
+    public = {"Valve", "load", "load_result", "resume", "CaseError", "SolveError", "Observer", "State"}
+    public |= {f"{name}Result" for name in results.split()}
     assert public <= set(dir(dbvfiv)) and public == set(dbvfiv.__all__)
     assert isinstance(dbvfiv.load(thesis_case(), COARSE), dbvfiv.Valve) and issubclass(dbvfiv.CaseError, ValueError)
 
