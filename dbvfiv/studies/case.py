@@ -24,7 +24,7 @@ from . import KINDS
 
 def _section(kind: str) -> tuple[type[Section], Any]:
     """The section of a study, under the first line of its docstring."""
-    keys = import_module(f"{__package__}.{kind}.keys").Keys
+    keys = import_module(f"{__package__}.{kind}.command").Keys
     return keys, key(keys(), (keys.__doc__ or "").partition("\n")[0])
 
 

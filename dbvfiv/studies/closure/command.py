@@ -2,14 +2,114 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import typer
+from pydantic import StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
 
-from ...case.quantity import number_or_text
+from ...case.measured import AREA, MEASURED_FILES, SHAPE, find_measured
+from ...case.parameters import PARAMETERS
+from ...case.physics import LoadPressure
+from ...case.quantity import Length, Number, Pressure, Time, number_or_text
+from ...case.section import Section, key
 from ..request import ClassesOption, Request, with_unit
 
 ORDER = 35
+
+_PRESSURES = (7e3, 14e3, 21e3, 28e3)
+#: Back pressure up to which a rated valve is examined, over the rated one: EN 12266-1 tests shells at 1.5 times theirs.
+EXAMINED = 1.5
+
+
+class Keys(Section):
+    """Back pressure on the outside, no flow."""
+
+    pressures: tuple[LoadPressure, ...] = key(
+        _PRESSURES,
+        "Static back pressures, outside over inside; where only a rated_pressure is given, the default ones below 1.5 "
+        "times that, itself and 1.5 times that.",
+        min_length=1,
+    )
+    rated_pressure: Pressure | None = key(
+        None,
+        "Back pressure that the safety factor refers to; the largest of pressures without it.",
+        **PARAMETERS["pressure"].limits,
+    )
+    supports: Literal["contact", "held-lips"] = key(
+        "contact",
+        "Inner faces touching the closing plane, or the simplification of Th. 3.6: duckbill held shut, "
+        "mid-surface of the "
+        "saddle kept from crossing the plane.",
+    )
+    start: Literal["rest", "open"] = key(
+        "rest", "From the valve at rest, or from the steady flow at open_pressure turned back."
+    )
+    open_pressure: LoadPressure = key(10e3, "Static inlet pressure of the open start.")
+    max_step: LoadPressure = key(1e3, "Largest load step; the stiffness is watched for buckling at each.")
+    contact_depth: Length = key(
+        3e-6,
+        (
+            "Depth to which the largest back pressure alone would press the faces into each other, before "
+            "multipliers push them apart."
+        ),
+        gt=0,
+        le=1e-3,
+    )
+    penetration: Length = key(1e-6, "Largest penetration that is left.", gt=0, le=1e-3)
+    shut_fraction: Number = key(
+        0.2, "A section counts as shut when less than this fraction of the lip's opening at rest is left.", ge=0, lt=1
+    )
+    eigenvalues: StrictInt = key(4, "Lowest eigenvalues of the tangent stiffness to follow.", ge=1, le=100)
+    symmetry: Literal["SS", "all"] = key(
+        "SS",
+        "Classes of motion watched for buckling: SS is that of the model, all adds those in which the lips sway in y "
+        "(SA), the valve sways sideways in x (AS) and twists (AA).",
+    )
+    balance_tolerance: Number = key(
+        0.0,
+        "Largest error of the energy balance over the work; load steps that miss it are halved as often as "
+        "it takes, for the balance alone. 0 reports the "
+        "balance of the load steps as they are.",
+        ge=0,
+        le=1,
+    )
+    arclength: StrictBool = key(
+        True, "Go on along the equilibrium path by arclength when load steps end at a limit point."
+    )
+    measured: Annotated[tuple[Path, ...], MEASURED_FILES] = key(
+        (),
+        "CSV of measured points that figures and tables show beside the computed ones, one file or several, relative "
+        "to the case file. The first line names the columns with units: a back pressure with the area of the narrowest "
+        "passage left (pressure [kPa], area [mm2]), or with points of sections of the wall (pressure [kPa], z [mm], "
+        "face, x [mm], y [mm]; without z at the lip, without face on the inner one).",
+    )
+    reversal_time: Time = key(
+        0.2, "Time in which the drive turns from open_pressure to as much back pressure.", gt=0, le=1e3
+    )
+    reversal_hold: Time = key(0.2, "Time for which the back pressure is then held.", ge=0, le=1e3)
+    reversal_continuity: Literal["storage", "quasi-steady"] = key(
+        "storage",
+        "Continuity law while the drive turns. Lips that meet push the fluid between them away with "
+        "storage; quasi-steady they stop it at once, and the "
+        "pressure of the incompressible fluid knows no bounds.",
+    )
+
+    @model_validator(mode="after")
+    def reach_rated_pressure(self) -> Keys:
+        """Let pressures that were not given go up to 1.5 times the rated one."""
+        if "pressures" not in self.model_fields_set:
+            self.__dict__["pressures"] = _PRESSURES
+            if self.rated_pressure:
+                last = EXAMINED * self.rated_pressure
+                below = {pressure for pressure in _PRESSURES if pressure < last}
+                self.__dict__["pressures"] = tuple(sorted(below | {self.rated_pressure, last}))
+        return self
+
+    @field_validator("measured", mode="before")
+    @classmethod
+    def _find_measured(cls, given: Any, info: ValidationInfo) -> Any:
+        return find_measured(given, info, (AREA, SHAPE))
 
 
 def command(

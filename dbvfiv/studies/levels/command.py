@@ -6,10 +6,20 @@ from typing import Annotated
 
 import typer
 
-from ..case import Case
+from ...case.model import Case
+from ...case.physics import LoadPressure
+from ...case.section import Section, key
 from ..request import Request, with_unit
 
 ORDER = 25
+
+
+class Keys(Section):
+    """Strain levels that agree with themselves."""
+
+    pressures: tuple[LoadPressure, ...] = key(
+        (18e3, 29e3, 36e3), "Static inlet pressures at which levels are looked for.", min_length=1
+    )
 
 
 def command(
