@@ -1,21 +1,59 @@
-"""Pages of the site that are no files of docs/: the README as its first page, with its links seen from there."""
+"""Pages of the site that are no files of docs/: the README as its first page, the notebooks of the gallery, the public
+names of each package, and the copy of MathJax that draws the equations without a network.
+"""
 
 from __future__ import annotations
 
+import json
 import re
+import sys
+from importlib import import_module
 from pathlib import Path
 
+import mathjax
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parent.parent
+MATHJAX = Path(mathjax.__path__[0]) / "static/mathjax/es5/tex-svg.js"
 
 
 def on_files(files: Files, config) -> Files:
-    """Add the README as index.md."""
+    """Add the README as index.md, a page for each notebook, and MathJax."""
     files.append(File.generated(config, "index.md", content=first_page((ROOT / "README.md").read_text())))
+    for notebook in sorted((ROOT / "docs/gallery").glob("*.ipynb")):
+        files.append(File.generated(config, f"gallery/{notebook.stem}.md", content=notebook_page(notebook)))
+    files.append(File.generated(config, "assets/tex-svg.js", abs_src_path=str(MATHJAX)))
     return files
+
+
+def on_page_markdown(markdown: str, **_) -> str:
+    """Replace `<!-- public names of PACKAGE -->` by a block of mkdocstrings for each name of its `__all__`."""
+    return re.sub(r"<!-- public names of (\w+) -->", lambda found: public_names(found[1]), markdown)
 
 
 def first_page(text: str) -> str:
     """The README with links that lead from docs/."""
     return re.sub(r"(\]\()docs/", r"\1", text)
+
+
+def notebook_page(path: Path) -> str:
+    """Cells of a notebook as a page, with a link to the file itself."""
+    cells = json.loads(path.read_text())["cells"]
+    texts = ["".join(cell["source"]) for cell in cells]
+    page = [text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```" for cell, text in zip(cells, texts)]
+    return "\n\n".join([*page, f"The notebook itself: [{path.name}]({path.name})."])
+
+
+def public_names(package: str) -> str:
+    """Directives of mkdocstrings for the public names of a package, each by the module that defines it."""
+    sys.path.insert(0, str(ROOT))
+    try:
+        module = import_module(package)
+        objects = {name: getattr(module, name) for name in sorted(module.__all__, key=str.lower)}
+    finally:
+        sys.path.remove(str(ROOT))
+    own = {name for name, one in objects.items() if str(getattr(one, "__module__", "")).startswith(package)}
+    paths = [
+        f"{one.__module__}.{one.__qualname__}" if name in own else f"{package}.{name}" for name, one in objects.items()
+    ]
+    return "\n\n".join(f"::: {path}" for path in paths)
