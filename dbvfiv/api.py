@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
-from .case.axis import is_single, read_pressures
+from .case.axis import is_single, read_pressures, write_axis
 from .case.model import Changes, change_case
 from .drawing import described
 from .drawing.style import draw_figures, write_figures
 from .errors import SolveError
 from .materials.damping_report import DampingReport, describe_damping
 from .model import ValveModel
+from .observer import Observer, Progress, is_watched
 from .studies.case import Case, load_case
 from .studies.closure.result import ClosureResult
 from .studies.cycle.result import CycleResult
@@ -27,11 +28,15 @@ from .studies.steady.result import SteadyResult
 from .studies.sweep.result import SweepResult
 from .studies.transient.result import TransientResult
 
-if TYPE_CHECKING:
-    from .observer import Observer
-
 #: A result file to write; none without it.
 Output = str | Path | None
+#: A parameter with the values it takes: ``"density=1:1000:40:log"`` or ``{"density": [1, 10, 100]}``.
+Range = str | Mapping[str, Sequence[float | str]]
+
+
+def bar() -> Observer | None:
+    """Bar of a run from Python, where there is a terminal or a notebook to show it."""
+    return Progress() if is_watched() else None
 
 
 class Valve:
@@ -115,7 +120,7 @@ class Valve:
         output : path, optional
             Result file, written state by state.
         observer : Observer, optional
-            Is told of progress and warnings.
+            Is told of progress and warnings; a bar by default, where there is a terminal or a notebook.
 
         Returns
         -------
@@ -131,11 +136,13 @@ class Valve:
         """
         single = is_single(pressure)
         if pressure is None and self.case.meets_pump("steady"):
-            return self.session.perform("steady", output, observer)
+            return self.session.perform("steady", output, observer or bar())
         asked = self.case.steady_pressures() if pressure is None else [pressure] if single else pressure
         pressures = read_pressures(asked, "drive.pressure" if pressure is None else "pressure", self.case.fluid.density)
         self.model  # shared by what is asked of this valve
-        result = self.session.replace({"steady.pressures": list(pressures)}).perform("steady", output, observer)
+        result = self.session.replace({"steady.pressures": list(pressures)}).perform(
+            "steady", output, observer or bar()
+        )
         if not single:
             return result
         if result.failures:
@@ -149,7 +156,7 @@ class Valve:
         `dbvfiv.studies.levels.result.LevelsResult`.
         """
         given = None if pressure is None else [pressure] if is_single(pressure) else list(pressure)
-        return self._ask({"levels.pressures": given}, {}).perform("levels", output, observer)
+        return self._ask({"levels.pressures": given}, {}).perform("levels", output, observer or bar())
 
     def modes(
         self,
@@ -187,11 +194,11 @@ class Valve:
         >>> found.modes[0].growth_rate, found.stable                      # doctest: +SKIP
         """
         keys = {"drive.pressure": pressure, "modes.count": count}
-        return self._ask(keys, changes).perform("modes", output, observer)
+        return self._ask(keys, changes).perform("modes", output, observer or bar())
 
     def sweep(
         self,
-        over: str | None = None,
+        over: Range | None = None,
         *,
         count: int | None = None,
         output: Output = None,
@@ -202,14 +209,17 @@ class Valve:
 
         Parameters
         ----------
-        over : str, optional
-            Parameter and values, "density=1:1000:40:log"; sweep.over of the case by default.
+        over : str or mapping, optional
+            Parameter and values, "density=1:1000:40:log" or {"density": [1, 10, 100]}; sweep.over of the case by
+            default.
         count : int, optional
             Leading modes to follow.
         output, observer, changes
             As for `modes`; also pressure, for sweeps over something else.
         """
-        return self._ask({"sweep.over": over, "sweep.count": count}, changes).perform("sweep", output, observer)
+        return self._ask({"sweep.over": write_axis(over), "sweep.count": count}, changes).perform(
+            "sweep", output, observer or bar()
+        )
 
     def sensitivity(
         self,
@@ -231,7 +241,7 @@ class Valve:
         output, observer, changes
             As for `modes`; also pressure.
         """
-        return self._ask(sensitivity_keys(of, mode), changes).perform("sensitivity", output, observer)
+        return self._ask(sensitivity_keys(of, mode), changes).perform("sensitivity", output, observer or bar())
 
     def closure(
         self,
@@ -270,17 +280,17 @@ class Valve:
         asked = self.case.closure.pressures if pressure is None else [pressure] if is_single(pressure) else pressure
         pressures = read_pressures(asked, "pressure", self.case.fluid.density)
         session = self._ask({"closure.pressures": list(pressures)}, {})
-        return session.perform("closure", output, observer, in_time=in_time, compare=compare)
+        return session.perform("closure", output, observer or bar(), in_time=in_time, compare=compare)
 
     def onset(
-        self, over: str | None = None, *, output: Output = None, observer: Observer | None = None, **changes: Any
+        self, over: Range | None = None, *, output: Output = None, observer: Observer | None = None, **changes: Any
     ) -> OnsetResult:
         """Every onset along one parameter: where the valve loses or regains stability.
 
         Parameters
         ----------
-        over : str, optional
-            Parameter, or PARAMETER=START:STOP:COUNT[:log]; onset.over of the case by default.
+        over : str or mapping, optional
+            Parameter, or a range as for `sweep`; onset.over of the case by default.
         output : path, optional
             Result file, written sample by sample; `dbvfiv.resume` continues it.
         observer, changes
@@ -290,17 +300,17 @@ class Valve:
         ------
         CaseError, SolveError
         """
-        return self._ask({"onset.over": over}, changes).perform("onset", output, observer)
+        return self._ask({"onset.over": write_axis(over)}, changes).perform("onset", output, observer or bar())
 
     def cycle(
-        self, over: str | None = None, *, output: Output = None, observer: Observer | None = None, **changes: Any
+        self, over: Range | None = None, *, output: Output = None, observer: Observer | None = None, **changes: Any
     ) -> CycleResult:
         """Limit cycles followed from an onset along one parameter.
 
         Parameters
         ----------
-        over : str, optional
-            PARAMETER=START:STOP:COUNT[:log]; cycle.over of the case by default.
+        over : str or mapping, optional
+            Range as for `sweep`; cycle.over of the case by default.
         output, observer, changes
             As for `onset`.
 
@@ -308,12 +318,12 @@ class Valve:
         --------
         >>> found = dbvfiv.load("cases/light-fluid.toml").cycle("density=25:60:8")     # doctest: +SKIP
         """
-        return self._ask({"cycle.over": over}, changes).perform("cycle", output, observer)
+        return self._ask({"cycle.over": write_axis(over)}, changes).perform("cycle", output, observer or bar())
 
     def map(
         self,
-        x: str | None = None,
-        y: str | None = None,
+        x: Range | None = None,
+        y: Range | None = None,
         *,
         workers: int | None = None,
         output: Output = None,
@@ -324,8 +334,8 @@ class Valve:
 
         Parameters
         ----------
-        x, y : str, optional
-            PARAMETER=START:STOP:COUNT[:log]; map.x and map.y of the case by default.
+        x, y : str or mapping, optional
+            Ranges as for `sweep`; map.x and map.y of the case by default.
         workers : int, optional
             Processes that share the columns; map.workers of the case by default. Under ``mpiexec`` with mpi4py all its
             processes.
@@ -338,8 +348,8 @@ class Valve:
         ------
         CaseError, SolveError
         """
-        session = self._ask({"map.x": x, "map.y": y}, changes)
-        return session.perform("map", output, observer, workers=workers)
+        session = self._ask({"map.x": write_axis(x), "map.y": write_axis(y)}, changes)
+        return session.perform("map", output, observer or bar(), workers=workers)
 
     def transient(
         self,
@@ -369,7 +379,7 @@ class Valve:
         SolveError
             If there is no first state. A step that is not found ends the run, which keeps what it has.
         """
-        return self._ask({"transient.duration": duration}, changes).perform("transient", output, observer)
+        return self._ask({"transient.duration": duration}, changes).perform("transient", output, observer or bar())
 
     def _ask(self, keys: Mapping[str, Any], given: Mapping[str, Any]) -> Session:
         """The session with keys and named arguments put into its case; None stands for nothing given."""

@@ -40,6 +40,22 @@ def test_pencil_of_a_state_has_the_eigenvalues_of_its_modes(state):
     assert all(map(is_short, (state, state.results, modes)))
 
 
+def test_tables_come_with_units_and_ranges_as_arrays():
+    valve = dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6})
+    swept = valve.sweep({"density": np.array([10.0, 20.0, 100.0])})
+    frame = swept.table("points")
+    assert list(frame["value"]) == [10.0, 20.0, 100.0] and frame.attrs["units"]["unstable_count"] == ""
+    grid = swept.table("states", form="xarray")
+    assert grid["pressure"].attrs["units"] == "Pa" and grid["max_displacement_position"].shape == (1, 3)
+    assert len(swept.table()) == sum(len(branch["growth_rate"]) for branch in swept.summary()["branches"])
+    assert valve.sweep("density=10,20,100").summary()["values"] == swept.summary()["values"]
+    with pytest.raises(dbvfiv.CaseError, match="'rows'.*branches"):
+        swept.table("rows")
+    for given in ({"density": [1]}, {"density": "10"}, {"density": [1, 2], "pressure": [1, 2]}):
+        with pytest.raises(dbvfiv.CaseError, match="A range is given as"):
+            valve.onset(given)
+
+
 def test_texts_of_a_branch_and_its_points_are_short():
     options = ContinuationOptions(eigenvalues=2, limits={"B": (0.0, 4.0)})
     branch = continue_branch(brusselator(), [1.0, 0.5], {"A": 1.0, "B": 0.5}, "B", options)

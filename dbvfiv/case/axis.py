@@ -1,11 +1,12 @@
-"""Ranges and pressures as words: ``density=1:1000:40:log``, ``pressure=0.5 kPa:50 kPa:64``, ``36 kPa``."""
+"""Ranges and pressures as words: ``density=1:1000:40:log``, ``pressure=0.5 kPa:50 kPa:64``, ``length=1,10,30 m``."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, StrictStr, ValidationInfo
@@ -14,10 +15,10 @@ from ..errors import CaseError
 from .parameters import PARAMETERS, SWEPT, Parameter
 from .quantity import number_or_text
 
-FORM = 'PARAMETER=START:STOP:COUNT, with ":log" behind it for logarithmic steps'
+FORM = 'PARAMETER=START:STOP:COUNT, with ":log" behind it for logarithmic steps, or PARAMETER=VALUE,VALUE,...'
 _LARGEST = 100_000
 #: A head of the fluid in the text of a range.
-_HEAD = re.compile(r"\d\s*(m|ft)\s*(:|$)")
+_HEAD = re.compile(r"\d\s*(m|ft)\s*([:,]|$)")
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Axis:
     parameter : str
         Name of one of `dbvfiv.case.parameters.PARAMETERS`.
     values : tuple of float
-        SI values from start to stop.
+        SI values, rising.
     log : bool
         Whether they are spaced logarithmically.
     """
@@ -45,8 +46,8 @@ class Axis:
 
 
 def parse_axis(text: str, names: Iterable[str] = SWEPT, density: float | None = None) -> Axis:
-    """Read ``PARAMETER=START:STOP:COUNT[:log]`` for one of the parameters named; pressures may be heads of a
-    fluid whose density, kg/m3, is given.
+    """Read ``PARAMETER=START:STOP:COUNT[:log]`` or ``PARAMETER=VALUE,VALUE,...`` for one of the parameters named;
+    pressures may be heads of a fluid whose density, kg/m3, is given.
 
     Raises
     ------
@@ -61,24 +62,45 @@ def parse_axis(text: str, names: Iterable[str] = SWEPT, density: float | None = 
         raise ValueError(f"whose parameter is none of {', '.join(names)}")
     row = PARAMETERS[name]
     log = parts[-1] in ("log", "lin") and parts.pop() == "log"
-    if not equals or len(parts) != 3:
+    listed = len(parts) == 1 and "," in parts[0]
+    if not equals or (len(parts) != 3 and not listed):
         raise ValueError("which is not of that form")
-    start, stop = (_value(row, part, density) for part in parts[:2])
-    if not parts[2].isascii() or not parts[2].isdigit() or len(parts[2]) > 6 or not 2 <= int(parts[2]) <= _LARGEST:
+    values = [_value(row, part, density) for part in (parts[0].split(",") if listed else parts[:2])]
+    if not listed and (not re.fullmatch("[0-9]{1,6}", parts[2]) or not 2 <= int(parts[2]) <= _LARGEST):
         raise ValueError(f"whose count is not between 2 and {_LARGEST}")
-    if start >= stop:
-        raise ValueError("whose start is not below its stop")
+    if any(first >= second for first, second in pairwise(values)):
+        raise ValueError("whose values do not rise" if listed else "whose start is not below its stop")
+    start, stop = values[0], values[-1]
     if start < 0 or (start == 0 and (log or not row.low_included)):
         raise ValueError("whose start is not greater than 0")
     if start < row.low or stop > row.high:
         raise ValueError(f"whose range is not within {row.low:g} to {row.high:g}")
-    count = int(parts[2])
+    if listed:
+        return Axis(name, tuple(values), log)
+    steps = range(int(parts[2]))
     if log:
         ratio = math.log(stop / start)
-        values = [start * math.exp(ratio * i / (count - 1)) for i in range(count)]
+        values = [start * math.exp(ratio * i / steps[-1]) for i in steps]
     else:
-        values = [start + (stop - start) * i / (count - 1) for i in range(count)]
+        values = [start + (stop - start) * i / steps[-1] for i in steps]
     return Axis(name, (*values[:-1], stop), log)
+
+
+def write_axis(given: Any) -> Any:
+    """Text of a range that is given as ``{"density": [1, 10, 100]}``; anything else as it is.
+
+    Raises
+    ------
+    CaseError
+        For a mapping that is not of one parameter and two or more values.
+    """
+    if not isinstance(given, Mapping):
+        return given
+    values = [] if len(given) != 1 else next(iter(given.values()))
+    values = values.tolist() if hasattr(values, "tolist") else values
+    if not isinstance(values, Sequence) or isinstance(values, str) or len(values) < 2:
+        raise CaseError(f'A range is given as {given!r}; it must be {FORM}, or such as {{"density": [1, 10, 100]}}.')
+    return f"{next(iter(given))}={','.join(map(str, values))}"
 
 
 def _value(row: Parameter, text: str, density: float | None) -> float:
@@ -101,7 +123,10 @@ def _in_pascal(text: str, axis: Axis) -> str:
     span = text.partition("=")[2]
     if axis.parameter != "pressure" or not _HEAD.search(span):
         return text
-    return f"pressure={axis.values[0]!r} Pa:{axis.values[-1]!r} Pa:{len(axis.values)}{':log' if axis.log else ''}"
+    log = ":log" if axis.log else ""
+    if "," in span:
+        return f"pressure={','.join(f'{value!r} Pa' for value in axis.values)}{log}"
+    return f"pressure={axis.values[0]!r} Pa:{axis.values[-1]!r} Pa:{len(axis.values)}{log}"
 
 
 #: A key that holds the text of a range.
@@ -109,7 +134,7 @@ Range = Annotated[StrictStr, AfterValidator(_readable)]
 
 
 def parse_stability_axis(text: str, density: float | None = None) -> Axis:
-    """Read ``PARAMETER=START:STOP:COUNT[:log]``, or a parameter alone with its usual range; heads as in `parse_axis`.
+    """Read a range as `parse_axis` does, or a parameter alone with its usual range.
 
     Raises
     ------

@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from ..errors import CaseError, SolveError
-from .terminal import AsJson, CaseFile, Override, Progress, print_json
+from ..observer import Progress
+from .terminal import AsJson, CaseFile, Override, print_json
 
 
 def report(

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import CaseError
+from ..observer import Progress
 from .terminal import (
     AsJson,
     Override,
     PlotFolder,
-    Progress,
     ResultFile,
     print_answer,
     print_json,

@@ -12,9 +12,10 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from ..errors import CaseError, SolveError
+from ..observer import Progress
 from ..studies import KINDS
 from ..studies.request import is_sheet
-from .terminal import AsJson, CaseFile, Output, Override, PlotFolder, Progress, ResultFile, print_answer
+from .terminal import AsJson, CaseFile, Output, Override, PlotFolder, ResultFile, print_answer
 
 #: Arguments that the command of a study may take from those that all share.
 _SHARED = ("case", "plots", "output")

@@ -13,7 +13,6 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import CaseError
-from ..observer import Observer
 from ..studies.request import is_sheet
 
 
@@ -122,54 +121,3 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "to_dict"):
         return _plain(value.to_dict())
     return str(value)
-
-
-class Progress(Observer):
-    """A bar on standard error where that is a terminal; warnings on standard error in any case.
-
-    Parameters
-    ----------
-    quiet : bool
-        Never show a bar.
-    row : callable, optional
-        Makes a line for standard output from each item.
-    """
-
-    def __init__(self, quiet: bool = False, row: Callable[[Any], str] | None = None):
-        self._show = not quiet and sys.stderr.isatty()
-        self._row = row
-        self._bar = None
-        self._warned: set[str] = set()
-
-    def begin(self, study: str, total: int | None) -> None:
-        if self._show:
-            from tqdm import tqdm
-
-            self._bar = tqdm(total=total, desc=study, file=sys.stderr, leave=False, dynamic_ncols=True, mininterval=0.2)
-
-    def progress(self, text: str) -> None:
-        if self._bar is not None:
-            self._bar.set_postfix_str(text)
-
-    def item(self, result: object) -> None:
-        if self._row is not None:
-            self._print(self._row(result), sys.stdout)
-        if self._bar is not None:
-            self._bar.update()
-
-    def warn(self, sentence: str) -> None:
-        if sentence not in self._warned:
-            self._warned.add(sentence)
-            self._print(f"Warning: {sentence}", sys.stderr)
-
-    def end(self, interrupted: bool) -> None:
-        if self._bar is not None:
-            self._bar.close()
-            self._bar = None
-
-    def _print(self, text: str, file: Any) -> None:
-        if self._bar is not None:
-            self._bar.clear()
-        print(text, file=file, flush=True)
-        if self._bar is not None:
-            self._bar.refresh()

@@ -10,12 +10,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..case.model import Case
+from ..errors import CaseError
 from ..observer import Observer
 from .files import DeferredSignals, reading
 from .header import Header, read_header
@@ -367,3 +369,32 @@ class RecordPart(Record):
     @property
     def log(self) -> list[dict[str, Any]]:
         return self.whole.log
+
+
+def tabulate(record: Record, spec: TableSpec, form: str) -> Any:
+    """Table of a record as a pandas DataFrame (columns with one value a row) or an xarray Dataset (all columns).
+
+    Raises
+    ------
+    CaseError
+        For another form, or where the package is not installed.
+    """
+    if form not in ("pandas", "xarray"):
+        raise CaseError(f"form is given as {form!r}; it must be 'pandas' or 'xarray'.")
+    try:
+        library = import_module(form)
+    except ImportError:
+        raise CaseError(f"Tables of {form} need the package {form}: pip install {form}.") from None
+    columns = [column for column in spec.columns if form == "xarray" or not spec.shape(column)]
+    values = {column.name: record.column(spec.name, column.name) for column in columns}
+    if form == "pandas":
+        table = library.DataFrame(values)
+        table.attrs["units"] = {column.name: column.units for column in columns}
+        table.attrs["descriptions"] = {column.name: column.description for column in columns}
+        return table
+    table = library.Dataset()
+    for column in columns:
+        dims = ("row", *(f"{column.name}_{axis}" for axis in range(len(spec.shape(column)))))
+        attrs = {"units": column.units, "long_name": column.description}
+        table[column.name] = library.Variable(dims, values[column.name], attrs)
+    return table

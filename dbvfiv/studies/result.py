@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from ..drawing.style import draw_figures, write_figures
+from ..errors import CaseError
 from ..model import ValveModel
 from ..record.header import Header
 from ..record.mesh import MeshData, WholeValve
-from ..record.record import Record, copy_record
+from ..record.record import Record, copy_record, tabulate
 from ..record.vtkhdf import Step, export_result
 from .case import Case
 from .session import Session
@@ -108,6 +109,34 @@ class StudyResult:
     def lines(self) -> list[str]:
         """The numbers as a table for people."""
         raise NotImplementedError
+
+    def table(self, name: str | None = None, form: Literal["pandas", "xarray"] = "pandas") -> Any:
+        """Rows of a table of the result as a pandas DataFrame, or as an xarray Dataset.
+
+        Parameters
+        ----------
+        name : str, optional
+            One of those that ``repr`` lists; the longest by default.
+        form : {"pandas", "xarray"}
+            A DataFrame holds the columns with one number or text a row, a Dataset also those with an array a row; its
+            dimension is ``row``. Units and descriptions are in ``attrs``. Both packages are optional.
+
+        Raises
+        ------
+        CaseError
+            For a table that the result does not have, or a package that is not installed.
+
+        Examples
+        --------
+        >>> curve = dbvfiv.load().steady(["6 kPa", "18 kPa"]).table()          # doctest: +SKIP
+        >>> curve.plot("pressure", "mass_flow"), curve.attrs["units"]           # doctest: +SKIP
+        """
+        specs = {spec.name: spec for spec in find_study(self.kind).tables(self.mesh)}
+        held = sorted(filter(self.record.rows, specs), key=self.record.rows, reverse=True)
+        if name not in specs and not (name is None and held):
+            given = "table is asked for" if name is None else f"table is given as {name!r}"
+            raise CaseError(f"{given}; this {self.kind} result has {', '.join(held) or 'no rows yet'}.")
+        return tabulate(self.record, specs[held[0] if name is None else name], form)
 
     def remarks(self) -> list[str]:
         """Lines to print after the table.

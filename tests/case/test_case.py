@@ -181,6 +181,7 @@ def test_parameter_ranges():
     assert axis.key == "fluid.density" and axis.values == pytest.approx((1, 10, 100, 1000))
     assert parse_axis("pressure=0.5 kPa:50 kPa:3").values == (500.0, 25250.0, 50000.0)
     assert parse_axis("alpha=0:5:2").values == (0.0, 5.0)
+    assert parse_axis("pressure=0.5 kPa, 2 kPa,1 m", density=1000.0).values == (500.0, 2000.0, 1000.0 * 9.80665)
 
 
 @pytest.mark.parametrize(
