@@ -25,7 +25,7 @@ _PUBLIC = {
     "Observer": "observer",
     "ClosureResult": "studies.closure.result",
     "CycleResult": "studies.cycle.result",
-    "LevelsResult": "studies.levels.result",
+    "LevelsResult": "studies.levels.study",
     "MapResult": "studies.map.result",
     "ModesResult": "studies.modes.result",
     "OnsetResult": "studies.onset.result",

@@ -153,7 +153,7 @@ class Valve:
 
     def levels(self, pressure=None, *, output: Output = None, observer: Observer | None = None):
         """Strain levels of the built-in rubbers that agree with what their layers strain, at one or more pressures; a
-        `dbvfiv.studies.levels.result.LevelsResult`.
+        `dbvfiv.studies.levels.study.LevelsResult`.
         """
         given = None if pressure is None else [pressure] if is_single(pressure) else list(pressure)
         return self._ask({"levels.pressures": given}, {}).perform("levels", output, observer or bar())

@@ -315,6 +315,12 @@ class StoredRecord(Record):
     def log(self) -> list[dict[str, Any]]:
         return self._log
 
+    def cut(self, rows: Mapping[str, int]) -> StoredRecord:
+        """Leave out the last rows of tables: those beyond so many, by the names of the tables."""
+        self._columns.clear()
+        self._count |= {name: min(count, self._count[name]) for name, count in rows.items()}
+        return self
+
     @cached_property
     def size(self) -> int:
         """Bytes of the file."""
@@ -341,34 +347,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return tuple(value.tolist()) if value.shape == (3,) else value
     return value.item() if isinstance(value, np.generic) else value
-
-
-class RecordPart(Record):
-    """A record without the last rows of some of its tables; its notes are all there.
-
-    Parameters
-    ----------
-    whole : Record
-    rows : mapping of str to int
-        How many rows of a table are left; all of those that are not named.
-    """
-
-    def __init__(self, whole: Record, rows: Mapping[str, int]):
-        self.whole, self._left = whole, dict(rows)
-        self.header, self.mesh, self.path = whole.header, whole.mesh, whole.path
-
-    def rows(self, table: str) -> int:
-        return min(self._left.get(table, self.whole.rows(table)), self.whole.rows(table))
-
-    def column(self, table: str, name: str) -> np.ndarray:
-        return self.whole.column(table, name)[: self.rows(table)]
-
-    def value(self, table: str, name: str, row: int) -> Any:
-        return self.whole.value(table, name, range(self.rows(table))[row])
-
-    @property
-    def log(self) -> list[dict[str, Any]]:
-        return self.whole.log
 
 
 def tabulate(record: Record, spec: TableSpec, form: str) -> Any:

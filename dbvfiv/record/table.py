@@ -1,10 +1,11 @@
-"""Tables of a result: columns with units and descriptions, how rows lie in a file and how they are printed."""
+"""Tables of a result: each column declared once, with the way it is read, kept in a file and printed."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import h5py
@@ -12,24 +13,26 @@ import numpy as np
 
 LAYOUT = 2
 TEXT = "text"
+#: SI value of the units in which numbers are printed, where it is not 1.
+PRINTED = {"kPa": 1e3, "static kPa": 1e3, "mm": 1e-3, "cm2": 1e-4, "mm2": 1e-6, "L/s": 1e-3, "%": 1e-2}
 
 
 @dataclass(frozen=True)
 class Shown:
-    """Format of a quantity in a printed table.
+    """Print format of a column.
 
     Attributes
     ----------
     title, unit : str
     width : int
-    write : callable
-        From a row (any object with the column as attribute) to text.
+    write : str or callable
+        Format of the number in that unit, such as ".3f"; or a function from a row to a text.
     """
 
     title: str
     unit: str
     width: int
-    write: Callable[[Any], str]
+    write: str | Callable[[Any], str]
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,10 @@ class Column:
         How it is printed; not at all without.
     earlier : float, optional
         What its rows are in files of earlier versions, which do not have it.
+    read : callable, optional
+        Its value, from the object that a row is made of; the item or attribute of its name without.
+    shape : tuple of int, or callable
+        Shape of one row, or a function from the mesh to that; None where a result on the mesh has no such column.
     """
 
     name: str
@@ -57,10 +64,26 @@ class Column:
     dtype: str = "f8"
     shown: Shown | None = None
     earlier: float | None = None
+    read: Callable[[Any], Any] | None = None
+    shape: tuple[int, ...] | Callable[[Any], tuple[int, ...] | None] = ()
 
     def __reduce__(self) -> tuple:
-        """For pickle; how it is printed is no data and stays behind."""
+        """For pickle; functions that print and read it are no data and stay behind."""
         return Column, (self.name, self.units, self.description, self.dtype, None, self.earlier)
+
+    def of(self, source: Any) -> Any:
+        """Value of the column in a mapping or an object; a slash in its name leads to an attribute of an attribute."""
+        if self.read is not None:
+            return self.read(source)
+        return source[self.name] if isinstance(source, Mapping) else attrgetter(self.name.replace("/", "."))(source)
+
+    def text(self, row: Any) -> str:
+        """Printed value in a row."""
+        if callable(self.shown.write):
+            return self.shown.write(row)
+        value = row[self.name] if isinstance(row, Mapping) else getattr(row, self.name)
+        scale = PRINTED.get(self.shown.unit)
+        return f"{value / scale if scale else value:{self.shown.write}}"
 
     def mark(self, dataset: h5py.Dataset) -> None:
         """Write units and description beside a dataset."""
@@ -83,10 +106,8 @@ def read_array(group: h5py.Group, column: Column) -> Any:
     return tuple(dataset.asstr()[:]) if column.dtype == TEXT else dataset[...].astype(column.dtype)
 
 
-#: Dataset that marks whole rows.
-MARK = "#"
-#: Bytes kept for a text in a row.
-TEXT_BYTES = 400
+#: Dataset that marks whole rows, and bytes kept for a text in a row.
+MARK, TEXT_BYTES = "#", 400
 
 
 @dataclass(frozen=True)
@@ -98,7 +119,7 @@ class TableSpec:
     name : str
     columns : tuple of Column
     shapes : mapping of str to tuple of int
-        Shape of one row of the columns that are not scalars.
+        Shape of one row of the columns that are not scalars, where these do not say it.
     chunk : int
         Rows of scalar columns that are stored together; those with a shape are stored row by row up to 64 kB.
     later : bool
@@ -111,6 +132,22 @@ class TableSpec:
     chunk: int = 64
     later: bool = False
 
+    @classmethod
+    def on(cls, mesh: Any, name: str, columns: Iterable[Column], chunk: int = 64) -> TableSpec:
+        """Table with those of some columns that a result on a mesh has."""
+        shapes = {c: c.shape(mesh) if callable(c.shape) else c.shape for c in columns}
+        kept = {c: shape for c, shape in shapes.items() if shape is not None}
+        return cls(name, tuple(kept), {c.name: shape for c, shape in kept.items()}, chunk)
+
+    def row(self, source: Any) -> dict[str, Any]:
+        """Row of an object."""
+        return {c.name: c.of(source) for c in self.columns}
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of one row in a file."""
+        return sum(int(np.prod(self.shape(c))) * self.dtype(c).itemsize for c in self.columns)
+
     def create(self, parent: h5py.Group) -> None:
         """Make the empty columns in a file."""
         group = parent.create_group(self.name)
@@ -118,19 +155,13 @@ class TableSpec:
             shape, dtype = self.shape(column), self.dtype(column)
             size = max(1, int(np.prod(shape)) * dtype.itemsize)
             rows = max(1, min(self.chunk, 65536 // size)) if shape else self.chunk
-            dataset = group.create_dataset(
-                column.name,
-                (0, *shape),
-                dtype,
-                maxshape=(None, *shape),
-                chunks=(rows, *(max(1, n) for n in shape)),
-            )
-            column.mark(dataset)
+            chunks = (rows, *(max(1, n) for n in shape))
+            column.mark(group.create_dataset(column.name, (0, *shape), dtype, maxshape=(None, *shape), chunks=chunks))
         group.create_dataset(MARK, (0,), "u1", maxshape=(None,), chunks=(self.chunk,))
 
     def shape(self, column: Column) -> tuple[int, ...]:
         """Shape of one row of a column."""
-        return tuple(self.shapes.get(column.name, ()))
+        return tuple(self.shapes.get(column.name, () if callable(column.shape) else column.shape))
 
     @staticmethod
     def dtype(column: Column) -> np.dtype:
@@ -185,20 +216,18 @@ def _plain(value: Any) -> Any:
     return value
 
 
+def document_of(columns: Iterable[Column], row: Any) -> dict[str, Any]:
+    """Plain SI numbers of a row for JSON, by the names of the columns."""
+    values = {c.name: getattr(row, c.name) for c in columns}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+
 def printed_head(columns: Iterable[Column]) -> list[str]:
     """Titles and units above a printed table."""
     shown = [c.shown for c in columns if c.shown is not None]
-    return [
-        " ".join(s.title.rjust(s.width) for s in shown).rstrip(),
-        " ".join(s.unit.rjust(s.width) for s in shown).rstrip(),
-    ]
+    return [" ".join(getattr(s, part).rjust(s.width) for s in shown).rstrip() for part in ("title", "unit")]
 
 
 def printed_row(columns: Iterable[Column], row: Any) -> str:
     """One line of a printed table."""
-    shown = [c.shown for c in columns if c.shown is not None]
-    return " ".join(s.write(row).rjust(s.width) for s in shown).rstrip()
-
-
-def _text(value: bytes) -> str:
-    return value.decode(errors="ignore")
+    return " ".join(c.text(row).rjust(c.shown.width) for c in columns if c.shown is not None).rstrip()

@@ -17,7 +17,7 @@ from ..observer import Observer
 from ..record.files import check_writable, kind_of
 from ..record.header import Header
 from ..record.mesh import MeshData
-from ..record.record import GrowingRecord, Record, RecordPart, StoredRecord
+from ..record.record import GrowingRecord, Record, StoredRecord
 from . import KINDS
 from .case import Case
 from .contradictions import require_consistent
@@ -274,7 +274,7 @@ def resume_result(path: str | Path, observer: Observer | None = None, changes: M
         raise nothing_to_resume(study.kind, path)
     session = Session(known.header.rebuildable_case(), known.header.name).replace(changes)
     if study.rows_to_keep is not None:
-        known = RecordPart(known, study.rows_to_keep(known, session.case))
+        known.cut(study.rows_to_keep(known, session.case))
     return session.resume(known, observer, **choices)
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
-from ...record.states import LAYERS, layer_shapes, state_table
+from ...record.states import LAYERS, PATH_RESTART, state_table
 from ...record.table import TEXT, Column, Shown, TableSpec
-from ..load_path import PATH_RESTART, restart_shapes
 
 #: Tables: of the walk along back pressures, of the flow before it is turned back, of the turn in time.
 STATES, PATH, BUCKLING, OPENED, REVERSAL = "states", "path", "buckling", "opened", "reversal"
@@ -181,13 +180,13 @@ SAMPLE = (
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     """Tables of a back-pressure result on a mesh."""
     walks = [table for prefix in ("", COMPARED) for table in _walk_tables(prefix, mesh)]
-    opened = state_table(OPENED, mesh, PATH_RESTART, restart_shapes(mesh))
+    opened = state_table(OPENED, mesh, PATH_RESTART)
     return (*walks, opened, TableSpec(REVERSAL, SAMPLE, chunk=256))
 
 
 def _walk_tables(prefix: str, mesh: MeshData) -> tuple[TableSpec, ...]:
     nodes = len(mesh.nodes)
-    shapes = layer_shapes(mesh) | {
+    shapes = {c.name: c.shape(mesh) for c in LAYERS} | {
         "max_displacement_position": (3,),
         "nodal": mesh.nodal_shape,
         "opening": (len(mesh.z),),

@@ -23,9 +23,8 @@ from ...motion.state import consistent_state
 from ...motion.stepper import StepFailure, StepOptions, Stepper
 from ...observer import Observer
 from ...record.record import GrowingRecord
-from ...record.states import read_states, state_row
+from ...record.states import read_states, restart_row, restore_path, state_row
 from ..case import Case
-from ..load_path import restart_row, restore_path
 from .columns import OPENED
 from .valve import InnerFace, contact_law, face_plane
 

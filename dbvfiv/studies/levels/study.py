@@ -2,13 +2,40 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from ...case.materials import RUBBERS
 from ...errors import CaseError, SolveError
 from ...model.strain_level import agree_levels
+from ...record.mesh import MeshData
 from ...record.record import GrowingRecord
+from ...record.table import TEXT, Column, Shown, TableSpec, printed_head, printed_row
+from ..result import StudyResult
 from ..session import Session
 from ..study import Study
-from .result import LAYERS, LevelsResult, rows_of, tables_of
+
+LEVELS = "levels"
+_LEVEL = "Strain level whose constants it has; NaN of rubbers without levels"
+_PEAK = "Strain that 99 % of its volume does not reach; of tension with the same first invariant"
+_MEAN = "Mean strain, weighted with the energy stored"
+#: A row for each pressure and layer of rubber, made of a state and one of its layers.
+_COLUMNS = (
+    Column("pressure", "Pa", "Static inlet pressure", shown=Shown("pressure", "kPa", 10, ".6g")),
+    Column("mass_flow", "kg/s", "Whole valve, with levels that agree", shown=Shown("flow", "kg/s", 9, ".5g")),
+    Column("layer", "", "Number of the layer, from inside to outside", "i4", Shown("layer", "", 6, "")),
+    Column("material", "", "Its rubber", TEXT, Shown("rubber", "", 8, "")),
+    Column("level", "", _LEVEL, shown=Shown("level", "%", 8, ".4g")),
+    Column("peak", "", _PEAK, shown=Shown("peak", "%", 8, ".4g")),
+    Column("mean", "", _MEAN, shown=Shown("mean", "%", 8, ".4g")),
+)
+_TABLE = TableSpec(LEVELS, _COLUMNS)
+
+
+def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
+    """The table of a result."""
+    return (_TABLE,)
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -18,9 +45,8 @@ def run(session: Session, record: GrowingRecord) -> None:
         raise CaseError(
             f"No layer is one of the built-in rubbers {', '.join(RUBBERS)}, which alone have strain levels.", "layers"
         )
-    kept = record.rows(LAYERS)
-    done = {float(pressure) for pressure in record.column(LAYERS, "pressure")}
-    levels = levels_of(record, kept)
+    done = set(record.column(LEVELS, "pressure").tolist())
+    levels = last_levels(record)
     record.begin("levels", len(case.levels.pressures))
     for pressure in case.levels.pressures:
         if pressure in done:
@@ -30,21 +56,46 @@ def run(session: Session, record: GrowingRecord) -> None:
         except SolveError as error:
             record.fail(str(error))
             continue
-        rows = list(rows_of(found))
-        record.extend(LAYERS, {name: [row[name] for row in rows] for name in rows[0]})  # whole pressures or none
+        state = {"pressure": found.state.pressure, "mass_flow": found.state.mass_flow}
+        rows = [state | vars(layer) | {"layer": layer.number} for layer in found.layers]
+        record.extend(LEVELS, {c.name: [row[c.name] for row in rows] for c in _COLUMNS})  # whole pressures or none
         levels = found.levels
         record.item(found)
         for sentence in found.bounded():
             record.warn(sentence)
 
 
-def levels_of(record: GrowingRecord, count: int) -> dict[str, float] | None:
+def last_levels(record: GrowingRecord) -> dict[str, float] | None:
     """Levels at the last pressure that is kept, which the next one starts from; None if there is none."""
-    if not count:
+    if not record.rows(LEVELS):
         return None
-    pressures, names, levels = (record.column(LAYERS, name) for name in ("pressure", "material", "level"))
+    pressures, names, levels = (record.column(LEVELS, name) for name in ("pressure", "material", "level"))
     last = pressures == pressures[-1]
     return {str(name): float(level) for name, level in zip(names[last], levels[last]) if level == level}
+
+
+class LevelsResult(StudyResult):
+    """Levels that agree with the strains of the layers.
+
+    Examples
+    --------
+    >>> found = dbvfiv.load().levels(["18 kPa", "36 kPa"])                                      # doctest: +SKIP
+    >>> [(row["pressure"], row["material"], row["level"]) for row in found.rows]                # doctest: +SKIP
+    """
+
+    kind = "levels"
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each pressure and layer of rubber, SI; strains as fractions."""
+        return self.record.table_rows(_TABLE)
+
+    def summary(self) -> dict[str, Any]:
+        rows = [row.items() for row in self.rows]
+        return {"points": [{k: None if isinstance(x, float) and np.isnan(x) else x for k, x in r} for r in rows]}
+
+    def lines(self) -> list[str]:
+        return [*printed_head(_COLUMNS), *(printed_row(_COLUMNS, row) for row in self.rows)]
 
 
 STUDY = Study("levels", tables_of, run, LevelsResult)

@@ -19,11 +19,10 @@ from ...case.measured import AREA, DISCHARGE, SHAPE, TAPS
 from ...drawing import views
 from ...model.state import SteadyState
 from ...record.mesh import MeshData, WholeValve
-from ...record.states import shown_summary, state_table
+from ...record.states import PATH_RESTART, shown_summary, state_table
 from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
 from ...record.vtkhdf import Step, layer_field_names, motion
 from ..case import Case
-from ..load_path import PATH_RESTART, restart_shapes
 from ..measured.curves import MeasuredCurve, MeasuredParts, MeasuredTaps, lacking, state_at
 from ..measured.figures import draw_shapes
 from ..measured.kept import joined, kept_tables
@@ -241,7 +240,7 @@ STATES = "states"
 
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     """Tables of a steady result on a mesh."""
-    return (state_table(STATES, mesh, PATH_RESTART, restart_shapes(mesh)),)
+    return (state_table(STATES, mesh, PATH_RESTART),)
 
 
 class SteadyResult(StudyResult):

@@ -14,8 +14,7 @@ from ...model import ValveModel
 from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_warnings
 from ...model.state import SteadyState
 from ...record.record import GrowingRecord
-from ...record.states import read_states, shown_summary, state_row
-from ..load_path import restart_row, restore_path
+from ...record.states import read_states, restart_row, restore_path, shown_summary, state_row
 from ..measured.kept import keep_measured
 from ..session import Session
 from ..study import Study, print_rows

@@ -18,7 +18,7 @@ from dbvfiv.motion.control import RunOptions
 from dbvfiv.record.header import Header
 from dbvfiv.record.journal import Journal
 from dbvfiv.record.mesh import MeshData
-from dbvfiv.record.record import GrowingRecord, RecordPart, StoredRecord
+from dbvfiv.record.record import GrowingRecord, StoredRecord
 from dbvfiv.studies.case import THESIS, Case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient import keeping
@@ -234,7 +234,7 @@ def test_progress_and_history_go_through_a_file_unchanged(tmp_path, valve):
     left, right = ({n: v for n, v in vars(p).items() if n != "state"} for p in (again, run.progress))
     assert np.isnan([left.pop("eigenvalue"), right.pop("eigenvalue")]).all()
     assert left == right
-    part = RecordPart(stored, {HISTORY: 2})
+    part = StoredRecord(stored.path, tables_of, Case).cut({HISTORY: 2})
     assert (part.rows(HISTORY), part.rows(STATES)) == (2, stored.rows(STATES)) and part.log == stored.log
     assert np.array_equal(part.column(HISTORY, "station_area"), run.history["station_area"][:2])
     assert part.value(HISTORY, "time", -1) == run.history["time"][1]
