@@ -103,13 +103,6 @@ ALL = (
         },
     ),
     Made(
-        "slam",
-        'dbvfiv transient cases/dbv12.toml --set mesh.around=14 --set mesh.along=24 --set drive.pressure="6 kPa" '
-        "--set fluid.density=1.2 --set damping.alpha=0 --set supports.lip_stop_columns=all "
-        '--set transient.step="0.5 ms" --set transient.duration="0.7 s"',
-        {"history.png": "transient-slamming.png"},
-    ),
-    Made(
         "slam-in-air",
         'dbvfiv transient cases/dbv12.toml --set mesh.around=14 --set mesh.along=24 --set drive.pressure="6 kPa" '
         "--set fluid.density=1.2 --set damping.alpha=0 --set fluid.continuity=storage --set fluid.sound_speed=343 "

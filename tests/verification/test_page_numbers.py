@@ -72,8 +72,8 @@ def test_openings_of_the_six_inch_valve(given):
 
 
 def test_flows_of_the_twelve_inch_valve(given):
-    """In the theory's comparison with the thesis, in the README and in the findings."""
-    table = table_of("theory.md", " | 18 kPa")
+    """In the comparison with the thesis, in the README and in the findings."""
+    table = table_of("thesis.md", " | 18 kPa")
     rows = {row[0]: [numbers(cell)[0] for cell in row[1:]] for row in table.rows[1:]}
     line = made(table)
     ten = [point["mass_flow"] for point in given(line)["points"]]
@@ -87,7 +87,7 @@ def test_flows_of_the_twelve_inch_valve(given):
 
 
 def test_recovery_in_a_pipe(given):
-    table = table_of("installation.md", "static at the flange")
+    table = table_of("evidence/line.md", "static at the flange")
     line = made(table)
     piped, free = given(line)["points"], given(re.sub(r" --set downstream\S+ ?\S*\"", "", line))["points"]
     for row, inside, outside in zip(table.rows[1:], piped, free, strict=True):
@@ -107,7 +107,7 @@ def test_recovery_in_a_pipe(given):
 
 
 def test_heads_behind_a_line(given):
-    table = table_of("installation.md", "head in the reservoir | lost in the line")
+    table = table_of("evidence/line.md", "head in the reservoir | lost in the line")
     for row, point in zip(table.rows[1:], given(made(table))["points"], strict=True):
         told = point["hydraulics"]
         found = (
@@ -122,7 +122,7 @@ def test_heads_behind_a_line(given):
 
 @pytest.mark.parametrize("length", ["0.5", "2", "10", "100"])
 def test_pipes_in_front(given, length):
-    table = table_of("installation.md", "pipe | quasi-steady")
+    table = table_of("evidence/line.md", "pipe | quasi-steady")
     row = next(row for row in table.rows[1:] if row[0] == f"{length} m")
     said = given(made(table).replace("upstream.length=10", f"upstream.length={length}"))
     for cell, modes in zip(row[1:], (said["modes"], said["other_law"]["modes"]), strict=True):
