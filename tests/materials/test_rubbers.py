@@ -20,7 +20,7 @@ from dbvfiv.materials import (
 )
 from tests.pages import agrees
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "materials.md"
+DOCUMENT = Path(__file__).parents[2] / "docs/evidence/materials.md"
 
 # Th. Table 3-3, MPa: for each level the three-constant set, then the two-constant set.
 TABLE_3_3 = {
@@ -112,7 +112,7 @@ def test_stable_constants_are_the_least_squares(name):
 
 
 def test_the_documented_fits_are_true():
-    """docs/materials.md: constants, R^2 and largest error beyond 2 % strain, to the digits printed."""
+    """docs/evidence/materials.md: constants, R^2 and largest error beyond 2 % strain, to the digits printed."""
     rows = [[c.strip() for c in line.strip("|").split("|")] for line in DOCUMENT.read_text().splitlines()]
     rows = [row for row in rows if row[0] in FOUND and len(row) == 10]
     assert len(rows) == 12
