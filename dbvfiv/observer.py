@@ -69,11 +69,13 @@ class Progress(Observer):
         Never show a bar.
     row : callable, optional
         Makes a line for standard output from each item.
+    say : callable
+        Puts the numbers of a line into the units of choice.
     """
 
-    def __init__(self, quiet: bool = False, row: Callable[[Any], str] | None = None):
+    def __init__(self, quiet: bool = False, row: Callable[[Any], str] | None = None, say: Callable[[str], str] = str):
         self._show = not quiet and is_watched()
-        self._row = row
+        self._row, self._say = row, say
         self._bar = None
         self._warned: set[str] = set()
 
@@ -106,6 +108,6 @@ class Progress(Observer):
     def _print(self, text: str, file: Any) -> None:
         if self._bar is not None:
             self._bar.clear()
-        print(text, file=file, flush=True)
+        print(self._say(text), file=file, flush=True)
         if self._bar is not None:
             self._bar.refresh()

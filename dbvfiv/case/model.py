@@ -18,7 +18,9 @@ from .parameters import PARAMETERS
 from .part import Part, part_of
 from .physics import Gravity, Outside
 from .pipes import Downstream, Upstream
+from .project import Project, Report
 from .section import BrokenRule, Section, key
+from .units import Units, unit_of
 from .valve import Valve
 
 
@@ -52,6 +54,8 @@ class Case(Section):
     outside: Outside = key(Outside(), "The fluid outside the wall.")
     gravity: Gravity = key(Gravity(), "The weight of wall and fluid.")
     supports: physics.Supports = key(physics.Supports(), "What keeps the lips from crossing.")
+    project: Project = key(Project(), "What a report is for, and the units in which results are read.")
+    report: Report = key(Report(), "What a report covers.")
 
     @model_validator(mode="before")
     @classmethod
@@ -66,6 +70,16 @@ class Case(Section):
             except ValueError:
                 info.context["density"] = None  # refused where it stands
         return data
+
+    @model_validator(mode="before")
+    @classmethod
+    def _keep_unit_of_pressure(cls, data: Any) -> Any:
+        """Let the unit in which drive.pressure is given be that in which results are read, where none is chosen."""
+        drive, project = (data.get(name, {}) if isinstance(data, Mapping) else None for name in ("drive", "project"))
+        if not isinstance(drive, Mapping) or not isinstance(project, Mapping) or project.get("units"):
+            return data
+        unit = "m" if drive.get("head") is not None else unit_of(drive.get("pressure"))
+        return {**data, "project": {**project, "units": unit}} if unit not in ("", "kPa") else data
 
     @model_validator(mode="after")
     def _goes_together(self) -> Case:
@@ -175,6 +189,11 @@ class Case(Section):
                         "every place of the wall needs a layer, and two points through it that mesh.layer_points and "
                         "its layers make",
                     )
+
+    @property
+    def units(self) -> Units:
+        """Units in which results are read."""
+        return Units(self.project.units, self.fluid.density)
 
     @property
     def part(self) -> Part:

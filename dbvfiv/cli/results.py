@@ -71,7 +71,8 @@ def _describe(result: Any) -> list[str]:
         ("load", flow if drive.kind == "flow" else f"uniform pressure {drive.side}, no flow"),
     )
     settled = [result.record.settled] if result.record.settled else []
-    lines = [f"{name:<10}{value}" for name, value in facts] + ["", *result.lines(), *settled]
+    said = [header.case.units.say(line) for line in (*result.lines(), *settled)]
+    lines = [f"{name:<10}{value}" for name, value in facts] + ["", *said]
     notes = [("Warning", text) for text in result.warnings] + [("Failure", text) for text in result.failures]
     return lines + [""] * bool(notes) + [f"{kind}: {text}" for kind, text in notes]
 

@@ -42,6 +42,7 @@ def _make_command(kind: str, module: ModuleType) -> Callable[..., None]:
         case = load_case(case_file, overrides or ())
         shared = {"case": case, "plots": plots, "output": output}
         request = module.command(**{name: shared[name] for name in _SHARED if name in asked}, **given)
+        case = _in_units_asked(case, given.get("pressures") or [given.get("pressure")])
         perform(kind, case, request, case_file.stem if case_file else "dbv12", output, plots, as_json)
 
     shared_last = (("output", Output, None), ("plots", PlotFolder, None), ("overrides", Override, None))
@@ -61,6 +62,16 @@ def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
+def _in_units_asked(case, pressures):
+    """The case, read in the unit in which the command line has its pressure."""
+    from ..case.units import unit_of, with_pressure_in
+
+    unit = unit_of(pressures[0])
+    if unit in ("", case.units.name("pressure")):
+        return case
+    return case.replace({"project.units": with_pressure_in(case.project.units, unit)})
+
+
 def perform(kind: str, case, request, name: str, output: Path | None, plots: Path | None, as_json: bool) -> None:
     """Run a study on a case with what its command asks for (a `Request`), and report it."""
     from ..studies.session import Session
@@ -71,11 +82,12 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
             f"{str(output)!r} names a sheet, which `dbvfiv steady` writes alone; -o of {kind} takes a .h5 file."
         )
     changes = {key: value for key, value in request.changes.items() if value is not None}
+    case = case.replace({"project.units": changes.pop("project.units", case.project.units)})
     choices = {key: value for key, value in request.choices.items() if value is not None}
     session = Session(case, name).replace(changes)
     session.mesh  # a case that gives no model fails before a table begins
     live = None if as_json else find_study(kind).live
-    progress = Progress(quiet=as_json, row=live and live(session.case))
+    progress = Progress(quiet=as_json, row=live and live(session.case), say=case.units.say)
     result = session.perform(kind, output if request.sheet is None else None, progress, **choices)
     if request.sheet is not None:
         found = [result]
@@ -156,7 +168,8 @@ def _report(
     figures += further(result) if further else []
 
     def lines() -> list[str]:
-        return [*(result.remarks() if printed else result.lines()), *filter(None, [result.record.settled])]
+        lines = [*(result.remarks() if printed else result.lines()), *filter(None, [result.record.settled])]
+        return [result.case.units.say(line) for line in lines]
 
     document = result.summary() | {"output": str(output) if output else None} if as_json else {}
     print_answer(document, lines, as_json, (figures, plots), output)

@@ -74,13 +74,13 @@ SUMMARY = (
 
 
 def shown_summary(case: Case) -> tuple[Column, ...]:
-    """`SUMMARY` as it is printed: with a line in front, pressures at both of its ends."""
+    """`SUMMARY` as it is printed, in the units of a case: with a line in front, pressures at both of its ends."""
     if not case.has_line:
-        return SUMMARY
+        return case.units.columns(SUMMARY)
     reservoir = case.drive.at == "reservoir"
     far = Shown("reservoir", "kPa", 10, ".6g") if reservoir else Shown("far end", "static kPa", 10, ".6g")
     shown = {"pressure": far, "flange_pressure": Shown("at the flange", "static kPa", 13, ".6g")}
-    return tuple(replace(column, shown=shown.get(column.name, column.shown)) for column in SUMMARY)
+    return case.units.columns(replace(column, shown=shown.get(column.name, column.shown)) for column in SUMMARY)
 
 
 def by_row(mesh: MeshData) -> tuple[int, ...]:

@@ -339,7 +339,8 @@ class ClosureResult(StudyResult):
     # ----
 
     def lines(self) -> list[str]:
-        lines = [*printed_head(SUMMARY), *(printed_row(SUMMARY, state) for state in self._all_states), *sentences(self)]
+        columns = self.case.units.columns(SUMMARY)
+        lines = [*printed_head(columns), *(printed_row(columns, state) for state in self._all_states), *sentences(self)]
         if self.compared is None:
             return lines
         return [f"Supports: {self.supports}", *lines, f"Supports: {self.compared.supports}", *self.compared.lines()]

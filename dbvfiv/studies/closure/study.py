@@ -65,4 +65,4 @@ def _turn_in_time(case: Case, record: GrowingRecord) -> None:
         record.fail(f"The turn of the drive in time was not followed to its end: {failure}")
 
 
-STUDY = Study("closure", tables_of, run, ClosureResult, live=lambda case: print_rows(SUMMARY))
+STUDY = Study("closure", tables_of, run, ClosureResult, live=lambda case: print_rows(case.units.columns(SUMMARY)))

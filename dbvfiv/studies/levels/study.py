@@ -95,7 +95,8 @@ class LevelsResult(StudyResult):
         return {"points": [{k: None if isinstance(x, float) and np.isnan(x) else x for k, x in r} for r in rows]}
 
     def lines(self) -> list[str]:
-        return [*printed_head(_COLUMNS), *(printed_row(_COLUMNS, row) for row in self.rows)]
+        columns = self.case.units.columns(_COLUMNS)
+        return [*printed_head(columns), *(printed_row(columns, row) for row in self.rows)]
 
 
 STUDY = Study("levels", tables_of, run, LevelsResult)

@@ -76,7 +76,9 @@ Sizes = Annotated[
 ]
 Units = Annotated[
     str | None,
-    typer.Option("--units", metavar="U,U", help="Of a sheet: its units, 'ft, gpm, ft/s, in'; else m, L/s, m/s, mm."),
+    typer.Option(
+        "--units", metavar="U,U", help="Units of tables and sheet, 'ft, gpm, ft/s, in'; else m, L/s, m/s, mm."
+    ),
 ]
 
 
@@ -99,19 +101,19 @@ def command(
 
     dbvfiv steady cases/dbv12.toml -p "0.2 m:5 m:9:log" --scale 0.5 --scale 1 --units "ft, gpm, in" -o catalogue.csv
     """
-    changes: dict[str, Any] = {}
+    changes: dict[str, Any] = {"project.units": units}
     if pressures or not case.meets_pump("steady"):
         asked = _read(pressures, case.fluid.density) if pressures else case.steady_pressures()
-        changes = {"steady.pressures": list(asked)}
+        changes["steady.pressures"] = list(asked)
     if not is_sheet(output):
-        if sizes or units:
-            raise CaseError("--scale and --units go with a sheet; name one with -o, such as catalogue.csv.")
+        if sizes:
+            raise CaseError("--scale goes with a sheet; name one with -o, such as catalogue.csv.")
         return Request(changes)
     first, *others = sizes or [None]
-    require_sheet(output, units)
+    require_sheet(output)
     return Request(
         changes | {"valve.scale": first},
-        sheet=lambda results: write_sheet(output, [state for result in results for state in result.states], units),
+        sheet=lambda results: write_sheet(output, [state for result in results for state in result.states]),
         variants=tuple({"valve.scale": scale} for scale in others),
     )
 

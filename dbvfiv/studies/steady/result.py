@@ -125,7 +125,7 @@ def hydraulic_lines(case: Case, states: Sequence[State]) -> list[str]:
     flowing = [state for state in states if state.hydraulics is not None]
     if not flowing:
         return []
-    columns = (*(_LINE if case.has_line else ()), *_VALVE, *(_TAIL if case.has_tail else ()))
+    columns = case.units.columns((*(_LINE if case.has_line else ()), *_VALVE, *(_TAIL if case.has_tail else ())))
     rows = [printed_row(columns, state) for state in flowing]
     said = [_outlet_sentence(case)]
     if case.downstream.pressure:

@@ -1,0 +1,47 @@
+"""Units in which results are read: chosen, or those of the pressure that was given, in tables and sentences."""
+
+import pytest
+
+from dbvfiv.errors import CaseError
+from dbvfiv.studies.case import load_case
+from tests.small_valves import THESIS_SET
+
+COARSE = (*THESIS_SET, "--set", "mesh.around=4", "--set", "mesh.along=6")
+
+
+def test_pressures_are_read_in_the_unit_they_were_given_in():
+    case = load_case(None, ["drive.pressure=2 m", "fluid.density=1025"])
+    assert case.drive.pressure == pytest.approx(2 * 1025 * 9.80665)
+    assert case.units.pressure(case.drive.pressure) == "2 m"
+    assert case.units.say("Settled at 20.1036 kPa, between 10.05 to 20.1 kPa, 3.2 mm.") == (
+        "Settled at 2 m, between 1 to 2 m, 3.2 mm."
+    )
+    assert load_case(None, ["drive.pressure=10 psi"]).units.pressure(6894.757) == "1 psi"
+    assert load_case(None, ["drive.pressure=10 kPa"]).project.units == ""
+
+
+def test_units_of_choice_stand_before_that_of_the_pressure():
+    case = load_case(None, ["drive.pressure=2 m", "project.units=kPa, gpm"])
+    assert case.units.pressure(2e3) == "2 kPa"
+    assert case.units.text_of("flow", 3.785411784e-3 / 60) == "1 gpm"
+
+
+@pytest.mark.parametrize("units, words", [("furlong", "no unit to choose"), ("m, ft", "second unit")])
+def test_units_that_are_none(one_sentence, units, words):
+    with pytest.raises(CaseError) as refused:
+        load_case(None, [f"project.units={units}"])
+    assert words in str(refused.value) and "project.units" in str(refused.value)
+
+
+def test_a_table_speaks_in_heads_and_json_in_si(command_line):
+    import json
+
+    asked = ("steady", *COARSE, "-p", "1 m", "--units", "m, gpm")
+    printed = command_line(*asked).out.splitlines()
+    document = json.loads(command_line(*asked, "--json").out)
+    point = document["points"][0]
+    assert point["pressure"] == pytest.approx(9806.65)
+    units, row = printed[1].split(), printed[2].split()
+    assert units[:4] == ["static", "m", "kg/s", "gpm"]
+    assert float(row[0]) == 1.0
+    assert float(row[2]) == pytest.approx(point["volume_flow"] * 60 / 3.785411784e-3, rel=1e-3)
