@@ -12,7 +12,7 @@ from .case.model import Changes, change_case
 from .drawing import described
 from .drawing.style import draw_figures, write_figures
 from .errors import SolveError
-from .materials.damping_report import DampingReport, describe_damping
+from .fit.damping import DampingReport, describe_damping
 from .model import ValveModel
 from .observer import Observer, Progress, is_watched
 from .studies.case import Case, load_case

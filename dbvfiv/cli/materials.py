@@ -13,8 +13,8 @@ from ..errors import CaseError
 from .terminal import AsJson, CaseFile, Override, PlotFolder, print_answer, save_figures
 
 if TYPE_CHECKING:
-    from ..materials.orthotropic import OrthotropicPly
-    from ..materials.ply_fit import PlyFit
+    from ..fit.ply import PlyFit
+    from ..materials.laws import OrthotropicPly
 
 _CONSTANTS = ("e1", "e2", "nu12", "g12", "g13", "g23")
 
@@ -36,7 +36,7 @@ def damping(
     dbvfiv damping my.toml --set damping.model="loss factor" --at 5,40 --plots figures
     """
     from ..drawing.materials import damping_figure
-    from ..materials.damping_report import describe_damping, read_frequencies
+    from ..fit.damping import describe_damping, read_frequencies
     from ..studies.case import load_case
 
     case = load_case(case_file, overrides or ())
@@ -111,8 +111,8 @@ def fit(
     dbvfiv fit tension.csv --planar shear.csv --constraint stable --plots figures
     """
     from ..drawing.materials import fit_figure
-    from ..materials.fit_report import describe_fits
-    from ..materials.rubber_tests import read_tests
+    from ..fit.curves import read_tests
+    from ..fit.report import describe_fits
 
     mass = _read_material(name, density)
     far = None if stable_to is None else _read_positive("--stable-to", stable_to, "%", "a strain greater than 0: 30 %")
@@ -141,7 +141,7 @@ def ply(
     dbvfiv ply warp.csv weft.csv --fraction "45 %" --at "30 %,60 %" --plots figures
     """
     from ..drawing.materials import ply_figure
-    from ..materials.ply_fit import fit_ply, read_strip_test
+    from ..fit.ply import fit_ply, read_strip_test
 
     mass = _read_material(name, density)
     share = _read_fraction("--fraction", fraction)

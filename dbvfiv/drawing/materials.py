@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..materials.damping import MaterialDamping
-from ..materials.damping_report import DampingReport
-from ..materials.fit_report import FitReport
-from ..materials.ply_fit import PlyFit
+from ..fit.cards import MaterialDamping
+from ..fit.damping import DampingReport
+from ..fit.ply import PlyFit
+from ..fit.report import FitReport
 from .style import COMPUTED, DANGER, REST, branch_looks, headline, log_axis, new_figure
 
 #: How far the curves go beyond the band, in decades.

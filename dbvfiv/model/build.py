@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..case.model import Case
+from ..fit.cards import law_from_case, relaxation_from_case
 from ..flow import Channel, FlowLaw, UniformLoad
 from ..flow.elastic_line import ElasticLine, LineChannel
 from ..flow.gas import GasChannel
@@ -13,9 +14,7 @@ from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
 from ..geometry import ValveMesh, valve_mesh
 from ..geometry.divisions import grading
-from ..materials.damping import relaxation_from_case
-from ..materials.orthotropic import OrthotropicPly
-from ..materials.rubbers import law_from_case
+from ..materials.laws import OrthotropicPly
 from ..shell import Layer, Section, Shell, ShellMesh, Weight
 from ..shell.zones import Zones
 from .supports import free_unknowns

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.materials import AUTO
-from ..materials.law import MOONEY_RIVLIN, plane_stress_invariants
+from ..materials.energy import MOONEY_RIVLIN, plane_stress_invariants
 from ..materials.stability import principal_log_strains, stability_margin
 from .state import SteadyState
 from .valve import ValveModel

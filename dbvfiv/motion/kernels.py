@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..materials.law import OGDEN_FROM
+from ..materials.energy import OGDEN_FROM
 from ..shell.kernel_rubber import FAST, first_invariant, has_more, ogden_terms
 from ..shell.kernel_section import linear_response, point_strain
 from ..shell.kernel_strain import numbers_of, strains_at

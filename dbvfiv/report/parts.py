@@ -9,8 +9,8 @@ from ..drawing.described import valve_figure
 from ..drawing.materials import damping_figure
 from ..drawing.views import deformed, layer_stress
 from ..errors import CaseError
-from ..materials.damping_report import describe_damping
-from ..materials.rubbers import law_from_case
+from ..fit.cards import law_from_case
+from ..fit.damping import describe_damping
 from ..materials.stability import StableRange, stable_range
 from ..model.symmetry import symmetry_named
 from ..record.mesh import MeshData

@@ -22,8 +22,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..materials.energy import linear_elastic_energy, rubber_energy
-from ..materials.law import LINEAR_ELASTIC, MOONEY_RIVLIN
+from ..materials.energy import LINEAR_ELASTIC, MOONEY_RIVLIN, linear_elastic_energy, rubber_energy
 from .assumed_strain import FACTORS, PAIRS, VECTORS, AssumedStrains
 from .reference import (
     SHEAR_EDGES,

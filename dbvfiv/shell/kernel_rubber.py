@@ -12,8 +12,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..materials.law import OGDEN_FROM
-from ..materials.ogden import OGDEN_ANGLES, OGDEN_ELLIPSE, OGDEN_FOCI, OGDEN_SPREAD
+from ..materials.energy import OGDEN_ANGLES, OGDEN_ELLIPSE, OGDEN_FOCI, OGDEN_FROM, OGDEN_SPREAD
 
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 _COS, _SIN = np.cos(OGDEN_ANGLES), np.sin(OGDEN_ANGLES)
@@ -47,7 +46,7 @@ def _deformation(constants, e):
 
 @numba.njit(fastmath=FAST, inline="always")
 def first_invariant(e):
-    """I1 - 3 of strains e (5,) without cancellation; see `dbvfiv.materials.law`."""
+    """I1 - 3 of strains e (5,) without cancellation; see `dbvfiv.materials.energy`."""
     trace = 2 * (e[0] + e[1])
     det = 4 * e[0] * e[1] - e[2] * e[2]
     plane = 4 * (e[0] * e[0] + e[0] * e[1] + e[1] * e[1]) + e[2] * e[2]
@@ -82,7 +81,7 @@ def i1_slopes(constants, e):
 @numba.njit(fastmath=FAST)
 def ogden_terms(constants, e, energy, out):
     """Fill out (6,): energy of Ogden's terms, where it is asked for, and its derivatives by I1, I2, I1 I1, I1 I2,
-    I2 I2; see `dbvfiv.materials.ogden`.
+    I2 I2; see `dbvfiv.materials.energy`.
     """
     out[:] = 0.0
     largest = 0.0

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..materials.law import KNEE, OGDEN_FROM
+from ..materials.energy import KNEE, OGDEN_FROM
 from ..materials.prony import Prony
 
 LINEAR, RUBBER = 0, 1

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..drawing.style import branch_looks, new_figure
-from ..materials.damping_report import rayleigh_constants
-from ..materials.fit import uniaxial_stress
-from ..materials.ply_fit import ply_from_constituents
-from ..materials.rubbers import published_rubber, strain_levels
+from ..fit.damping import rayleigh_constants
+from ..fit.rubber import uniaxial_stress
+from ..materials.laws import ply_from_constituents
+from ..materials.shipped import published_rubber, strain_levels
 from ..report.content import picture
 from .entry import Entry, Number, Outcome, Workshop
 

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dbvfiv.materials import published_rubber, rubber, uniaxial_stress
-from dbvfiv.materials.fit import fit_rubber, form_of
-from dbvfiv.materials.rubber_tests import loading_tests, read_tests
-from dbvfiv.materials.rubbers import law_from_card
+from dbvfiv.fit import uniaxial_stress
+from dbvfiv.fit.cards import law_from_card
+from dbvfiv.fit.curves import loading_tests, read_tests
+from dbvfiv.fit.rubber import fit_rubber, form_of
+from dbvfiv.materials import published_rubber, rubber
 from dbvfiv.studies.case import load_case
 
-TRELOAR = str(Path(__file__).parents[1] / "materials" / "treloar.csv")
+TRELOAR = str(Path(__file__).parents[1] / "fit" / "treloar.csv")
 
 
 def test_treloar(command_line, tmp_path):

@@ -6,9 +6,9 @@ import tomllib
 import numpy as np
 import pytest
 
+from dbvfiv.fit.cards import law_from_card
+from dbvfiv.fit.ply import StripTest
 from dbvfiv.materials import fibre_ply, ply_from_constituents
-from dbvfiv.materials.ply_fit import StripTest
-from dbvfiv.materials.rubbers import law_from_card
 from dbvfiv.studies.case import load_case
 
 

@@ -23,8 +23,7 @@ from dbvfiv.materials import (
     published_rubber,
     rubber,
 )
-from dbvfiv.materials.energy import mooney_rivlin_energy
-from dbvfiv.materials.law import plane_stress_invariants
+from dbvfiv.materials.energy import mooney_rivlin_energy, plane_stress_invariants
 
 LAWS = {
     "SBR 10 %": published_rubber("SBR", 0.10),

@@ -9,7 +9,7 @@ import pytest
 
 from dbvfiv.api import Valve
 from dbvfiv.materials import MaterialError, MooneyRivlin, Ogden
-from dbvfiv.materials.law import plane_stress_invariants
+from dbvfiv.materials.energy import plane_stress_invariants
 from dbvfiv.materials.stability import hill_margin, principal_log_strains, stability_margin
 from dbvfiv.motion.kernels import _rubber_energy as compiled_energy
 from dbvfiv.shell.kernel_rubber import rubber_stress, rubber_tangent

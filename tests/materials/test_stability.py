@@ -29,8 +29,7 @@ from dbvfiv.materials import (
     strain_levels,
 )
 from dbvfiv.materials.energy import rubber_energy
-from dbvfiv.materials.hill import rubber_moduli
-from dbvfiv.materials.stability import hill_margin, principal_log_strains
+from dbvfiv.materials.stability import hill_margin, principal_log_strains, rubber_moduli
 
 DOCUMENT = Path(__file__).parents[2] / "docs/evidence/materials.md"
 
@@ -55,7 +54,7 @@ _tau, _second = (jax.jit(derivative(_principal_energy, argnums=1)) for derivativ
 
 
 def _moduli(law, ln):
-    return rubber_moduli(law.parameters, ln)[0]
+    return rubber_moduli(law.parameters, ln)
 
 
 LAWS = [

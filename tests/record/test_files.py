@@ -11,7 +11,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.materials.rubbers import published_rubber
+from dbvfiv.materials.shipped import published_rubber
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header, read_header, write_header

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dbvfiv.case.parameters import Mu
-from dbvfiv.materials import Prony, fit_constant
+from dbvfiv.fit import fit_constant
+from dbvfiv.materials import Prony
 from dbvfiv.model import LinearisedState, ValveModel, linearise
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.model.relaxing import WallRelaxation

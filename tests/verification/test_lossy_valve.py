@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.case.parameters import Mu
-from dbvfiv.materials.damping import damping_of
+from dbvfiv.fit.cards import damping_of
 from dbvfiv.model import LinearisedState, ValveModel, linearise
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes, lowest_frequencies

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
-from ...materials import outside_band
+from ...fit import outside_band
 from ...observer import Observer
 from ..case import Case
 from ..stability.place import check_scan

@@ -13,7 +13,7 @@ from eigen import Certificate
 
 from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
-from ...materials import outside_band
+from ...fit import outside_band
 from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...observer import Observer
 from ..case import Case

@@ -13,7 +13,7 @@ from eigen import Branches, SearchOptions, Spectrum, TrackOptions, track
 from ...case.axis import Axis
 from ...case.parameters import Mu
 from ...errors import CaseError, SolveError
-from ...materials import outside_band
+from ...fit import outside_band
 from ...model import ValveModel
 from ...model.equilibria import require_equilibrium
 from ...model.leading import growth_floor

@@ -6,9 +6,9 @@ strain column may be replaced by ``stretch [-]``. Without a column ``cycle`` all
 cycle; which one is the user's choice (the thesis takes the fifth loading curve, Th. 3.2.1).
 
 A rubber that was stretched before is softer up to the strain it has seen (Mullins 1969, Rubber Chem. Technol. 42, 339);
-after a few cycles to the same strain the curve repeats. A valve works on that stabilised curve: the thesis fits the
-fifth loading (Th. 3.2.1). What the cycles leave as permanent set is taken off: strains count from the length at which
-the cycle carries no stress, stresses from the area there.
+after a few cycles to the same strain the curve repeats. A valve works on that stabilised curve. What the cycles leave
+as permanent set is taken off: strains count from the length at which the cycle carries no stress, stresses from the
+area there.
 
 The loss factor of a loop is that of the linear material with the same loop area A, strain amplitude e0 and stress
 between the ends of strain: tan delta = A / (pi E' e0^2), E' = (stress at the largest strain less that at the least)
@@ -20,12 +20,13 @@ from __future__ import annotations
 import csv
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from dbvfiv.materials.law import MaterialError
+from dbvfiv.materials.laws import MaterialError
 
 STRAIN_UNITS = {"-": 1.0, "1": 1.0, "mm/mm": 1.0, "m/m": 1.0, "%": 0.01, "percent": 0.01}
 STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm^2": 1e6, "N/mm2": 1e6, "psi": 6894.757293168361}
@@ -35,15 +36,19 @@ _WORDS = {
     "planar": ("planar", "planar tension", "pure shear"),
     "biaxial": ("biaxial", "equibiaxial", "biaxial tension", "equibiaxial tension"),
 }
-_HEADER = re.compile(r"\s*([A-Za-z_ ]+?)\s*[\[(]\s*([^\])]+?)\s*[\])]\s*")
-
 #: Kinds of tests, in the order in which they are listed.
-MODES = ("uniaxial", "planar", "biaxial")
+MODES = tuple(_WORDS)
+CYCLES = ("first", "last")
+_HEADER = re.compile(r"\s*([A-Za-z_ ]+?)\s*[\[(]\s*([^\])]+?)\s*[\])]\s*")
+#: Share of the range of strain that a way back must cover for a loop, and rows it needs.
+_CLOSED, _FEWEST = 0.9, 3
+#: Work over stiffness and amplitude squared that is rounding alone.
+_NOISE = 1e-9
 
 
 @dataclass(frozen=True)
 class TensionTest:
-    """A loading curve.
+    """A curve of one test, and of one cycle of it where the table tells cycles apart.
 
     Attributes
     ----------
@@ -53,11 +58,14 @@ class TensionTest:
         Nominal (engineering) stress, Pa.
     mode : str
         "uniaxial", "planar" (pure shear: the width is held) or "biaxial" (both directions pulled alike).
+    cycle : int or None
+        A cycle has its way back too, in the order of the file; loading alone without one.
     """
 
     strain: np.ndarray
     stress: np.ndarray
     mode: str = "uniaxial"
+    cycle: int | None = None
 
     def __post_init__(self) -> None:
         if self.mode not in MODES:
@@ -74,10 +82,9 @@ class TensionTest:
             raise MaterialError(
                 f"Engineering strain must be greater than -1, but the tension test holds {strain.min():g}."
             )
-        strain.setflags(write=False)
-        stress.setflags(write=False)
-        object.__setattr__(self, "strain", strain)
-        object.__setattr__(self, "stress", stress)
+        for name, values in (("strain", strain), ("stress", stress)):
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
 
 
 def read_tension_test(path: str | Path) -> TensionTest:
@@ -89,34 +96,13 @@ def read_tension_test(path: str | Path) -> TensionTest:
         Also if the table holds other tests, or several cycles.
     """
     curves = read_curves(path)
-    if len(curves) > 1 or curves[0].test.mode != "uniaxial":
-        raise MaterialError(
-            f"Tension test {path}: it must hold one uniaxial test, but it holds {_describe_curves(curves)}."
-        )
-    return curves[0].test
+    if len(curves) > 1 or curves[0].mode != "uniaxial":
+        held = ", ".join(c.mode + ("" if c.cycle is None else f" (cycle {c.cycle})") for c in curves)
+        raise MaterialError(f"Tension test {path}: it must hold one uniaxial test, but it holds {held}.")
+    return curves[0]
 
 
-@dataclass(frozen=True)
-class Curve:
-    """The rows of one test, and of one cycle of it where the table tells cycles apart.
-
-    Attributes
-    ----------
-    test : TensionTest
-        In the order of the file; a cycle has its way back too.
-    cycle : int or None
-    """
-
-    test: TensionTest
-    cycle: int | None = None
-
-
-def _describe_curves(curves: list[Curve]) -> str:
-    """Description of a table's test curves: deformation modes and load cycles."""
-    return ", ".join(c.test.mode + ("" if c.cycle is None else f" (cycle {c.cycle})") for c in curves)
-
-
-def read_curves(path: str | Path, mode: str | None = None) -> list[Curve]:
+def read_curves(path: str | Path, mode: str | None = None) -> list[TensionTest]:
     """Read tests of a rubber.
 
     Parameters
@@ -130,7 +116,7 @@ def read_curves(path: str | Path, mode: str | None = None) -> list[Curve]:
 
     Returns
     -------
-    list of Curve
+    list of TensionTest
         In SI units; tests in the order of `MODES`, cycles ascending.
 
     Raises
@@ -139,71 +125,88 @@ def read_curves(path: str | Path, mode: str | None = None) -> list[Curve]:
         If the file cannot be read, a column or unit is missing or unknown, or a cell is no
         number; the message names file, line and column.
     """
-    path = Path(path)
-    rows = _rows(path)
-    line, header = rows[0]
-    columns = _columns(path, line, header)
+    header, rows = _table(Path(path), _COLUMNS)
     words = {t.strip().lower(): i for i, t in enumerate(header) if t.strip().lower() in ("test", "cycle", "cycle [-]")}
     if mode is not None and "test" in words:
         raise MaterialError(f"Tension test {path}: it has a column test, so it cannot be given as {mode} as a whole.")
+    number = next((i for word, i in words.items() if word != "test"), None)
     kept: dict[tuple[int, int], list[tuple[float, float]]] = {}
-    for line, row in rows[1:]:
-        place = f"Tension test {path}, line {line}"
-        values = {name: _number(place, name, _cell(row, index)) * unit for name, (index, unit) in columns.items()}
+    for place, row, values in rows:
         which = _mode(place, _cell(row, words["test"])) if "test" in words else mode or "uniaxial"
-        cycle = next((_cycle(place, _cell(row, words[w])) for w in words if w != "test"), 0)
-        strain = values["engineering_strain"] if "engineering_strain" in values else values["stretch"] - 1.0
-        kept.setdefault((MODES.index(which), cycle), []).append((strain, values["nominal_stress"]))
-    if not kept:
-        raise MaterialError(f"Tension test {path}: there is no row of numbers below the header.")
-    numbered = any(w != "test" for w in words)
-    try:
+        cycle = 0 if number is None else _cycle(place, _cell(row, number))
+        points = kept.setdefault((MODES.index(which), cycle), [])
+        points.append((values["engineering_strain"], values["nominal_stress"]))
+    with _blamed(path, kept):
         return [
-            Curve(TensionTest(*np.array(kept[key]).T, MODES[key[0]]), key[1] if numbered else None)
-            for key in sorted(kept)
+            TensionTest(*np.array(kept[which, cycle]).T, MODES[which], cycle or None) for which, cycle in sorted(kept)
         ]
-    except MaterialError as error:
-        raise MaterialError(f"Tension test {path}: {error}") from None
 
 
-def read_numbers(path: str | Path, others: dict[str, dict[str, float]]) -> dict[str, np.ndarray]:
-    """Strain, stress and further columns of a table that holds one test, in SI units.
+def read_columns(path: str | Path, others: dict[str, dict[str, float]]) -> tuple[TensionTest, dict[str, np.ndarray]]:
+    """The one test of a table, and further columns in SI units.
 
     Parameters
     ----------
     path : str or Path
     others : dict
-        Names of columns that may stand beside them, and factors of their units.
+        Names of columns that may stand beside strain and stress, and factors of their units.
 
     Raises
     ------
     MaterialError
         See `read_curves`.
     """
-    path = Path(path)
-    rows = _rows(path)
-    columns = _columns(path, *rows[0], _COLUMNS | others)
-    found: dict[str, list[float]] = {name: [] for name in columns}
-    for line, row in rows[1:]:
-        for name, (index, unit) in columns.items():
-            found[name].append(_number(f"Tension test {path}, line {line}", name, _cell(row, index)) * unit)
-    if not found["nominal_stress"]:
-        raise MaterialError(f"Tension test {path}: there is no row of numbers below the header.")
-    values = {name: np.array(numbers) for name, numbers in found.items()}
-    if "stretch" in values:
-        values["engineering_strain"] = values.pop("stretch") - 1.0
-    return values
+    found = [values for _, _, values in _table(Path(path), _COLUMNS | others)[1]]
+    with _blamed(path, found):
+        columns = {name: np.array([values[name] for values in found]) for name in found[0]}
+        return TensionTest(columns["engineering_strain"], columns["nominal_stress"]), columns
+
+
+class _blamed:
+    """Refuse a table without rows, and name its file in what is refused within."""
+
+    def __init__(self, path: str | Path, rows):
+        self.path = path
+        if not rows:
+            raise MaterialError(f"Tension test {path}: there is no row of numbers below the header.")
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind, error, trace) -> None:
+        if isinstance(error, MaterialError):
+            raise MaterialError(f"Tension test {self.path}: {error}") from None
+
+
+def _table(path: Path, known: dict[str, dict[str, float]]) -> tuple[list[str], Iterator]:
+    """Titles of a table, and place, cells and SI values of the known columns of each row; a stretch as a strain."""
+    (line, header), *rows = _rows(path)
+    columns = _columns(path, line, header, known)
+
+    def read():
+        for line, row in rows:
+            place = f"Tension test {path}, line {line}"
+            values = {name: _number(place, name, _cell(row, index)) * unit for name, (index, unit) in columns.items()}
+            if "stretch" in values:
+                values["engineering_strain"] = values.pop("stretch") - 1.0
+            yield place, row, values
+
+    return header, read()
 
 
 def _cell(row: list[str], index: int) -> str:
     return row[index].strip() if index < len(row) else ""
 
 
-def _number(place: str, name: str, cell: str) -> float:
+def _float(cell: str) -> float:
     try:
-        number = float(cell)
+        return float(cell)
     except ValueError:
-        number = math.nan
+        return math.nan
+
+
+def _number(place: str, name: str, cell: str) -> float:
+    number = _float(cell)
     if not math.isfinite(number):
         raise MaterialError(f"{place}: column {name} must hold a finite number, but {cell!r} was found.")
     return number
@@ -218,11 +221,8 @@ def _mode(place: str, cell: str) -> str:
 
 
 def _cycle(place: str, cell: str) -> int:
-    try:
-        number = float(cell)
-    except ValueError:
-        number = math.nan
-    if not (number >= 1 and number == int(number)):
+    number = _float(cell)
+    if not (number >= 1 and number % 1 == 0):
         raise MaterialError(f"{place}: column cycle must hold a whole number from 1, but {cell!r} was found.")
     return int(number)
 
@@ -234,14 +234,10 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
     except UnicodeDecodeError:
         raise MaterialError(f"Tension test {path} is not a text file in UTF-8.") from None
     except (OSError, ValueError) as error:
-        raise MaterialError(
-            f"Tension test {path} cannot be read: {getattr(error, 'strerror', None) or error}."
-        ) from None
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+        reason = getattr(error, "strerror", None) or error
+        raise MaterialError(f"Tension test {path} cannot be read: {reason}.") from None
+    numbered = enumerate(text.splitlines(), 1)
+    lines = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise MaterialError(f"Tension test {path} is empty.")
     delimiter = max(",;\t", key=lines[0][1].count)
@@ -249,10 +245,10 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def _columns(
-    path: Path, line: int, header: list[str], known: dict[str, dict[str, float]] = _COLUMNS
+    path: Path, line: int, header: list[str], known: dict[str, dict[str, float]]
 ) -> dict[str, tuple[int, float]]:
     """Index and unit factor of each known column."""
-    found: dict[str, tuple[int, float]] = {}
+    place, found = f"Tension test {path}, line {line}", {}
     for index, title in enumerate(header):
         match = _HEADER.fullmatch(title)
         name = re.sub(r"\s+", "_", (match[1] if match else title).strip().lower())
@@ -262,28 +258,20 @@ def _columns(
         if not match or match[2] not in units:
             given = f"unit {match[2]!r} is not known" if match else "no unit is given"
             raise MaterialError(
-                f"Tension test {path}, line {line}: for column {name} {given}; write {name} [UNIT] with one "
-                f"of {', '.join(units)}."
+                f"{place}: for column {name} {given}; write {name} [UNIT] with one of {', '.join(units)}."
             )
         if name in found:
-            raise MaterialError(f"Tension test {path}, line {line}: column {name} appears twice.")
+            raise MaterialError(f"{place}: column {name} appears twice.")
         found[name] = (index, units[match[2]])
-    if "nominal_stress" not in found or not {"engineering_strain", "stretch"} & set(found):
+    strains = {"engineering_strain", "stretch"} & set(found)
+    if "nominal_stress" not in found or not strains:
         raise MaterialError(
-            f"Tension test {path}, line {line}: the header must name engineering_strain [%] (or stretch [-]) and "
+            f"{place}: the header must name engineering_strain [%] (or stretch [-]) and "
             f"nominal_stress [MPa], but it reads {', '.join(t.strip() for t in header)!r}."
         )
-    if {"engineering_strain", "stretch"} <= set(found):
-        raise MaterialError(f"Tension test {path}, line {line}: give either engineering_strain or stretch, not both.")
+    if len(strains) > 1:
+        raise MaterialError(f"{place}: give either engineering_strain or stretch, not both.")
     return found
-
-
-CYCLES = ("first", "last")
-#: Share of the range of strain that a way back must cover for a loop.
-_CLOSED = 0.9
-_FEWEST = 3
-#: Work over stiffness and amplitude squared that is rounding alone.
-_NOISE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -294,16 +282,12 @@ class CycleReport:
     ----------
     mode : str
     cycle : int
-    peak_strain : float
-        Largest engineering strain.
-    peak_stress : float
-        Nominal stress there, Pa.
+    peak_strain, peak_stress : float
+        Largest engineering strain, and the nominal stress there, Pa.
     set_strain : float
         Strain at which its loading begins to carry stress; 0 where it does so from the first row.
-    lost : float
-        Work lost in the loop over the volume, J/m3; NaN without a way back.
-    loss_factor : float
-        tan delta; NaN without a way back.
+    lost, loss_factor : float
+        Work lost in the loop over the volume, J/m3, and tan delta; NaN without a way back.
     """
 
     mode: str
@@ -315,7 +299,9 @@ class CycleReport:
     loss_factor: float
 
 
-def read_tests(path: str | Path, planar: str | Path | None = None, biaxial: str | Path | None = None) -> list[Curve]:
+def read_tests(
+    path: str | Path, planar: str | Path | None = None, biaxial: str | Path | None = None
+) -> list[TensionTest]:
     """Tests of one rubber from one file or several; see `read_curves`.
 
     Raises
@@ -326,7 +312,7 @@ def read_tests(path: str | Path, planar: str | Path | None = None, biaxial: str 
     curves = read_curves(path)
     for name, mode in ((planar, "planar"), (biaxial, "biaxial")):
         if name is not None:
-            if any(curve.test.mode == mode for curve in curves):
+            if any(curve.mode == mode for curve in curves):
                 raise MaterialError(
                     f"Tension test {path} holds a {mode} test already, so {name} cannot be a second one."
                 )
@@ -334,14 +320,8 @@ def read_tests(path: str | Path, planar: str | Path | None = None, biaxial: str 
     return curves
 
 
-def loading_tests(curves: list[Curve], cycle: str = "last") -> tuple[TensionTest, ...]:
-    """The loading branch of one cycle of each test; curves without cycles as they are.
-
-    Parameters
-    ----------
-    curves : list of Curve
-        Of `read_curves`.
-    cycle : {"first", "last"}
+def loading_tests(curves: list[TensionTest], cycle: str = "last") -> tuple[TensionTest, ...]:
+    """The loading branch of the "first" or "last" cycle of each test; curves without cycles as they are.
 
     Raises
     ------
@@ -352,13 +332,13 @@ def loading_tests(curves: list[Curve], cycle: str = "last") -> tuple[TensionTest
         raise MaterialError(f"The cycle must be one of {', '.join(CYCLES)}, but {cycle!r} was given.")
     tests = []
     for mode in MODES:
-        found = sorted((c for c in curves if c.test.mode == mode), key=lambda c: c.cycle or 0)
+        found = sorted((c for c in curves if c.mode == mode), key=lambda c: c.cycle or 0)
         if found:
             tests.append(_loading(found[0 if cycle == "first" else -1]))
     return tuple(tests)
 
 
-def describe_cycles(curves: list[Curve]) -> list[CycleReport]:
+def describe_cycles(curves: list[TensionTest]) -> list[CycleReport]:
     """Every cycle that a table tells apart."""
     return [_described(curve) for curve in curves if curve.cycle is not None]
 
@@ -392,19 +372,19 @@ def hysteresis_loss(strain, stress) -> tuple[float, float]:
     return lost, lost / (np.pi * stiffness * amplitude**2)
 
 
-def _loading(curve: Curve) -> TensionTest:
+def _loading(curve: TensionTest) -> TensionTest:
     """Up to the largest strain, counted from the permanent set."""
     if curve.cycle is None:
-        return curve.test
-    last = int(np.argmax(curve.test.strain))
-    strain, stress = curve.test.strain[: last + 1], curve.test.stress[: last + 1]
+        return curve
+    last = int(np.argmax(curve.strain))
+    strain, stress = curve.strain[: last + 1], curve.stress[: last + 1]
     residual, kept = _set_of(strain, stress)
     if np.count_nonzero(kept) < _FEWEST:
         raise MaterialError(
-            f"Cycle {curve.cycle} of the {curve.test.mode} test has {np.count_nonzero(kept)} rows of loading under "
+            f"Cycle {curve.cycle} of the {curve.mode} test has {np.count_nonzero(kept)} rows of loading under "
             f"stress; at least {_FEWEST} are needed."
         )
-    return TensionTest((1 + strain[kept]) / (1 + residual) - 1, stress[kept] * (1 + residual), curve.test.mode)
+    return TensionTest((1 + strain[kept]) / (1 + residual) - 1, stress[kept] * (1 + residual), curve.mode)
 
 
 def _set_of(strain: np.ndarray, stress: np.ndarray) -> tuple[float, np.ndarray]:
@@ -425,14 +405,14 @@ def _set_of(strain: np.ndarray, stress: np.ndarray) -> tuple[float, np.ndarray]:
     return float(np.clip(begins, strain[i], strain[i + 1])), beyond
 
 
-def _described(curve: Curve) -> CycleReport:
-    strain, stress = curve.test.strain, curve.test.stress
+def _described(curve: TensionTest) -> CycleReport:
+    strain, stress = curve.strain, curve.stress
     top = int(np.argmax(strain))
     back = strain[top] - strain[top:].min()
     closed = strain.size - top > _FEWEST and back >= _CLOSED * np.ptp(strain) > 0.0
     try:
         lost, factor = hysteresis_loss(strain, stress) if closed else (float("nan"), float("nan"))
     except MaterialError as error:
-        raise MaterialError(f"Cycle {curve.cycle} of the {curve.test.mode} test: {error}") from None
+        raise MaterialError(f"Cycle {curve.cycle} of the {curve.mode} test: {error}") from None
     residual = _set_of(strain[: top + 1], stress[: top + 1])[0]
-    return CycleReport(curve.test.mode, curve.cycle, float(strain[top]), float(stress[top]), residual, lost, factor)
+    return CycleReport(curve.mode, curve.cycle, float(strain[top]), float(stress[top]), residual, lost, factor)

@@ -7,19 +7,18 @@ import pytest
 
 from dbvfiv.case import Case, CaseError, make_case
 from dbvfiv.case.materials import KINDS
+from dbvfiv.fit import law_from_case, uniaxial_stress
+from dbvfiv.fit.cards import CARD_KINDS
 from dbvfiv.materials import (
     IsotropicElastic,
     MooneyRivlin,
     OrthotropicPly,
     SofteningRubber,
     fibre_ply,
-    law_from_case,
     ply_from_constituents,
     published_rubber,
     rubber,
-    uniaxial_stress,
 )
-from dbvfiv.materials.rubbers import CARD_KINDS
 from dbvfiv.studies.case import thesis_case
 
 

@@ -13,14 +13,9 @@ from hypothesis import strategies as st
 from dbvfiv.case import CaseError
 from dbvfiv.case.damping import SHIPPED_LOSSES
 from dbvfiv.case.parameters import Mu
-from dbvfiv.materials import MaterialError, damping_of, relaxation_from_case, shipped_loss, shipped_loss_names
-from dbvfiv.materials.damping_report import (
-    describe_damping,
-    outside_band,
-    rayleigh_constants,
-    rayleigh_ratio,
-    read_frequencies,
-)
+from dbvfiv.fit import damping_of, relaxation_from_case
+from dbvfiv.fit.damping import describe_damping, outside_band, rayleigh_constants, rayleigh_ratio, read_frequencies
+from dbvfiv.materials import MaterialError, shipped_loss, shipped_loss_names
 from dbvfiv.model.build import build_section
 from dbvfiv.studies.case import Case, thesis_case
 
@@ -96,7 +91,7 @@ def test_a_loss_factor_of_ones_own_or_by_name():
 
 
 def test_a_table_of_a_built_in_material_leaves_its_constants_as_they_are():
-    from dbvfiv.materials import law_from_case
+    from dbvfiv.fit import law_from_case
 
     case = thesis_case({"materials.strain_level": 0.4, "materials.CR.loss_factor": 0.2})
     assert law_from_case(case, "CR") == law_from_case(thesis_case({"materials.strain_level": 0.4}), "CR")

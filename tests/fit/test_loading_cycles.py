@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbvfiv.materials import MaterialError, TensionTest, form_of
-from dbvfiv.materials.fit_report import describe_fits
-from dbvfiv.materials.rubber_tests import Curve, describe_cycles, hysteresis_loss, loading_tests, read_tests
+from dbvfiv.fit import TensionTest, form_of
+from dbvfiv.fit.curves import describe_cycles, hysteresis_loss, loading_tests, read_tests
+from dbvfiv.fit.report import describe_fits
+from dbvfiv.materials import MaterialError
 
 NEO = form_of("neo-hookean")
 
@@ -33,7 +34,7 @@ def _cycle(number, modulus, residual=0.0, top=0.5):
     inner = (1 + outer) / (1 + residual) - 1
     stress = np.where(inner > 0, NEO.columns("uniaxial", inner)[:, 0] * 0.5 * modulus / (1 + residual), 0.0)
     strain = np.concatenate([outer, outer[-2::-1]])
-    return Curve(TensionTest(strain, np.concatenate([stress, 0.8 * stress[-2::-1]])), number)
+    return TensionTest(strain, np.concatenate([stress, 0.8 * stress[-2::-1]]), cycle=number)
 
 
 def test_first_and_stabilised_constants_come_back():
@@ -74,6 +75,6 @@ def test_bad_loops_are_refused():
         hysteresis_loss([1.0, 1.0, 1.0], [0.0, 1.0, 3.0])
     with pytest.raises(MaterialError, match="first, last, but 'third'"):
         loading_tests([_cycle(1, 1e6)], "third")
-    few = Curve(TensionTest([0.0, 0.1, 0.2, 0.1], [0.0, 1.0, 2.0, 0.5]), 2)
+    few = TensionTest([0.0, 0.1, 0.2, 0.1], [0.0, 1.0, 2.0, 0.5], cycle=2)
     with pytest.raises(MaterialError, match="Cycle 2 of the uniaxial test has 2 rows"):
         loading_tests([few])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.materials import least_squares
-from dbvfiv.materials.least_squares import nonnegative
+from dbvfiv.materials import prony
+from dbvfiv.materials.prony import nonnegative
 
 
 @pytest.mark.parametrize("method", ["Lawson and Hanson", "Stark and Parker"])
@@ -17,7 +17,7 @@ def test_the_least_of_all(method, monkeypatch):
         def going_round(*_args, **_options):
             raise RuntimeError("Maximum number of iterations reached.")
 
-        monkeypatch.setattr(least_squares, "nnls", going_round)
+        monkeypatch.setattr(prony, "nnls", going_round)
     random = np.random.default_rng(3)
     for rows, unknowns in ((6, 3), (40, 8), (5, 5)):
         matrix, target = random.standard_normal((rows, unknowns)), random.standard_normal(rows)

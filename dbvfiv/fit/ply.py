@@ -1,14 +1,4 @@
-"""Constants of a fibre ply from its fibre and matrix (Halpin-Tsai, Th. 3.3), from its tests, and backwards.
-
-M = Mm (Mf + xi (f Mf + (1 - f) Mm)) / (f Mm + (1 - f) Mf + xi Mm)
-
-xi = 0 is the series (Reuss) mean, xi -> infinity the parallel (Voigt) mean. The sources do
-not agree on one point: App. A's program gives the plane of the ply the shear modulus with xi = 2
-(5.57 MPa) and both transverse planes the one with xi = 0 (2.94 MPa), while Th. Table 3-5 prints
-2.94 MPa for xy and xz and 5.57 MPa for yz; the Poisson ratios (0.282 with xi = 2, 0.269 with xi = 0)
-are exchanged in the same way. The table's 1558 MPa along the fibre is 0.3 % above the program's
-1553.8. The program's assignment is the default here, because the listing runs; which of the two the
-published results were computed with is not said.
+"""Constants of a fibre ply from tests of strips, and of its fibre and matrix by Halpin-Tsai backwards.
 
 A strip pulled along the warp (the fibre), the weft (across it) or at 45 degrees answers as the wall's ply does, with a
 line between second Piola-Kirchhoff stress and Green-Lagrange strain, so that the nominal stress at the strain s is
@@ -28,107 +18,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from dbvfiv.materials.law import MaterialError, require_finite, require_positive
-from dbvfiv.materials.orthotropic import OrthotropicPly
-from dbvfiv.materials.rubber_tests import STRAIN_UNITS, TensionTest, read_numbers
-
-FIBRE_CONSTANTS = ("program", "table")
-
-
-def halpin_tsai(fibre: float, matrix: float, fibre_fraction: float, xi: float) -> float:
-    """Halpin-Tsai mean of one property (a modulus or a Poisson ratio).
-
-    Parameters
-    ----------
-    fibre, matrix : float
-        The property of the constituents; any unit, the same for both.
-    fibre_fraction : float
-        Volume fraction of the fibre, 0 to 1.
-    xi : float
-        Reinforcement coefficient, at least 0.
-    """
-    f = fibre_fraction
-    parallel = f * fibre + (1.0 - f) * matrix
-    return matrix * (fibre + xi * parallel) / (f * matrix + (1.0 - f) * fibre + xi * matrix)
-
-
-def ply_from_constituents(
-    fibre_fraction: float = 0.45,
-    fibre_modulus: float = 3460e6,
-    matrix_modulus: float = 4.37e6,
-    fibre_poisson: float = 0.21,
-    matrix_poisson: float = 0.35,
-    xi: float = 120000.0,
-    density: float = 1270.0,
-) -> OrthotropicPly:
-    """Unidirectional ply from its constituents; the defaults are App. A's.
-
-    ``e1`` uses `xi`, ``e2`` 0, ``g12`` and ``nu12`` 2, ``g13`` = ``g23`` 0.
-
-    Parameters
-    ----------
-    fibre_fraction : float
-        Volume fraction of the fibre, greater than 0 and less than 1.
-    fibre_modulus, matrix_modulus : float
-        Young's moduli of the isotropic constituents, Pa.
-    fibre_poisson, matrix_poisson : float
-        Their Poisson ratios, greater than 0 and at most 0.5.
-    xi : float
-        Coefficient for the modulus along the fibre, 2 (length/thickness) of the fibre.
-    density : float
-        Of the ply, kg/m3.
-
-    Raises
-    ------
-    MaterialError
-        For a constant outside these bounds.
-    """
-    name = "Halpin-Tsai ply"
-    require_positive(name, fibre_modulus=fibre_modulus, matrix_modulus=matrix_modulus)
-    require_positive(name, density=density, fibre_fraction=fibre_fraction)
-    require_finite(name, fibre_poisson=fibre_poisson, matrix_poisson=matrix_poisson, xi=xi)
-    if fibre_fraction >= 1.0:
-        raise MaterialError(f"{name}: fibre_fraction must be less than 1, but {fibre_fraction:g} was given.")
-    if xi < 0.0:
-        raise MaterialError(f"{name}: xi must be at least 0, but {xi:g} was given.")
-    for key, value in (("fibre_poisson", fibre_poisson), ("matrix_poisson", matrix_poisson)):
-        # The series mean of two ratios is meaningless when one of them is not positive.
-        if not 0.0 < value <= 0.5:
-            raise MaterialError(f"{name}: {key} must be greater than 0 and at most 0.5, but {value:g} was given.")
-    fibre_shear = fibre_modulus / (2.0 * (1.0 + fibre_poisson))
-    matrix_shear = matrix_modulus / (2.0 * (1.0 + matrix_poisson))
-    transverse_shear = halpin_tsai(fibre_shear, matrix_shear, fibre_fraction, 0.0)
-    return OrthotropicPly(
-        e1=halpin_tsai(fibre_modulus, matrix_modulus, fibre_fraction, xi),
-        e2=halpin_tsai(fibre_modulus, matrix_modulus, fibre_fraction, 0.0),
-        nu12=halpin_tsai(fibre_poisson, matrix_poisson, fibre_fraction, 2.0),
-        g12=halpin_tsai(fibre_shear, matrix_shear, fibre_fraction, 2.0),
-        g13=transverse_shear,
-        g23=transverse_shear,
-        density=density,
-    )
-
-
-def fibre_ply(constants: str = "program") -> OrthotropicPly:
-    """The reference valve's fibre ply.
-
-    Parameters
-    ----------
-    constants : {"program", "table"}
-        "program": App. A's constituents through Halpin-Tsai. "table": the printed constants of
-        Th. Table 3-5 (1558 and 7.94 MPa, shear 2.94, 2.94, 5.57 MPa for 12, 13, 23, Poisson 0.27).
-
-    Raises
-    ------
-    MaterialError
-        For any other word.
-    """
-    if constants == "program":
-        return ply_from_constituents()
-    if constants == "table":
-        return OrthotropicPly(1558e6, 7.94e6, 0.27, 2.94e6, 2.94e6, 5.57e6, 1270.0)
-    raise MaterialError(f"Fibre constants must be one of {', '.join(FIBRE_CONSTANTS)}, but {constants!r} was given.")
-
+from dbvfiv.fit.curves import STRAIN_UNITS, TensionTest, read_columns
+from dbvfiv.materials.laws import MaterialError, OrthotropicPly, halpin_tsai, ply_from_constituents, require_positive
 
 _SOFTEST, _STIFFEST = 1e-3, 0.5
 
@@ -193,28 +84,15 @@ def read_strip_test(path: str | Path, direction: str) -> StripTest:
     Raises
     ------
     MaterialError
-        See `rubber_tests.read_curves`.
+        See `curves.read_curves`.
     """
-    values = read_numbers(path, {"transverse_strain": STRAIN_UNITS})
-    try:
-        test = TensionTest(values["engineering_strain"], values["nominal_stress"])
-    except MaterialError as error:
-        raise MaterialError(f"Tension test {path}: {error}") from None
-    return StripTest(direction, test, values.get("transverse_strain"))
+    test, columns = read_columns(path, {"transverse_strain": STRAIN_UNITS})
+    return StripTest(direction, test, columns.get("transverse_strain"))
 
 
 @dataclass(frozen=True)
 class Constituents:
-    """Fibre and matrix of a ply; the keys of a material of kind halpin-tsai.
-
-    Attributes
-    ----------
-    fibre_fraction : float
-    fibre_modulus, matrix_modulus : float
-        Young's moduli, Pa.
-    fibre_poisson, matrix_poisson : float
-    xi : float
-    """
+    """Fibre and matrix of a ply: the keys of a material of kind halpin-tsai, in SI units."""
 
     fibre_fraction: float
     fibre_modulus: float
@@ -225,8 +103,8 @@ class Constituents:
 
     def ply(self, density: float, fibre_fraction: float | None = None) -> OrthotropicPly:
         """The ply of these constituents, of another volume fraction of the fibre if one is given."""
-        values = vars(self) | ({} if fibre_fraction is None else {"fibre_fraction": fibre_fraction})
-        return ply_from_constituents(**values, density=density)
+        fraction = self.fibre_fraction if fibre_fraction is None else fibre_fraction
+        return ply_from_constituents(**vars(self) | {"fibre_fraction": fraction}, density=density)
 
 
 def constituents_of(
@@ -243,14 +121,10 @@ def constituents_of(
     ----------
     e1, e2 : float
         Along and across the fibre, Pa.
-    fibre_fraction : float
-        Volume fraction of the fibre.
-    xi : float
-        Coefficient along the fibre.
+    fibre_fraction, xi : float
+        Volume fraction of the fibre, and coefficient along it.
     nu12 : float, optional
-        Poisson ratio of the ply; gives that of the matrix in place of the second of `poisson`.
-    poisson : (float, float)
-        Of fibre and matrix.
+        Poisson ratio of the ply; gives that of the matrix in place of the second of `poisson`, of fibre and matrix.
 
     Raises
     ------

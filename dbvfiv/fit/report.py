@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dbvfiv.materials.fit import RubberFit, all_forms, fit_rubber, form_of
-from dbvfiv.materials.law import MaterialError
-from dbvfiv.materials.rubber_tests import Curve, CycleReport, TensionTest, describe_cycles, loading_tests
+from dbvfiv.fit.curves import CycleReport, TensionTest, describe_cycles, loading_tests
+from dbvfiv.fit.rubber import RubberFit, all_forms, fit_rubber, form_of
+from dbvfiv.materials.laws import MaterialError
 
 #: Condition number above which constants say little of states that were not tested.
 ILL_CONDITIONED = 100.0
@@ -161,7 +161,7 @@ class FitReport:
 
 
 def describe_fits(
-    curves: list[Curve],
+    curves: list[TensionTest],
     law: str | None = None,
     terms: int | None = None,
     constraint: str = "none",
@@ -173,13 +173,13 @@ def describe_fits(
 
     Parameters
     ----------
-    curves : list of Curve
-        Of `loading_cycles.read_tests`.
+    curves : list of TensionTest
+        Of `curves.read_tests`.
     law, terms : optional
         The form told in full; the softening rubber if not given and the tests suffice for it, else of those but Ogden's
         that are stable as far as the tests reach the one of least residual.
     constraint, stable_to, error, cycle
-        See `fit.fit_rubber` and `loading_cycles.loading_tests`.
+        See `rubber.fit_rubber` and `curves.loading_tests`.
 
     Raises
     ------

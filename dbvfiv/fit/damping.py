@@ -14,8 +14,8 @@ import numpy as np
 
 from dbvfiv.case.quantity import Quantity, number_or_text
 from dbvfiv.errors import CaseError
-from dbvfiv.materials.damping import MaterialDamping, damping_of
-from dbvfiv.materials.law import MaterialError
+from dbvfiv.fit.cards import MaterialDamping, damping_of
+from dbvfiv.materials.laws import MaterialError
 from dbvfiv.materials.prony import Prony
 
 if TYPE_CHECKING:

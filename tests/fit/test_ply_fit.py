@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbvfiv.materials import MaterialError, TensionTest, fibre_ply, ply_from_constituents
-from dbvfiv.materials.ply_fit import StripTest, constituents_of, fit_ply, read_strip_test
+from dbvfiv.fit import TensionTest
+from dbvfiv.fit.ply import StripTest, constituents_of, fit_ply, read_strip_test
+from dbvfiv.materials import MaterialError, fibre_ply, ply_from_constituents
 
 APP_A = {
     "fibre_fraction": 0.45,

@@ -1,0 +1,403 @@
+"""Series of Maxwell branches fitted to loss factors, moduli and relaxation, and the tables that hold these.
+
+Columns are separated by commas, semicolons, tabs or blanks; the first line of names says what each is, with its unit in
+brackets: ``frequency [Hz], tan delta``, ``frequency [Hz], storage modulus [MPa], loss modulus [MPa]`` or ``time [s],
+modulus [MPa]``. A column ``temperature [degC]`` may stand beside them. Other columns are ignored.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dbvfiv.case.damping import LARGEST_LOSS, celsius, kelvin
+from dbvfiv.fit.curves import STRESS_UNITS
+from dbvfiv.materials.laws import MaterialError
+from dbvfiv.materials.prony import Prony, branch_moduli, fit_loss, nonnegative
+from dbvfiv.verdict.table import Table, read_table, seconds_in, unit_in_name
+
+#: How far the ends of the times reach beyond the band, in decades of frequency at its lower and upper end: offset and
+#: slope over the decades a branch covers. Measured for loss factors of 0.05 to 0.5, see docs/damping.md.
+_LOWER, _UPPER = (0.60, -1.05), (0.86, -1.10)
+#: Points a decade at which a constant loss factor is asked for.
+_PER_DECADE = 25
+_FREQUENCY_UNITS = {"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "MHz": 1e6, "rad/s": 1.0 / (2.0 * np.pi)}
+_RATIO_UNITS = {"": 1.0, "-": 1.0, "1": 1.0, "%": 0.01}
+#: Names of columns, in small letters with single blanks; what stands in brackets is left out.
+_NAMES = {
+    "frequency": ("frequency", "freq", "f", "angular frequency", "omega", "ω"),
+    "tan delta": ("tan delta", "tandelta", "tan d", "tan δ", "tanδ", "loss factor", "eta", "η"),
+    "storage modulus": ("storage modulus", "e'", "g'", "storage"),
+    "loss modulus": ("loss modulus", "e''", "g''", 'e"', 'g"', "loss"),
+    "modulus": ("modulus", "relaxation modulus", "relaxing modulus", "e", "g", "e(t)", "g(t)"),
+    "time": ("time", "t"),
+    "temperature": ("temperature", "temp", "temp."),
+}
+#: Temperatures within this of each other are one, K: a chamber holds no better.
+SAME_TEMPERATURE = 1.0
+
+
+@dataclass(frozen=True)
+class PronyFit:
+    """A series and how well it meets what it was fitted to.
+
+    Attributes
+    ----------
+    prony : Prony
+    quantity : str
+        What was fitted: "tan delta", "moduli" or "relaxing modulus".
+    error : numpy.ndarray, shape (n,)
+        Fitted over wanted, less one: of tan delta, or of the relaxing modulus.
+    """
+
+    prony: Prony
+    quantity: str
+    error: np.ndarray
+
+    @property
+    def largest_error(self) -> float:
+        """Largest relative error, a fraction."""
+        return float(np.abs(self.error).max())
+
+    @property
+    def rms_error(self) -> float:
+        """Root mean square of the relative errors, a fraction."""
+        return float(np.sqrt(np.mean(self.error**2)))
+
+
+def relaxation_times(band: tuple[float, float], branches: int) -> np.ndarray:
+    """Times (branches,), s, of a series that is to hold over a band of frequencies, Hz, ascending.
+
+    Spread evenly over the logarithm; few branches lie within the band, many reach beyond it.
+    """
+    low, high = _checked_band(band)
+    if isinstance(branches, bool) or not isinstance(branches, (int, np.integer)) or branches < 1:
+        raise MaterialError(f"A Prony series has at least one branch, but {branches!r} was given.")
+    if branches == 1:
+        return np.array([1.0 / (2 * np.pi * np.sqrt(low * high))])
+    decades = np.log10(high / low)
+    covered = decades / branches
+    beyond = [max(offset + slope * covered, -0.25 * decades) for offset, slope in (_LOWER, _UPPER)]
+    ends = np.log10(low) - beyond[0], np.log10(high) + beyond[1]
+    return 1.0 / (2 * np.pi * np.logspace(ends[1], ends[0], branches))
+
+
+def fit_constant(loss_factor: float, band: tuple[float, float], branches: int) -> PronyFit:
+    """A series whose loss factor is the same over a band, with the largest relative error as small as it gets.
+
+    Parameters
+    ----------
+    loss_factor : float
+        tan delta, 0 (elastic) to 2.
+    band : tuple of float
+        Lowest and highest frequency, Hz.
+    branches : int
+
+    Raises
+    ------
+    MaterialError
+        For a loss factor or a band out of range.
+
+    Examples
+    --------
+    >>> fit = fit_constant(0.2, (1.0, 200.0), 4)
+    >>> fit.largest_error < 0.03
+    True
+    """
+    _check_loss(np.array([loss_factor], float))
+    low, high = _checked_band(band)
+    times = relaxation_times(band, branches)
+    at = np.geomspace(low, high, max(int(_PER_DECADE * np.log10(high / low)), 4 * branches) + 1)
+    if loss_factor == 0.0:
+        return PronyFit(Prony((0.0,) * branches, times), "tan delta", np.zeros(len(at)))
+    return _of_tan_delta(at, np.full(len(at), float(loss_factor)), times, level=True)
+
+
+def fit_tan_delta(frequency, tan_delta, times) -> PronyFit:
+    """Series of given times from tan delta over frequency; relative errors count, evenly over the logarithm.
+
+    Parameters
+    ----------
+    frequency, tan_delta : array_like, shape (n,)
+        Hz, ascending; greater than 0 and at most 2.
+    times : array_like, shape (j,)
+        s.
+
+    Raises
+    ------
+    MaterialError
+        For tables that cannot be used.
+    """
+    return _of_tan_delta(*checked_tan_delta(frequency, tan_delta), np.asarray(times, float))
+
+
+def fit_moduli(frequency, storage, loss, times) -> PronyFit:
+    """Series of given times from storage and loss modulus over frequency.
+
+    The slow modulus is found with the strengths and dropped: what a law is scaled with is its own test.
+
+    Parameters
+    ----------
+    frequency, storage, loss : array_like, shape (n,)
+        Hz, ascending; Pa, or any common unit, positive.
+    times : array_like, shape (j,)
+        s.
+
+    Raises
+    ------
+    MaterialError
+        For tables that cannot be used, or moduli that leave no slow modulus.
+    """
+    frequency, storage, loss = checked_moduli(frequency, storage, loss)
+    times = np.asarray(times, float)
+    branch, even = branch_moduli(frequency, times), _even_weights(frequency)
+    above = np.hstack([np.ones((len(frequency), 1)), branch.real]) * (even / storage)[:, None]
+    below = np.hstack([np.zeros((len(frequency), 1)), branch.imag]) * (even / loss)[:, None]
+    found = nonnegative(np.vstack([above, below]), np.concatenate([even, even]))
+    prony = Prony(_over_slow(found, "storage modulus"), times)
+    return PronyFit(prony, "moduli", prony.loss_factor(frequency) * storage / loss - 1.0)
+
+
+def fit_relaxation(time, modulus, times) -> PronyFit:
+    """Series of given times from a relaxation test: the modulus over the time since the strain was put on.
+
+    Parameters
+    ----------
+    time, modulus : array_like, shape (n,)
+        s, ascending, positive; Pa, or any unit, positive.
+    times : array_like, shape (j,)
+        s.
+
+    Raises
+    ------
+    MaterialError
+        For tables that cannot be used, or a modulus that relaxes to nothing.
+    """
+    time, modulus = checked_relaxation(time, modulus)
+    times = np.asarray(times, float)
+    even = _even_weights(time)
+    matrix = np.hstack([np.ones((len(time), 1)), np.exp(-np.multiply.outer(time, 1.0 / times))])
+    found = nonnegative(matrix * (even / modulus)[:, None], even)
+    prony = Prony(_over_slow(found, "relaxing modulus"), times)
+    return PronyFit(prony, "relaxing modulus", matrix @ found / modulus - 1.0)
+
+
+def _of_tan_delta(at: np.ndarray, wanted: np.ndarray, times: np.ndarray, level: bool = False) -> PronyFit:
+    prony = Prony(fit_loss(at, wanted, times, _even_weights(at), level), times)
+    return PronyFit(prony, "tan delta", prony.loss_factor(at) / wanted - 1.0)
+
+
+def checked_tan_delta(frequency, tan_delta) -> tuple[np.ndarray, np.ndarray]:
+    """A table that `fit_tan_delta` takes, as arrays; raises `MaterialError` for any other."""
+    frequency, wanted = _checked("frequency", "Hz", frequency, tan_delta)
+    _check_loss(wanted)
+    if not (wanted > 0).all():
+        raise MaterialError("tan delta must be greater than 0 in a table; an elastic material is loss_factor = 0.")
+    return frequency, wanted
+
+
+def checked_moduli(frequency, storage, loss) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A table that `fit_moduli` takes, as arrays; see `checked_tan_delta`."""
+    frequency, storage = _checked("frequency", "Hz", frequency, storage)
+    _, loss = _checked("frequency", "Hz", frequency, loss)
+    _check_positive("storage modulus", frequency, "Hz", storage)
+    _check_positive("loss modulus", frequency, "Hz", loss)
+    _check_loss(loss / storage)
+    return frequency, storage, loss
+
+
+def checked_relaxation(time, modulus) -> tuple[np.ndarray, np.ndarray]:
+    """A table that `fit_relaxation` takes, as arrays; see `checked_tan_delta`."""
+    time, modulus = _checked("time", "s", time, modulus)
+    _check_positive("modulus", time, "s", modulus)
+    return time, modulus
+
+
+def _checked(name: str, unit: str, at, values) -> tuple[np.ndarray, np.ndarray]:
+    """Two columns as arrays: finite, as long as each other, the first one positive and ascending."""
+    at, values = np.asarray(at, float), np.asarray(values, float)
+    if at.ndim != 1 or at.shape != values.shape:
+        raise MaterialError(f"There must be one value for each {name}, but the shapes are {at.shape}, {values.shape}.")
+    if not at.size:
+        raise MaterialError("There is no row of numbers.")
+    if not (np.isfinite(at).all() and np.isfinite(values).all()):
+        raise MaterialError("There must be finite numbers only.")
+    if at[0] <= 0:
+        raise MaterialError(f"The {name} must be greater than 0 {unit}, but {at[0]:g} {unit} was found.")
+    for before, after in zip(at, at[1:]):
+        if after == before:
+            raise MaterialError(f"The {name} {after:g} {unit} appears twice; each must stand once.")
+        if after < before:
+            raise MaterialError(
+                f"The {name} must increase from row to row, but {after:g} {unit} follows {before:g} {unit}."
+            )
+    return at, values
+
+
+def _checked_band(band: tuple[float, float]) -> tuple[float, float]:
+    low, high = (float(f) for f in band)
+    if not 0 < low < high < np.inf:
+        raise MaterialError(
+            f"A band goes from a positive frequency to a higher one, but {low:g} to {high:g} Hz is given."
+        )
+    return low, high
+
+
+def _check_loss(tan_delta: np.ndarray) -> None:
+    for value in tan_delta:
+        if not 0 <= value <= LARGEST_LOSS:
+            raise MaterialError(
+                f"A loss factor (tan delta) must lie between 0 and {LARGEST_LOSS:g}, but {value:g} was found."
+            )
+
+
+def _check_positive(what: str, at: np.ndarray, unit: str, values: np.ndarray) -> None:
+    bad = np.flatnonzero(values <= 0)
+    if bad.size:
+        i = bad[0]
+        raise MaterialError(f"The {what} must be greater than 0, but at {at[i]:g} {unit} it is {values[i]:g}.")
+
+
+def _even_weights(at: np.ndarray) -> np.ndarray:
+    """Roots of the share of each point in the logarithmic axis, so that crowds of points do not rule."""
+    if at.size < 3:
+        return np.ones(at.size)
+    return np.sqrt(np.gradient(np.log(at)) * at.size / np.log(at[-1] / at[0]))
+
+
+def _over_slow(found: np.ndarray, what: str) -> np.ndarray:
+    if found[0] <= 1e-6 * found.sum():
+        raise MaterialError(
+            f"The {what} leaves nothing that lasts: the material would flow, and a wall needs a slow modulus above 0."
+        )
+    return found[1:] / found[0]
+
+
+def read_loss_table(path: str | Path, temperature: float | None = None) -> tuple[np.ndarray, ...]:
+    """Read frequencies, Hz, with tan delta, or with storage and loss modulus, Pa, where a table holds both; each (n,).
+
+    Parameters
+    ----------
+    path : path
+    temperature : float, optional
+        K; which rows are meant where the table holds several temperatures.
+
+    Raises
+    ------
+    MaterialError
+        If the file cannot be read, a column or its unit is missing or unknown, or several temperatures are left.
+    """
+    columns = _read(path, ("frequency", "tan delta", "storage modulus", "loss modulus"), temperature)
+    _require(
+        path, columns, "frequency", "frequency [Hz] beside tan delta, or storage modulus [MPa] and loss modulus [MPa]"
+    )
+    if {"storage modulus", "loss modulus"} <= set(columns):
+        return columns["frequency"], columns["storage modulus"], columns["loss modulus"]
+    if "tan delta" not in columns:
+        raise MaterialError(
+            f"Table {path}: it needs a column tan delta, or columns storage modulus [MPa] and loss modulus [MPa]."
+        )
+    return columns["frequency"], columns["tan delta"]
+
+
+def read_relaxation_table(path: str | Path, temperature: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Read times, s, since the strain was put on and a relaxing modulus, Pa; see `read_loss_table`."""
+    columns = _read(path, ("time", "modulus"), temperature)
+    for name in ("time", "modulus"):
+        _require(path, columns, name, "time [s] and modulus [MPa]")
+    return columns["time"], columns["modulus"]
+
+
+def _require(path: str | Path, columns: dict[str, np.ndarray], name: str, wanted: str) -> None:
+    if name not in columns:
+        raise MaterialError(f"Table {path}: there is no column {name}; the header must name {wanted}.")
+
+
+def _read(path: str | Path, wanted: tuple[str, ...], temperature: float | None) -> dict[str, np.ndarray]:
+    """Columns in SI units by what they are, of one temperature."""
+    try:
+        table = read_table(path)
+    except OSError as error:
+        raise MaterialError(f"Table {path} cannot be read ({error.strerror or error}).") from None
+    except ValueError as error:
+        raise MaterialError(f"Table {path} cannot be used: {error}.") from None
+    found: dict[str, int] = {}
+    for i, title in enumerate(table.names):
+        name = _meaning(title, wanted)
+        if name in found:
+            raise MaterialError(f"Table {path}: column {name} appears twice.")
+        if name:
+            found[name] = i
+    chosen = list(found.values())
+    if chosen and table.bad_rows(chosen).any():
+        raise MaterialError(f"Table {path} cannot be used: {table.describe_bad(chosen)}.")
+    columns = {name: _in_si(path, table, name, i) for name, i in found.items()}
+    return _of_one_temperature(path, columns, temperature)
+
+
+def _meaning(title: str, wanted: tuple[str, ...]) -> str | None:
+    """Name of the wanted column that a title stands for; None for a title that is not known."""
+    bare = re.sub(r"\s*[\[(<{][^\])>}]*[\])>}]\s*$", "", title) if not title.strip().endswith("(t)") else title
+    plain = " ".join(re.sub(r"[_,]", " ", bare).replace("′", "'").replace("″", "''").lower().split())
+    return next((name for name in (*wanted, "temperature") if plain in _NAMES[name]), None)
+
+
+def _in_si(path: str | Path, table: Table, name: str, column: int) -> np.ndarray:
+    title = table.names[column]
+    unit = ((table.units[column] if table.units else "") or unit_in_name(title)).strip()
+    values = table.values[:, column]
+    try:
+        if name == "temperature":
+            return kelvin(values, unit)
+        return _factor(name, title, unit) * values
+    except ValueError as error:
+        raise MaterialError(f"Table {path}, column {title!r}: {error}.") from None
+
+
+def _factor(name: str, title: str, unit: str) -> float:
+    if name == "time":
+        return seconds_in(unit)
+    units = {"frequency": _FREQUENCY_UNITS, "tan delta": _RATIO_UNITS}.get(name, STRESS_UNITS)
+    if unit not in units:
+        known = ", ".join(u for u in units if u)
+        said = f"the unit {unit!r} is not known" if unit else "no unit is given"
+        raise ValueError(f"{said}; write {name} [UNIT] with one of {known}")
+    turns = any(word in title.lower() for word in ("angular", "omega", "ω"))
+    if name == "frequency" and turns != (unit == "rad/s"):
+        raise ValueError("an angular frequency is in rad/s, and a frequency in Hz")
+    return units[unit]
+
+
+def _of_one_temperature(
+    path: str | Path, columns: dict[str, np.ndarray], temperature: float | None
+) -> dict[str, np.ndarray]:
+    """Rows of the temperature that was asked for, or of the only one."""
+    measured = columns.pop("temperature", None)
+    if measured is None:
+        if temperature is not None:
+            raise MaterialError(
+                f"Table {path}: {celsius(temperature)} is asked for, but there is no column temperature [degC]."
+            )
+        return columns
+    steps = _steps(measured)
+    named = ", ".join(celsius(t) for t in steps)
+    if temperature is None:
+        if len(steps) > 1:
+            raise MaterialError(
+                f"Table {path} holds several temperatures, {named}; loss_temperature must say which one is meant."
+            )
+        return columns
+    near = np.abs(measured - temperature) <= SAME_TEMPERATURE
+    if not near.any():
+        raise MaterialError(f"Table {path}: {celsius(temperature)} is asked for, but it holds {named} alone.")
+    return {name: values[near] for name, values in columns.items()}
+
+
+def _steps(measured: np.ndarray) -> list[float]:
+    """Means of the groups of temperatures that lie together."""
+    ordered = np.sort(measured)
+    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > SAME_TEMPERATURE) + 1)
+    return [float(np.round(group.mean(), 2)) for group in groups]
