@@ -1,18 +1,13 @@
-"""Eigenpairs near a shift: SLEPc's Krylov-Schur method, and a compact Arnoldi method for viscoelastic walls.
+"""Eigenpairs near a shift by a compact Arnoldi method, for elastic and viscoelastic walls alike.
 
 With x = (q, lambda q, U, lambda U, z_j) and (lambda - sigma) x_new = x_in all structural parts of a new vector are sums
 of T(sigma)^-1 f and of parts that are there already, so that those of k vectors lie in k + 2 structural vectors (TOAR:
 Lu, Su and Bai 2016; CORK: Van Beeumen, Meerbergen and Michiels 2015): work and memory are those of one structural
-vector a step however many branches relax.
+vector a step however many relaxation times there are.
 
-Creep: thousands of real eigenvalues lie left of each -1/tau_j, nearer to a real shift than what oscillates. In the
+Relaxation: thousands of real eigenvalues lie left of each -1/tau_j, nearer to a real shift than what oscillates. In the
 plane of theta = 1/(lambda - sigma) they stay on the real axis, inside the circle near which the oscillating ones lie;
-so these are counted by |Im theta|, and those right of the creep are taken in as they come.
-
-Measured at 6816 structural unknowns with four branches, seconds of processor for ten leading pairs: this 1.1, as much
-as a search under Rayleigh damping; SLEPc's Krylov-Schur on whole vectors by imaginary part 1.3, by magnitude none found
-in 14; SLEPc's NLEIGS, which takes only real targets in real arithmetic, none found in 8; a quadratic pencil in place of
-the rational one, its vectors corrected on the latter, 1.9, with one pair of ten lost.
+so these are counted by |Im theta|, and those right of the relaxation spectrum are taken in as they come.
 """
 
 from __future__ import annotations
@@ -34,15 +29,15 @@ class KrylovPairs:
 
     Attributes
     ----------
+    eigenvalues : ndarray, shape (k,)
     vectors_q : ndarray, shape (n, k), complex
         Structural part; for left pairs the conjugated left vector w of w^H T = 0.
     vectors_u : ndarray, shape (b, k), complex
-    eigenvalues : ndarray, shape (k,)
     reach : float
-        Size of the region around the shift in which every eigenvalue was found, as
-        |lambda - shift| |lambda - reference| < reach**2, see `SearchedRegion`.
-    iterations, applications : int
-        Restarts, and applications of the shift-and-invert operator.
+        Radius of the disc around the shift in which every eigenvalue was found; of a viscoelastic wall at a real shift
+        of the disc around shift + i reach, and of its mirror image.
+    applications : int
+        Applications of the shift-and-invert operator.
     exhausted : bool
         True if every eigenvalue of the pencil was found.
     """
@@ -51,257 +46,8 @@ class KrylovPairs:
     vectors_q: np.ndarray
     vectors_u: np.ndarray
     reach: float
-    iterations: int
     applications: int
     exhausted: bool
-
-
-class _ShiftAndInvert:
-    """Operator (F - sigma E)^-1 E on x = (q, v / scale, U), or its transpose.
-
-    Real arithmetic with a complex shift uses the imaginary part over Im sigma, which is
-    (F - sigma E)^-1 E (F - conj(sigma) E)^-1: the same eigenvectors, the transformed
-    eigenvalue 1 / ((lambda - sigma)(lambda - conj sigma)).
-    """
-
-    def __init__(self, shifted: ShiftedPencil, dtype, transposed: bool):
-        pencil = shifted.pencil
-        self.shifted, self.transposed = shifted, transposed
-        self.n, self.b = pencil.n, pencil.b
-        self.paired = np.dtype(dtype).kind == "f" and isinstance(shifted.shift, complex)
-        self.scale = abs(shifted.shift) or 1.0
-        p, s = pencil, shifted.shift
-        self._A12 = p.A1 + s * p.A2
-        self._R12 = p.R1 + s * p.R2
-        self._MT = p.M.T.tocsr() if transposed else None
-        self._CT = shifted.damping_shifted.T.tocsr() if transposed else None
-        self._J, self._GT = shifted.motion, shifted.force
-        self.applications = 0
-
-    def mult(self, _matrix, x, y):
-        self.applications += 1
-        out = (self._left if self.transposed else self._right)(x.getArray(readonly=True))
-        y.setArray(out.imag / self.shifted.shift.imag if self.paired else out)
-
-    def _right(self, x):
-        """y = (F - sigma E)^-1 E x by T(sigma) (q, U) = -(f, g), v = q_in + sigma q."""
-        p, s, n = self.shifted.pencil, self.shifted.shift, self.n
-        q_in, v_in, u_in = x[:n], x[n : 2 * n] * self.scale, x[2 * n :]
-        f = real_apply(p.M, v_in) + _apply(self.shifted.damping_shifted, q_in)
-        g = np.zeros(self.b, dtype=np.result_type(x, s))
-        if p.m:
-            yv, yq = (self._J @ np.stack([v_in, q_in], axis=1)).T
-            f -= self._GT.transposed(p.A2 @ yv + self._A12 @ yq + p.B1 @ u_in)
-            g = p.R2 @ yv + self._R12 @ yq
-        g = g + p.S1 @ u_in
-        q, u = self.shifted.solve(-f, -g)
-        return np.concatenate([q, (q_in + s * q) / self.scale, u])
-
-    def _left(self, z):
-        """y = E^T (F - sigma E)^-T z; the left vector of T is part of (F - sigma E)^-T z."""
-        p = self.shifted.pencil
-        w, W = self.left_vector(z)
-        # a is the multiplier of dq/dt = v, from the second block column
-        a = z[self.n : 2 * self.n] / self.scale + _apply(self._CT, w)
-        e2 = real_apply(self._MT, w)
-        e3 = p.S1.T @ W
-        if p.m:
-            t = self._GT @ w
-            a = a + self._J.transposed(self._R12.T @ W - self._A12.T @ t)
-            e2 = e2 + self._J.transposed(p.R2.T @ W - p.A2.T @ t)
-            e3 = e3 - p.B1.T @ t
-        return np.concatenate([a, e2 * self.scale, e3])
-
-    def left_vector(self, z):
-        """Left vector of the polynomial from an eigenvector of the transposed operator."""
-        n = self.n
-        return self.shifted.solve_transposed(-(z[:n] + self.shifted.shift * z[n : 2 * n] / self.scale), -z[2 * n :])
-
-
-#: Restarts at most, and those after which a search ends that neither brought a further pair nor halved the error of the
-#: next: next to a limit point no number helps, while in a dense spectrum all pairs converge late and together.
-RESTARTS, PATIENCE = 60, 3
-
-
-def near_shift(
-    shifted: ShiftedPencil,
-    wanted: int,
-    *,
-    tolerance: float = 1e-10,
-    transposed: bool = False,
-    limit_point: float | None = None,
-    enough: Callable[[np.ndarray, float], bool] | None = None,
-) -> KrylovPairs:
-    """The eigenvalues nearest to the shift of a factored pencil.
-
-    Parameters
-    ----------
-    shifted : ShiftedPencil
-    wanted : int
-        Number of eigenvalues, conjugates counted apart.
-    tolerance : float
-        Relative, on the transformed eigenvalue.
-    transposed : bool
-        Left vectors (conjugated) instead of right ones, from the same factor.
-    limit_point : float, optional
-        Real limit point of eigenvalues: the search ends when all that is left to converge lies as
-        far from the shift as this, 3 per cent less.
-    enough : callable, optional
-        enough(eigenvalues, reach) is asked after each restart about those that have converged;
-        True ends the search. Not asked at a complex shift in real arithmetic.
-
-    Returns
-    -------
-    KrylovPairs
-        Nearest first; what did not converge is left out.
-    """
-    from petsc4py import PETSc
-    from slepc4py import SLEPc
-
-    size = shifted.pencil.order
-    wanted = min(wanted, size)
-    operator = _ShiftAndInvert(shifted, PETSc.ScalarType, transposed)
-    shell = PETSc.Mat().createPython((size, size), operator, comm=PETSc.COMM_SELF)
-    shell.setUp()
-    solver = SLEPc.EPS().create(comm=PETSc.COMM_SELF)
-    solver.setOperators(shell)
-    solver.setProblemType(SLEPc.EPS.ProblemType.NHEP)
-    solver.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
-    solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
-    solver.setTolerances(tolerance, RESTARTS)
-    stopping = _Patience(SLEPc.EPS.ConvergedReason, _limit_size(shifted, limit_point))
-    if enough is not None and not operator.paired:
-        stopping.enough = lambda theta: enough(shifted.shift + 1.0 / theta, 1.0 / np.abs(theta).min())
-        stopping.matrix = SLEPc.DS.MatType.A
-    solver.setStoppingTest(stopping)
-    solver.setMonitor(stopping.watch)
-    subspace = size if size <= 5 * wanted else max(2 * wanted, wanted + 24)
-    solver.setDimensions(wanted, min(size, subspace))
-    start = shell.createVecRight()
-    start.setArray(np.random.default_rng(7).standard_normal(size))
-    solver.setInitialSpace(start)
-    solver.solve()
-    pairs = _collect(solver, shell, operator, size, stopping.limit if stopping.at_limit else 0.0)
-    for item in (solver, shell, start):
-        item.destroy()
-    return pairs
-
-
-def _limit_size(shifted, limit_point) -> float:
-    """Size of the transformed eigenvalue just right of a limit point; 0 without one."""
-    if limit_point is None:
-        return 0.0
-    shift, place = complex(shifted.shift), END * limit_point
-    mirror = shift.conjugate() if shift.imag else None
-    distance = abs(place - shift)
-    return 1.0 / (distance if mirror is None else distance * abs(place - mirror))
-
-
-class _Patience:
-    """Stopping test: enough pairs, too many restarts, no progress, or a limit point reached."""
-
-    def __init__(self, reasons, limit=0.0):
-        self.reasons, self.limit = reasons, limit
-        self.best, self.since = 0, 0
-        self.error = np.inf  # smallest seen of the first pair that has not converged
-        self.ritz = np.zeros(0)
-        self.at_limit = False
-        self.enough = None
-        self.matrix = None
-
-    def watch(self, _solver, restart, converged, ritz, errors):
-        self.ritz = np.abs(np.array(ritz))
-        if converged > self.best:
-            self.error = np.inf
-        error = errors[converged] if converged < len(errors) else 0.0
-        if 0.0 < error <= 0.5 * self.error:
-            self.error, self.since = error, restart
-
-    def __call__(self, _solver, restart, max_restarts, converged, wanted):
-        if converged >= wanted:
-            return self.reasons.CONVERGED_TOL
-        # the values of the restart before: they only move outwards
-        if self.limit and converged < self.ritz.size and 0 < self.ritz[converged] < self.limit:
-            self.at_limit = True
-            return self.reasons.CONVERGED_USER
-        if converged > self.best:
-            self.best, self.since = converged, restart
-            if self.enough is not None and self.enough(self._converged(_solver, converged)):
-                return self.reasons.CONVERGED_USER
-        if restart >= max_restarts or restart - self.since >= PATIENCE:
-            return self.reasons.DIVERGED_ITS
-        return self.reasons.CONVERGED_ITERATING
-
-    def _converged(self, solver, number):
-        """Transformed eigenvalues converged so far, from the projected Schur form."""
-        projected = solver.getDS()
-        schur = projected.getMat(self.matrix)
-        values = np.linalg.eigvals(schur.getDenseArray()[:number, :number])
-        projected.restoreMat(self.matrix, schur)
-        return values
-
-
-def _collect(solver, shell, operator, size, limit=0.0) -> KrylovPairs:
-    shift, n = operator.shifted.shift, operator.n
-    found = solver.getConverged()
-    real = shell.createVecRight()
-    imag = shell.createVecRight()
-    values, q, u, theta_size = [], [], [], []
-    for i in range(found):
-        theta = solver.getEigenpair(i, real, imag)
-        if theta == 0 or abs(theta) < 1e-14 / operator.scale:
-            continue  # an infinite eigenvalue: E is singular
-        x = real.getArray() + (0 if np.iscomplexobj(real.getArray()) else 1j * imag.getArray())
-        theta_size.append(abs(theta))
-        if operator.paired:
-            values.append(_from_pair(theta, shift, x, n, operator))
-        else:
-            values.append(shift + 1.0 / theta)
-        if operator.transposed:
-            w, W = operator.left_vector(x)
-            q.append(w)
-            u.append(W)
-        else:
-            q.append(x[:n])
-            u.append(x[2 * n :])
-    k = len(values)
-    far = limit or (min(theta_size) if k else np.inf)
-    reach = far**-0.5 if operator.paired else 1.0 / far
-    return KrylovPairs(
-        eigenvalues=np.array(values, complex),
-        vectors_q=np.array(q, complex).reshape(k, n).T,
-        vectors_u=np.array(u, complex).reshape(k, operator.b).T,
-        reach=reach,
-        iterations=solver.getIterationNumber(),
-        applications=operator.applications,
-        exhausted=found >= size,
-    )
-
-
-def _from_pair(theta, shift, x, n, operator):
-    """lambda from 1/theta = (lambda - shift)(lambda - conj shift); the vector picks the root."""
-    root = np.sqrt(complex(1.0 / theta - shift.imag**2))
-    candidates = np.array([shift.real + root, shift.real - root])
-    if operator.transposed:
-        w, W = operator.left_vector(x)
-        pencil = operator.shifted.pencil
-        estimate = [_left_residual(pencil, c, w, W) for c in candidates]
-        return candidates[int(np.argmin(estimate))]
-    rate = x[n : 2 * n] * operator.scale
-    distance = [np.linalg.norm(rate - c * x[:n]) for c in candidates]
-    return candidates[int(np.argmin(distance))]
-
-
-def _left_residual(pencil, s, w, W):
-    A, B, R, S = pencil.fluid_at(s)
-    t = real_apply(pencil.G.T.tocsr(), w)
-    first = (
-        s * s * real_apply(pencil.M.T, w)
-        + s * real_apply(pencil.C.T, w)
-        + real_apply(pencil.K.T, w)
-        + real_apply(pencil.J.T.tocsr(), R.T @ W - A.T @ t)
-    )
-    return np.linalg.norm(first)
 
 
 def _apply(matrix, x):
@@ -309,13 +55,13 @@ def _apply(matrix, x):
     return real_apply(matrix, x) if matrix.dtype.kind == "f" else matrix @ x
 
 
-#: Steps before convergence is looked at, and between looks.
+#: Steps before convergence is looked at, and between looks at least.
 FIRST, EVERY = 30, 10
-#: Estimated relative error of theta below which a pair counts as converged; Newton's corrections do the rest.
-CONVERGED = 1e-10
+#: Relative error of theta up to which a pair counts as converged; Newton's corrections do the rest.
+CONVERGED = 1e-12
 #: Share of |theta| below which an imaginary part is rounding.
 REAL = 1e-9
-#: Distance over the shift beyond which a search does not wait for what lies right of the creep.
+#: Distance over the shift beyond which a search does not wait for what lies right of the relaxation spectrum.
 FAR = 10.0
 
 
@@ -343,9 +89,10 @@ class _Operator:
             self._B, self._R, self._S1 = (-p.R1.T, -p.R2.T), (-p.B1.T, zero), p.S1.T
         else:
             self._A, self._B, self._R, self._S1 = (p.A1, p.A2), (p.B1, zero.T), (p.R1, p.R2), p.S1
-        self.times = p.relaxation.times
+        self.times = np.zeros(0) if p.relaxation is None else p.relaxation.times
         self._below = 1.0 / (1.0 + s * self.times)
-        self._weights = p.relaxation.strengths * (self.times * self._below)  # (g, j)
+        strengths = np.zeros((0, 0)) if p.relaxation is None else p.relaxation.strengths
+        self._weights = strengths * (self.times * self._below)  # (g, j)
 
     def apply(self, Q, c, u):
         """Structural vector and inner unknowns of the new vector, before the former is made orthogonal.
@@ -396,13 +143,18 @@ class _Arnoldi:
         self.rows, self.rank = most, 0
         self.coefficients = np.zeros((steps + 1, (2 + self.branches) * most + 2 * b), dtype)
         self.H = np.zeros((steps + 1, steps), dtype)
-        rng = np.random.default_rng(seed)
-        c = np.zeros((2 + self.branches, most), dtype)
+        self._rng = np.random.default_rng(seed)
+        first = self._random()
+        self.coefficients[0] = first / np.linalg.norm(first)
+
+    def _random(self) -> np.ndarray:
+        """A vector without preferred direction."""
+        n, dtype, rng = len(self.Q), self.Q.dtype, self._rng
+        c = np.zeros((2 + self.branches, self.rows), dtype)
         c[0] = self._added(rng.standard_normal(n).astype(dtype))
         c[1] = self._added(rng.standard_normal(n).astype(dtype))
         c[2:] = c[0] + rng.standard_normal((self.branches, 1)) * c[1]
-        first = self._packed(c, rng.standard_normal((2, b)).astype(dtype))
-        self.coefficients[0] = first / np.linalg.norm(first)
+        return self._packed(c, rng.standard_normal((2, self.operator.b)).astype(dtype))
 
     def _packed(self, c, u):
         return np.concatenate([c.ravel(), u.ravel()])
@@ -427,8 +179,8 @@ class _Arnoldi:
             self.rank += 1
         return out
 
-    def advance(self) -> bool:
-        """One step; False where the space is exhausted."""
+    def advance(self) -> None:
+        """One step; where an invariant space is complete another one begins."""
         k = self.steps
         c, u = self._parts(self.coefficients[k])
         q, inner = self.operator.apply(self.Q[:, : self.rank], c[:, : self.rank], u)
@@ -440,11 +192,14 @@ class _Arnoldi:
             self.H[: k + 1, k] += h
         left = np.linalg.norm(x)
         self.steps += 1
-        if left <= 1e-14 * size:
-            return False
-        self.H[k + 1, k] = left
-        self.coefficients[k + 1] = x / left
-        return True
+        if left > 1e-14 * size:
+            self.H[k + 1, k] = left
+            self.coefficients[k + 1] = x / left
+            return
+        x = self._random()
+        for _ in range(2):
+            x = x - (known.conj() @ x) @ known
+        self.coefficients[k + 1] = x / np.linalg.norm(x)
 
     def ritz(self):
         """theta, estimated relative errors, and coefficients in the Krylov vectors as columns."""
@@ -461,53 +216,64 @@ class _Arnoldi:
         return self.Q[:, : self.rank] @ x[: self.rank], x[split : split + self.operator.b]
 
 
-def oscillating_pairs(
+def krylov_pairs(
     shifted: ShiftedPencil,
+    wanted: int,
     *,
-    most: int = 300,
     band: float = np.inf,
-    tolerance: float = CONVERGED,
+    limit_point: float | None = None,
     transposed: bool = False,
     enough: Callable[[np.ndarray, float], bool] | None = None,
+    most: int = 300,
 ) -> KrylovPairs:
-    """Eigenpairs of a pencil that relaxes: those of large |Im 1/(lambda - shift)|, and those right of the creep.
+    """Eigenpairs near the shift of a factored pencil.
 
-    At a complex shift those nearest to it.
+    Those nearest to the shift; of a viscoelastic wall at a real shift those of large |Im 1/(lambda - shift)| and those
+    right of its relaxation spectrum.
 
     Parameters
     ----------
     shifted : ShiftedPencil
-    most : int
-        Steps at most, one solve each.
+        The pencil, its shift, and solves with it.
+    wanted : int
+        Number of eigenvalues, conjugates counted apart, that end a search of an elastic wall without `enough`.
     band : float
-        Angular frequency, rad/s, up to which those right of the creep are waited for.
-    tolerance : float
-        Estimated relative error of theta = 1/(lambda - shift) of a pair that has converged.
+        Angular frequency, rad/s, up to which those right of the relaxation spectrum are waited for.
+    limit_point : float, optional
+        Real limit point of eigenvalues: the search ends where all that is left to converge lies as far from the shift.
     transposed : bool
         Left vectors (conjugated) instead of right ones, from the same factor.
     enough : callable, optional
         enough(eigenvalues, reach) is asked now and then about those that have converged; True ends the search.
+    most : int
+        Steps at most, one solve each.
 
     Returns
     -------
     KrylovPairs
-        `reach` is the radius R of the disc around shift + i R, and of its mirror image, in which all were found; at
-        a complex shift of the disc around it.
+        What did not converge is left out.
     """
-    shift = shifted.shift
-    order = shifted.pencil.order
-    most = min(most, order)
+    pencil, shift = shifted.pencil, shifted.shift
+    whole = pencil.order + pencil.b  # lambda U is among the unknowns
+    most = min(max(most, 2 * wanted + FIRST), whole)
+    limit = 0.0 if limit_point is None else 1.0 / abs(END * limit_point - shift)
     krylov = _Arnoldi(_Operator(shifted, transposed), most)
-    edge = edge_of(shifted.pencil.relaxation)
-    alive = True
+    edge = edge_of(pencil.relaxation)
+    beside = pencil.relaxation is not None and not isinstance(shift, complex)
     while True:
-        aim = min(most, FIRST if krylov.steps < FIRST else krylov.steps + EVERY)
-        while alive and krylov.steps < aim:
-            alive = krylov.advance()
+        aim = min(most, max(FIRST, krylov.steps + max(EVERY, krylov.steps // EVERY)))
+        while krylov.steps < aim:
+            krylov.advance()
         theta, error, turn = krylov.ritz()
-        chosen, reach, settled = _settled(shift, theta, error, edge, band, tolerance)
-        ended = not alive or krylov.steps >= most
-        if ended or (settled and enough is not None and enough(shift + 1.0 / theta[chosen], reach)):
+        if beside:
+            chosen, reach, ready = _oscillating(shift, theta, error, edge, band)
+            ended = False
+        else:
+            chosen, reach, ended = _nearest(theta, error, limit)
+            ready = chosen.size > 0
+            ended = ended or (enough is None and chosen.size >= wanted)
+        ended = ended or krylov.steps >= most
+        if ended or (ready and enough is not None and enough(shift + 1.0 / theta[chosen], reach)):
             break
     q, u = krylov.vectors(turn[:, chosen])
     return KrylovPairs(
@@ -515,20 +281,30 @@ def oscillating_pairs(
         vectors_q=q.astype(complex),
         vectors_u=u.astype(complex),
         reach=reach,
-        iterations=1,
         applications=krylov.steps,
-        exhausted=False,
+        exhausted=krylov.steps == whole and chosen.size >= np.sum(_is_finite(theta)),
     )
 
 
-def _settled(shift, theta, error, edge, band, tolerance):
-    """Mask of converged pairs, the reach, and whether all right of the creep, if not far off, are among them."""
-    size = np.abs(theta)
-    good = (error <= tolerance) & (size > 1e-12 * size.max(initial=0.0))
-    if isinstance(shift, complex):
-        far = np.max(size[~good], initial=0.0)
-        chosen = np.flatnonzero(good & (size > far))
-        return chosen, 1.0 / size[chosen].min() if chosen.size else 0.0, True
+def _is_finite(theta) -> np.ndarray:
+    """Mask of finite eigenvalues."""
+    return np.abs(theta) > 1e-12 * np.abs(theta).max(initial=0.0)
+
+
+def _nearest(theta, error, limit):
+    """Pairs that converged before any farther from the shift, the reach, and whether the limit point ends them."""
+    size, good = np.abs(theta), (error <= CONVERGED) & _is_finite(theta)
+    far = np.max(size[~good], initial=0.0)
+    chosen = np.flatnonzero(good & (size > far))
+    at_limit = far < limit
+    return chosen, 1.0 / (limit if at_limit else size[chosen].min(initial=np.inf)), at_limit
+
+
+def _oscillating(shift, theta, error, edge, band):
+    """Indices of converged pairs, the reach, and whether all right of the relaxation spectrum, if not far off, are
+    among them.
+    """
+    size, good = np.abs(theta), (error <= CONVERGED) & _is_finite(theta)
     height = np.where(np.abs(theta.imag) > REAL * size, np.abs(theta.imag), 0.0)
     values = shift + 1.0 / np.where(size > 0, theta, 1.0)
     right = (values.real > edge) & (size > 0)
@@ -536,49 +312,5 @@ def _settled(shift, theta, error, edge, band, tolerance):
     bound = height[~good].max(initial=0.0)
     oscillating = good & (height > bound)
     chosen = np.flatnonzero(oscillating | (good & right))
-    lowest = height[oscillating].min(initial=np.inf)
     waited = right & (np.abs(values.imag) <= band) & (size * FAR * shift >= 1.0)
-    settled = bool((good | ~waited).all())
-    return chosen, 0.5 / lowest if np.isfinite(lowest) else 0.0, settled
-
-
-def krylov_pairs(
-    shifted: ShiftedPencil,
-    wanted: int,
-    *,
-    tolerance: float = 1e-12,
-    band: float = np.inf,
-    limit_point: float | None = None,
-    transposed: bool = False,
-    enough: Callable[[np.ndarray, float], bool] | None = None,
-) -> KrylovPairs:
-    """Eigenpairs near the shift of a factored pencil: what a search asks of any eigen-solver.
-
-    Parameters
-    ----------
-    shifted : ShiftedPencil
-        The pencil, its shift, and solves with it.
-    wanted : int
-        Number of eigenvalues, conjugates counted apart; those nearest to the shift, and of a viscoelastic wall those
-        that oscillate.
-    tolerance : float
-        Relative.
-    band : float
-        Angular frequency of interest, rad/s.
-    limit_point : float, optional
-        Real limit point of eigenvalues, at which the search may end.
-    transposed : bool
-        Left vectors (conjugated) instead of right ones.
-    enough : callable, optional
-        enough(eigenvalues, reach) is True where no more are needed.
-
-    Returns
-    -------
-    KrylovPairs
-        With `reach` as large as is known to be complete, and `exhausted` where these are all eigenvalues.
-    """
-    if shifted.pencil.relaxation is not None:
-        return oscillating_pairs(shifted, band=band, transposed=transposed, enough=enough)
-    return near_shift(
-        shifted, wanted, tolerance=tolerance, transposed=transposed, limit_point=limit_point, enough=enough
-    )
+    return chosen, 0.5 / height[oscillating].min(initial=np.inf), bool((good | ~waited).all())

@@ -304,7 +304,6 @@ class Found:
     applications: int = 0
     refined: int = 0
     rejected: int = 0
-    limited: bool = False
     lowest: float = 0.0
     slope: float = np.inf
     notes: list[str] = field(default_factory=list)

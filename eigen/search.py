@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .factor import SingularShiftError, Workspace, petsc_is_complex
+from .factor import SingularShiftError, Workspace
 from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, apart_from_creep
 from .pairs import Found, all_pairs, attach_left, biorthogonalise, empty, merge, polish, refine, upper_half, verified
@@ -251,16 +251,8 @@ def _search(pencil, count, options, workspace, first, solver) -> Found:
     queue = list(options.shifts) if given else [first]
     while queue:
         shift = queue.pop(0)
-        wanted = pairs
         before = number_in_band(found, options)
-        while True:
-            got = _at_shift(pencil, shift, wanted, aim, options, workspace, found, solver)
-            if found.everything or queue or is_covered(found, aim, options):
-                break
-            # no more converge, or a pair that was rejected closes the region
-            if got < wanted or found.limited or wanted >= min(options.max_pairs, pencil.order):
-                break
-            wanted = min(int(1.6 * wanted) + 2, options.max_pairs)
+        _at_shift(pencil, shift, pairs, aim, options, workspace, found, solver)
         fresh = number_in_band(found, options) - before
         if found.everything or (is_covered(found, aim, options) and not given):
             break
@@ -271,13 +263,13 @@ def _search(pencil, count, options, workspace, first, solver) -> Found:
     return found
 
 
-def _at_shift(pencil, shift, wanted, aim, options, workspace, found, solver) -> int:
-    """Search near one shift and merge; returns the number of eigenvalues that converged."""
+def _at_shift(pencil, shift, wanted, aim, options, workspace, found, solver) -> None:
+    """Search near one shift and merge."""
     relaxing = pencil.relaxation is not None
-    asked = {"tolerance": options.krylov_tolerance, "limit_point": options.limit_point}
+    asked = {"limit_point": options.limit_point}
 
     def enough(values, reach):
-        return (relaxing or not found.shifts) and would_do(values, _oval(shift, reach, relaxing), found, aim, options)
+        return would_do(values, _oval(shift, reach, relaxing), found, aim, options)
 
     def search(shifted):
         asked_for = enough if relaxing or not options.shifts else None
@@ -302,27 +294,22 @@ def _at_shift(pencil, shift, wanted, aim, options, workspace, found, solver) -> 
     reach = min([pairs.reach * (1 + 1e-9)] + [(1 - 1e-6) * _reach_to(d, shift, relaxing) for d in dropped])
     if reach > 0:
         found.ovals[shift] = _oval(shift, reach, relaxing)
-    found.limited = bool(dropped.size)
     found.everything = found.everything or (pairs.exhausted and not dropped.size)
-    return 0 if relaxing else pairs.eigenvalues.size
 
 
 def _oval(shift, reach, relaxing) -> Oval:
-    """Oval in which all eigenvalues are known after a search at a shift."""
-    if relaxing:
-        return Oval(shift if isinstance(shift, complex) else complex(shift, reach), reach, False)
-    return Oval(shift, reach, isinstance(shift, complex) and not petsc_is_complex())
+    """Disc in which all eigenvalues are known after a search at a shift."""
+    beside = relaxing and not isinstance(shift, complex)
+    return Oval(complex(shift, reach) if beside else shift, reach)
 
 
 def _reach_to(place, shift, relaxing) -> float:
-    """Reach of the oval that ends at a place."""
+    """Reach of the disc that ends at a place."""
     distance = abs(place - shift)
-    if relaxing:
-        # the disc that touches the real axis at the shift
-        high = abs(np.imag(place))
-        return distance if isinstance(shift, complex) else distance**2 / (2 * high) if high else np.inf
-    paired = isinstance(shift, complex) and not petsc_is_complex()
-    return np.sqrt(distance * abs(place - (np.conj(shift) if paired else shift)))
+    if not relaxing or isinstance(shift, complex):
+        return distance
+    high = abs(np.imag(place))  # the disc touches the real axis at the shift
+    return distance**2 / (2 * high) if high else np.inf
 
 
 def _clear_of_eigenvalues(pencil, shift, workspace, found, search):
@@ -362,7 +349,7 @@ def _dense(pencil, count, options, workspace) -> Found:
     merge(found, batch)
     found.everything = not dropped.size
     if dropped.size:
-        found.ovals[0.0] = Oval(0.0, float(np.abs(dropped).min()), False)
+        found.ovals[0.0] = Oval(0.0, float(np.abs(dropped).min()))
     return found
 
 

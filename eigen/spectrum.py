@@ -35,8 +35,6 @@ class SearchOptions:
         Shifts, 1/s, instead of those chosen automatically; real ones cost least.
     tolerance : float
         Largest residual of an accepted pair, see `Spectrum`.
-    krylov_tolerance : float
-        Relative tolerance of the Krylov method.
     left : bool
         Also left vectors.
     method : {"auto", "krylov", "dense"}
@@ -55,7 +53,6 @@ class SearchOptions:
     limit_point: float | None = None
     shifts: tuple[complex, ...] | None = None
     tolerance: float = 1e-8
-    krylov_tolerance: float = 1e-12
     left: bool = False
     method: str = "auto"
     dense_below: int = 240
@@ -76,43 +73,34 @@ class SearchOptions:
             for s in self.shifts:
                 if not (math.isfinite(complex(s).real) and math.isfinite(complex(s).imag)):
                     raise ValueError("Shifts must be finite numbers.")
-        if not (0 < self.krylov_tolerance < 1 and 0 < self.tolerance < 1):
-            raise ValueError("Tolerances must lie between 0 and 1.")
+        if not 0 < self.tolerance < 1:
+            raise ValueError("The tolerance must lie between 0 and 1.")
         if self.max_shifts < 1 or self.max_pairs < 1 or self.least < 1:
             raise ValueError("max_shifts, max_pairs and least must be at least 1.")
 
 
 @dataclass(frozen=True)
 class Oval:
-    """Oval in which a Krylov search at one shift has found every eigenvalue.
+    """Disc, with its mirror image, in which a search at one shift has found every eigenvalue.
 
-    A real shift gives a disc; of a pencil that relaxes one that touches the real axis at the shift, given with its
-    centre shift + i reach in place of the shift, and its mirror image. A complex shift in real arithmetic gives the
-    Cassini oval |lambda - shift| |lambda - conj(shift)| <= reach^2; in complex arithmetic a disc and its mirror image.
+    Around the shift; of a viscoelastic wall at a real shift it touches the real axis there.
 
     Attributes
     ----------
     shift : complex
+        Centre.
     reach : float
-        1/s.
-    paired : bool
-        True for a Cassini oval.
+        Radius, 1/s.
     """
 
     shift: complex
     reach: float
-    paired: bool
 
     def interval(self, omega: np.ndarray) -> np.ndarray:
         """Growth rates covered at angular frequencies, shape (k, 2); empty ones are NaN."""
-        a, b = self.shift.real, abs(self.shift.imag)
-        y = np.abs(np.asarray(omega, float))
-        if self.paired:
-            square = np.sqrt(4 * (y * b) ** 2 + self.reach**4) - (y**2 + b**2)
-        else:
-            square = self.reach**2 - (y - b) ** 2
+        square = self.reach**2 - (np.abs(np.asarray(omega, float)) - abs(self.shift.imag)) ** 2
         half = np.sqrt(np.where(square >= 0, square, np.nan))
-        return np.stack([a - half, a + half], axis=-1)
+        return np.stack([self.shift.real - half, self.shift.real + half], axis=-1)
 
     def contains(self, eigenvalue: complex) -> bool:
         """True where a point (or its conjugate) lies in the oval."""

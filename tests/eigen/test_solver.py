@@ -22,7 +22,7 @@ def dense_pairs(shifted, wanted, *, transposed=False, **_) -> KrylovPairs:
     x, n = (left.conj() if transposed else right)[:, finite], pencil.n
     q = x[n : 2 * n] if transposed else x[:n]
     u = x[2 * n : 2 * n + pencil.b]
-    return KrylovPairs(above[finite] / below[finite], q, u, np.inf, 1, 0, exhausted=True)
+    return KrylovPairs(above[finite] / below[finite], q, u, np.inf, 0, exhausted=True)
 
 
 @pytest.mark.parametrize("left", [False, True])
